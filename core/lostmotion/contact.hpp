@@ -1,0 +1,235 @@
+// Set-valued dry contacts: which combination of stuck and slipping is consistent (model.md, section 4).
+//
+// A regime holds just after t if each of its guards g is positive there. Since the flow of a regime is known, that
+// is decided at t itself: by the sign of the first of g, g', g'', ... that is not zero. So break-away, reversal,
+// touching a boundary and several of these at once are one rule, and no step has to be tried out.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+
+#include "drive.hpp"
+#include "regime.hpp"
+
+namespace lostmotion {
+
+struct Instant {
+    State x{};
+    Memory memory;
+    InputJet input{};
+};
+
+// Rounding of a form is taken as this multiple of the sum of the magnitudes of its terms.
+inline constexpr double rounding = 64.0 * std::numeric_limits<double>::epsilon();
+
+// Time derivatives of the state along the flow of one regime, computed as far as they are asked for.
+class Flow {
+   public:
+    Flow(const Regime& regime, const Instant& now) : regime_(regime), now_(now) {
+        x_[0] = now.x;
+        for (int k = 0; k < n_states; ++k) size_[0][k] = std::fabs(now.x[k]);
+    }
+
+    // Sign of the guard just after now; 0 if it stays at zero.
+    int sign(const Guard& guard) {
+        const auto& u = now_.input;
+        double value = evaluate(guard.form, now_.x, now_.memory, u[0]);
+        double size = magnitude(guard.form, now_.x, now_.memory, u[0]);
+        for (int k = 1;; ++k) {
+            if (value > rounding * size) return +1;
+            if (value < -rounding * size) return -1;
+            if (k == n_derivatives) return 0;
+            if (k > order_) extend();
+            value = evaluate_rate(guard.form, x_[k], u[k]);
+            size = std::fabs(guard.form.c[command] * u[k][0]) + std::fabs(guard.form.c[load_torque] * u[k][1]);
+            for (int j = 0; j < n_states; ++j) size += std::fabs(guard.form.c[j]) * size_[k][j];
+        }
+    }
+
+   private:
+    void extend() {
+        const int k = order_++;
+        for (int row = 0; row < n_states; ++row) {
+            const LinearForm& f = regime_.rate[row];
+            const auto& u = now_.input[k];
+            if (k == 0) {
+                x_[1][row] = evaluate(f, now_.x, now_.memory, u);
+                size_[1][row] = magnitude(f, now_.x, now_.memory, u);
+                continue;
+            }
+            double size = std::fabs(f.c[command] * u[0]) + std::fabs(f.c[load_torque] * u[1]);
+            for (int j = 0; j < n_states; ++j) size += std::fabs(f.c[j]) * size_[k][j];
+            x_[k + 1][row] = evaluate_rate(f, x_[k], u);
+            size_[k + 1][row] = size;
+        }
+    }
+
+    const Regime& regime_;
+    const Instant& now_;
+    int order_ = 0;
+    std::array<State, n_derivatives + 1> x_{}, size_{};
+};
+
+enum class Found { yes, inconsistent, outside };
+
+// The drive as a switched linear system: which regime follows at an event.
+class SwitchedDrive {
+   public:
+    explicit SwitchedDrive(const Drive& drive) : drive_(drive) {}
+    const Drive& drive() const { return drive_; }
+    Regime build(const RegimeKey& key) const { return drive_.build(key); }
+
+    // Regime at the start of a run, where nothing is known but the state.
+    template <class Cache>
+    Found start(Cache& cache, Instant& now, RegimeKey& key) const {
+        for (int c = 0; c < n_contacts; ++c) key.modes[c] = drive_.has(static_cast<Contact>(c)) ? 1 : absent;
+        std::array<bool, n_contacts> at_rest = at_exact_rest(now.x);
+        if (drive_.rigid()) at_rest[twist_contact] = true;
+        const double P = drive_.rigid() ? now.memory.held_torque : drive_.gearbox.curve.torque(now.x[twist]);
+        return find(cache, now, at_rest, P, key);
+    }
+
+    // Regime that follows `key` at this instant: after one of its guards has reached zero, or (fired = nullptr)
+    // after an input has jumped. Speeds that reached zero are set to zero exactly; a turning point of the twist
+    // sets the hysteresis capacity anew (16).
+    template <class Cache>
+    Found next(Cache& cache, Instant& now, const Guard* fired, RegimeKey& key) const {
+        const Regime& old = cache.regime(key);
+        const double T_2 = evaluate(old.output_torque, now.x, now.memory, now.input[0]);
+        std::array<bool, n_contacts> at_rest = old.at_rest;
+        for (int k = 0; k < old.n_guards; ++k) {
+            const Guard& g = old.guards[k];
+            if (g.kind != Guard::speed) continue;
+            const double value = evaluate(g.form, now.x, now.memory, now.input[0]);
+            const double size = magnitude(g.form, now.x, now.memory, now.input[0]);
+            if (&g == fired || std::fabs(value) <= rounding * size) at_rest[g.contact] = true;
+        }
+        stop(now.x, at_rest);
+        if (at_rest[twist_contact] && !old.at_rest[twist_contact] && drive_.gearbox.has_hysteresis())
+            now.memory.hysteresis_capacity = drive_.gearbox.hysteresis_capacity(now.x[twist]);
+        return find(cache, now, at_rest, T_2, key);
+    }
+
+   private:
+    std::array<bool, n_contacts> at_exact_rest(const State& x) const {
+        const double w_M = x[motor_speed], w = x[load_speed];
+        return {w_M == 0.0, w_M * (1.0 / drive_.gearbox.ratio) == w, w == 0.0};
+    }
+
+    void stop(State& x, std::array<bool, n_contacts>& at_rest) const {
+        if (at_rest[0] + at_rest[1] + at_rest[2] >= 2) at_rest = {true, true, true};
+        if (at_rest[input_contact]) x[motor_speed] = 0.0;
+        if (at_rest[load_contact]) x[load_speed] = 0.0;
+        if (at_rest[twist_contact]) x[load_speed] = x[motor_speed] * (1.0 / drive_.gearbox.ratio);
+    }
+
+    // Tries the combinations of modes, those with most contacts stuck first.
+    template <class Cache>
+    Found find(Cache& cache, Instant& now, const std::array<bool, n_contacts>& at_rest, double T_2,
+               RegimeKey& key) const {
+        std::array<std::array<std::int8_t, 3>, n_contacts> choices{};
+        std::array<int, n_contacts> n{};
+        for (int k = 0; k < n_contacts; ++k) {
+            const auto c = static_cast<Contact>(k);
+            if (!drive_.has(c)) {
+                choices[k][n[k]++] = absent;
+            } else if (c == twist_contact && drive_.rigid()) {
+                choices[k][n[k]++] = 0;
+            } else if (at_rest[c]) {
+                for (const int mode : {0, +1, -1}) choices[k][n[k]++] = static_cast<std::int8_t>(mode);
+            } else {
+                const double speed = evaluate(drive_.contact_speed(c), now.x, now.memory, now.input[0]);
+                choices[k][n[k]++] = speed > 0.0 ? +1 : -1;
+            }
+        }
+        const Instant before = now;
+        Found worst = Found::inconsistent;
+        for (int slips = 0; slips <= n_contacts; ++slips)
+            for (int a = 0; a < n[0]; ++a)
+                for (int b = 0; b < n[1]; ++b)
+                    for (int c = 0; c < n[2]; ++c) {
+                        const Modes modes{choices[0][a], choices[1][b], choices[2][c]};
+                        if ((modes[0] != 0) + (modes[1] != 0) + (modes[2] != 0) != slips) continue;
+                        now = before;
+                        const Found found = settle(cache, now, modes, at_rest, T_2, key);
+                        if (found == Found::yes) return found;
+                        if (found == Found::outside) worst = found;
+                    }
+        return worst;
+    }
+
+    // Is this combination of modes consistent? Finds the piece of the curve and the cell of the map on the way, by
+    // walking across each of their edges that is violated; load and cell depend on each other while the twist is stuck.
+    template <class Cache>
+    Found settle(Cache& cache, Instant& now, const Modes& modes, const std::array<bool, n_contacts>& at_rest,
+                 double T_2, RegimeKey& key) const {
+        RegimeKey trial;
+        trial.modes = modes;
+        const Gearbox& gearbox = drive_.gearbox;
+        const double d = now.x[twist], E = now.input[0][0];
+        if (drive_.motor.limits_voltage() && std::fabs(E) > drive_.motor.voltage_limit) trial.amplifier = E > 0.0 ? 1 : -1;
+        if (!drive_.rigid()) {
+            trial.piece = static_cast<std::int16_t>(gearbox.curve.locate(d));
+            const int slip = modes[twist_contact];
+            if (slip != 0)
+                T_2 = gearbox.curve.torque(d) + (slip == absent ? 0.0 : slip * now.memory.hysteresis_capacity);
+        }
+        if (modes[0] == 0 && modes[1] == 0 && modes[2] == 0 && !hold(now, T_2)) return Found::inconsistent;
+        if (gearbox.losses == Gearbox::loss_map) {
+            const int s = modes[input_contact];
+            const double mu = T_2 / gearbox.rated_output_torque;
+            const double v = std::fabs(now.x[motor_speed]) / gearbox.rated_input_speed;
+            trial.cell = s == 0 ? gearbox.map.load_interval(mu) : gearbox.map.triangle(s * mu, v);
+            trial.cell_back = s == 0 ? gearbox.map.load_interval(-mu) : 0;
+        }
+        constexpr int longest_walk = 400;
+        for (int step = 0; step < longest_walk; ++step) {
+            const Regime& r = cache.regime(trial);
+            if (!r.solvable) return Found::inconsistent;
+            Flow flow(r, now);
+            const Guard* left = nullptr;
+            bool overcome = false;
+            for (int k = 0; k < r.n_guards && left == nullptr; ++k) {
+                const Guard& g = r.guards[k];
+                // The mode of a contact that moves was chosen by its speed.
+                if (g.kind == Guard::speed && !at_rest[g.contact]) continue;
+                if (flow.sign(g) >= 0) continue;
+                if (g.kind == Guard::outside) return Found::outside;
+                if (g.kind == Guard::speed || g.kind == Guard::capacity)
+                    overcome = true;
+                else
+                    left = &g;
+            }
+            if (left == nullptr) {
+                if (overcome) return Found::inconsistent;
+                key = trial;
+                return Found::yes;
+            }
+            switch (left->kind) {
+                case Guard::torsion_piece: trial.piece = static_cast<std::int16_t>(left->neighbour); break;
+                case Guard::loss_cell_back: trial.cell_back = left->neighbour; break;
+                case Guard::amplifier: trial.amplifier = static_cast<std::int8_t>(left->neighbour); break;
+                default: trial.cell = left->neighbour;
+            }
+        }
+        return Found::inconsistent;
+    }
+
+    // Everything stands: T_2 stays where it was, or at the nearest value that twist and load contact can hold.
+    bool hold(Instant& now, double T_2) const {
+        const double M_Z = now.input[0][1], T_f = drive_.load.friction_torque;
+        double low = M_Z - T_f, high = M_Z + T_f;
+        if (!drive_.rigid()) {
+            const double P = drive_.gearbox.curve.torque(now.x[twist]), h = now.memory.hysteresis_capacity;
+            low = std::max(low, P - h);
+            high = std::min(high, P + h);
+        }
+        if (low > high) return false;
+        now.memory.held_torque = std::clamp(T_2, low, high);
+        return true;
+    }
+
+    const Drive& drive_;
+};
+
+}  // namespace lostmotion

@@ -1,0 +1,453 @@
+// Exact solver: propagation by matrix exponentials; only switching instants are searched, and none is missed.
+//
+// A look tests an interval of length h for a guard that becomes negative. From value and slope of the guard at both
+// ends comes its cubic Hermite interpolant, which departs from the guard by at most h^4/384 max|g''''|, its slope
+// by at most sqrt(3)/216 h^3 max|g''''| (Birkhoff and Priver 1967). max|g''''| is bounded through the fourth
+// derivative of the state at the start and a bound on |exp(A s)|. The Bernstein coefficients of the cubic enclose
+// it. So a guard is certified positive, or certified to fall through zero once, or the interval is halved. There is
+// no other step size.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "contact.hpp"
+#include "regime_cache.hpp"
+
+namespace lostmotion {
+
+enum class Status {
+    done,
+    interrupted,
+    jammed,   // no combination of contact modes is consistent
+    outside,  // left the extended loss map, or the range of the arithmetic
+    zeno,     // switching instants accumulate
+};
+
+// What ended a regime.
+struct Switching {
+    double time = 0.0;
+    Guard::Kind kind = Guard::speed;
+    Contact contact = input_contact;
+    bool input_jump = false;  // an input changed its value or slope; kind and contact mean nothing
+    RegimeKey before, after;
+    State x{};
+    double torque_before = 0.0, torque_after = 0.0;  // T_2 [N m], left and right limit
+};
+
+// A stretch of time spent in one regime, from which an observer can evaluate the exact state at any instant.
+template <class System>
+struct Segment {
+    typename RegimeCache<System>::Entry& entry;
+    const Signals& signals;
+    double begin, end;  // [s]
+    bool last;          // no further segment follows in this call: `end` belongs to it
+    State x;            // at begin
+    Memory memory;
+    State constant;  // the part of dx/dt that depends on neither state nor inputs
+};
+
+// Constant part of a regime's rates.
+inline State constant_rate(const Regime& r, const Memory& m) {
+    State c{};
+    for (int k = 0; k < n_states; ++k)
+        c[k] = r.rate[k].c[one] + r.rate[k].c[hysteresis_capacity] * m.hysteresis_capacity +
+               r.rate[k].c[held_torque] * m.held_torque;
+    return c;
+}
+
+// A point that moves along one regime.
+class Cursor {
+   public:
+    Cursor(Propagator& propagator, const Signals& signals, const std::vector<InputBasis>& basis, const State& constant,
+           double time, const State& x)
+        : propagator_(&propagator), constant_(&constant), input_(signals, basis), x_(x) {
+        input_.anchor(time);
+    }
+    Cursor& operator=(const Cursor&) = default;
+    Cursor(const Cursor&) = default;
+
+    double time() const { return input_.time(); }
+    const State& x() const { return x_; }
+    const InputState& input() const { return input_; }
+    State rate() const { return propagator_->rate(x_, *constant_, input_.values()); }
+
+    void anchor(double time) { input_.anchor(time); }
+
+    void step(int level) {
+        x_ = propagator_->step(level, x_, rate(), input_.weights());
+        input_.advance(propagator_->level(level).length, propagator_->rotations(level));
+    }
+    // By any length: whole levels from the longest down, then the Taylor series.
+    void advance(double h) {
+        const double target = time() + h;
+        int k = propagator_->level_below(h);
+        for (; k >= 0; --k) {
+            const double length = propagator_->level(k).length;
+            while (h >= length) {
+                step(k);
+                h -= length;
+            }
+        }
+        if (h > 0.0) x_ = propagator_->series(h, x_, rate(), input_);
+        input_.anchor(target);
+    }
+
+   private:
+    Propagator* propagator_;
+    const State* constant_;
+    InputState input_;
+    State x_;
+};
+
+template <class System>
+class ExactSolver {
+   public:
+    using Cache = RegimeCache<System>;
+
+    // unit: a length of time [s] that is to be a power-of-two multiple of the elementary steps, such as the
+    // sampling interval. scale: natural sizes of the states.
+    ExactSolver(const System& system, const Signals& signals, double unit, const State& scale)
+        : system_(system), signals_(signals), basis_(input_basis(signals)), cache_(system), scale_(scale), unit_(unit) {
+        while (unit_ > 1e-2) unit_ *= 0.5;
+        const auto bound = InputState(signals_, basis_).fourth_derivative_bound();
+        for (int i = 0; i < n_inputs; ++i) input_bound_[i] = bound[i];
+    }
+    ExactSolver(const ExactSolver&) = delete;
+    ExactSolver& operator=(const ExactSolver&) = delete;
+
+    // Polled now and then; true ends the run.
+    bool (*interrupted)(void*) = nullptr;
+    void* interrupted_context = nullptr;
+
+    double time() const { return time_; }
+    const State& state() const { return now_.x; }
+    const Memory& memory() const { return now_.memory; }
+    const RegimeKey& key() const { return key_; }
+    const Regime& regime() { return cache_.regime(key_); }
+    const Signals& signals() const { return signals_; }
+    const std::vector<InputBasis>& basis() const { return basis_; }
+    double unit() const { return unit_; }
+    Contact stopped_at() const { return stopped_at_; }
+    long looks() const { return looks_; }
+
+    // Sets the state and finds the regime it is in.
+    Status begin(double time, const State& x, const Memory& memory) {
+        set_time(time);
+        now_.x = x;
+        now_.memory = memory;
+        anchor_inputs();
+        return status_of(system_.start(cache_, now_, key_));
+    }
+    // Continues from a state with a known regime.
+    void resume(double time, const State& x, const Memory& memory, const RegimeKey& key) {
+        set_time(time);
+        now_.x = x;
+        now_.memory = memory;
+        key_ = key;
+    }
+    // The inputs have changed at this instant: finds the regime anew.
+    Status inputs_changed() {
+        anchor_inputs();
+        return status_of(system_.next(cache_, now_, nullptr, key_));
+    }
+
+    // Runs to t_end. The observer gets every segment and every switching as they come.
+    template <class Observer>
+    Status advance(double t_end, Observer& observer) {
+        if (jump_pending_) {
+            jump_pending_ = false;
+            const Status status = change_regime(nullptr, observer);
+            if (status != Status::done) return status;
+        }
+        while (true) {
+            typename Cache::Entry& entry = cache_.entry(key_);
+            if (!entry.propagator.ready()) entry.propagator.prepare(entry.regime, unit_, scale_, basis_);
+            Segment<System> segment{entry, signals_, time_, t_end, true, now_.x, now_.memory,
+                                    constant_rate(entry.regime, now_.memory)};
+            const double knot = next_knot();
+            const double limit = std::fmin(t_end, knot);
+            const Guard* fired = nullptr;
+            const Status status = run_regime(segment, limit, fired);
+            if (status != Status::done) return status;
+            segment.end = time_;
+            segment.last = fired == nullptr && time_ >= t_end;
+            if (!observer.segment(segment, basis_)) return Status::interrupted;
+            if (segment.last) {
+                jump_pending_ = knot == t_end;  // it belongs to what comes after
+                return Status::done;
+            }
+            const Status switched = change_regime(fired, observer);
+            if (switched != Status::done) return switched;
+        }
+    }
+
+   private:
+    // Accumulation of switching instants: this many of them within a few thousand roundings of the time.
+    static constexpr int zeno_count = 100;
+    static constexpr double zeno_span = 1e4 * std::numeric_limits<double>::epsilon();
+
+    void set_time(double time) {
+        time_ = time;
+        recent_ = 0;
+        jump_pending_ = false;
+    }
+    double next_knot() const {
+        return std::fmin(signals_[0].next_knot(time_), signals_[1].next_knot(time_));
+    }
+    void anchor_inputs() {
+        InputState input(signals_, basis_);
+        input.anchor(time_);
+        now_.input = input.jet();
+    }
+    Status status_of(Found found) {
+        if (found == Found::yes) return Status::done;
+        return found == Found::outside ? Status::outside : Status::jammed;
+    }
+
+    template <class Observer>
+    Status change_regime(const Guard* fired, Observer& observer) {
+        Switching s;
+        s.time = time_;
+        s.before = key_;
+        s.input_jump = fired == nullptr;
+        if (fired != nullptr) {
+            s.kind = fired->kind;
+            s.contact = fired->contact;
+            stopped_at_ = fired->contact;
+            if (fired->kind == Guard::outside) return Status::outside;
+        }
+        anchor_inputs();
+        if (s.input_jump) {
+            InputState before(signals_, basis_);
+            before.anchor_left(time_);
+            s.torque_before = evaluate(cache_.regime(key_).output_torque, now_.x, now_.memory, before.values());
+        } else {
+            s.torque_before = evaluate(cache_.regime(key_).output_torque, now_.x, now_.memory, now_.input[0]);
+        }
+        const Found found = system_.next(cache_, now_, fired, key_);
+        if (found != Found::yes) return status_of(found);
+        s.after = key_;
+        s.x = now_.x;
+        s.torque_after = evaluate(cache_.regime(key_).output_torque, now_.x, now_.memory, now_.input[0]);
+        observer.switching(s);
+        if (recent_ == 0 || time_ - recent_since_ > zeno_span * std::fmax(std::fabs(time_), unit_)) {
+            recent_ = 0;
+            recent_since_ = time_;
+        }
+        return ++recent_ > zeno_count ? Status::zeno : Status::done;
+    }
+
+    enum class Verdict { clear, crossing, uncertain };
+
+    // Guards of one segment at the start of a look and at its end.
+    struct Look {
+        std::array<double, max_guards> value, slope, end_value, end_slope, fourth;
+    };
+
+    static void evaluate_guards(const typename Cache::Entry& e, const std::array<double, max_guards>& constant,
+                                const State& x, const std::array<double, n_inputs>& u,
+                                std::array<double, max_guards>& out) {
+        out = constant;
+        for (int k = 0; k < n_states; ++k)
+            for (int g = 0; g < max_guards; ++g) out[g] += e.guard_columns[k][g] * x[k];
+        for (int i = 0; i < n_inputs; ++i) {
+            if (u[i] == 0.0) continue;
+            for (int g = 0; g < max_guards; ++g) out[g] += e.guard_columns[n_states + i][g] * u[i];
+        }
+    }
+
+    // Advances within the regime until a guard reaches zero (fired) or `limit`.
+    Status run_regime(const Segment<System>& segment, double limit, const Guard*& fired) {
+        typename Cache::Entry& e = segment.entry;
+        const Regime& r = e.regime;
+        Propagator& p = e.propagator;
+        std::array<double, max_guards> constant{};
+        const std::array<double, max_guards> zero{};
+        for (int g = 0; g < r.n_guards; ++g) {
+            const LinearForm& f = r.guards[g].form;
+            constant[g] = f.c[one] + f.c[hysteresis_capacity] * segment.memory.hysteresis_capacity +
+                          f.c[held_torque] * segment.memory.held_torque;
+        }
+        Cursor cursor(p, signals_, basis_, segment.constant, time_, now_.x), end = cursor;
+        Look look;
+        int level = std::min(last_level_, p.level_below(limit - time_));
+        for (long count = 1; time_ < limit; ++count) {
+            ++looks_;
+            if (count % 1024 == 0 && interrupted != nullptr && interrupted(interrupted_context))
+                return Status::interrupted;
+            if (count % 64 == 0) cursor.anchor(time_);
+            const InputJet u = cursor.input().jet();
+            const State rate = cursor.rate();
+            if (!(std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100)) return Status::outside;
+            const State fourth = p.fourth_derivative(rate, u);
+            evaluate_guards(e, constant, cursor.x(), u[0], look.value);
+            evaluate_guards(e, zero, rate, u[1], look.slope);
+            const double left = limit - time_;
+            while (true) {
+                const double length = p.level(level).length;
+                const bool whole = length <= left;
+                const double h = whole ? length : left;
+                end = cursor;
+                if (whole)
+                    end.step(level);
+                else
+                    end.advance(h);
+                const InputJet v = end.input().jet();
+                evaluate_guards(e, constant, end.x(), v[0], look.end_value);
+                evaluate_guards(e, zero, end.rate(), v[1], look.end_slope);
+                bound_fourth(e, p.level(level).growth, fourth, h, look.fourth);
+                const Verdict verdict = judge(r, cursor, look, h, level == 0, segment.memory, u[0]);
+                if (verdict == Verdict::uncertain) {
+                    --level;
+                    continue;
+                }
+                if (verdict == Verdict::crossing) {
+                    const double s = first_crossing(r, e, constant, cursor, look, h, end, fired);
+                    time_ += s;
+                    now_.x = end.x();
+                    last_level_ = level;
+                    return Status::done;
+                }
+                time_ = whole ? time_ + h : limit;
+                break;
+            }
+            std::swap(cursor, end);
+            if (level + 1 < Propagator::max_levels && 2.0 * p.level(level).length <= limit - time_) ++level;
+        }
+        now_.x = cursor.x();
+        last_level_ = level;
+        return Status::done;
+    }
+
+    // |g''''| over the look.
+    void bound_fourth(const typename Cache::Entry& e, const Matrix& growth, const State& fourth, double h,
+                      std::array<double, max_guards>& out) const {
+        State size{};
+        double any = input_bound_[0] + input_bound_[1];
+        for (int k = 0; k < n_states; ++k) {
+            size[k] = std::fabs(fourth[k]);
+            for (int i = 0; i < n_inputs; ++i)
+                size[k] += h * std::fabs(e.propagator.input_column(i)[k]) * input_bound_[i];
+            any += size[k];
+        }
+        out = {};
+        if (any == 0.0) return;  // at rest; growth may have overflowed
+        size = growth * size;
+        for (int k = 0; k < n_states; ++k) {
+            if (size[k] == 0.0) continue;
+            for (int g = 0; g < max_guards; ++g) out[g] += std::fabs(e.guard_columns[k][g]) * size[k];
+        }
+        for (int i = 0; i < n_inputs; ++i)
+            for (int g = 0; g < max_guards; ++g)
+                out[g] += std::fabs(e.guard_columns[n_states + i][g]) * input_bound_[i];
+    }
+
+    Verdict judge(const Regime& r, const Cursor& cursor, Look& look, double h, bool shortest, const Memory& memory,
+                  const std::array<double, n_inputs>& u) {
+        n_crossing_ = 0;
+        for (int g = 0; g < r.n_guards; ++g) {
+            const double c0 = look.value[g], c3 = look.end_value[g];
+            const double c1 = c0 + h / 3.0 * look.slope[g], c2 = c3 - h / 3.0 * look.end_slope[g];
+            const double bound = h * h * h * look.fourth[g], error = h / 384.0 * bound;
+            const double least = std::fmin(std::fmin(c0, c1), std::fmin(c2, c3));
+            if (least > error) continue;
+            const double tolerance = rounding * magnitude(r.guards[g].form, cursor.x(), memory, u);
+            if (least - error >= -tolerance) continue;
+            const double slope_error = 0.00802 * bound;
+            const double d0 = 3.0 / h * (c1 - c0), d1 = 3.0 / h * (c2 - c1), d2 = 3.0 / h * (c3 - c2);
+            if (std::fmin(d0, std::fmin(d1, d2)) > slope_error && c0 >= -tolerance) continue;  // rises all the way
+            const bool falls = std::fmax(d0, std::fmax(d1, d2)) < -slope_error;
+            if (falls && c3 >= -tolerance) continue;
+            if (falls) {
+                crossing_[n_crossing_++] = g;
+                continue;
+            }
+            if (!shortest) return Verdict::uncertain;
+            // At the shortest length the cubic is the guard to rounding; does it dip below zero?
+            double low = c3;
+            for (int k = 1; k < 16; ++k) low = std::fmin(low, cubic(c0, c1, c2, c3, k / 16.0));
+            if (low < -tolerance) crossing_[n_crossing_++] = g;
+        }
+        return n_crossing_ > 0 ? Verdict::crossing : Verdict::clear;
+    }
+
+    static double cubic(double c0, double c1, double c2, double c3, double s) {
+        const double r = 1.0 - s;
+        return r * r * (r * c0 + 3.0 * s * c1) + s * s * (3.0 * r * c2 + s * c3);
+    }
+
+    // Earliest of the certified crossings; `end` is left there. Returns the time from the cursor.
+    double first_crossing(const Regime& r, const typename Cache::Entry& e, const std::array<double, max_guards>& constant,
+                          const Cursor& cursor, const Look& look, double h, Cursor& end, const Guard*& fired) {
+        double best = std::numeric_limits<double>::infinity();
+        Cursor at = end;
+        for (int k = 0; k < n_crossing_; ++k) {
+            const int g = crossing_[k];
+            const double c0 = look.value[g], c3 = look.end_value[g];
+            const double c1 = c0 + h / 3.0 * look.slope[g], c2 = c3 - h / 3.0 * look.end_slope[g];
+            // Bracket on the cubic: positive at a, negative at b (in units of h).
+            double a = 0.0, b = 1.0;
+            if (c3 >= 0.0)
+                for (int m = 1; m < 16; ++m)
+                    if (cubic(c0, c1, c2, c3, m / 16.0) < 0.0) {
+                        b = m / 16.0;
+                        break;
+                    }
+            for (int m = 0; m < 60 && b - a > 1e-7; ++m) {
+                // Newton on the cubic, kept within the bracket by bisection.
+                const double middle = 0.5 * (a + b);
+                (cubic(c0, c1, c2, c3, middle) > 0.0 ? a : b) = middle;
+            }
+            double low = 0.0, high = h, s = 0.5 * (a + b) * h;
+            for (int m = 0; m < 100; ++m) {
+                at = cursor;
+                at.advance(s);
+                std::array<double, max_guards> value, slope;
+                const InputJet u = at.input().jet();
+                evaluate_guards(e, constant, at.x(), u[0], value);
+                evaluate_guards(e, {}, at.rate(), u[1], slope);
+                if (value[g] > 0.0)
+                    low = s;
+                else
+                    high = s;
+                double next = s - value[g] / slope[g];
+                if (!(next >= low && next <= high)) next = 0.5 * (low + high);
+                const double moved = std::fabs(next - s);
+                if (value[g] == 0.0 || moved <= 2.0 * std::numeric_limits<double>::epsilon() * s ||
+                    moved <= 0.25 * std::numeric_limits<double>::epsilon() * std::fabs(time_))
+                    break;
+                s = next;
+            }
+            if (s < best) {
+                best = s;
+                end = at;
+                fired = &r.guards[g];
+            }
+        }
+        return best;
+    }
+
+    const System& system_;
+    Signals signals_;
+    std::vector<InputBasis> basis_;
+    Cache cache_;
+    State scale_;
+    double unit_;
+    std::array<double, n_inputs> input_bound_{};
+
+    double time_ = 0.0;
+    Instant now_;
+    RegimeKey key_;
+    int last_level_ = 4;
+    long looks_ = 0;
+    std::array<int, max_guards> crossing_{};
+    int n_crossing_ = 0;
+    int recent_ = 0;
+    double recent_since_ = 0.0;
+    bool jump_pending_ = false;
+    Contact stopped_at_ = input_contact;
+};
+
+}  // namespace lostmotion

@@ -1,0 +1,37 @@
+// The gearbox: a compliance and a loss law, chosen independently.
+#pragma once
+
+#include "loss_map.hpp"
+#include "torsion_curve.hpp"
+
+namespace lostmotion {
+
+struct Gearbox {
+    enum Compliance { rigid, torsion_curve };
+    enum Losses { constant_efficiency, loss_map };
+
+    double ratio = 1.0;             // i_C [-], input speed / output speed
+    double inertia = 0.0;           // J_R [kg m2], on the input shaft
+    double viscous_friction = 0.0;  // b_MR [N m s/rad], on the input shaft
+
+    Compliance compliance = rigid;
+    TorsionCurve curve;
+    double hysteresis_efficiency = 1.0;  // eta_H [-]; 1: no hysteresis
+
+    Losses losses = constant_efficiency;
+    double efficiency = 1.0;           // eta_C [-], for constant_efficiency (5b), in both directions of power flow
+    LossMap map;                       // m_2B(mu, v), for loss_map (12)
+    double rated_input_speed = 1.0;    // n_1R [rad/s], scales v
+    double rated_output_torque = 1.0;  // T_2R [N m], scales mu and m_2B
+
+    bool has_hysteresis() const { return compliance == torsion_curve && hysteresis_efficiency < 1.0; }
+
+    // Capacity h [N m] that eq. (16b) sets at a turning point with twist d.
+    double hysteresis_capacity(double d) const {
+        return 0.5 * (1.0 - hysteresis_efficiency) * std::fabs(curve.torque(d));
+    }
+    // Torque M_2B [N m at the output] lost at relative load mu and relative speed v.
+    double loss_torque(double mu, double v) const { return losses == loss_map ? rated_output_torque * map(mu, v) : 0.0; }
+};
+
+}  // namespace lostmotion

@@ -1,0 +1,155 @@
+// Loss coefficient m_2B(mu, v) on a grid, linear on triangles.
+// mu = T_2 sign(w_M)/T_2R is the signed relative load (> 0: the motor drives), v = |w_M|/n_1R the relative speed.
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+namespace lostmotion {
+
+// m = at_zero + per_speed * v + per_load * mu
+struct Plane {
+    double at_zero = 0.0, per_speed = 0.0, per_load = 0.0;
+};
+
+// The half plane at_zero + per_speed * v + per_load * mu >= 0 that bounds a triangle, and what lies beyond it.
+struct Edge {
+    Plane inside;
+    int neighbour = -1;  // triangle on the other side; -1: the end of the extended map
+};
+
+class LossMap {
+   public:
+    LossMap() = default;
+
+    // speeds: v, rising from 0; loads: mu, rising; values: m_2B >= 0, values[j * speeds.size() + i] at (loads[j], speeds[i]).
+    //
+    // Outside its data the map goes on with the slope of the last interval where the losses rise outwards, and
+    // stays constant where they fall (a loss must not become negative); in_data() tells the two apart.
+    LossMap(std::vector<double> speeds, std::vector<double> loads, std::vector<double> values)
+        : speeds_(std::move(speeds)), loads_(std::move(loads)), values_(std::move(values)) {
+        extend();
+    }
+
+    bool empty() const { return values_.empty(); }
+
+    // Number of the triangle that contains (mu, v); on an edge, one of its two.
+    int triangle(double mu, double v) const {
+        const int i = interval(speeds_, v), j = interval(loads_, mu);
+        const double s = (v - speeds_[i]) / (speeds_[i + 1] - speeds_[i]);
+        const double r = (mu - loads_[j]) / (loads_[j + 1] - loads_[j]);
+        const bool upper = rising(j) ? r > s : r > 1.0 - s;
+        return 2 * (j * cells_along_speed() + i) + (upper ? 1 : 0);
+    }
+    // Number of the interval of the load axis that contains mu: the cells of the line v = 0.
+    int load_interval(double mu) const { return interval(loads_, mu); }
+    double load_interval_lower(int j) const { return loads_[j]; }
+    double load_interval_upper(int j) const { return loads_[j + 1]; }
+    int load_intervals() const { return static_cast<int>(loads_.size()) - 1; }
+
+    Plane plane(int triangle) const {
+        const int cell = triangle / 2, i = cell % cells_along_speed(), j = cell / cells_along_speed();
+        const bool upper = triangle % 2 == 1;
+        const double dv = speeds_[i + 1] - speeds_[i], dm = loads_[j + 1] - loads_[j];
+        // The triangle has a whole side along v (at the top or the bottom) and one along mu (left or right).
+        const int row = upper ? j + 1 : j;
+        const int column = rising(j) == upper ? i : i + 1;
+        Plane p;
+        p.per_speed = (value(row, i + 1) - value(row, i)) / dv;
+        p.per_load = (value(j + 1, column) - value(j, column)) / dm;
+        p.at_zero = value(row, column) - p.per_speed * speeds_[column] - p.per_load * loads_[row];
+        return p;
+    }
+    // On the line v = 0, as a function of mu alone.
+    Plane line_at_standstill(int j) const {
+        Plane p;
+        p.per_load = (value(j + 1, 0) - value(j, 0)) / (loads_[j + 1] - loads_[j]);
+        p.at_zero = value(j, 0) - p.per_load * loads_[j];
+        return p;
+    }
+
+    // The edges of a triangle, without the one on v = 0 (that is the sign of the speed, not an edge of the map).
+    // Returns their number (at most 3).
+    int edges(int triangle, Edge out[3]) const {
+        const int cell = triangle / 2, n = cells_along_speed(), i = cell % n, j = cell / n;
+        const bool upper = triangle % 2 == 1, up = rising(j);
+        int count = 0;
+        // Across the diagonal: r - s (rising) or r + s - 1 (falling), positive in the upper triangle.
+        const double dv = speeds_[i + 1] - speeds_[i], dm = loads_[j + 1] - loads_[j];
+        Plane diagonal;
+        diagonal.per_load = 1.0 / dm;
+        diagonal.per_speed = (up ? -1.0 : 1.0) / dv;
+        diagonal.at_zero = -loads_[j] / dm + (up ? speeds_[i] : -speeds_[i]) / dv - (up ? 0.0 : 1.0);
+        if (!upper) diagonal = {-diagonal.at_zero, -diagonal.per_speed, -diagonal.per_load};
+        out[count++] = {diagonal, triangle ^ 1};
+        // Along v: the top of an upper triangle, the bottom of a lower one.
+        if (upper)
+            out[count++] = {{loads_[j + 1] / dm, 0.0, -1.0 / dm}, j + 1 < load_intervals() ? 2 * (cell + n) : -1};
+        else
+            out[count++] = {{-loads_[j] / dm, 0.0, 1.0 / dm}, j > 0 ? 2 * (cell - n) + 1 : -1};
+        // Along mu: upper and rising, or lower and falling, touch the left side; the others the right.
+        if (upper == up) {
+            if (i > 0) out[count++] = {{-speeds_[i] / dv, 1.0 / dv, 0.0}, 2 * (cell - 1) + (up ? 0 : 1)};
+        } else {
+            out[count++] = {{speeds_[i + 1] / dv, -1.0 / dv, 0.0}, i + 1 < n ? 2 * (cell + 1) + (up ? 1 : 0) : -1};
+        }
+        return count;
+    }
+
+    double operator()(double mu, double v) const {
+        const Plane p = plane(triangle(mu, v));
+        return p.at_zero + p.per_speed * v + p.per_load * mu;
+    }
+
+    bool in_data(int triangle) const {
+        const int cell = triangle / 2, i = cell % cells_along_speed(), j = cell / cells_along_speed();
+        return i < cells_along_speed() - 1 && load_interval_in_data(j);
+    }
+    bool load_interval_in_data(int j) const { return j > 0 && j < load_intervals() - 1; }
+
+    int triangles() const { return 2 * cells_along_speed() * load_intervals(); }
+
+   private:
+    int cells_along_speed() const { return static_cast<int>(speeds_.size()) - 1; }
+    double value(int j, int i) const { return values_[j * speeds_.size() + i]; }
+    // Diagonals rise for mu > 0 and fall for mu < 0, so that a map mirrored in its data is mirrored in its triangles.
+    bool rising(int j) const { return loads_[j] + loads_[j + 1] >= 0.0; }
+
+    static int interval(const std::vector<double>& axis, double at) {
+        int k = 0;
+        while (k + 2 < static_cast<int>(axis.size()) && at > axis[k + 1]) ++k;
+        return k;
+    }
+
+    // One more row on each side of the load axis and one more column at the fast end, far away.
+    void extend() {
+        constexpr double far = 1e3;
+        const auto beyond = [](double inner, double last, double step, double distance) {
+            return last + std::fmax(0.0, (last - inner) / step) * distance;
+        };
+        const std::size_t n = speeds_.size(), m = loads_.size();
+        const double speed_step = speeds_[n - 1] - speeds_[n - 2], speed_reach = far * (speeds_[n - 1] + 1.0);
+        const double low_step = loads_[1] - loads_[0], high_step = loads_[m - 1] - loads_[m - 2];
+        const double load_reach = far * (loads_[m - 1] - loads_[0]);
+        std::vector<double> wide;
+        for (std::size_t j = 0; j < m; ++j) {
+            const double* row = &values_[j * n];
+            wide.insert(wide.end(), row, row + n);
+            wide.push_back(beyond(row[n - 2], row[n - 1], speed_step, speed_reach));
+        }
+        const std::size_t w = n + 1;
+        std::vector<double> full;
+        for (std::size_t i = 0; i < w; ++i) full.push_back(beyond(wide[w + i], wide[i], low_step, load_reach));
+        full.insert(full.end(), wide.begin(), wide.end());
+        for (std::size_t i = 0; i < w; ++i)
+            full.push_back(beyond(wide[(m - 2) * w + i], wide[(m - 1) * w + i], high_step, load_reach));
+        speeds_.push_back(speeds_.back() + speed_reach);
+        loads_.insert(loads_.begin(), loads_.front() - load_reach);
+        loads_.push_back(loads_.back() + load_reach);
+        values_ = std::move(full);
+    }
+
+    std::vector<double> speeds_, loads_, values_;
+};
+
+}  // namespace lostmotion

@@ -1,0 +1,43 @@
+// What drives the input shaft.
+#pragma once
+
+#include <limits>
+
+#include "linear_form.hpp"
+
+namespace lostmotion {
+
+struct Motor {
+    enum Kind { dc, torque_source } kind = dc;
+
+    double rotor_inertia = 0.0;              // J_M [kg m2]
+    double friction_torque = 0.0;            // T_10 [N m], dry friction of the bearings
+    double rated_torque = 1.0;               // M_DR [N m]
+    double rated_speed = 1.0;                // omega_DR [rad/s]
+    double electrical_time_constant = 1e-3;  // tau_a [s]
+    double armature_voltage_constant = 2.0;  // k_N [-], stall torque / rated torque at rated voltage
+    double voltage_limit = std::numeric_limits<double>::infinity();  // of |E_Z| [-]
+
+    // Torque on the rotor [N m]. A torque source follows its command without delay.
+    template <class F>
+    F torque() const {
+        return kind == dc ? F::unit(motor_torque) : F::unit(command);
+    }
+
+    // dM_D/dt by eq. (2), with E_Z = E_C, or the limit with the sign of `amplifier` if that is not 0.
+    template <class F>
+    F torque_rate(int amplifier) const {
+        if (kind == torque_source) return F{};
+        const F voltage = amplifier == 0 ? F::unit(command) : F::unit(one, amplifier * voltage_limit);
+        const F m_D = F::unit(motor_torque, 1.0 / rated_torque);
+        const F back_emf = F::unit(motor_speed, (armature_voltage_constant - 1.0) / rated_speed);
+        return rated_torque / electrical_time_constant * (armature_voltage_constant * voltage - back_emf - m_D);
+    }
+
+    bool limits_voltage() const { return kind == dc && voltage_limit < std::numeric_limits<double>::infinity(); }
+
+    // Torque [N m] at standstill per unit of command.
+    double stall_torque() const { return kind == dc ? armature_voltage_constant * rated_torque : 1.0; }
+};
+
+}  // namespace lostmotion

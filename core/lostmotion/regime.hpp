@@ -1,0 +1,73 @@
+// One regime of the drive: dx/dt = A x + B u and the linear conditions that end it. All that a solver sees.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "linear_form.hpp"
+
+namespace lostmotion {
+
+// The dry contacts of the drive.
+enum Contact : int { input_contact, twist_contact, load_contact, n_contacts };
+
+// A contact slips forward (+1), slips backward (-1) or is stuck (0). A contact that the drive does not have is
+// `absent` and acts as if it were not there.
+inline constexpr std::int8_t absent = 2;
+using Modes = std::array<std::int8_t, n_contacts>;
+
+// Which regime: the mode of each contact, the amplifier's saturation, the piece of the torsion curve and the
+// cell(s) of the loss map.
+struct RegimeKey {
+    Modes modes{absent, absent, absent};
+    std::int8_t amplifier = 0;   // -1, +1: at the voltage limit
+    std::int16_t piece = 0;      // of the torsion curve
+    std::int32_t cell = 0;       // slipping: triangle; stuck: load interval for starting forward ...
+    std::int32_t cell_back = 0;  // ... and backward
+
+    friend bool operator==(const RegimeKey&, const RegimeKey&) = default;
+
+    std::uint64_t packed() const {
+        const auto bits = [](auto v, int n) { return static_cast<std::uint64_t>(v) & ((1ull << n) - 1); };
+        return bits(modes[0], 2) | bits(modes[1], 2) << 2 | bits(modes[2], 2) << 4 | bits(amplifier, 2) << 6 |
+               bits(piece, 8) << 8 | bits(cell, 28) << 16 | bits(cell_back, 20) << 44;
+    }
+};
+
+// A regime holds while each of its guards is >= 0.
+struct Guard {
+    enum Kind : std::uint8_t {
+        speed,          // a slipping contact comes to rest
+        capacity,       // a stuck contact is overcome
+        torsion_piece,  // the twist leaves its piece of the curve
+        loss_cell,      // load and speed leave their cell of the loss map
+        loss_cell_back,
+        amplifier,      // the command crosses the voltage limit
+        outside,        // the extended loss map ends, or a state leaves the range of the arithmetic
+    };
+    LinearForm form;
+    Kind kind = outside;
+    Contact contact = input_contact;  // for speed and capacity
+    int neighbour = 0;                // for pieces, cells and the amplifier: the index beyond; capacity: the sign of slip
+};
+
+inline constexpr int max_guards = 16;
+
+struct Regime {
+    RegimeKey key;
+    std::array<LinearForm, n_states> rate{};      // dx/dt
+    LinearForm output_torque;                     // T_2 [N m]
+    LinearForm source_torque;                     // M_D [N m]
+    LinearForm input_friction;                    // F, all that the input contact takes [N m at the input]
+    LinearForm input_torque;                      // T_1 [N m]; while the input contact is stuck, T_2/i only
+    LinearForm hysteresis_torque;                 // H [N m]
+    LinearForm load_friction;                     // what the load contact takes [N m]
+    std::array<Guard, max_guards> guards;
+    int n_guards = 0;
+    bool solvable = true;                         // false: the reactions have no unique solution (jamming)
+    bool in_data = true;                          // false: the loss map is used outside its data
+
+    std::array<bool, n_contacts> at_rest{};       // speeds that this regime keeps at exactly zero
+};
+
+}  // namespace lostmotion

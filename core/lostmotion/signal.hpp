@@ -1,0 +1,186 @@
+// Commands and disturbances: a piecewise-linear part plus a sum of sines, each the output of a linear system.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "linear_form.hpp"
+
+namespace lostmotion {
+
+// amplitude * sin(2 pi frequency t + phase)
+struct Sine {
+    double amplitude = 0.0;  // unit of the signal
+    double frequency = 0.0;  // [Hz]
+    double phase = 0.0;      // [rad]
+};
+
+// From `time` on the piecewise-linear part is value + slope * (t - time), until the next knot.
+struct Knot {
+    double time = 0.0;   // [s]
+    double value = 0.0;  // unit of the signal
+    double slope = 0.0;  // unit of the signal per second
+};
+
+struct Signal {
+    std::vector<Knot> knots{Knot{}};  // sorted by time; the first holds from the start of the run
+    std::vector<Sine> sines;
+
+    // Index of the knot that holds at t (on a knot: the one that begins there).
+    std::size_t segment(double t) const {
+        std::size_t low = 0, high = knots.size();
+        while (high - low > 1) {
+            const std::size_t middle = (low + high) / 2;
+            (knots[middle].time <= t ? low : high) = middle;
+        }
+        return low;
+    }
+    double next_knot(double t) const {
+        const std::size_t k = segment(t) + 1;
+        return k < knots.size() ? (knots[k].time > t ? knots[k].time : next_after(k, t))
+                                : std::numeric_limits<double>::infinity();
+    }
+
+   private:
+    double next_after(std::size_t k, double t) const {
+        while (k < knots.size() && knots[k].time <= t) ++k;
+        return k < knots.size() ? knots[k].time : std::numeric_limits<double>::infinity();
+    }
+};
+
+using Signals = std::array<Signal, n_inputs>;  // command, load torque
+
+// One function of time by which an input departs from its value at an anchor instant:
+// a ramp (omega = 0), cos(omega s) - 1, or sin(omega s).
+struct InputBasis {
+    enum Kind { ramp, cosine, sine } kind;
+    int input;
+    double omega;  // [rad/s]
+};
+
+inline std::vector<InputBasis> input_basis(const Signals& signals) {
+    std::vector<InputBasis> basis;
+    for (int i = 0; i < n_inputs; ++i) {
+        bool slopes = false;
+        for (const Knot& k : signals[i].knots) slopes |= k.slope != 0.0;
+        if (slopes) basis.push_back({InputBasis::ramp, i, 0.0});
+    }
+    for (int i = 0; i < n_inputs; ++i)
+        for (const Sine& s : signals[i].sines) {
+            const double omega = 2.0 * std::numbers::pi * s.frequency;
+            basis.push_back({InputBasis::cosine, i, omega});
+            basis.push_back({InputBasis::sine, i, omega});
+        }
+    return basis;
+}
+
+// The two inputs at one instant, as the state of the linear system that generates them.
+class InputState {
+   public:
+    InputState(const Signals& signals, const std::vector<InputBasis>& basis)
+        : signals_(&signals), basis_(&basis), weights_(basis.size()) {
+        anchor(0.0);
+    }
+
+    // Sets all from absolute time, so that no phase error accumulates however long the run.
+    void anchor(double t) {
+        time_ = t;
+        std::size_t q = 0;
+        for (int i = 0; i < n_inputs; ++i) {
+            const Knot& k = (*signals_)[i].knots[(*signals_)[i].segment(t)];
+            linear_[i] = k.value + k.slope * (t - k.time);
+            slope_[i] = k.slope;
+            if (q < basis_->size() && (*basis_)[q].kind == InputBasis::ramp && (*basis_)[q].input == i)
+                weights_[q++] = k.slope;
+        }
+        for (int i = 0; i < n_inputs; ++i)
+            for (const Sine& s : (*signals_)[i].sines) {
+                const double turns = s.frequency * t;
+                const double angle = 2.0 * std::numbers::pi * (turns - std::floor(turns)) + s.phase;
+                weights_[q++] = s.amplitude * std::sin(angle);
+                weights_[q++] = s.amplitude * std::cos(angle);
+            }
+    }
+
+    // The left limit: as anchor(t), with the piecewise-linear parts continued from before t.
+    void anchor_left(double t) {
+        anchor(t);
+        for (int i = 0; i < n_inputs; ++i) {
+            const Signal& s = (*signals_)[i];
+            std::size_t k = s.segment(t);
+            while (k > 0 && s.knots[k].time >= t) --k;
+            linear_[i] = s.knots[k].value + s.knots[k].slope * (t - s.knots[k].time);
+            slope_[i] = s.knots[k].slope;
+        }
+    }
+
+    double time() const { return time_; }
+    const std::vector<InputBasis>& basis() const { return *basis_; }
+    const std::vector<double>& weights() const { return weights_; }
+
+    std::array<double, n_inputs> values() const {
+        std::array<double, n_inputs> u = linear_;
+        for (std::size_t q = 0; q < basis_->size(); ++q)
+            if ((*basis_)[q].kind == InputBasis::cosine) u[(*basis_)[q].input] += weights_[q];
+        return u;
+    }
+
+    // The piecewise-linear parts alone.
+    const std::array<double, n_inputs>& linear() const { return linear_; }
+
+    InputJet jet() const {
+        InputJet u{};
+        u[0] = linear_;
+        u[1] = slope_;
+        for (std::size_t q = 0; q < basis_->size(); ++q) {
+            if ((*basis_)[q].kind != InputBasis::cosine) continue;
+            const int i = (*basis_)[q].input;
+            const double omega = (*basis_)[q].omega, s = weights_[q], c = weights_[q + 1];
+            double power = 1.0;
+            for (int k = 0; k < n_derivatives; ++k, power *= omega) {
+                constexpr std::array<int, 4> sign{+1, +1, -1, -1};
+                u[k][i] += sign[k % 4] * power * (k % 2 == 0 ? s : c);
+            }
+        }
+        return u;
+    }
+
+    // Bound on the fourth derivative of each input for all time.
+    std::array<double, n_inputs> fourth_derivative_bound() const {
+        std::array<double, n_inputs> bound{};
+        for (int i = 0; i < n_inputs; ++i)
+            for (const Sine& s : (*signals_)[i].sines) {
+                const double omega = 2.0 * std::numbers::pi * s.frequency;
+                bound[i] += std::fabs(s.amplitude) * omega * omega * omega * omega;
+            }
+        return bound;
+    }
+
+    // Moves on by h, with the rotations (cos, sin)(omega h) of the sines given in basis order.
+    void advance(double h, const double* cos_sin) {
+        time_ += h;
+        for (int i = 0; i < n_inputs; ++i) linear_[i] += slope_[i] * h;
+        for (std::size_t q = 0; q < basis_->size(); ++q) {
+            if ((*basis_)[q].kind != InputBasis::cosine) continue;
+            const double s = weights_[q], c = weights_[q + 1];
+            weights_[q] = s * cos_sin[q] + c * cos_sin[q + 1];
+            weights_[q + 1] = c * cos_sin[q] - s * cos_sin[q + 1];
+        }
+    }
+
+    double next_knot(double t) const {
+        return std::fmin((*signals_)[0].next_knot(t), (*signals_)[1].next_knot(t));
+    }
+
+   private:
+    const Signals* signals_;
+    const std::vector<InputBasis>* basis_;
+    double time_ = 0.0;
+    std::array<double, n_inputs> linear_{}, slope_{};
+    std::vector<double> weights_;  // ramp: slope; cosine: a sin(psi); sine: a cos(psi)
+};
+
+}  // namespace lostmotion
