@@ -46,6 +46,34 @@ class Drive {
         return input_inertia() + least * load.inertia / i2;
     }
 
+    // Sizes of the states in which the coupling of the equations is balanced (all time constants of like weight).
+    // They serve to measure rates by a matrix norm, nothing else.
+    State balanced_scale() const {
+        const double i = gearbox.ratio, J = input_inertia();
+        State s{};
+        s[motor_torque] = 1.0;
+        s[motor_speed] = 1.0;
+        if (motor.kind == Motor::dc)
+            s[motor_speed] = std::sqrt(motor.electrical_time_constant * motor.rated_speed /
+                                       (J * (motor.armature_voltage_constant - 1.0) * motor.rated_torque));
+        if (rigid()) {
+            s[load_speed] = s[motor_speed] / i;
+            s[twist] = s[load_angle] = s[load_speed] * J;
+        } else {
+            const double k = gearbox.curve.largest_slope();
+            s[twist] = s[motor_speed] / i / std::sqrt(k / (i * i * J));
+            s[load_speed] = s[twist] * std::sqrt(k / load.inertia);
+            s[load_angle] = s[twist];
+        }
+        return s;
+    }
+    // Sizes that the states have at rated speed and torque, for error control.
+    State rated_scale() const {
+        const double w = gearbox.rated_input_speed, i = gearbox.ratio;
+        const double d = rigid() ? 1.0 : gearbox.rated_output_torque / gearbox.curve.largest_slope();
+        return {motor.rated_torque, w, w / i, d, 1.0, 1.0};
+    }
+
     Regime build(const RegimeKey& key) const;
 
    private:

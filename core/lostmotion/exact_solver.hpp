@@ -8,6 +8,7 @@
 // no other step size.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -79,18 +80,17 @@ class Cursor {
         x_ = propagator_->step(level, x_, rate(), input_.weights());
         input_.advance(propagator_->level(level).length, propagator_->rotations(level));
     }
-    // By any length: whole levels from the longest down, then the Taylor series.
+    // By any length: whole levels from the longest down, then the Taylor series. Backward by a base interval at most.
     void advance(double h) {
         const double target = time() + h;
-        int k = propagator_->level_below(h);
-        for (; k >= 0; --k) {
+        for (int k = h > 0.0 ? propagator_->level_below(h) : -1; k >= 0; --k) {
             const double length = propagator_->level(k).length;
             while (h >= length) {
                 step(k);
                 h -= length;
             }
         }
-        if (h > 0.0) x_ = propagator_->series(h, x_, rate(), input_);
+        if (h != 0.0) x_ = propagator_->series(h, x_, rate(), input_);
         input_.anchor(target);
     }
 
@@ -99,6 +99,43 @@ class Cursor {
     const State* constant_;
     InputState input_;
     State x_;
+};
+
+// Cubic on [0, 1] in Bernstein form, from values and slopes at both ends of an interval of length h.
+struct Cubic {
+    double c0, c1, c2, c3;
+
+    Cubic(double value, double slope, double end_value, double end_slope, double h)
+        : c0(value), c1(value + h / 3.0 * slope), c2(end_value - h / 3.0 * end_slope), c3(end_value) {}
+
+    double least() const { return std::min(std::min(c0, c1), std::min(c2, c3)); }  // a lower bound
+    double operator()(double s) const {
+        const double r = 1.0 - s;
+        return r * r * (r * c0 + 3.0 * s * c1) + s * s * (3.0 * r * c2 + s * c3);
+    }
+    double slope(double s) const {
+        const double r = 1.0 - s;
+        return 3.0 * (r * r * (c1 - c0) + 2.0 * r * s * (c2 - c1) + s * s * (c3 - c2));
+    }
+    // First of sixteen equidistant points where the cubic lies below the threshold; 2 if there is none.
+    double first_negative(double threshold) const {
+        for (int k = 1; k <= 16; ++k)
+            if ((*this)(k / 16.0) < threshold) return k / 16.0;
+        return 2.0;
+    }
+    // Zero between 0, where it is positive, and `b`, where it is negative: Newton, kept in its bracket by bisection.
+    double root(double b) const {
+        double a = 0.0, z = 0.5 * b;
+        for (int k = 0; k < 60 && b - a > 1e-9; ++k) {
+            const double value = (*this)(z);
+            (value > 0.0 ? a : b) = z;
+            const double next = z - value / slope(z), moved = std::fabs(next - z);
+            const bool inside = next > a && next < b;
+            z = inside ? next : 0.5 * (a + b);
+            if (inside && moved < 1e-9) break;
+        }
+        return z;
+    }
 };
 
 template <class System>
@@ -246,30 +283,12 @@ class ExactSolver {
         std::array<double, max_guards> value, slope, end_value, end_slope, fourth;
     };
 
-    static void evaluate_guards(const typename Cache::Entry& e, const std::array<double, max_guards>& constant,
-                                const State& x, const std::array<double, n_inputs>& u,
-                                std::array<double, max_guards>& out) {
-        out = constant;
-        for (int k = 0; k < n_states; ++k)
-            for (int g = 0; g < max_guards; ++g) out[g] += e.guard_columns[k][g] * x[k];
-        for (int i = 0; i < n_inputs; ++i) {
-            if (u[i] == 0.0) continue;
-            for (int g = 0; g < max_guards; ++g) out[g] += e.guard_columns[n_states + i][g] * u[i];
-        }
-    }
-
     // Advances within the regime until a guard reaches zero (fired) or `limit`.
     Status run_regime(const Segment<System>& segment, double limit, const Guard*& fired) {
         typename Cache::Entry& e = segment.entry;
         const Regime& r = e.regime;
         Propagator& p = e.propagator;
-        std::array<double, max_guards> constant{};
-        const std::array<double, max_guards> zero{};
-        for (int g = 0; g < r.n_guards; ++g) {
-            const LinearForm& f = r.guards[g].form;
-            constant[g] = f.c[one] + f.c[hysteresis_capacity] * segment.memory.hysteresis_capacity +
-                          f.c[held_torque] * segment.memory.held_torque;
-        }
+        const std::array<double, max_guards> constant = e.guard_constants(segment.memory);
         Cursor cursor(p, signals_, basis_, segment.constant, time_, now_.x), end = cursor;
         Look look;
         int level = std::min(last_level_, p.level_below(limit - time_));
@@ -281,9 +300,9 @@ class ExactSolver {
             const InputJet u = cursor.input().jet();
             const State rate = cursor.rate();
             if (!(std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100)) return Status::outside;
-            const State fourth = p.fourth_derivative(rate, u);
-            evaluate_guards(e, constant, cursor.x(), u[0], look.value);
-            evaluate_guards(e, zero, rate, u[1], look.slope);
+            const State fourth = p.higher_rate(p.higher_rate(p.higher_rate(rate, u[1]), u[2]), u[3]);
+            e.evaluate_guards(&constant, cursor.x(), u[0], look.value);
+            e.evaluate_guards(nullptr, rate, u[1], look.slope);
             const double left = limit - time_;
             while (true) {
                 const double length = p.level(level).length;
@@ -295,8 +314,8 @@ class ExactSolver {
                 else
                     end.advance(h);
                 const InputJet v = end.input().jet();
-                evaluate_guards(e, constant, end.x(), v[0], look.end_value);
-                evaluate_guards(e, zero, end.rate(), v[1], look.end_slope);
+                e.evaluate_guards(&constant, end.x(), v[0], look.end_value);
+                e.evaluate_guards(nullptr, end.rate(), v[1], look.end_slope);
                 bound_fourth(e, p.level(level).growth, fourth, h, look.fourth);
                 const Verdict verdict = judge(r, cursor, look, h, level == 0, segment.memory, u[0]);
                 if (verdict == Verdict::uncertain) {
@@ -304,7 +323,7 @@ class ExactSolver {
                     continue;
                 }
                 if (verdict == Verdict::crossing) {
-                    const double s = first_crossing(r, e, constant, cursor, look, h, end, fired);
+                    const double s = first_crossing(r, e, segment.memory, cursor, look, h, end, fired);
                     time_ += s;
                     now_.x = end.x();
                     last_level_ = level;
@@ -332,93 +351,73 @@ class ExactSolver {
                 size[k] += h * std::fabs(e.propagator.input_column(i)[k]) * input_bound_[i];
             any += size[k];
         }
-        out = {};
-        if (any == 0.0) return;  // at rest; growth may have overflowed
-        size = growth * size;
-        for (int k = 0; k < n_states; ++k) {
-            if (size[k] == 0.0) continue;
-            for (int g = 0; g < max_guards; ++g) out[g] += std::fabs(e.guard_columns[k][g]) * size[k];
+        if (any == 0.0) {  // at rest; growth may have overflowed
+            out.fill(0.0);
+            return;
         }
-        for (int i = 0; i < n_inputs; ++i)
-            for (int g = 0; g < max_guards; ++g)
-                out[g] += std::fabs(e.guard_columns[n_states + i][g]) * input_bound_[i];
+        size = growth * size;
+        const auto& c = e.guard_sizes;
+        for (int g = 0; g < e.guard_lanes; ++g)
+            out[g] = c[0][g] * size[0] + c[1][g] * size[1] + c[2][g] * size[2] + c[3][g] * size[3] + c[4][g] * size[4] +
+                     c[5][g] * input_bound_[0] + c[6][g] * input_bound_[1];
     }
 
     Verdict judge(const Regime& r, const Cursor& cursor, Look& look, double h, bool shortest, const Memory& memory,
                   const std::array<double, n_inputs>& u) {
         n_crossing_ = 0;
         for (int g = 0; g < r.n_guards; ++g) {
-            const double c0 = look.value[g], c3 = look.end_value[g];
-            const double c1 = c0 + h / 3.0 * look.slope[g], c2 = c3 - h / 3.0 * look.end_slope[g];
+            const Cubic c(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
             const double bound = h * h * h * look.fourth[g], error = h / 384.0 * bound;
-            const double least = std::fmin(std::fmin(c0, c1), std::fmin(c2, c3));
+            const double least = c.least();
             if (least > error) continue;
             const double tolerance = rounding * magnitude(r.guards[g].form, cursor.x(), memory, u);
             if (least - error >= -tolerance) continue;
             const double slope_error = 0.00802 * bound;
-            const double d0 = 3.0 / h * (c1 - c0), d1 = 3.0 / h * (c2 - c1), d2 = 3.0 / h * (c3 - c2);
-            if (std::fmin(d0, std::fmin(d1, d2)) > slope_error && c0 >= -tolerance) continue;  // rises all the way
+            const double d0 = 3.0 / h * (c.c1 - c.c0), d1 = 3.0 / h * (c.c2 - c.c1), d2 = 3.0 / h * (c.c3 - c.c2);
+            if (std::fmin(d0, std::fmin(d1, d2)) > slope_error && c.c0 >= -tolerance) continue;  // rises all the way
             const bool falls = std::fmax(d0, std::fmax(d1, d2)) < -slope_error;
-            if (falls && c3 >= -tolerance) continue;
+            if (falls && c.c3 >= -tolerance) continue;
             if (falls) {
                 crossing_[n_crossing_++] = g;
                 continue;
             }
             if (!shortest) return Verdict::uncertain;
             // At the shortest length the cubic is the guard to rounding; does it dip below zero?
-            double low = c3;
-            for (int k = 1; k < 16; ++k) low = std::fmin(low, cubic(c0, c1, c2, c3, k / 16.0));
-            if (low < -tolerance) crossing_[n_crossing_++] = g;
+            if (c.first_negative(-tolerance) <= 1.0) crossing_[n_crossing_++] = g;
         }
         return n_crossing_ > 0 ? Verdict::crossing : Verdict::clear;
     }
 
-    static double cubic(double c0, double c1, double c2, double c3, double s) {
-        const double r = 1.0 - s;
-        return r * r * (r * c0 + 3.0 * s * c1) + s * s * (3.0 * r * c2 + s * c3);
-    }
-
     // Earliest of the certified crossings; `end` is left there. Returns the time from the cursor.
-    double first_crossing(const Regime& r, const typename Cache::Entry& e, const std::array<double, max_guards>& constant,
-                          const Cursor& cursor, const Look& look, double h, Cursor& end, const Guard*& fired) {
+    double first_crossing(const Regime& r, typename Cache::Entry& e, const Memory& memory, const Cursor& cursor,
+                          const Look& look, double h, Cursor& end, const Guard*& fired) {
         double best = std::numeric_limits<double>::infinity();
         Cursor at = end;
         for (int k = 0; k < n_crossing_; ++k) {
             const int g = crossing_[k];
-            const double c0 = look.value[g], c3 = look.end_value[g];
-            const double c1 = c0 + h / 3.0 * look.slope[g], c2 = c3 - h / 3.0 * look.end_slope[g];
-            // Bracket on the cubic: positive at a, negative at b (in units of h).
-            double a = 0.0, b = 1.0;
-            if (c3 >= 0.0)
-                for (int m = 1; m < 16; ++m)
-                    if (cubic(c0, c1, c2, c3, m / 16.0) < 0.0) {
-                        b = m / 16.0;
-                        break;
-                    }
-            for (int m = 0; m < 60 && b - a > 1e-7; ++m) {
-                // Newton on the cubic, kept within the bracket by bisection.
-                const double middle = 0.5 * (a + b);
-                (cubic(c0, c1, c2, c3, middle) > 0.0 ? a : b) = middle;
-            }
-            double low = 0.0, high = h, s = 0.5 * (a + b) * h;
+            const Cubic c(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
+            const double z = c.root(c.c3 < 0.0 ? 1.0 : std::fmin(1.0, c.first_negative(0.0)));
+            // Newton on the guard itself, kept within its bracket by bisection.
+            double low = 0.0, high = h, s = z * h;
+            at = cursor;
+            at.advance(s);
             for (int m = 0; m < 100; ++m) {
-                at = cursor;
-                at.advance(s);
-                std::array<double, max_guards> value, slope;
+                const Guard& guard = r.guards[g];
                 const InputJet u = at.input().jet();
-                evaluate_guards(e, constant, at.x(), u[0], value);
-                evaluate_guards(e, {}, at.rate(), u[1], slope);
-                if (value[g] > 0.0)
-                    low = s;
-                else
-                    high = s;
-                double next = s - value[g] / slope[g];
+                const double value = evaluate(guard.form, at.x(), memory, u[0]);
+                (value > 0.0 ? low : high) = s;
+                double next = s - value / evaluate_rate(guard.form, at.rate(), u[1]);
                 if (!(next >= low && next <= high)) next = 0.5 * (low + high);
-                const double moved = std::fabs(next - s);
-                if (value[g] == 0.0 || moved <= 2.0 * std::numeric_limits<double>::epsilon() * s ||
-                    moved <= 0.25 * std::numeric_limits<double>::epsilon() * std::fabs(time_))
-                    break;
+                const double moved = next - s;
+                if (value == 0.0 || std::fabs(moved) <= 2.0 * std::numeric_limits<double>::epsilon() * s) break;
+                if (std::fabs(moved) < e.propagator.level(0).length) {
+                    at.advance(moved);
+                } else {
+                    at = cursor;
+                    at.advance(next);
+                }
                 s = next;
+                if (std::fabs(moved) <= 0.25 * std::numeric_limits<double>::epsilon() * std::fabs(time_)) break;
             }
             if (s < best) {
                 best = s;

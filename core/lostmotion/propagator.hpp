@@ -60,15 +60,15 @@ class Propagator {
             for (int r = 0; r < n_states; ++r) rate_.column[c][r] = regime.rate[r].c[c];
         for (int i = 0; i < n_inputs; ++i)
             for (int r = 0; r < n_states; ++r) input_column_[i][r] = regime.rate[r].c[first_input + i];
-        double norm = 0.0;
+        norm_ = 0.0;
         for (int r = 0; r < n_states; ++r) {
             double sum = 0.0;
             for (int c = 0; c < n_states; ++c) sum += std::fabs(rate_.column[c][r]) * scale[c] / scale[r];
-            norm = std::fmax(norm, sum);
+            norm_ = std::fmax(norm_, sum);
         }
-        for (const InputBasis& b : basis) norm = std::fmax(norm, b.omega);
+        for (const InputBasis& b : basis) norm_ = std::fmax(norm_, b.omega);
         double h = unit;
-        while (norm * h > base_norm) h *= 0.5;
+        while (norm_ * h > base_norm) h *= 0.5;
         steps_.clear();
         responses_.clear();
         rotations_.clear();
@@ -85,14 +85,11 @@ class Propagator {
         for (int r = 0; r < lanes; ++r) out[r] += constant[r] + input_column_[0][r] * u[0] + input_column_[1][r] * u[1];
         return out;
     }
-    // d4x/dt4 from dx/dt and the derivatives of the inputs.
-    State fourth_derivative(const State& rate, const InputJet& u) const {
-        State x = rate;
-        for (int k = 1; k < 4; ++k) {
-            x = rate_ * x;
-            for (int r = 0; r < lanes; ++r) x[r] += input_column_[0][r] * u[k][0] + input_column_[1][r] * u[k][1];
-        }
-        return x;
+    // The next time derivative of the state from one that is at least the first.
+    State higher_rate(const State& derivative, const std::array<double, n_inputs>& u) const {
+        State out = rate_ * derivative;
+        for (int r = 0; r < lanes; ++r) out[r] += input_column_[0][r] * u[0] + input_column_[1][r] * u[1];
+        return out;
     }
 
     const Step& level(int k) {
@@ -119,18 +116,18 @@ class Propagator {
         return y;
     }
 
-    // Taylor series over less than one base interval.
+    // Taylor series over at most one base interval, forward or backward.
     State series(double s, const State& x, const State& rate, const InputState& input) const {
-        const InputJet u = input.jet();
+        const auto u = input.jet<series_terms + 1>();
         State term = rate, sum = x;
         double power = s;
+        double left = 1.0;  // bound on the relative size of the next term
         for (int k = 1; k <= series_terms; ++k) {
             add_scaled(sum, power, term);
+            left *= norm_ * std::fabs(s) / k;
+            if (left < 1e-19) break;
             term = rate_ * term;
-            if (k < n_derivatives)
-                for (int i = 0; i < n_inputs; ++i) add_scaled(term, u[k][i], input_column_[i]);
-            else
-                add_high_derivatives(term, k, input);
+            for (int i = 0; i < n_inputs; ++i) add_scaled(term, u[k][i], input_column_[i]);
             power *= s / (k + 1);
         }
         return sum;
@@ -138,19 +135,6 @@ class Propagator {
 
    private:
     static constexpr int series_terms = 12;  // 0.125^13/13! < 1e-21
-
-    void add_high_derivatives(State& term, int order, const InputState& input) const {
-        for (int q = 0; q < n_basis_; ++q) {
-            const InputBasis& b = (*basis_)[q];
-            if (b.kind == InputBasis::ramp) continue;
-            const bool own = (order % 2 == 0) == (b.kind == InputBasis::cosine);
-            if (!own) continue;
-            const double sign = (order / 2) % 2 == 0 ? 1.0 : -1.0;
-            double power = 1.0;
-            for (int k = 0; k < order; ++k) power *= b.omega;
-            add_scaled(term, sign * power * input.weights()[q], input_column_[b.input]);
-        }
-    }
 
     void add_base(double h) {
         Step& s = steps_.emplace_back();
@@ -250,6 +234,7 @@ class Propagator {
 
     Matrix rate_;
     std::array<State, n_inputs> input_column_{};
+    double norm_ = 0.0;  // of A in scaled units, or the highest input frequency [1/s]
     int n_basis_ = 0;
     const std::vector<InputBasis>* basis_ = nullptr;
     std::vector<Step> steps_;        // one a level

@@ -17,7 +17,29 @@ class RegimeCache {
         Regime regime;
         Propagator propagator;
         // Guards as columns, so that all are evaluated at once: value = constant + sum columns * (x, u).
-        std::array<std::array<double, max_guards>, n_states + n_inputs> guard_columns{};
+        std::array<std::array<double, max_guards>, n_states + n_inputs> guard_columns{}, guard_sizes{};
+        int guard_lanes = 0;  // number of guards, rounded up to whole vectors
+
+        // The guards' values, or with constant = nullptr and the derivatives of state and inputs, their rates.
+        void evaluate_guards(const std::array<double, max_guards>* constant, const State& x,
+                             const std::array<double, n_inputs>& u, std::array<double, max_guards>& out) const {
+            const auto& c = guard_columns;
+            for (int g = 0; g < guard_lanes; ++g) {
+                const double fixed = constant != nullptr ? (*constant)[g] : 0.0;
+                out[g] = fixed + c[0][g] * x[0] + c[1][g] * x[1] + c[2][g] * x[2] + c[3][g] * x[3] + c[4][g] * x[4] +
+                         c[5][g] * u[0] + c[6][g] * u[1];
+            }
+        }
+        // The part of the guards that depends on neither state nor inputs.
+        std::array<double, max_guards> guard_constants(const Memory& m) const {
+            std::array<double, max_guards> constant{};
+            for (int g = 0; g < regime.n_guards; ++g) {
+                const LinearForm& f = regime.guards[g].form;
+                constant[g] =
+                    f.c[one] + f.c[hysteresis_capacity] * m.hysteresis_capacity + f.c[held_torque] * m.held_torque;
+            }
+            return constant;
+        }
     };
 
     explicit RegimeCache(const System& system) : system_(system) {}
@@ -31,11 +53,14 @@ class RegimeCache {
             found = std::make_unique<Entry>();
             found->regime = system_.build(key);
             const Regime& r = found->regime;
+            found->guard_lanes = (r.n_guards + 3) / 4 * 4;
             for (int g = 0; g < r.n_guards; ++g) {
                 for (int k = 0; k < n_states; ++k) found->guard_columns[k][g] = r.guards[g].form.c[k];
                 for (int i = 0; i < n_inputs; ++i)
                     found->guard_columns[n_states + i][g] = r.guards[g].form.c[first_input + i];
             }
+            for (int k = 0; k < n_states + n_inputs; ++k)
+                for (int g = 0; g < r.n_guards; ++g) found->guard_sizes[k][g] = std::fabs(found->guard_columns[k][g]);
         }
         return *found;
     }

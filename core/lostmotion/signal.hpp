@@ -131,8 +131,10 @@ class InputState {
     // The piecewise-linear parts alone.
     const std::array<double, n_inputs>& linear() const { return linear_; }
 
-    InputJet jet() const {
-        InputJet u{};
+    // Value and derivatives up to order N - 1.
+    template <int N = n_derivatives>
+    std::array<std::array<double, n_inputs>, N> jet() const {
+        std::array<std::array<double, n_inputs>, N> u{};
         u[0] = linear_;
         u[1] = slope_;
         for (std::size_t q = 0; q < basis_->size(); ++q) {
@@ -140,10 +142,7 @@ class InputState {
             const int i = (*basis_)[q].input;
             const double omega = (*basis_)[q].omega, s = weights_[q], c = weights_[q + 1];
             double power = 1.0;
-            for (int k = 0; k < n_derivatives; ++k, power *= omega) {
-                constexpr std::array<int, 4> sign{+1, +1, -1, -1};
-                u[k][i] += sign[k % 4] * power * (k % 2 == 0 ? s : c);
-            }
+            for (int k = 0; k < N; ++k, power *= k % 2 == 0 ? -omega : omega) u[k][i] += power * (k % 2 == 0 ? s : c);
         }
         return u;
     }

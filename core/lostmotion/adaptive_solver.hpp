@@ -1,0 +1,303 @@
+// Adaptive solver: Dormand and Prince's embedded Runge-Kutta pair 5(4) with Shampine's dense output, over the same
+// regimes, plus an optional nonlinear remainder. A second opinion on the exact solver, and room for physics that is
+// not piecewise linear.
+//
+// J. R. Dormand, P. J. Prince: A family of embedded Runge-Kutta formulae, J. Comput. Appl. Math. 6 (1980) 19-26.
+// L. F. Shampine: Some practical Runge-Kutta formulas, Math. Comput. 46 (1986) 135-150.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "exact_solver.hpp"
+
+namespace lostmotion {
+
+struct DormandPrince {
+    static constexpr int stages = 7;
+    static constexpr std::array<double, stages> c{0.0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1.0, 1.0};
+    static constexpr double a[stages][stages] = {
+        {},
+        {1.0 / 5},
+        {3.0 / 40, 9.0 / 40},
+        {44.0 / 45, -56.0 / 15, 32.0 / 9},
+        {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
+        {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656},
+        {35.0 / 384, 0.0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84},
+    };
+    // Weights of order 5 minus weights of order 4.
+    static constexpr std::array<double, stages> error{71.0 / 57600,      0.0,        -71.0 / 16695, 71.0 / 1920,
+                                                      -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
+    // Quartic dense output: x(t + s h) = x + h sum_i k_i (d[i][0] s + d[i][1] s^2 + d[i][2] s^3 + d[i][3] s^4).
+    static constexpr double dense[stages][4] = {
+        {1.0, -8048581381.0 / 2820520608.0, 8663915743.0 / 2820520608.0, -12715105075.0 / 11282082432.0},
+        {},
+        {0.0, 131558114200.0 / 32700410799.0, -68118460800.0 / 10900136933.0, 87487479700.0 / 32700410799.0},
+        {0.0, -1754552775.0 / 470086768.0, 14199869525.0 / 1410260304.0, -10690763975.0 / 1880347072.0},
+        {0.0, 127303824393.0 / 49829197408.0, -318862633887.0 / 49829197408.0, 701980252875.0 / 199316789632.0},
+        {0.0, -282668133.0 / 205662961.0, 2019193451.0 / 616988883.0, -1453857185.0 / 822651844.0},
+        {0.0, 40617522.0 / 29380423.0, -110615467.0 / 29380423.0, 69997945.0 / 29380423.0},
+    };
+};
+
+// A remainder adds to the linear rates; called as remainder(t, x, rate).
+struct NoRemainder {
+    void operator()(double, const State&, State&) const {}
+};
+
+// One accepted stretch of the solution; evaluates the state anywhere on it.
+struct DenseStep {
+    double begin = 0.0, length = 0.0, end = 0.0;  // [s]; used up to `end` <= begin + length
+    State x{};
+    std::array<State, DormandPrince::stages> k{};
+
+    State operator()(double t) const {
+        const double s = length > 0.0 ? (t - begin) / length : 0.0;
+        State out = x;
+        for (int i = 0; i < DormandPrince::stages; ++i) {
+            const double* d = DormandPrince::dense[i];
+            add_scaled(out, length * s * (d[0] + s * (d[1] + s * (d[2] + s * d[3]))), k[i]);
+        }
+        return out;
+    }
+};
+
+template <class System, class Remainder = NoRemainder>
+class AdaptiveSolver {
+   public:
+    AdaptiveSolver(const System& system, const Signals& signals, double relative_tolerance, const State& scale,
+                   Remainder remainder = {})
+        : system_(system),
+          signals_(signals),
+          basis_(input_basis(signals)),
+          cache_(system),
+          tolerance_(relative_tolerance),
+          scale_(scale),
+          remainder_(remainder),
+          input_(signals_, basis_) {}
+    AdaptiveSolver(const AdaptiveSolver&) = delete;
+    AdaptiveSolver& operator=(const AdaptiveSolver&) = delete;
+
+    bool (*interrupted)(void*) = nullptr;
+    void* interrupted_context = nullptr;
+
+    double time() const { return time_; }
+    const State& state() const { return now_.x; }
+    const Memory& memory() const { return now_.memory; }
+    const Regime& regime() { return cache_.regime(key_); }
+    const Signals& signals() const { return signals_; }
+    const std::vector<InputBasis>& basis() const { return basis_; }
+    Contact stopped_at() const { return stopped_at_; }
+    long steps() const { return steps_; }
+
+    Status begin(double time, const State& x, const Memory& memory) {
+        time_ = time;
+        now_.x = x;
+        now_.memory = memory;
+        set_inputs();
+        step_ = 0.0;
+        return status_of(system_.start(cache_, now_, key_));
+    }
+
+    // observer.step(regime, memory, dense step, inputs at any time through `input_at`), observer.switching(...)
+    template <class Observer>
+    Status advance(double t_end, Observer& observer) {
+        while (time_ < t_end) {
+            const double knot = std::fmin(signals_[0].next_knot(time_), signals_[1].next_knot(time_));
+            const Guard* fired = nullptr;
+            const Status status = run_regime(std::fmin(t_end, knot), fired, observer);
+            if (status != Status::done) return status;
+            if (fired == nullptr && time_ >= t_end) break;
+            const Status switched = change_regime(fired, observer);
+            if (switched != Status::done) return switched;
+        }
+        return Status::done;
+    }
+
+    std::array<double, n_inputs> input_at(double t) {
+        input_.anchor(t);
+        return input_.values();
+    }
+
+   private:
+    Status status_of(Found found) {
+        if (found == Found::yes) return Status::done;
+        return found == Found::outside ? Status::outside : Status::jammed;
+    }
+    void set_inputs() {
+        input_.anchor(time_);
+        now_.input = input_.jet();
+    }
+
+    template <class Observer>
+    Status change_regime(const Guard* fired, Observer& observer) {
+        Switching s;
+        s.time = time_;
+        s.before = key_;
+        s.input_jump = fired == nullptr;
+        if (fired != nullptr) {
+            s.kind = fired->kind;
+            s.contact = stopped_at_ = fired->contact;
+            if (fired->kind == Guard::outside) return Status::outside;
+        }
+        set_inputs();
+        const double before = last_event_;
+        last_event_ = time_;
+        repeats_ = time_ - before < 1e-14 * std::fmax(1.0, time_) ? repeats_ + 1 : 0;
+        if (repeats_ > 100) return Status::zeno;
+        const Found found = system_.next(cache_, now_, fired, key_);
+        if (found != Found::yes) return status_of(found);
+        s.after = key_;
+        s.x = now_.x;
+        observer.switching(s);
+        return Status::done;
+    }
+
+    // Right-hand side of one regime.
+    struct Equations {
+        Matrix rate;
+        State constant{};
+        std::array<State, n_inputs> input_column{};
+
+        Equations(const Regime& r, const Memory& m) : constant(constant_rate(r, m)) {
+            for (int row = 0; row < n_states; ++row) {
+                for (int c = 0; c < n_states; ++c) rate.column[c][row] = r.rate[row].c[c];
+                for (int i = 0; i < n_inputs; ++i) input_column[i][row] = r.rate[row].c[first_input + i];
+            }
+        }
+    };
+    State rates(const Equations& equations, double t, const State& x) {
+        State out = equations.rate * x;
+        const auto u = input_at(t);
+        for (int k = 0; k < lanes; ++k)
+            out[k] += equations.constant[k] + equations.input_column[0][k] * u[0] + equations.input_column[1][k] * u[1];
+        remainder_(t, x, out);
+        return out;
+    }
+
+    template <class Observer>
+    Status run_regime(double limit, const Guard*& fired, Observer& observer) {
+        const auto& entry = cache_.entry(key_);
+        const Regime& r = entry.regime;
+        const Equations equations(r, now_.memory);
+        const std::array<double, max_guards> constant = entry.guard_constants(now_.memory);
+        using DP = DormandPrince;
+        DenseStep dense;
+        std::array<double, max_guards> value, slope, end_value, end_slope;
+        const auto look = [&](double t, const State& x, const State& rate, auto& g, auto& g_rate) {
+            input_.anchor(t);
+            const auto u = input_.template jet<2>();
+            entry.evaluate_guards(&constant, x, u[0], g);
+            entry.evaluate_guards(nullptr, rate, u[1], g_rate);
+        };
+        double h = step_ > 0.0 ? step_ : 1e-6;
+        dense.k[0] = rates(equations, time_, now_.x);
+        look(time_, now_.x, dense.k[0], value, slope);
+        while (time_ < limit) {
+            if (++steps_ % 256 == 0 && interrupted != nullptr && interrupted(interrupted_context))
+                return Status::interrupted;
+            const bool last = h >= limit - time_;
+            if (last) h = limit - time_;
+            dense.x = now_.x;
+            dense.begin = time_;
+            dense.length = h;
+            // At a knot the inputs of this regime are those before it.
+            const double latest = std::nextafter(limit, time_);
+            State x{};
+            for (int stage = 1; stage < DP::stages; ++stage) {
+                x = now_.x;
+                for (int j = 0; j < stage; ++j) add_scaled(x, h * DP::a[stage][j], dense.k[j]);
+                dense.k[stage] = rates(equations, std::min(time_ + DP::c[stage] * h, latest), x);
+            }
+            double error = 0.0;
+            for (int n = 0; n < n_states; ++n) {
+                double e = 0.0;
+                for (int j = 0; j < DP::stages; ++j) e += DP::error[j] * dense.k[j][n];
+                const double size = tolerance_ * (scale_[n] + std::max(std::fabs(now_.x[n]), std::fabs(x[n])));
+                error += (h * e / size) * (h * e / size);
+            }
+            error = std::sqrt(error / n_states);
+            if (!(error < 1.0)) {
+                if (!(h > 1e-14 * std::max(1.0, time_))) return Status::outside;
+                h *= std::isfinite(error) ? std::clamp(0.9 * std::pow(error, -0.2), 0.2, 0.9) : 0.1;
+                continue;
+            }
+            const double end = last ? latest : time_ + h;
+            look(end, x, dense.k[DP::stages - 1], end_value, end_slope);
+            const Guard* crossed = nullptr;
+            double t_event = end;
+            for (int g = 0; g < r.n_guards; ++g) {
+                const Cubic c(value[g], slope[g], end_value[g], end_slope[g], h);
+                if (c.least() <= 0.0) refine_crossing(r.guards[g], dense, end, t_event, crossed);
+            }
+            if (crossed != nullptr) {
+                dense.end = t_event;
+                observer.step(r, now_.memory, dense, false);
+                now_.x = dense(t_event);
+                time_ = t_event;
+                fired = crossed;
+                step_ = h;
+                return Status::done;
+            }
+            dense.end = last ? limit : end;
+            observer.step(r, now_.memory, dense, last);
+            now_.x = x;
+            time_ = dense.end;
+            dense.k[0] = dense.k[DP::stages - 1];
+            std::swap(value, end_value);
+            std::swap(slope, end_slope);
+            step_ = h *= std::clamp(0.9 * std::pow(std::max(error, 1e-10), -0.2), 0.2, 5.0);
+        }
+        return Status::done;
+    }
+
+    // Looks for the first fall of the guard below zero on a grid within the step, before t_event, and refines it by
+    // bisection on the dense output.
+    void refine_crossing(const Guard& guard, const DenseStep& dense, double end, double& t_event,
+                         const Guard*& crossed) {
+        constexpr int looks = 16;
+        const auto value = [&](double t) { return evaluate(guard.form, dense(t), now_.memory, input_at(t)); };
+        const double noise = noise_factor * magnitude(guard.form, dense.x, now_.memory, input_at(dense.begin));
+        double low = dense.begin;
+        for (int k = 1; k <= looks; ++k) {
+            double high = k == looks ? end : dense.begin + dense.length * k / looks;
+            if (low >= t_event) return;
+            if (value(high) >= -noise) {
+                low = high;
+                continue;
+            }
+            const double resolution = 2.0 * std::numeric_limits<double>::epsilon() * std::max(1e-3, high);
+            while (high - low > resolution) {
+                const double middle = 0.5 * (low + high);
+                (value(middle) > 0.0 ? low : high) = middle;
+            }
+            if (high < t_event || crossed == nullptr) {
+                t_event = high;
+                crossed = &guard;
+            }
+            return;
+        }
+    }
+
+    static constexpr double noise_factor = 1e-14;
+
+    const System& system_;
+    Signals signals_;
+    std::vector<InputBasis> basis_;
+    RegimeCache<System> cache_;
+    double tolerance_;
+    State scale_;
+    Remainder remainder_;
+    InputState input_;
+
+    double time_ = 0.0, step_ = 0.0;
+    Instant now_;
+    RegimeKey key_;
+    long steps_ = 0;
+    int repeats_ = 0;
+    double last_event_ = -1.0;
+    Contact stopped_at_ = input_contact;
+};
+
+}  // namespace lostmotion
