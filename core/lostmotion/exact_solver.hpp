@@ -184,6 +184,8 @@ class ExactSolver {
         now_.memory = memory;
         key_ = key;
     }
+    // From now on the input is value + slope * (t - now). Only for signals made with ramped_inputs().
+    void set_ramp(int input, double value, double slope) { signals_[input].knots[0] = {time_, value, slope}; }
     // The inputs have changed at this instant: finds the regime anew.
     Status inputs_changed() {
         anchor_inputs();

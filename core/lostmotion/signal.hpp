@@ -53,6 +53,13 @@ struct Signal {
 
 using Signals = std::array<Signal, n_inputs>;  // command, load torque
 
+// Inputs that will be set to ramps from outside, step by step.
+inline Signals ramped_inputs() {
+    Signals s;
+    for (Signal& signal : s) signal.knots[0].slope = 1.0;
+    return s;
+}
+
 // One function of time by which an input departs from its value at an anchor instant:
 // a ramp (omega = 0), cos(omega s) - 1, or sin(omega s).
 struct InputBasis {

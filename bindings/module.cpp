@@ -1,0 +1,298 @@
+// Thin binding: builds core objects from Python values, runs them with the GIL released, hands arrays back.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <memory>
+
+#include "lostmotion/explain.hpp"
+#include "lostmotion/run.hpp"
+#include "lostmotion/simulation.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace lostmotion;
+
+namespace {
+
+using Vector = std::vector<double>;
+
+bool poll_signals(void*) {
+    nb::gil_scoped_acquire hold;
+    return PyErr_CheckSignals() != 0;
+}
+
+const char* contact_name(Contact c) {
+    return c == input_contact ? "input shaft" : c == twist_contact ? "twist of the gear" : "load bearing";
+}
+
+struct SolverError : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+// Turns a status into an exception; the signal's own exception is already set when a run was interrupted.
+void check(Status status, double time, Contact contact) {
+    const std::string at = "at t = " + std::to_string(time) + " s";
+    switch (status) {
+        case Status::done: return;
+        case Status::interrupted: throw nb::python_error();
+        case Status::jammed:
+            throw SolverError("no combination of sticking and slipping contacts is consistent " + at +
+                              ": the friction jams. Give the gearbox a compliance, or lower its losses.");
+        case Status::outside:
+            throw SolverError("the state left the range that the loss map can be extended to " + at +
+                              " (1000 times its data). The drive is unstable, or its data or inputs have a wrong unit.");
+        case Status::zeno:
+            throw SolverError("switching instants of the contact '" + std::string(contact_name(contact)) +
+                              "' accumulate " + at + ": infinitely many in finite time. The model ends here.");
+    }
+}
+
+nb::ndarray<nb::numpy, double, nb::ndim<2>> as_array(std::unique_ptr<double[]> data, std::size_t rows,
+                                                     std::size_t columns) {
+    double* raw = data.release();
+    nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+    return {raw, {rows, columns}, owner};
+}
+
+State to_state(const std::array<double, n_states>& v) {
+    State x{};
+    std::copy(v.begin(), v.end(), x.begin());
+    return x;
+}
+std::array<double, n_states> from_state(const State& x) {
+    std::array<double, n_states> v;
+    std::copy_n(x.begin(), n_states, v.begin());
+    return v;
+}
+
+// Switching as numbers: time, kind, contact, contact modes before and after, T_2 before and after.
+constexpr std::size_t switching_columns = 11;
+nb::ndarray<nb::numpy, double, nb::ndim<2>> switching_table(const RunReport& report) {
+    const std::size_t n = report.switchings.size();
+    auto data = std::make_unique<double[]>(n * switching_columns);
+    for (std::size_t k = 0; k < n; ++k) {
+        const Switching& s = report.switchings[k];
+        double* row = &data[k * switching_columns];
+        row[0] = s.time;
+        row[1] = s.input_jump ? -1.0 : static_cast<double>(s.kind);
+        row[2] = s.contact;
+        for (int c = 0; c < n_contacts; ++c) {
+            row[3 + c] = s.before.modes[c];
+            row[6 + c] = s.after.modes[c];
+        }
+        row[9] = s.torque_before;
+        row[10] = s.torque_after;
+    }
+    return as_array(std::move(data), n, switching_columns);
+}
+
+nb::dict ledger_dict(const EnergyLedger& e) {
+    nb::dict d;
+    const char* names[n_flows] = {"source",      "input_damper", "motor_friction", "gear_losses",
+                                  "hysteresis",  "load_damper",  "load_friction",  "load_work"};
+    for (int k = 0; k < n_flows; ++k) d[names[k]] = e.flow[k];
+    d["kinetic_change"] = e.kinetic_end - e.kinetic_begin;
+    d["elastic_change"] = e.elastic_end - e.elastic_begin;
+    d["residual"] = e.residual();
+    d["turned_over"] = e.turned_over;
+    return d;
+}
+
+nb::tuple run(const Drive& drive, const Signals& signals, const std::array<double, n_states>& x, double capacity,
+              double duration, double interval, std::size_t samples, bool energy, double tolerance,
+              std::size_t max_switchings) {
+    auto data = std::make_unique<double[]>(n_channels * samples);
+    RunOptions options;
+    options.duration = duration;
+    options.sample_interval = interval;
+    options.samples = samples;
+    options.energy = energy;
+    options.max_switchings = max_switchings;
+    options.interrupted = poll_signals;
+    const Start start{to_state(x), {capacity, 0.0}};
+    RunReport report;
+    {
+        nb::gil_scoped_release release;
+        report = tolerance > 0.0 ? run_adaptive(drive, signals, start, options, tolerance, data.get())
+                                 : run_exact(drive, signals, start, options, data.get());
+    }
+    check(report.status, report.time, report.contact);
+    return nb::make_tuple(as_array(std::move(data), n_channels, samples), switching_table(report),
+                          report.switching_count, ledger_dict(report.energy), from_state(report.x),
+                          report.memory.hysteresis_capacity, report.left_data_at, report.steps);
+}
+
+nb::list explain_state(const Drive& drive, const Regime& r, const State& x, const Memory& m,
+                       const std::array<double, n_inputs>& u) {
+    nb::list out;
+    for (int c = 0; c < n_contacts; ++c) {
+        const ContactReport report = explain_contact(drive, r, static_cast<Contact>(c), x, m, u);
+        if (report.present)
+            out.append(nb::make_tuple(c, report.mode, report.speed, report.torque, report.capacity_forward,
+                                      report.capacity_backward));
+    }
+    return out;
+}
+
+// Runs to an instant and reports on it: readings, contacts, output torque.
+nb::tuple explain_at(const Drive& drive, const Signals& signals, const std::array<double, n_states>& x,
+                     double capacity, double time) {
+    const SwitchedDrive system(drive);
+    ExactSolver<SwitchedDrive> solver(system, signals, 1e-3, drive.balanced_scale());
+    solver.interrupted = poll_signals;
+    RunReport report;
+    RunOptions options;
+    options.max_switchings = 0;
+    options.energy = false;
+    Recorder recorder(drive, options, nullptr, report);
+    Status status = solver.begin(0.0, to_state(x), {capacity, 0.0});
+    if (status == Status::done && time > 0.0) {
+        nb::gil_scoped_release release;
+        status = solver.advance(time, recorder);
+    }
+    check(status, solver.time(), solver.stopped_at());
+    InputState input(signals, solver.basis());
+    input.anchor(time);
+    const auto u = input.values();
+    const Reading reading = read(drive, solver.regime(), solver.state(), solver.memory(), u);
+    return nb::make_tuple(std::vector<double>(reading.value.begin(), reading.value.end()),
+                          explain_state(drive, solver.regime(), solver.state(), solver.memory(), u));
+}
+
+void advance(Simulation& s, double interval, double c0, double c1, double m0, double m1) {
+    s.set_interrupt(poll_signals, nullptr);
+    Status status;
+    {
+        nb::gil_scoped_release release;
+        status = s.advance(interval, c0, c1, m0, m1);
+    }
+    if (status != Status::done) check(status, s.time(), s.stopped_at());
+}
+
+}  // namespace
+
+NB_MODULE(_core, m) {
+    nb::exception<SolverError>(m, "SolverError", PyExc_RuntimeError);
+
+    nb::class_<Motor>(m, "Motor")
+        .def(nb::init<>())
+        .def_prop_rw(
+            "torque_source", [](const Motor& s) { return s.kind == Motor::torque_source; },
+            [](Motor& s, bool v) { s.kind = v ? Motor::torque_source : Motor::dc; })
+        .def_rw("rotor_inertia", &Motor::rotor_inertia)
+        .def_rw("friction_torque", &Motor::friction_torque)
+        .def_rw("rated_torque", &Motor::rated_torque)
+        .def_rw("rated_speed", &Motor::rated_speed)
+        .def_rw("electrical_time_constant", &Motor::electrical_time_constant)
+        .def_rw("armature_voltage_constant", &Motor::armature_voltage_constant)
+        .def_rw("voltage_limit", &Motor::voltage_limit);
+    nb::class_<Load>(m, "Load")
+        .def(nb::init<>())
+        .def_rw("inertia", &Load::inertia)
+        .def_rw("viscous_friction", &Load::viscous_friction)
+        .def_rw("friction_torque", &Load::friction_torque);
+    nb::class_<TorsionCurve>(m, "TorsionCurve")
+        .def(nb::init<Vector, Vector>(), "breaks"_a, "slopes"_a)
+        .def("torque", &TorsionCurve::torque, "twist"_a)
+        .def("energy", &TorsionCurve::energy, "twist"_a);
+    nb::class_<LossMap>(m, "LossMap")
+        .def(nb::init<Vector, Vector, Vector>(), "speeds"_a, "loads"_a, "values"_a)
+        .def("__call__", &LossMap::operator(), "load"_a, "speed"_a);
+    nb::class_<Gearbox>(m, "Gearbox")
+        .def(nb::init<>())
+        .def_rw("ratio", &Gearbox::ratio)
+        .def_rw("inertia", &Gearbox::inertia)
+        .def_rw("viscous_friction", &Gearbox::viscous_friction)
+        .def_rw("hysteresis_efficiency", &Gearbox::hysteresis_efficiency)
+        .def_rw("efficiency", &Gearbox::efficiency)
+        .def_rw("rated_input_speed", &Gearbox::rated_input_speed)
+        .def_rw("rated_output_torque", &Gearbox::rated_output_torque)
+        .def("set_torsion_curve",
+             [](Gearbox& g, const TorsionCurve& c) {
+                 g.compliance = Gearbox::torsion_curve;
+                 g.curve = c;
+             }, "curve"_a)
+        .def("set_loss_map",
+             [](Gearbox& g, const LossMap& map) {
+                 g.losses = Gearbox::loss_map;
+                 g.map = map;
+             }, "loss_map"_a);
+    nb::class_<Drive>(m, "Drive")
+        .def("__init__",
+             [](Drive* self, const Motor& motor, const Gearbox& gearbox, const Load& load) {
+                 new (self) Drive{motor, gearbox, load};
+             }, "motor"_a, "gearbox"_a, "load"_a)
+        .def("smallest_rigid_inertia", &Drive::smallest_rigid_inertia)
+        .def("smallest_command",
+             [](const Drive& d, double T_2, double M_Z, int s) { return smallest_command(d, T_2, M_Z, s); },
+             "output_torque"_a, "load_torque"_a, "direction"_a);
+
+    nb::class_<Signal>(m, "Signal")
+        .def("__init__",
+             [](Signal* self, const std::vector<std::array<double, 3>>& knots,
+                const std::vector<std::array<double, 3>>& sines) {
+                 auto s = std::make_unique<Signal>();
+                 s->knots.clear();
+                 for (const auto& k : knots) s->knots.push_back({k[0], k[1], k[2]});
+                 for (const auto& a : sines) s->sines.push_back({a[0], a[1], a[2]});
+                 new (self) Signal(std::move(*s));
+             }, "knots"_a, "sines"_a);
+
+    m.def("run",
+          [](const Drive& drive, const Signal& command, const Signal& load_torque,
+             const std::array<double, n_states>& x, double capacity, double duration, double interval,
+             std::size_t samples, bool energy, double tolerance, std::size_t max_switchings) {
+              return run(drive, Signals{command, load_torque}, x, capacity, duration, interval, samples, energy,
+                         tolerance, max_switchings);
+          },
+          "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a, "duration"_a, "interval"_a,
+          "samples"_a, "energy"_a, "tolerance"_a, "max_switchings"_a);
+    m.def("explain_at",
+          [](const Drive& drive, const Signal& command, const Signal& load_torque,
+             const std::array<double, n_states>& x, double capacity, double time) {
+              return explain_at(drive, Signals{command, load_torque}, x, capacity, time);
+          },
+          "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a, "time"_a);
+
+    nb::class_<Simulation>(m, "Simulation")
+        .def(nb::init<const Drive&, double>(), "drive"_a, "step"_a)
+        .def("advance", &advance, "interval"_a, "command_begin"_a, "command_end"_a, "load_begin"_a, "load_end"_a)
+        .def("time", &Simulation::time)
+        .def("read",
+             [](Simulation& s) {
+                 const Reading r = s.reading();
+                 return std::vector<double>(r.value.begin(), r.value.end());
+             })
+        .def("explain",
+             [](Simulation& s) {
+                 const Reading r = s.reading();
+                 const auto& now = s.snapshot();
+                 return nb::make_tuple(std::vector<double>(r.value.begin(), r.value.end()),
+                                       explain_state(s.drive(), s.regime(), now.x, now.memory, now.input));
+             })
+        .def("get_state",
+             [](const Simulation& s) {
+                 const auto& n = s.snapshot();
+                 return nb::make_tuple(n.time, from_state(n.x), n.memory.hysteresis_capacity, n.memory.held_torque,
+                                       std::array<int, 7>{n.key.modes[0], n.key.modes[1], n.key.modes[2],
+                                                          n.key.amplifier, n.key.piece, n.key.cell, n.key.cell_back},
+                                       n.input, n.started);
+             })
+        .def("set_state",
+             [](Simulation& s, double time, const std::array<double, n_states>& x, double capacity, double held,
+                const std::array<int, 7>& k, const std::array<double, n_inputs>& input, bool started) {
+                 RegimeKey key;
+                 key.modes = {static_cast<std::int8_t>(k[0]), static_cast<std::int8_t>(k[1]),
+                              static_cast<std::int8_t>(k[2])};
+                 key.amplifier = static_cast<std::int8_t>(k[3]);
+                 key.piece = static_cast<std::int16_t>(k[4]);
+                 key.cell = k[5];
+                 key.cell_back = k[6];
+                 s.restore({time, to_state(x), {capacity, held}, key, input, started});
+             },
+             "time"_a, "state"_a, "hysteresis_capacity"_a, "held_torque"_a, "regime"_a, "input"_a, "started"_a);
+}

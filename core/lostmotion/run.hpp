@@ -1,0 +1,141 @@
+// A whole run, recorded: samples, switchings and energy ledger.
+#pragma once
+
+#include <vector>
+
+#include "adaptive_solver.hpp"
+#include "energy.hpp"
+#include "sampler.hpp"
+
+namespace lostmotion {
+
+struct Start {
+    State x{};
+    Memory memory;
+};
+
+struct RunOptions {
+    double duration = 1.0;          // [s]
+    double sample_interval = 1e-3;  // [s]
+    std::size_t samples = 0;        // instants k * sample_interval to record, from k = 0
+    bool energy = true;
+    std::size_t max_switchings = 100000;  // kept; all are counted
+    bool (*interrupted)(void*) = nullptr;
+    void* interrupted_context = nullptr;
+};
+
+struct RunReport {
+    Status status = Status::done;
+    double time = 0.0;  // [s] reached
+    Contact contact = input_contact;  // at the last switching
+    State x{};
+    Memory memory;
+    std::vector<Switching> switchings;
+    std::size_t switching_count = 0;
+    EnergyLedger energy;
+    double left_data_at = 0.0;  // [s], infinity if never
+    long steps = 0;             // looks of the exact solver, steps of the adaptive one
+};
+
+// Observer of the exact solver that samples, keeps switchings and meters energy.
+class Recorder {
+   public:
+    Recorder(const Drive& drive, const RunOptions& options, double* out, RunReport& report)
+        : sampler_(drive, 0.0, options.sample_interval, options.samples, out),
+          meter_(drive),
+          options_(options),
+          report_(report) {
+        sampler_.interrupted = options.interrupted;
+        sampler_.interrupted_context = options.interrupted_context;
+    }
+    void begin(const State& x) { meter_.begin(x); }
+    bool segment(const Segment<SwitchedDrive>& s, const std::vector<InputBasis>& basis) {
+        return sampler_.segment(s, basis) && (!options_.energy || meter_.segment(s, basis));
+    }
+    void switching(const Switching& s) {
+        if (report_.switching_count++ < options_.max_switchings) report_.switchings.push_back(s);
+    }
+    void end(const State& x) {
+        meter_.end(x);
+        report_.energy = meter_.ledger;
+        report_.left_data_at = sampler_.left_data_at;
+    }
+
+   private:
+    Sampler sampler_;
+    EnergyMeter meter_;
+    const RunOptions& options_;
+    RunReport& report_;
+};
+
+// out: n_channels x samples, channel by channel.
+inline RunReport run_exact(const Drive& drive, const Signals& signals, const Start& start, const RunOptions& options,
+                           double* out) {
+    RunReport report;
+    const SwitchedDrive system(drive);
+    ExactSolver<SwitchedDrive> solver(system, signals, options.sample_interval, drive.balanced_scale());
+    solver.interrupted = options.interrupted;
+    solver.interrupted_context = options.interrupted_context;
+    Recorder recorder(drive, options, out, report);
+    report.status = solver.begin(0.0, start.x, start.memory);
+    recorder.begin(start.x);
+    if (report.status == Status::done) report.status = solver.advance(options.duration, recorder);
+    recorder.end(solver.state());
+    report.time = solver.time();
+    report.contact = solver.stopped_at();
+    report.x = solver.state();
+    report.memory = solver.memory();
+    report.steps = solver.looks();
+    return report;
+}
+
+// Observer of the adaptive solver.
+template <class Solver>
+class AdaptiveRecorder {
+   public:
+    AdaptiveRecorder(const Drive& drive, Solver& solver, const RunOptions& options, double* out, RunReport& report)
+        : drive_(drive), solver_(solver), options_(options), out_(out), report_(report) {}
+
+    void step(const Regime& r, const Memory& m, const DenseStep& dense, bool last) {
+        if (!r.in_data) report_.left_data_at = std::fmin(report_.left_data_at, dense.begin);
+        for (; next_ < options_.samples; ++next_) {
+            const double t = static_cast<double>(next_) * options_.sample_interval;
+            if (!(t < dense.end || (last && t <= dense.end * (1.0 + 1e-15)))) return;
+            const Reading reading = read(drive_, r, dense(t), m, solver_.input_at(t));
+            for (int c = 0; c < n_channels; ++c) out_[c * options_.samples + next_] = reading.value[c];
+        }
+    }
+    void switching(const Switching& s) {
+        if (report_.switching_count++ < options_.max_switchings) report_.switchings.push_back(s);
+    }
+
+   private:
+    const Drive& drive_;
+    Solver& solver_;
+    const RunOptions& options_;
+    double* out_;
+    RunReport& report_;
+    std::size_t next_ = 0;
+};
+
+inline RunReport run_adaptive(const Drive& drive, const Signals& signals, const Start& start,
+                              const RunOptions& options, double relative_tolerance, double* out) {
+    RunReport report;
+    report.left_data_at = std::numeric_limits<double>::infinity();
+    const SwitchedDrive system(drive);
+    using Solver = AdaptiveSolver<SwitchedDrive>;
+    Solver solver(system, signals, relative_tolerance, drive.rated_scale());
+    solver.interrupted = options.interrupted;
+    solver.interrupted_context = options.interrupted_context;
+    AdaptiveRecorder<Solver> recorder(drive, solver, options, out, report);
+    report.status = solver.begin(0.0, start.x, start.memory);
+    if (report.status == Status::done) report.status = solver.advance(options.duration, recorder);
+    report.time = solver.time();
+    report.contact = solver.stopped_at();
+    report.x = solver.state();
+    report.memory = solver.memory();
+    report.steps = solver.steps();
+    return report;
+}
+
+}  // namespace lostmotion
