@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "lostmotion/explain.hpp"
+#include "lostmotion/periodic.hpp"
 #include "lostmotion/run.hpp"
 #include "lostmotion/simulation.hpp"
 
@@ -124,6 +125,19 @@ nb::tuple run(const Drive& drive, const Signals& signals, const std::array<doubl
     return nb::make_tuple(as_array(std::move(data), n_channels, samples), switching_table(report),
                           report.switching_count, ledger_dict(report.energy), from_state(report.x),
                           report.memory.hysteresis_capacity, report.left_data_at, report.steps);
+}
+
+nb::tuple follow(const Drive& drive, const Signals& signals, double period, std::size_t samples, int max_periods,
+                 double tolerance) {
+    auto data = std::make_unique<double[]>(n_channels * samples);
+    PeriodicMotion motion;
+    {
+        nb::gil_scoped_release release;
+        motion = follow_to_periodic(drive, signals, {}, period, samples, max_periods, tolerance, data.get(), poll_signals);
+    }
+    check(motion.status, motion.time, motion.contact);
+    return nb::make_tuple(as_array(std::move(data), n_channels, samples), motion.converged, motion.periods,
+                          motion.residual, motion.drift);
 }
 
 nb::list explain_state(const Drive& drive, const Regime& r, const State& x, const Memory& m,
@@ -251,6 +265,12 @@ NB_MODULE(_core, m) {
           },
           "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a, "duration"_a, "interval"_a,
           "samples"_a, "energy"_a, "tolerance"_a, "max_switchings"_a);
+    m.def("follow_to_periodic",
+          [](const Drive& drive, const Signal& command, const Signal& load_torque, double period, std::size_t samples,
+             int max_periods, double tolerance) {
+              return follow(drive, Signals{command, load_torque}, period, samples, max_periods, tolerance);
+          },
+          "drive"_a, "command"_a, "load_torque"_a, "period"_a, "samples"_a, "max_periods"_a, "tolerance"_a);
     m.def("explain_at",
           [](const Drive& drive, const Signal& command, const Signal& load_torque,
              const std::array<double, n_states>& x, double capacity, double time) {

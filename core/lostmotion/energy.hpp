@@ -136,7 +136,7 @@ class EnergyMeter {
             difference += std::fabs(sums[f] - lower);
             size += std::fabs(sums[f]);
         }
-        if (!shortest && difference > 1e-9 * std::fmax(size, mean_power_ * h)) return false;
+        if (!shortest && difference > 1e-10 * std::fmax(size, mean_power_ * h)) return false;
         for (int f = 0; f < n_flows; ++f) ledger.flow[f] += sums[f];
         ledger.turned_over += size;
         elapsed_ += h;

@@ -16,7 +16,7 @@ enum Term : int {
     one,                  // the constant 1
     hysteresis_capacity,  // h [N m], set anew at every turning point of the twist (eq. 16)
     held_torque,          // T_2 [N m] frozen while all contacts stand
-    command,              // E_C [-], or [N m] for a torque source
+    command,              // E_C [-]
     load_torque,          // M_Z [N m]
     n_terms
 };

@@ -18,10 +18,10 @@ struct Motor {
     double armature_voltage_constant = 2.0;  // k_N [-], stall torque / rated torque at rated voltage
     double voltage_limit = std::numeric_limits<double>::infinity();  // of |E_Z| [-]
 
-    // Torque on the rotor [N m]. A torque source follows its command without delay.
+    // Torque on the rotor [N m]. A torque source follows its command, in units of the rated torque, without delay.
     template <class F>
     F torque() const {
-        return kind == dc ? F::unit(motor_torque) : F::unit(command);
+        return kind == dc ? F::unit(motor_torque) : F::unit(command, rated_torque);
     }
 
     // dM_D/dt by eq. (2), with E_Z = E_C, or the limit with the sign of `amplifier` if that is not 0.
@@ -37,7 +37,7 @@ struct Motor {
     bool limits_voltage() const { return kind == dc && voltage_limit < std::numeric_limits<double>::infinity(); }
 
     // Torque [N m] at standstill per unit of command.
-    double stall_torque() const { return kind == dc ? armature_voltage_constant * rated_torque : 1.0; }
+    double stall_torque() const { return kind == dc ? armature_voltage_constant * rated_torque : rated_torque; }
 };
 
 }  // namespace lostmotion

@@ -1,0 +1,78 @@
+"""Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly.
+
+>>> import lostmotion as lm
+>>> scenario = lm.load("scenarios/paper-2dof-nl-large.toml")      # doctest: +SKIP
+>>> result = lm.simulate(scenario)                                # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ._core import SolverError as SolverError
+    from .errors import InputError as InputError
+    from .explain import explain as explain
+    from .parts import ConstantEfficiency as ConstantEfficiency
+    from .parts import Drive as Drive
+    from .parts import Gearbox as Gearbox
+    from .parts import Hysteresis as Hysteresis
+    from .parts import LinearStiffness as LinearStiffness
+    from .parts import Load as Load
+    from .parts import LossMap as LossMap
+    from .parts import Motor as Motor
+    from .parts import Rigid as Rigid
+    from .parts import TorsionCurve as TorsionCurve
+    from .results import energy_of as energy_of
+    from .results import open_result as open_result
+    from .results import save as save
+    from .results import scenario_of as scenario_of
+    from .scenario import Initial as Initial
+    from .scenario import Scenario as Scenario
+    from .scenario import load as load
+    from .signals import CommandSignal as CommandSignal
+    from .signals import TorqueSignal as TorqueSignal
+    from .simulate import simulate as simulate
+    from .stepping import Simulation as Simulation
+    from .variables import VARIABLES as VARIABLES
+
+# Where each public name lives; it is imported when first used, so that `import lostmotion` stays quick.
+_HOMES = {
+    "_core": ("SolverError",),
+    "errors": ("InputError",),
+    "explain": ("explain",),
+    "parts": (
+        "ConstantEfficiency",
+        "Drive",
+        "Gearbox",
+        "Hysteresis",
+        "LinearStiffness",
+        "Load",
+        "LossMap",
+        "Motor",
+        "Rigid",
+        "TorsionCurve",
+    ),
+    "results": ("energy_of", "open_result", "save", "scenario_of"),
+    "scenario": ("Initial", "Scenario", "load"),
+    "signals": ("CommandSignal", "TorqueSignal"),
+    "simulate": ("simulate",),
+    "stepping": ("Simulation",),
+    "variables": ("VARIABLES",),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = sorted(_HOME_OF)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'lostmotion' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f".{_HOME_OF[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,297 @@
+"""Result datasets, and their files: NetCDF, CSV, Parquet. Each carries its scenario and can be run again."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import InputError
+from .scenario import Scenario
+from .variables import CHANNELS, CONTACTS, STATES, VARIABLES
+
+if TYPE_CHECKING:
+    import xarray
+
+# What ended a regime, in the order of Guard::Kind (core/lostmotion/regime.hpp); last: an input jumped.
+CAUSES = ("came to rest", "broke away", "torsion piece", "loss cell", "loss cell", "voltage limit", "", "input changed")
+
+FORMATS = {".nc": "NetCDF", ".csv": "CSV", ".parquet": "Parquet"}
+
+
+def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) -> xarray.Dataset:
+    """Label what the solver returned."""
+    import xarray as xr
+
+    table, switchings, count, energy, state, capacity, left_data_at, steps = result
+    data = dict(zip((v.name for v in CHANNELS), table, strict=True))
+    data["efficiency"] = gear_efficiency(data, scenario)
+    data["motor_power"] = data["motor_torque"] * data["motor_speed"]
+    time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
+    variables: dict[str, Any] = {
+        v.name: (("time",), data[v.name], {"units": v.unit, "long_name": v.meaning, "symbol": v.symbol}) for v in VARIABLES
+    }
+    variables |= _switching_variables(switchings)
+    attributes = {
+        "title": scenario.title,
+        "scenario": scenario.to_json(),
+        "solver": solver,
+        "lostmotion_version": version("lostmotion"),
+        "switching_count": int(count),
+        "end_state": json.dumps(dict(zip(STATES, state, strict=True)) | {"hysteresis_capacity": capacity}),
+        "steps": int(steps),
+    }
+    if ledger:
+        attributes["energy"] = json.dumps(energy)
+    if np.isfinite(left_data_at):
+        attributes["warning"] = (
+            f"from t = {left_data_at:.6g} s on the loss map is used outside its data; there it continues with the slope "
+            "of its edge. Extend gearbox.losses."
+        )
+    if scenario.gearbox.note:
+        attributes["note"] = scenario.gearbox.note
+    return xr.Dataset(variables, coords={"time": ("time", time, {"units": "s", "long_name": "time"})}, attrs=attributes)
+
+
+def gear_efficiency(data: dict[str, Any], scenario: Scenario) -> Any:
+    """Useful torque / torque fed in [-], by the direction of the load; NaN where the input shaft stands still.
+
+    Driving (T_2 has the sign of w_M) it is T_2/(i T_1), overrunning i T_1/T_2; 0 where both sides feed the losses.
+    """
+    driving = data["output_torque"] * np.sign(data["motor_speed"])
+    fed_in = scenario.gearbox.ratio * data["input_torque"] * np.sign(data["motor_speed"])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        eta = np.where(driving >= 0.0, driving / fed_in, np.where(fed_in < 0.0, fed_in / driving, 0.0))
+    return np.where(data["motor_speed"] == 0.0, np.nan, eta)
+
+
+def _switching_variables(table: Any) -> dict[str, Any]:
+    columns = table.T if len(table) else np.zeros((11, 0))
+    dim = ("switching",)
+    kind = columns[1].astype(int)
+    out: dict[str, Any] = {
+        "switching_time": (dim, columns[0].copy(), {"units": "s", "long_name": "instant of switching"}),
+        "switching_cause": (
+            dim,
+            kind.astype(np.int8),
+            {"long_name": "what ended the regime", "flag_values": list(range(-1, 6)), "flag_meanings": _flags()},
+        ),
+    }
+    for c, name in enumerate(CONTACTS):
+        meaning = name.replace("_", " ")
+        # 2 stands for a contact that the drive does not have.
+        for when, first in (("before", 3), ("after", 6)):
+            out[f"switching_{name}_{when}"] = (
+                dim,
+                columns[first + c].astype(np.int8),
+                {"long_name": f"{meaning} {when} the switching; 2: there is none"},
+            )
+    for when, column in (("before", 9), ("after", 10)):
+        out[f"switching_output_torque_{when}"] = (
+            dim,
+            columns[column].copy(),
+            {"units": "N*m", "long_name": f"output torque, {'left' if when == 'before' else 'right'} limit"},
+        )
+    return out
+
+
+def _flags() -> str:
+    return " ".join(CAUSES[k].replace(" ", "_") for k in range(-1, 6))
+
+
+def scenario_of(dataset: xarray.Dataset) -> Scenario:
+    """The scenario that a result came from."""
+    return Scenario.from_json(dataset.attrs["scenario"])
+
+
+def energy_of(dataset: xarray.Dataset) -> dict[str, float]:
+    """Energy ledger of a run [J].
+
+    `source` is what the motor gave to the shaft; `input_damper`, `motor_friction`, `gear_losses`, `hysteresis`,
+    `load_damper` and `load_friction` is what became heat; `load_work` what went into the disturbance torque;
+    `kinetic_change` and `elastic_change` what is stored; `residual` what the balance fails by, `turned_over` the sum
+    of the magnitudes of all flows.
+    """
+    if "energy" not in dataset.attrs:
+        raise ValueError("this result has no energy ledger; simulate with the exact solver and energy=True")
+    ledger: dict[str, float] = json.loads(dataset.attrs["energy"])
+    return ledger
+
+
+# --- files -------------------------------------------------------------------------------------------------
+
+
+def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+    """Write a file under another name and move it into place, so that no half-written file bears the final name.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written there; nothing is left behind.
+    """
+    temporary: Path | None = None
+    try:
+        if path.is_dir():
+            raise InputError(f"{path}: is a directory; name a file")
+        if path.exists() and not path.is_file():  # a device takes no move
+            write(path)
+            return
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
+        os.close(handle)
+        temporary = Path(name)
+        write(temporary)
+        mode = 0o666 & ~_umask()
+        temporary.chmod(mode)
+        temporary.replace(path)
+    except FileNotFoundError:
+        raise InputError(f"{path}: its directory does not exist; make it first") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def check_output(path: str | Path) -> Path:
+    """The path, if a result can be written there by its ending and its directory.
+
+    Raises
+    ------
+    InputError
+    """
+    path = Path(path)
+    if path.suffix not in FORMATS:
+        endings = ", ".join(f"{ending} ({name})" for ending, name in FORMATS.items())
+        raise InputError(f"{path}: the ending {path.suffix or '(none)'} is not known; it must be one of {endings}")
+    if path.is_dir():
+        raise InputError(f"{path}: is a directory; name a file")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: its directory does not exist; make it first")
+    return path
+
+
+def save(dataset: xarray.Dataset, path: str | Path) -> None:
+    """Write a result as ``.nc``, ``.csv`` or ``.parquet``; `open_result` reads each back unchanged.
+
+    Raises
+    ------
+    InputError
+        Unknown ending, or the file cannot be written; nothing half-written remains.
+    """
+    path = check_output(path)
+    writers = {".nc": _write_netcdf, ".csv": _write_csv, ".parquet": _write_parquet}
+    write_whole(path, lambda target: writers[path.suffix](dataset, target))
+
+
+def open_result(path: str | Path) -> xarray.Dataset:
+    """Read a result that `save` wrote.
+
+    Raises
+    ------
+    InputError
+        The file is not such a result.
+    """
+    path = Path(path)
+    readers = {".nc": _read_netcdf, ".csv": _read_csv, ".parquet": _read_parquet}
+    if path.suffix not in readers:
+        raise InputError(f"{path}: the ending {path.suffix or '(none)'} is not known; it must be one of {', '.join(readers)}")
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; check the name")
+    try:
+        return readers[path.suffix](path)
+    except InputError:
+        raise
+    except Exception as error:  # whatever the format's library makes of a damaged file
+        raise InputError(f"{path}: cannot be read as a result ({type(error).__name__}: {str(error).splitlines()[0]})") from None
+
+
+def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
+    dataset.to_netcdf(path, engine="h5netcdf")
+
+
+def _read_netcdf(path: Path) -> xarray.Dataset:
+    import xarray as xr
+
+    with xr.open_dataset(path, engine="h5netcdf") as opened:
+        return opened.load()
+
+
+def _header(dataset: xarray.Dataset) -> str:
+    """All but the samples, as JSON: attributes, and the switchings with theirs."""
+    switchings = {
+        str(name): {"values": v.values.tolist(), "type": str(v.dtype), "attributes": v.attrs}
+        for name, v in dataset.variables.items()
+        if v.dims == ("switching",)
+    }
+    return json.dumps({"attributes": dataset.attrs, "switchings": switchings})
+
+
+def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Dataset:
+    import xarray as xr
+
+    known = {v.name: v for v in VARIABLES}
+    try:
+        meta = json.loads(header)
+        time = columns.pop("time")
+    except (json.JSONDecodeError, KeyError):
+        raise InputError(f"{path}: is no result of lostmotion; its header or its time column is missing") from None
+    variables: dict[str, Any] = {
+        name: (("time",), values, {"units": known[name].unit, "long_name": known[name].meaning, "symbol": known[name].symbol})
+        for name, values in columns.items()
+    }
+    for name, s in meta["switchings"].items():
+        variables[name] = (("switching",), np.asarray(s["values"], dtype=s["type"]), s["attributes"])
+    return xr.Dataset(variables, coords={"time": ("time", time, {"units": "s", "long_name": "time"})}, attrs=meta["attributes"])
+
+
+def _columns(dataset: xarray.Dataset) -> dict[str, Any]:
+    return {"time": dataset["time"].values} | {v.name: dataset[v.name].values for v in VARIABLES if v.name in dataset}
+
+
+def _write_csv(dataset: xarray.Dataset, path: Path) -> None:
+    columns = _columns(dataset)
+    units = {v.name: v.unit for v in VARIABLES} | {"time": "s"}
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(f"# lostmotion {_header(dataset)}\n")
+        file.write(",".join(f"{name} [{units[name]}]" for name in columns) + "\n")
+        for row in zip(*(c.tolist() for c in columns.values()), strict=True):
+            file.write(",".join(map(repr, row)) + "\n")
+
+
+def _read_csv(path: Path) -> xarray.Dataset:
+    with path.open(encoding="utf-8") as file:
+        first = file.readline()
+        names = [cell.split(" [")[0] for cell in file.readline().strip().split(",")]
+        if not first.startswith("# lostmotion "):
+            raise InputError(f"{path}: is no result of lostmotion; its first line does not say so")
+        table = np.loadtxt(file, delimiter=",", ndmin=2)
+    return _assemble(first.removeprefix("# lostmotion "), dict(zip(names, table.T.copy(), strict=True)), path)
+
+
+def _write_parquet(dataset: xarray.Dataset, path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.table(_columns(dataset)).replace_schema_metadata({"lostmotion": _header(dataset)})
+    with path.open("wb") as file:
+        pq.write_table(table, file)
+
+
+def _read_parquet(path: Path) -> xarray.Dataset:
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(path)
+    header = (table.schema.metadata or {}).get(b"lostmotion", b"")
+    return _assemble(header.decode(), {name: table[name].to_numpy() for name in table.column_names}, path)

@@ -1,0 +1,279 @@
+"""Scenario files: TOML in the words of the parts, with units, checked before anything runs."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from .errors import InputError
+from .parts import Drive, Gearbox, Load, Motor, Rigid
+from .quantities import Angle, NotNegative, Part, Positive, Speed, Time, Torque
+from .signals import CommandSignal, TorqueSignal
+
+MAX_SAMPLES = 100_000_000
+
+
+class LoadTable(Load):
+    """The driven body and the disturbance torque on it."""
+
+    torque: TorqueSignal = TorqueSignal()
+    """M_Z"""
+
+
+class Initial(Part):
+    """State at t = 0."""
+
+    motor_torque: Torque = 0.0
+    motor_speed: Speed = 0.0
+    load_speed: Speed = 0.0
+    twist: Angle = 0.0
+    load_angle: Angle = 0.0
+    hysteresis_capacity: Annotated[Torque, NotNegative] = 0.0
+    """h, which the last turning point before t = 0 left behind"""
+
+
+class SimulationTable(Part):
+    """How long, and at which instants the result is wanted. Neither affects the motion."""
+
+    duration: Annotated[Time, Positive]
+    sample_interval: Annotated[Time, Positive]
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> Self:
+        if self.sample_interval > self.duration:
+            raise ValueError(f"has a sample_interval of {self.sample_interval} s, longer than its duration")
+        if self.duration / self.sample_interval > MAX_SAMPLES:
+            raise ValueError(f"asks for more than {MAX_SAMPLES:.0e} samples; lengthen sample_interval")
+        return self
+
+    @property
+    def samples(self) -> int:
+        """Number of instants 0, sample_interval, ... up to the duration."""
+        return int(self.duration / self.sample_interval * (1.0 + 1e-12)) + 1
+
+
+class Scenario(Part):
+    """A drive, what acts on it, and what is wanted of it."""
+
+    title: str = ""
+    command: CommandSignal = CommandSignal()
+    """E_C: 1 is rated voltage, or with a torque source rated torque"""
+    motor: Motor
+    gearbox: Gearbox
+    load: LoadTable
+    initial: Initial = Initial()
+    simulation: SimulationTable
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        drive = self.drive()
+        start = self.initial
+        if isinstance(drive.gearbox.stiffness, Rigid):
+            if start.twist != 0.0:
+                raise ValueError(f"has initial.twist = {start.twist} rad, but the gearbox is rigid; leave it out")
+            if abs(start.motor_speed / drive.gearbox.ratio - start.load_speed) > 1e-12 * abs(start.load_speed):
+                raise ValueError(
+                    f"has initial.motor_speed = {start.motor_speed} rad/s and initial.load_speed = {start.load_speed} "
+                    "rad/s, but the gearbox is rigid; their quotient must be its ratio"
+                )
+        if drive.motor.kind == "torque_source" and start.motor_torque != 0.0:
+            raise ValueError("has initial.motor_torque, but a torque source has no such state; use command")
+        return self
+
+    def drive(self) -> Drive:
+        """The drive without its surroundings."""
+        load = Load(**{name: getattr(self.load, name) for name in Load.model_fields})
+        return Drive(motor=self.motor, gearbox=self.gearbox, load=load)
+
+    def replace(self, **changes: Any) -> Scenario:
+        """The same scenario with changes by dotted key, such as ``**{"command.amplitude": 0.1}``, checked anew."""
+        data = self.model_dump()
+        for key, value in changes.items():
+            _set(data, key, value)
+        return Scenario(**data)
+
+    def to_json(self) -> str:
+        """All values in SI, as JSON that `from_json` reads."""
+        return self.model_dump_json(exclude_defaults=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> Scenario:
+        return cls(**json.loads(text))
+
+
+def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
+    """Read a scenario file.
+
+    Parameters
+    ----------
+    path
+        TOML file. Its key `base` may name another scenario file (relative to it) that this one changes.
+    overrides
+        ``{"command.amplitude": 0.1}`` or ``["command.amplitude=0.1"]``, as by ``--set``.
+
+    Raises
+    ------
+    InputError
+        With one line that names the file, the key, the value and the remedy.
+    """
+    path = Path(path)
+    data = _read(path, ())
+    items = overrides.items() if isinstance(overrides, Mapping) else [_parse_override(text) for text in overrides]
+    for key, value in items:
+        try:
+            _set(data, key, value)
+        except KeyError as error:
+            raise InputError(f"--set {key}: {error.args[0]}") from None
+    try:
+        return Scenario(**data)
+    except ValidationError as error:
+        raise InputError(f"{path}: {describe(error)}") from None
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of scenario files, for editors."""
+    schema = Scenario.model_json_schema()
+    schema["properties"]["base"] = {"type": "string", "description": "scenario file that this one changes"}
+    schema["required"] = []  # with a base, none
+    return schema
+
+
+def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
+    if path.resolve() in including:
+        raise InputError(f"{path}: key base: leads back to this file; break the circle")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a directory; name a scenario file (.toml)") from None
+    except FileNotFoundError:
+        near = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.toml")], n=1)
+        hint = f"; did you mean {path.parent / near[0]}?" if near else "; check the name"
+        raise InputError(f"{path}: there is no such file{hint}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); a scenario is a TOML file") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: is not valid TOML: {error}") from None
+    if "base" not in data:
+        return data
+    base = data.pop("base")
+    if not isinstance(base, str):
+        raise InputError(f"{path}: key base: {base!r} must be the name of a scenario file")
+    return _merge(_read(path.parent / base, (*including, path.resolve())), data)
+
+
+def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Tables are merged; one of another `kind` takes the place of the old one."""
+    merged = dict(base)
+    for key, value in changes.items():
+        old = base.get(key)
+        if isinstance(value, dict) and isinstance(old, dict) and value.get("kind", old.get("kind")) == old.get("kind"):
+            merged[key] = _merge(old, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def _parse_override(text: str) -> tuple[str, Any]:
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise InputError(f"--set {text}: must be KEY=VALUE, such as --set command.amplitude=0.1")
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value.strip()
+
+
+def _set(data: dict[str, Any], key: str, value: Any) -> None:
+    *tables, name = key.split(".")
+    for table in tables:
+        inner = data.setdefault(table, {})
+        if table == "torque" and not isinstance(inner, dict):
+            inner = data[table] = {"mean": inner}
+        if inner is None:
+            inner = data[table] = {}
+        if not isinstance(inner, dict):
+            raise KeyError(f"{table} is the value {inner!r}, not a table; it has no {name}")
+        data = inner
+    data[name] = value
+
+
+def describe(error: ValidationError) -> str:
+    """One line for a failed validation: the key, the value and what would be right."""
+    problems = error.errors()
+    first = problems[0]
+    # Names of classes that the choice between kinds puts into the location are not keys of the file.
+    kinds = {"curve", "linear", "rigid", "constant_efficiency", "map"}
+    location = list(first["loc"])
+    keys = [k for n, k in enumerate(location) if not (k in kinds and n > 0 and location[n - 1] in ("stiffness", "losses"))]
+    name = _dotted(keys)
+    text = _explain(first, keys)
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return (f"key {name}: {text}" if name else f"the scenario {text}") + more
+
+
+def _dotted(keys: list[int | str]) -> str:
+    text = ""
+    for k in keys:
+        text += f"[{k}]" if isinstance(k, int) else f".{k}" if text else str(k)
+    return text
+
+
+def _explain(problem: Any, keys: list[int | str]) -> str:
+    kind, value, context = problem["type"], problem["input"], problem.get("ctx", {})
+    shown = repr(value) if len(repr(value)) < 60 else repr(value)[:57] + "..."
+    if kind == "missing":
+        return "is missing; add it"
+    if kind == "extra_forbidden":
+        known = _known_keys(keys[:-1])
+        near = difflib.get_close_matches(str(keys[-1]), known, n=1)
+        return f"is not known; did you mean {near[0]}?" if near else f"is not known; known here: {', '.join(known)}"
+    if kind == "value_error":
+        text = str(context["error"])
+        return text if isinstance(value, dict) or not isinstance(value, str | float | int) else f"{shown} {text}"
+    if kind == "union_tag_invalid":
+        return f"kind {context['tag']!r} is not known; it must be one of {context['expected_tags']}"
+    if kind == "union_tag_not_found":
+        return "lacks kind, which says what it is"
+    if kind == "finite_number":
+        return f"{shown} must be a finite number"
+    message = problem["msg"]
+    return f"{shown}: {message[0].lower()}{message[1:].replace('Input should', 'must')}".replace("input should", "must")
+
+
+def _known_keys(keys: list[int | str]) -> list[str]:
+    """Field names of the table at this place of the schema."""
+    schema = json_schema()
+    node: Any = schema
+    for key in keys:
+        node = _resolve(node, schema)
+        if isinstance(key, int):
+            node = node.get("items", {})
+        else:
+            node = node.get("properties", {}).get(key, {})
+    return sorted(_resolve(node, schema).get("properties", {}))
+
+
+def _resolve(node: Any, schema: dict[str, Any]) -> dict[str, Any]:
+    """Follows references and merges the properties of alternatives."""
+    if "$ref" in node:
+        return _resolve(schema["$defs"][node["$ref"].rsplit("/", 1)[1]], schema)
+    options = node.get("anyOf", []) + node.get("oneOf", []) + node.get("allOf", [])
+    if not options:
+        return dict(node)
+    properties: dict[str, Any] = {}
+    items: Any = {}
+    for option in options:
+        resolved = _resolve(option, schema)
+        properties |= resolved.get("properties", {})
+        items = resolved.get("items", items)
+    return {"properties": properties, "items": items}

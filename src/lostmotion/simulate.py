@@ -1,0 +1,145 @@
+"""Runs: from a scenario, or a drive and what acts on it, to a labelled dataset."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+from . import _core
+from .parts import Drive
+from .results import make_dataset
+from .scenario import Initial, LoadTable, Scenario, SimulationTable
+from .signals import CommandSignal, TorqueSignal
+
+if TYPE_CHECKING:
+    import xarray
+
+SolverName = Literal["exact", "dormand-prince"]
+
+MAX_SWITCHINGS = 100_000  # kept with a result; beyond it they are only counted
+
+
+def simulate(
+    scenario_or_drive: Scenario | Drive,
+    *,
+    command: CommandSignal | float | None = None,
+    load_torque: TorqueSignal | float | None = None,
+    duration: float | None = None,
+    sample_interval: float | None = None,
+    initial: Initial | None = None,
+    solver: SolverName = "exact",
+    relative_tolerance: float = 1e-8,
+    energy: bool = True,
+) -> xarray.Dataset:
+    """Simulate a drive.
+
+    Parameters
+    ----------
+    scenario_or_drive
+        A scenario, whose values the other arguments replace, or a drive alone.
+    command
+        E_C [-]; default 0 for a drive alone.
+    load_torque
+        M_Z [N·m]; default 0 for a drive alone.
+    duration, sample_interval
+        [s]; needed for a drive alone. They say at which instants the result is wanted and do not affect the motion.
+    initial
+        State at t = 0; default rest.
+    solver
+        ``"exact"``, or ``"dormand-prince"`` for the adaptive second opinion, which keeps no energy ledger.
+    relative_tolerance
+        Of the adaptive solver.
+    energy
+        Whether to keep the energy ledger (it takes about as long as the motion).
+
+    Returns
+    -------
+    xarray.Dataset
+        The variables of `lostmotion.VARIABLES` over the coordinate ``time`` [s], the switching instants, and in the
+        attributes the energy ledger, the end state and the scenario.
+
+    Raises
+    ------
+    InputError, pydantic.ValidationError
+        The scenario cannot be used.
+    SolverError
+        The motion has no continuation (jamming, accumulating switchings); the message names time and contact.
+    KeyboardInterrupt
+        Ctrl-C ends the run at once.
+    """
+    scenario = as_scenario(
+        scenario_or_drive,
+        command=command,
+        load_torque=load_torque,
+        duration=duration,
+        sample_interval=sample_interval,
+        initial=initial,
+    )
+    if solver not in ("exact", "dormand-prince"):
+        raise ValueError(f'solver {solver!r} is not known; it must be "exact" or "dormand-prince"')
+    if relative_tolerance <= 0.0:
+        raise ValueError(f"relative_tolerance {relative_tolerance} must be greater than 0")
+    table = scenario.simulation
+    exact = solver == "exact"
+    result = _core.run(
+        scenario.drive().core(),
+        scenario.command.core(),
+        scenario.load.torque.core(),
+        start_state(scenario.initial),
+        scenario.initial.hysteresis_capacity,
+        table.duration,
+        table.sample_interval,
+        table.samples,
+        energy and exact,
+        0.0 if exact else relative_tolerance,
+        MAX_SWITCHINGS,
+    )
+    how = "exact" if exact else f"dormand-prince, relative tolerance {relative_tolerance:g}"
+    return make_dataset(scenario, result, how, ledger=energy and exact)
+
+
+def as_scenario(
+    scenario_or_drive: Scenario | Drive,
+    *,
+    command: CommandSignal | float | None = None,
+    load_torque: TorqueSignal | float | None = None,
+    duration: float | None = None,
+    sample_interval: float | None = None,
+    initial: Initial | None = None,
+) -> Scenario:
+    """A scenario with the given changes, or a drive with its surroundings."""
+    changes: dict[str, Any] = {}
+    if isinstance(scenario_or_drive, Drive):
+        drive = scenario_or_drive
+        if duration is None or sample_interval is None:
+            raise ValueError("a drive alone needs duration and sample_interval [s]")
+        changes = {"motor": drive.motor, "gearbox": drive.gearbox, "load": LoadTable(**drive.load.model_dump())}
+    elif not isinstance(scenario_or_drive, Scenario):
+        raise TypeError(f"simulate takes a Scenario or a Drive, not {type(scenario_or_drive).__name__}")
+    elif all(v is None for v in (command, load_torque, duration, sample_interval, initial)):
+        return scenario_or_drive
+    else:
+        s = scenario_or_drive
+        changes = {name: getattr(s, name) for name in Scenario.model_fields}
+        duration = s.simulation.duration if duration is None else duration
+        sample_interval = s.simulation.sample_interval if sample_interval is None else sample_interval
+    changes["simulation"] = SimulationTable(duration=duration, sample_interval=sample_interval)
+    if command is not None:
+        changes["command"] = _signal(command, CommandSignal)
+    if load_torque is not None:
+        load = changes["load"]
+        torque = _signal(load_torque, TorqueSignal)
+        changes["load"] = LoadTable(**{**{n: getattr(load, n) for n in LoadTable.model_fields}, "torque": torque})
+    if initial is not None:
+        changes["initial"] = initial
+    return Scenario(**changes)
+
+
+def start_state(initial: Initial) -> list[float]:
+    """The solver's state vector."""
+    from .variables import STATES
+
+    return [getattr(initial, name) for name in STATES]
+
+
+def _signal(value: Any, kind: Any) -> Any:
+    return kind(mean=value) if isinstance(value, int | float) else value
