@@ -172,7 +172,9 @@ inline Drive::Equations Drive::compose(const RegimeKey& key, const Regime& r) co
     // Eq. (3); F_input holds T_10 sign(w_M) and, with a loss map, the loss part of T_1.
     const Open transmitted = gearbox.losses == Gearbox::loss_map ? e.T_2 / i : e.T_1;
     const Open w_M = r.at_rest[input_contact] ? Open{} : Open::unit(motor_speed);
-    const Open w = r.at_rest[load_contact] ? Open{} : Open::unit(load_speed);
+    const Open w = r.at_rest[load_contact]    ? Open{}
+                   : r.at_rest[twist_contact] ? Open::unit(motor_speed, 1.0 / i)
+                                              : Open::unit(load_speed);
     e.input_acceleration =
         (e.M_D - gearbox.viscous_friction * w_M - e.F_input - transmitted) / input_inertia();
     e.load_acceleration =

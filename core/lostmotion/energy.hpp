@@ -70,7 +70,7 @@ class EnergyMeter {
             t = whole ? t + length : s.end;
             std::swap(cursor, end);
             std::swap(here, there);
-            if (level + 1 < Propagator::max_levels && 2.0 * p.level(level).length <= s.end - t) ++level;
+            if (p.can_double(level, s.end - t)) ++level;
         }
         level_ = level;
         return true;

@@ -335,7 +335,7 @@ class ExactSolver {
                 break;
             }
             std::swap(cursor, end);
-            if (level + 1 < Propagator::max_levels && 2.0 * p.level(level).length <= limit - time_) ++level;
+            if (p.can_double(level, limit - time_)) ++level;
         }
         now_.x = cursor.x();
         last_level_ = level;

@@ -5,8 +5,9 @@
 // where x' is the rate at the anchor and y_q is the response from rest to the q-th function by which the inputs
 // depart from their anchor values (a ramp, cos - 1, sin). G and y_q come from their Taylor series over a short base
 // interval and are doubled as often as needed:
-//     G(2h) = G(h) + exp(A h) G(h),   exp(A h) = 1 + A G(h),
-// so nothing is ever subtracted from nearly itself, and a state at rest stays at rest to the last bit.
+//     E(2h) = 2 E(h) + E(h) E(h),   G(2h) = 2 G(h) + E(h) G(h),   E = exp(A h) - 1.
+// It is E that is doubled, not the exponential: so slow motions keep their relative accuracy beside fast ones, and a
+// state at rest stays at rest to the last bit.
 #pragma once
 
 #include <memory>
@@ -41,7 +42,7 @@ inline void add_scaled(State& y, double a, const State& x) {
 // Everything needed to step by one length in one regime.
 struct Step {
     double length = 0.0;  // [s]
-    Matrix transition;    // exp(A h)
+    Matrix change;        // E(h) = exp(A h) - 1
     Matrix integral;      // G(h)
     Matrix growth;        // bound on |exp(A s)|, element by element, for 0 <= s <= h
 };
@@ -66,7 +67,9 @@ class Propagator {
             for (int c = 0; c < n_states; ++c) sum += std::fabs(rate_.column[c][r]) * scale[c] / scale[r];
             norm_ = std::fmax(norm_, sum);
         }
-        for (const InputBasis& b : basis) norm_ = std::fmax(norm_, b.omega);
+        fastest_input_ = 0.0;
+        for (const InputBasis& b : basis) fastest_input_ = std::fmax(fastest_input_, b.omega);
+        norm_ = std::fmax(norm_, fastest_input_);
         double h = unit;
         while (norm_ * h > base_norm) h *= 0.5;
         steps_.clear();
@@ -102,8 +105,14 @@ class Propagator {
     // The highest level not longer than s (level 0 even if it is longer).
     int level_below(double s) {
         int k = 0;
-        while (k + 1 < max_levels && 2.0 * steps_[k].length <= s) level(++k);
+        while (can_double(k, s)) level(++k);
         return k;
+    }
+    // Whether twice the level is a step within s. Steps stay below a sixth of the fastest input period: the doubling
+    // formula of a sine loses accuracy beyond it.
+    bool can_double(int k, double s) const {
+        const double next = 2.0 * steps_[k].length;
+        return k + 1 < max_levels && next <= s && next * fastest_input_ <= 1.0;
     }
 
     // x after the step of level k; `rate` is x' at the anchor, `weights` the input state there.
@@ -161,7 +170,7 @@ class Propagator {
                 add_scaled(s.growth.column[c], 1.0, bound.column[c]);
             }
         }
-        finish(s);
+        s.change = rate_ * s.integral;
         for (int q = 0; q < n_basis_; ++q) {
             const InputBasis& b = (*basis_)[q];
             // y' = A y + b r(s), r = s, cos(omega s) - 1 or sin(omega s), by the series of r.
@@ -184,26 +193,25 @@ class Propagator {
         add_rotations(h);
     }
 
-    void finish(Step& s) const {
-        s.transition = rate_ * s.integral;
-        for (int c = 0; c < n_states; ++c) s.transition.column[c][c] += 1.0;
-    }
-
     void add_doubled() {
         const int k = static_cast<int>(steps_.size()) - 1;
         steps_.emplace_back();
         const Step& a = steps_[k];
         Step& b = steps_[k + 1];
         b.length = 2.0 * a.length;
-        b.integral = a.transition * a.integral;
-        for (int c = 0; c < n_states; ++c) add_scaled(b.integral.column[c], 1.0, a.integral.column[c]);
-        finish(b);
+        b.change = a.change * a.change;
+        b.integral = a.change * a.integral;
+        for (int c = 0; c < n_states; ++c) {
+            add_scaled(b.change.column[c], 2.0, a.change.column[c]);
+            add_scaled(b.integral.column[c], 2.0, a.integral.column[c]);
+        }
         b.growth = a.growth * a.growth;
         responses_.resize(responses_.size() + n_basis_);
         const State* from = responses(k);
         for (int q = 0; q < n_basis_; ++q) {
             const InputBasis& basis = (*basis_)[q];
-            State y = a.transition * from[q];
+            State y = a.change * from[q];
+            add_scaled(y, 1.0, from[q]);
             const State constant = a.integral * input_column_[basis.input];
             if (basis.kind == InputBasis::ramp) {
                 add_scaled(y, 1.0, from[q]);
@@ -235,6 +243,7 @@ class Propagator {
     Matrix rate_;
     std::array<State, n_inputs> input_column_{};
     double norm_ = 0.0;  // of A in scaled units, or the highest input frequency [1/s]
+    double fastest_input_ = 0.0;  // [rad/s]
     int n_basis_ = 0;
     const std::vector<InputBasis>* basis_ = nullptr;
     std::vector<Step> steps_;        // one a level
