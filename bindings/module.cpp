@@ -44,8 +44,9 @@ void check(Status status, double time, Contact contact) {
             throw SolverError("no combination of sticking and slipping contacts is consistent " + at +
                               ": the friction jams. Give the gearbox a compliance, or lower its losses.");
         case Status::outside:
-            throw SolverError("the state left the range that the loss map can be extended to " + at +
-                              " (1000 times its data). The drive is unstable, or its data or inputs have a wrong unit.");
+            throw SolverError(
+                "the state left the range that the loss map can be extended to " + at +
+                " (1000 times its data). The drive is unstable, or its data or inputs have a wrong unit.");
         case Status::zeno:
             throw SolverError("switching instants of the contact '" + std::string(contact_name(contact)) +
                               "' accumulate " + at + ": infinitely many in finite time. The model ends here.");
@@ -93,8 +94,8 @@ nb::ndarray<nb::numpy, double, nb::ndim<2>> switching_table(const RunReport& rep
 
 nb::dict ledger_dict(const EnergyLedger& e) {
     nb::dict d;
-    const char* names[n_flows] = {"source",      "input_damper", "motor_friction", "gear_losses",
-                                  "hysteresis",  "load_damper",  "load_friction",  "load_work"};
+    const char* names[n_flows] = {"source",     "input_damper", "motor_friction", "gear_losses",
+                                  "hysteresis", "load_damper",  "load_friction",  "load_work"};
     for (int k = 0; k < n_flows; ++k) d[names[k]] = e.flow[k];
     d["kinetic_change"] = e.kinetic_end - e.kinetic_begin;
     d["elastic_change"] = e.elastic_end - e.elastic_begin;
@@ -133,7 +134,8 @@ nb::tuple follow(const Drive& drive, const Signals& signals, double period, std:
     PeriodicMotion motion;
     {
         nb::gil_scoped_release release;
-        motion = follow_to_periodic(drive, signals, {}, period, samples, max_periods, tolerance, data.get(), poll_signals);
+        motion =
+            follow_to_periodic(drive, signals, {}, period, samples, max_periods, tolerance, data.get(), poll_signals);
     }
     check(motion.status, motion.time, motion.contact);
     return nb::make_tuple(as_array(std::move(data), n_channels, samples), motion.converged, motion.periods,
@@ -153,8 +155,8 @@ nb::list explain_state(const Drive& drive, const Regime& r, const State& x, cons
 }
 
 // Runs to an instant and reports on it: readings, contacts, output torque.
-nb::tuple explain_at(const Drive& drive, const Signals& signals, const std::array<double, n_states>& x,
-                     double capacity, double time) {
+nb::tuple explain_at(const Drive& drive, const Signals& signals, const std::array<double, n_states>& x, double capacity,
+                     double time) {
     const SwitchedDrive system(drive);
     ExactSolver<SwitchedDrive> solver(system, signals, 1e-3, drive.balanced_scale());
     solver.interrupted = poll_signals;
@@ -225,58 +227,82 @@ NB_MODULE(_core, m) {
         .def_rw("efficiency", &Gearbox::efficiency)
         .def_rw("rated_input_speed", &Gearbox::rated_input_speed)
         .def_rw("rated_output_torque", &Gearbox::rated_output_torque)
-        .def("set_torsion_curve",
-             [](Gearbox& g, const TorsionCurve& c) {
-                 g.compliance = Gearbox::torsion_curve;
-                 g.curve = c;
-             }, "curve"_a)
-        .def("set_loss_map",
-             [](Gearbox& g, const LossMap& map) {
-                 g.losses = Gearbox::loss_map;
-                 g.map = map;
-             }, "loss_map"_a);
+        .def(
+            "set_torsion_curve",
+            [](Gearbox& g, const TorsionCurve& c) {
+                g.compliance = Gearbox::torsion_curve;
+                g.curve = c;
+            },
+            "curve"_a)
+        .def(
+            "set_loss_map",
+            [](Gearbox& g, const LossMap& map) {
+                g.losses = Gearbox::loss_map;
+                g.map = map;
+            },
+            "loss_map"_a);
     nb::class_<Drive>(m, "Drive")
-        .def("__init__",
-             [](Drive* self, const Motor& motor, const Gearbox& gearbox, const Load& load) {
-                 new (self) Drive{motor, gearbox, load};
-             }, "motor"_a, "gearbox"_a, "load"_a)
+        .def(
+            "__init__",
+            [](Drive* self, const Motor& motor, const Gearbox& gearbox, const Load& load) {
+                new (self) Drive{motor, gearbox, load};
+            },
+            "motor"_a, "gearbox"_a, "load"_a)
         .def("smallest_rigid_inertia", &Drive::smallest_rigid_inertia)
-        .def("smallest_command",
-             [](const Drive& d, double T_2, double M_Z, int s) { return smallest_command(d, T_2, M_Z, s); },
-             "output_torque"_a, "load_torque"_a, "direction"_a);
+        .def(
+            "smallest_command",
+            [](const Drive& d, double T_2, double M_Z, int s) { return smallest_command(d, T_2, M_Z, s); },
+            "output_torque"_a, "load_torque"_a, "direction"_a);
 
     nb::class_<Signal>(m, "Signal")
-        .def("__init__",
-             [](Signal* self, const std::vector<std::array<double, 3>>& knots,
-                const std::vector<std::array<double, 3>>& sines) {
-                 auto s = std::make_unique<Signal>();
-                 s->knots.clear();
-                 for (const auto& k : knots) s->knots.push_back({k[0], k[1], k[2]});
-                 for (const auto& a : sines) s->sines.push_back({a[0], a[1], a[2]});
-                 new (self) Signal(std::move(*s));
-             }, "knots"_a, "sines"_a);
+        .def(
+            "__init__",
+            [](Signal* self, const std::vector<std::array<double, 3>>& knots,
+               const std::vector<std::array<double, 3>>& sines) {
+                auto s = std::make_unique<Signal>();
+                s->knots.clear();
+                for (const auto& k : knots) s->knots.push_back({k[0], k[1], k[2]});
+                for (const auto& a : sines) s->sines.push_back({a[0], a[1], a[2]});
+                new (self) Signal(std::move(*s));
+            },
+            "knots"_a, "sines"_a);
 
-    m.def("run",
-          [](const Drive& drive, const Signal& command, const Signal& load_torque,
-             const std::array<double, n_states>& x, double capacity, double duration, double interval,
-             std::size_t samples, bool energy, double tolerance, std::size_t max_switchings) {
-              return run(drive, Signals{command, load_torque}, x, capacity, duration, interval, samples, energy,
-                         tolerance, max_switchings);
-          },
-          "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a, "duration"_a, "interval"_a,
-          "samples"_a, "energy"_a, "tolerance"_a, "max_switchings"_a);
-    m.def("follow_to_periodic",
-          [](const Drive& drive, const Signal& command, const Signal& load_torque, double period, std::size_t samples,
-             int max_periods, double tolerance) {
-              return follow(drive, Signals{command, load_torque}, period, samples, max_periods, tolerance);
-          },
-          "drive"_a, "command"_a, "load_torque"_a, "period"_a, "samples"_a, "max_periods"_a, "tolerance"_a);
-    m.def("explain_at",
-          [](const Drive& drive, const Signal& command, const Signal& load_torque,
-             const std::array<double, n_states>& x, double capacity, double time) {
-              return explain_at(drive, Signals{command, load_torque}, x, capacity, time);
-          },
-          "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a, "time"_a);
+    // Tuples are spelled out for the stub.
+    m.def(
+        "run",
+        [](const Drive& drive, const Signal& command, const Signal& load_torque, const std::array<double, n_states>& x,
+           double capacity, double duration, double interval, std::size_t samples, bool energy, double tolerance,
+           std::size_t max_switchings) {
+            return run(drive, Signals{command, load_torque}, x, capacity, duration, interval, samples, energy,
+                       tolerance, max_switchings);
+        },
+        "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a, "duration"_a, "interval"_a,
+        "samples"_a, "energy"_a, "tolerance"_a, "max_switchings"_a,
+        nb::sig("def run(drive: Drive, command: Signal, load_torque: Signal, state: collections.abc.Sequence[float], "
+                "hysteresis_capacity: float, duration: float, interval: float, samples: int, energy: bool, "
+                "tolerance: float, max_switchings: int) -> tuple[numpy.typing.NDArray[numpy.float64], "
+                "numpy.typing.NDArray[numpy.float64], "
+                "int, dict[str, float], list[float], float, float, int]"));
+    m.def(
+        "follow_to_periodic",
+        [](const Drive& drive, const Signal& command, const Signal& load_torque, double period, std::size_t samples,
+           int max_periods, double tolerance) {
+            return follow(drive, Signals{command, load_torque}, period, samples, max_periods, tolerance);
+        },
+        "drive"_a, "command"_a, "load_torque"_a, "period"_a, "samples"_a, "max_periods"_a, "tolerance"_a,
+        nb::sig("def follow_to_periodic(drive: Drive, command: Signal, load_torque: Signal, period: float, "
+                "samples: int, max_periods: int, tolerance: float) -> tuple[numpy.typing.NDArray[numpy.float64], bool, "
+                "int, "
+                "float, float]"));
+    m.def(
+        "explain_at",
+        [](const Drive& drive, const Signal& command, const Signal& load_torque, const std::array<double, n_states>& x,
+           double capacity,
+           double time) { return explain_at(drive, Signals{command, load_torque}, x, capacity, time); },
+        "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a, "time"_a,
+        nb::sig("def explain_at(drive: Drive, command: Signal, load_torque: Signal, state: "
+                "collections.abc.Sequence[float], "
+                "hysteresis_capacity: float, time: float) -> tuple[list[float], list[tuple[float, ...]]]"));
 
     nb::class_<Simulation>(m, "Simulation")
         .def(nb::init<const Drive&, double>(), "drive"_a, "step"_a)
@@ -287,32 +313,37 @@ NB_MODULE(_core, m) {
                  const Reading r = s.reading();
                  return std::vector<double>(r.value.begin(), r.value.end());
              })
-        .def("explain",
-             [](Simulation& s) {
-                 const Reading r = s.reading();
-                 const auto& now = s.snapshot();
-                 return nb::make_tuple(std::vector<double>(r.value.begin(), r.value.end()),
-                                       explain_state(s.drive(), s.regime(), now.x, now.memory, now.input));
-             })
-        .def("get_state",
-             [](const Simulation& s) {
-                 const auto& n = s.snapshot();
-                 return nb::make_tuple(n.time, from_state(n.x), n.memory.hysteresis_capacity, n.memory.held_torque,
-                                       std::array<int, 7>{n.key.modes[0], n.key.modes[1], n.key.modes[2],
-                                                          n.key.amplifier, n.key.piece, n.key.cell, n.key.cell_back},
-                                       n.input, n.started);
-             })
-        .def("set_state",
-             [](Simulation& s, double time, const std::array<double, n_states>& x, double capacity, double held,
-                const std::array<int, 7>& k, const std::array<double, n_inputs>& input, bool started) {
-                 RegimeKey key;
-                 key.modes = {static_cast<std::int8_t>(k[0]), static_cast<std::int8_t>(k[1]),
-                              static_cast<std::int8_t>(k[2])};
-                 key.amplifier = static_cast<std::int8_t>(k[3]);
-                 key.piece = static_cast<std::int16_t>(k[4]);
-                 key.cell = k[5];
-                 key.cell_back = k[6];
-                 s.restore({time, to_state(x), {capacity, held}, key, input, started});
-             },
-             "time"_a, "state"_a, "hysteresis_capacity"_a, "held_torque"_a, "regime"_a, "input"_a, "started"_a);
+        .def(
+            "explain",
+            [](Simulation& s) {
+                const Reading r = s.reading();
+                const auto& now = s.snapshot();
+                return nb::make_tuple(std::vector<double>(r.value.begin(), r.value.end()),
+                                      explain_state(s.drive(), s.regime(), now.x, now.memory, now.input));
+            },
+            nb::sig("def explain(self) -> tuple[list[float], list[tuple[float, ...]]]"))
+        .def(
+            "get_state",
+            [](const Simulation& s) {
+                const auto& n = s.snapshot();
+                return nb::make_tuple(n.time, from_state(n.x), n.memory.hysteresis_capacity, n.memory.held_torque,
+                                      std::array<int, 7>{n.key.modes[0], n.key.modes[1], n.key.modes[2],
+                                                         n.key.amplifier, n.key.piece, n.key.cell, n.key.cell_back},
+                                      n.input, n.started);
+            },
+            nb::sig("def get_state(self) -> tuple[float, list[float], float, float, list[int], list[float], bool]"))
+        .def(
+            "set_state",
+            [](Simulation& s, double time, const std::array<double, n_states>& x, double capacity, double held,
+               const std::array<int, 7>& k, const std::array<double, n_inputs>& input, bool started) {
+                RegimeKey key;
+                key.modes = {static_cast<std::int8_t>(k[0]), static_cast<std::int8_t>(k[1]),
+                             static_cast<std::int8_t>(k[2])};
+                key.amplifier = static_cast<std::int8_t>(k[3]);
+                key.piece = static_cast<std::int16_t>(k[4]);
+                key.cell = k[5];
+                key.cell_back = k[6];
+                s.restore({time, to_state(x), {capacity, held}, key, input, started});
+            },
+            "time"_a, "state"_a, "hysteresis_capacity"_a, "held_torque"_a, "regime"_a, "input"_a, "started"_a);
 }

@@ -65,7 +65,7 @@ struct DenseStep {
 
 template <class System, class Remainder = NoRemainder>
 class AdaptiveSolver {
-   public:
+ public:
     AdaptiveSolver(const System& system, const Signals& signals, double relative_tolerance, const State& scale,
                    Remainder remainder = {})
         : system_(system),
@@ -120,7 +120,7 @@ class AdaptiveSolver {
         return input_.values();
     }
 
-   private:
+ private:
     Status status_of(Found found) {
         if (found == Found::yes) return Status::done;
         return found == Found::outside ? Status::outside : Status::jammed;

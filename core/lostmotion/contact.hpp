@@ -24,7 +24,7 @@ inline constexpr double rounding = 64.0 * std::numeric_limits<double>::epsilon()
 
 // Time derivatives of the state along the flow of one regime, computed as far as they are asked for.
 class Flow {
-   public:
+ public:
     Flow(const Regime& regime, const Instant& now) : regime_(regime), now_(now) {
         x_[0] = now.x;
         for (int k = 0; k < n_states; ++k) size_[0][k] = std::fabs(now.x[k]);
@@ -46,7 +46,7 @@ class Flow {
         }
     }
 
-   private:
+ private:
     void extend() {
         const int k = order_++;
         for (int row = 0; row < n_states; ++row) {
@@ -74,7 +74,7 @@ enum class Found { yes, inconsistent, outside };
 
 // The drive as a switched linear system: which regime follows at an event.
 class SwitchedDrive {
-   public:
+ public:
     explicit SwitchedDrive(const Drive& drive) : drive_(drive) {}
     const Drive& drive() const { return drive_; }
     Regime build(const RegimeKey& key) const { return drive_.build(key); }
@@ -110,7 +110,7 @@ class SwitchedDrive {
         return find(cache, now, at_rest, T_2, key);
     }
 
-   private:
+ private:
     std::array<bool, n_contacts> at_exact_rest(const State& x) const {
         const double w_M = x[motor_speed], w = x[load_speed];
         return {w_M == 0.0, w_M * (1.0 / drive_.gearbox.ratio) == w, w == 0.0};
@@ -167,7 +167,8 @@ class SwitchedDrive {
         trial.modes = modes;
         const Gearbox& gearbox = drive_.gearbox;
         const double d = now.x[twist], E = now.input[0][0];
-        if (drive_.motor.limits_voltage() && std::fabs(E) > drive_.motor.voltage_limit) trial.amplifier = E > 0.0 ? 1 : -1;
+        if (drive_.motor.limits_voltage() && std::fabs(E) > drive_.motor.voltage_limit)
+            trial.amplifier = E > 0.0 ? 1 : -1;
         if (!drive_.rigid()) {
             trial.piece = static_cast<std::int16_t>(gearbox.curve.locate(d));
             const int slip = modes[twist_contact];

@@ -11,7 +11,7 @@
 namespace lostmotion {
 
 class Drive {
-   public:
+ public:
     Motor motor;
     Gearbox gearbox;
     Load load;
@@ -30,7 +30,8 @@ class Drive {
     LinearForm contact_speed(Contact c) const {
         switch (c) {
             case input_contact: return LinearForm::unit(motor_speed);
-            case twist_contact: return LinearForm::unit(motor_speed, 1.0 / gearbox.ratio) - LinearForm::unit(load_speed);
+            case twist_contact:
+                return LinearForm::unit(motor_speed, 1.0 / gearbox.ratio) - LinearForm::unit(load_speed);
             default: return LinearForm::unit(load_speed);
         }
     }
@@ -76,7 +77,7 @@ class Drive {
 
     Regime build(const RegimeKey& key) const;
 
-   private:
+ private:
     // Equations while the reactions of the stuck contacts are still unknown: three more terms.
     static constexpr int n_open = static_cast<int>(n_terms) + n_contacts;
     using Open = Form<n_open>;
@@ -135,8 +136,8 @@ inline Drive::Equations Drive::compose(const RegimeKey& key, const Regime& r) co
     // Output torque: rigid, it is whatever is needed (7); else T_2 = P(d) + H (15). While everything stands, the
     // split between the contacts is not determined by the motion; T_2 then stays as it was.
     const TorsionCurve& curve = gearbox.curve;
-    const Open P = rigid() ? Open{}
-                           : Open::unit(twist, curve.slope(key.piece)) + Open::unit(one, curve.offset(key.piece));
+    const Open P =
+        rigid() ? Open{} : Open::unit(twist, curve.slope(key.piece)) + Open::unit(one, curve.offset(key.piece));
     if (all_stuck)
         e.H = Open::unit(held_torque) - P;
     else if (slip == 0)
@@ -175,10 +176,8 @@ inline Drive::Equations Drive::compose(const RegimeKey& key, const Regime& r) co
     const Open w = r.at_rest[load_contact]    ? Open{}
                    : r.at_rest[twist_contact] ? Open::unit(motor_speed, 1.0 / i)
                                               : Open::unit(load_speed);
-    e.input_acceleration =
-        (e.M_D - gearbox.viscous_friction * w_M - e.F_input - transmitted) / input_inertia();
-    e.load_acceleration =
-        (e.T_2 - load.viscous_friction * w - Open::unit(load_torque) - e.F_load) / load.inertia;
+    e.input_acceleration = (e.M_D - gearbox.viscous_friction * w_M - e.F_input - transmitted) / input_inertia();
+    e.load_acceleration = (e.T_2 - load.viscous_friction * w - Open::unit(load_torque) - e.F_load) / load.inertia;
     return e;
 }
 
@@ -264,8 +263,10 @@ inline void Drive::add_guards(const RegimeKey& key, const Equations& e, Regime& 
     }
     if (motor.limits_voltage()) {
         const LinearForm E = LinearForm::unit(command), limit = LinearForm::unit(one, motor.voltage_limit);
-        if (key.amplifier <= 0) add(key.amplifier == 0 ? limit - E : -limit - E, Guard::amplifier, input_contact, key.amplifier + 1);
-        if (key.amplifier >= 0) add(key.amplifier == 0 ? limit + E : E - limit, Guard::amplifier, input_contact, key.amplifier - 1);
+        if (key.amplifier <= 0)
+            add(key.amplifier == 0 ? limit - E : -limit - E, Guard::amplifier, input_contact, key.amplifier + 1);
+        if (key.amplifier >= 0)
+            add(key.amplifier == 0 ? limit + E : E - limit, Guard::amplifier, input_contact, key.amplifier - 1);
     }
 }
 
@@ -300,7 +301,8 @@ inline void Drive::add_loss_guards(const RegimeKey& key, const Equations& e, Reg
         const int n = gearbox.map.edges(key.cell, edges);
         for (int k = 0; k < n; ++k) {
             const Plane& p = edges[k].inside;
-            add(LinearForm::unit(one, p.at_zero) + LinearForm::unit(motor_speed, s * p.per_speed / gearbox.rated_input_speed) +
+            add(LinearForm::unit(one, p.at_zero) +
+                    LinearForm::unit(motor_speed, s * p.per_speed / gearbox.rated_input_speed) +
                     s * p.per_load / T_2R * T_2,
                 edges[k].neighbour < 0 ? Guard::outside : Guard::loss_cell, edges[k].neighbour);
         }

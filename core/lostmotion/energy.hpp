@@ -13,16 +13,16 @@ enum EnergyFlow : int {
     from_source,        // M_D w_M
     in_input_damper,    // b_MR w_M^2
     in_motor_friction,  // T_10 |w_M|
-    in_gear,            // (T_1 - T_2/i) w_M: the losses of the mesh; negative where a constant efficiency creates energy
-    in_hysteresis,      // H dd/dt
-    in_load_damper,     // b_ZR w^2
-    in_load_friction,   // dry friction of the load's bearing
-    to_load,            // M_Z w
+    in_gear,           // (T_1 - T_2/i) w_M: the losses of the mesh; negative where a constant efficiency creates energy
+    in_hysteresis,     // H dd/dt
+    in_load_damper,    // b_ZR w^2
+    in_load_friction,  // dry friction of the load's bearing
+    to_load,           // M_Z w
     n_flows
 };
 
 struct EnergyLedger {
-    std::array<double, n_flows> flow{};  // [J] since the start
+    std::array<double, n_flows> flow{};                                                     // [J] since the start
     double kinetic_begin = 0.0, kinetic_end = 0.0, elastic_begin = 0.0, elastic_end = 0.0;  // [J]
     double turned_over = 0.0;  // [J] sum of the magnitudes of all flows, panel by panel
 
@@ -35,7 +35,7 @@ struct EnergyLedger {
 };
 
 class EnergyMeter {
-   public:
+ public:
     explicit EnergyMeter(const Drive& drive) : drive_(drive) {}
     EnergyLedger ledger;
 
@@ -77,7 +77,7 @@ class EnergyMeter {
     }
     void switching(const Switching&) {}
 
-   private:
+ private:
     static constexpr int orders = 5;  // value and four derivatives
     using Jet = std::array<double, orders>;
     using Powers = std::array<Jet, n_flows>;
@@ -117,8 +117,9 @@ class EnergyMeter {
         const int mode = r.key.modes[input_contact];
         out[in_motor_friction] = scaled(mode == absent ? 0.0 : mode * drive_.motor.friction_torque, w_M);
         out[in_gear] = product(jet(r.input_torque - r.output_torque / drive_.gearbox.ratio), w_M);
-        out[in_hysteresis] =
-            r.at_rest[twist_contact] ? Jet{} : product(jet(r.hysteresis_torque), jet(drive_.contact_speed(twist_contact)));
+        out[in_hysteresis] = r.at_rest[twist_contact]
+                                 ? Jet{}
+                                 : product(jet(r.hysteresis_torque), jet(drive_.contact_speed(twist_contact)));
         out[in_load_damper] = scaled(drive_.load.viscous_friction, product(w, w));
         const int bearing = r.key.modes[load_contact];
         out[in_load_friction] = scaled(bearing == absent ? 0.0 : bearing * drive_.load.friction_torque, w);

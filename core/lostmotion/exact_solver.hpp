@@ -60,7 +60,7 @@ inline State constant_rate(const Regime& r, const Memory& m) {
 
 // A point that moves along one regime.
 class Cursor {
-   public:
+ public:
     Cursor(Propagator& propagator, const Signals& signals, const std::vector<InputBasis>& basis, const State& constant,
            double time, const State& x)
         : propagator_(&propagator), constant_(&constant), input_(signals, basis), x_(x) {
@@ -94,7 +94,7 @@ class Cursor {
         input_.anchor(target);
     }
 
-   private:
+ private:
     Propagator* propagator_;
     const State* constant_;
     InputState input_;
@@ -140,7 +140,7 @@ struct Cubic {
 
 template <class System>
 class ExactSolver {
-   public:
+ public:
     using Cache = RegimeCache<System>;
 
     // unit: a length of time [s] that is to be a power-of-two multiple of the elementary steps, such as the
@@ -203,8 +203,8 @@ class ExactSolver {
         while (true) {
             typename Cache::Entry& entry = cache_.entry(key_);
             if (!entry.propagator.ready()) entry.propagator.prepare(entry.regime, unit_, scale_, basis_);
-            Segment<System> segment{entry, signals_, time_, t_end, true, now_.x, now_.memory,
-                                    constant_rate(entry.regime, now_.memory)};
+            Segment<System> segment{entry, signals_, time_,       t_end,
+                                    true,  now_.x,   now_.memory, constant_rate(entry.regime, now_.memory)};
             const double knot = next_knot();
             const double limit = std::fmin(t_end, knot);
             const Guard* fired = nullptr;
@@ -222,7 +222,7 @@ class ExactSolver {
         }
     }
 
-   private:
+ private:
     // Accumulation of switching instants: this many of them within a few thousand roundings of the time.
     static constexpr int zeno_count = 100;
     static constexpr double zeno_span = 1e4 * std::numeric_limits<double>::epsilon();
@@ -232,9 +232,7 @@ class ExactSolver {
         recent_ = 0;
         jump_pending_ = false;
     }
-    double next_knot() const {
-        return std::fmin(signals_[0].next_knot(time_), signals_[1].next_knot(time_));
-    }
+    double next_knot() const { return std::fmin(signals_[0].next_knot(time_), signals_[1].next_knot(time_)); }
     void anchor_inputs() {
         InputState input(signals_, basis_);
         input.anchor(time_);

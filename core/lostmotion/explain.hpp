@@ -9,11 +9,11 @@ namespace lostmotion {
 
 struct ContactReport {
     bool present = false;
-    int mode = 0;                   // -1, 0, +1
-    double speed = 0.0;             // [rad/s]
-    double torque = 0.0;            // what the contact holds or takes [N m]
-    double capacity_forward = 0.0;  // largest torque it holds before it slips forward [N m]
-    double capacity_backward = 0.0; // ... and backward, as a magnitude [N m]
+    int mode = 0;                    // -1, 0, +1
+    double speed = 0.0;              // [rad/s]
+    double torque = 0.0;             // what the contact holds or takes [N m]
+    double capacity_forward = 0.0;   // largest torque it holds before it slips forward [N m]
+    double capacity_backward = 0.0;  // ... and backward, as a magnitude [N m]
 };
 
 inline ContactReport explain_contact(const Drive& drive, const Regime& r, Contact c, const State& x, const Memory& m,
@@ -28,7 +28,8 @@ inline ContactReport explain_contact(const Drive& drive, const Regime& r, Contac
     switch (c) {
         case input_contact: {
             report.torque = evaluate(r.input_friction, x, m, u);
-            const double v = std::fabs(x[motor_speed]) / gearbox.rated_input_speed, mu = T_2 / gearbox.rated_output_torque;
+            const double v = std::fabs(x[motor_speed]) / gearbox.rated_input_speed,
+                         mu = T_2 / gearbox.rated_output_torque;
             report.capacity_forward = drive.motor.friction_torque + gearbox.loss_torque(mu, v) / gearbox.ratio;
             report.capacity_backward = drive.motor.friction_torque + gearbox.loss_torque(-mu, v) / gearbox.ratio;
             break;

@@ -31,7 +31,9 @@ struct Gearbox {
         return 0.5 * (1.0 - hysteresis_efficiency) * std::fabs(curve.torque(d));
     }
     // Torque M_2B [N m at the output] lost at relative load mu and relative speed v.
-    double loss_torque(double mu, double v) const { return losses == loss_map ? rated_output_torque * map(mu, v) : 0.0; }
+    double loss_torque(double mu, double v) const {
+        return losses == loss_map ? rated_output_torque * map(mu, v) : 0.0;
+    }
 };
 
 }  // namespace lostmotion

@@ -19,10 +19,11 @@ struct Edge {
 };
 
 class LossMap {
-   public:
+ public:
     LossMap() = default;
 
-    // speeds: v, rising from 0; loads: mu, rising; values: m_2B >= 0, values[j * speeds.size() + i] at (loads[j], speeds[i]).
+    // speeds: v, rising from 0; loads: mu, rising; values: m_2B >= 0, values[j * speeds.size() + i] at (loads[j],
+    // speeds[i]).
     //
     // Outside its data the map goes on with the slope of the last interval where the losses rise outwards, and
     // stays constant where they fall (a loss must not become negative); in_data() tells the two apart.
@@ -109,7 +110,7 @@ class LossMap {
 
     int triangles() const { return 2 * cells_along_speed() * load_intervals(); }
 
-   private:
+ private:
     int cells_along_speed() const { return static_cast<int>(speeds_.size()) - 1; }
     double value(int j, int i) const { return values_[j * speeds_.size() + i]; }
     // Diagonals rise for mu > 0 and fall for mu < 0, so that a map mirrored in its data is mirrored in its triangles.

@@ -48,7 +48,7 @@ struct Step {
 };
 
 class Propagator {
-   public:
+ public:
     static constexpr int max_levels = 40;
     static constexpr double base_norm = 0.125;  // |A| h of the base interval, in scaled units
 
@@ -142,7 +142,7 @@ class Propagator {
         return sum;
     }
 
-   private:
+ private:
     static constexpr int series_terms = 12;  // 0.125^13/13! < 1e-21
 
     void add_base(double h) {
@@ -242,7 +242,7 @@ class Propagator {
 
     Matrix rate_;
     std::array<State, n_inputs> input_column_{};
-    double norm_ = 0.0;  // of A in scaled units, or the highest input frequency [1/s]
+    double norm_ = 0.0;           // of A in scaled units, or the highest input frequency [1/s]
     double fastest_input_ = 0.0;  // [rad/s]
     int n_basis_ = 0;
     const std::vector<InputBasis>* basis_ = nullptr;

@@ -42,32 +42,32 @@ struct Guard {
         torsion_piece,  // the twist leaves its piece of the curve
         loss_cell,      // load and speed leave their cell of the loss map
         loss_cell_back,
-        amplifier,      // the command crosses the voltage limit
-        outside,        // the extended loss map ends, or a state leaves the range of the arithmetic
+        amplifier,  // the command crosses the voltage limit
+        outside,    // the extended loss map ends, or a state leaves the range of the arithmetic
     };
     LinearForm form;
     Kind kind = outside;
     Contact contact = input_contact;  // for speed and capacity
-    int neighbour = 0;                // for pieces, cells and the amplifier: the index beyond; capacity: the sign of slip
+    int neighbour = 0;  // for pieces, cells and the amplifier: the index beyond; capacity: the sign of slip
 };
 
 inline constexpr int max_guards = 16;
 
 struct Regime {
     RegimeKey key;
-    std::array<LinearForm, n_states> rate{};      // dx/dt
-    LinearForm output_torque;                     // T_2 [N m]
-    LinearForm source_torque;                     // M_D [N m]
-    LinearForm input_friction;                    // F, all that the input contact takes [N m at the input]
-    LinearForm input_torque;                      // T_1 [N m]; while the input contact is stuck, T_2/i only
-    LinearForm hysteresis_torque;                 // H [N m]
-    LinearForm load_friction;                     // what the load contact takes [N m]
+    std::array<LinearForm, n_states> rate{};  // dx/dt
+    LinearForm output_torque;                 // T_2 [N m]
+    LinearForm source_torque;                 // M_D [N m]
+    LinearForm input_friction;                // F, all that the input contact takes [N m at the input]
+    LinearForm input_torque;                  // T_1 [N m]; while the input contact is stuck, T_2/i only
+    LinearForm hysteresis_torque;             // H [N m]
+    LinearForm load_friction;                 // what the load contact takes [N m]
     std::array<Guard, max_guards> guards;
     int n_guards = 0;
-    bool solvable = true;                         // false: the reactions have no unique solution (jamming)
-    bool in_data = true;                          // false: the loss map is used outside its data
+    bool solvable = true;  // false: the reactions have no unique solution (jamming)
+    bool in_data = true;   // false: the loss map is used outside its data
 
-    std::array<bool, n_contacts> at_rest{};       // speeds that this regime keeps at exactly zero
+    std::array<bool, n_contacts> at_rest{};  // speeds that this regime keeps at exactly zero
 };
 
 }  // namespace lostmotion

@@ -12,7 +12,7 @@ namespace lostmotion {
 
 template <class System>
 class RegimeCache {
-   public:
+ public:
     struct Entry {
         Regime regime;
         Propagator propagator;
@@ -70,7 +70,7 @@ class RegimeCache {
         for (auto& [key, entry] : entries_) entry->propagator.reset();
     }
 
-   private:
+ private:
     const System& system_;
     std::unordered_map<std::uint64_t, std::unique_ptr<Entry>> entries_;
 };

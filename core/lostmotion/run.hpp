@@ -26,7 +26,7 @@ struct RunOptions {
 
 struct RunReport {
     Status status = Status::done;
-    double time = 0.0;  // [s] reached
+    double time = 0.0;                // [s] reached
     Contact contact = input_contact;  // at the last switching
     State x{};
     Memory memory;
@@ -39,7 +39,7 @@ struct RunReport {
 
 // Observer of the exact solver that samples, keeps switchings and meters energy.
 class Recorder {
-   public:
+ public:
     Recorder(const Drive& drive, const RunOptions& options, double* out, RunReport& report)
         : sampler_(drive, 0.0, options.sample_interval, options.samples, out),
           meter_(drive),
@@ -61,7 +61,7 @@ class Recorder {
         report_.left_data_at = sampler_.left_data_at;
     }
 
-   private:
+ private:
     Sampler sampler_;
     EnergyMeter meter_;
     const RunOptions& options_;
@@ -92,7 +92,7 @@ inline RunReport run_exact(const Drive& drive, const Signals& signals, const Sta
 // Observer of the adaptive solver.
 template <class Solver>
 class AdaptiveRecorder {
-   public:
+ public:
     AdaptiveRecorder(const Drive& drive, Solver& solver, const RunOptions& options, double* out, RunReport& report)
         : drive_(drive), solver_(solver), options_(options), out_(out), report_(report) {}
 
@@ -109,7 +109,7 @@ class AdaptiveRecorder {
         if (report_.switching_count++ < options_.max_switchings) report_.switchings.push_back(s);
     }
 
-   private:
+ private:
     const Drive& drive_;
     Solver& solver_;
     const RunOptions& options_;
@@ -118,8 +118,8 @@ class AdaptiveRecorder {
     std::size_t next_ = 0;
 };
 
-inline RunReport run_adaptive(const Drive& drive, const Signals& signals, const Start& start,
-                              const RunOptions& options, double relative_tolerance, double* out) {
+inline RunReport run_adaptive(const Drive& drive, const Signals& signals, const Start& start, const RunOptions& options,
+                              double relative_tolerance, double* out) {
     RunReport report;
     report.left_data_at = std::numeric_limits<double>::infinity();
     const SwitchedDrive system(drive);

@@ -74,7 +74,7 @@ inline Reading read(const Drive& drive, const Regime& r, const State& x, const M
 
 // Writes `count` samples at begin + k * interval, channel by channel: out[channel * count + k].
 class Sampler {
-   public:
+ public:
     Sampler(const Drive& drive, double begin, double interval, std::size_t count, double* out)
         : drive_(drive), begin_(begin), interval_(interval), count_(count), out_(out) {}
 
@@ -106,7 +106,7 @@ class Sampler {
     }
     void switching(const Switching&) {}
 
-   private:
+ private:
     double instant(std::size_t k) const { return begin_ + static_cast<double>(k) * interval_; }
     bool due(const Segment<SwitchedDrive>& s) const {
         const double t = instant(next_);

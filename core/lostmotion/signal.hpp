@@ -44,7 +44,7 @@ struct Signal {
                                 : std::numeric_limits<double>::infinity();
     }
 
-   private:
+ private:
     double next_after(std::size_t k, double t) const {
         while (k < knots.size() && knots[k].time <= t) ++k;
         return k < knots.size() ? knots[k].time : std::numeric_limits<double>::infinity();
@@ -86,7 +86,7 @@ inline std::vector<InputBasis> input_basis(const Signals& signals) {
 
 // The two inputs at one instant, as the state of the linear system that generates them.
 class InputState {
-   public:
+ public:
     InputState(const Signals& signals, const std::vector<InputBasis>& basis)
         : signals_(&signals), basis_(&basis), weights_(basis.size()) {
         anchor(0.0);
@@ -177,11 +177,9 @@ class InputState {
         }
     }
 
-    double next_knot(double t) const {
-        return std::fmin((*signals_)[0].next_knot(t), (*signals_)[1].next_knot(t));
-    }
+    double next_knot(double t) const { return std::fmin((*signals_)[0].next_knot(t), (*signals_)[1].next_knot(t)); }
 
-   private:
+ private:
     const Signals* signals_;
     const std::vector<InputBasis>* basis_;
     double time_ = 0.0;

@@ -8,7 +8,7 @@
 namespace lostmotion {
 
 class Simulation {
-   public:
+ public:
     // All that a run needs to go on bit for bit.
     struct Snapshot {
         double time = 0.0;
@@ -40,8 +40,7 @@ class Simulation {
     Status advance(double interval, double command_begin, double command_end, double load_begin, double load_end) {
         const std::array<double, n_inputs> begin{command_begin, load_begin}, end{command_end, load_end};
         Status status = Status::done;
-        if (now_.started)
-            solver_.resume(now_.time, now_.x, now_.memory, now_.key);
+        if (now_.started) solver_.resume(now_.time, now_.x, now_.memory, now_.key);
         for (int i = 0; i < n_inputs; ++i) {
             if (!now_.started) solver_.resume(now_.time, now_.x, now_.memory, now_.key);
             solver_.set_ramp(i, begin[i], (end[i] - begin[i]) / interval);
@@ -61,7 +60,7 @@ class Simulation {
     }
     Regime regime() const { return system_.build(now_.key); }
 
-   private:
+ private:
     struct Nothing {
         bool segment(const Segment<SwitchedDrive>&, const std::vector<InputBasis>&) { return true; }
         void switching(const Switching&) {}

@@ -7,7 +7,7 @@
 namespace lostmotion {
 
 class TorsionCurve {
-   public:
+ public:
     TorsionCurve() : TorsionCurve({}, {1.0}) {}
 
     // breaks: twists [rad] > 0 at which the slope changes, rising; slopes: [N m/rad], one more than breaks.
@@ -52,7 +52,7 @@ class TorsionCurve {
         return k;
     }
 
-   private:
+ private:
     std::vector<double> breaks_, slopes_, offsets_;
 };
 

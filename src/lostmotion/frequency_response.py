@@ -79,9 +79,17 @@ def frequency_response(
     dim = ("frequency",)
     return xr.Dataset(
         {
-            "response": (dim, response, {"units": "rad/s", "long_name": "first harmonic of load speed / that of command"}),
+            "response": (
+                dim,
+                response,
+                {"units": "rad/s", "long_name": "first harmonic of load speed / that of command"},
+            ),
             "distortion": (dim, distortion, {"units": "1", "long_name": "harmonics above the first / first harmonic"}),
-            "efficiency": (dim, efficiency, {"units": "1", "long_name": "mean power out of the gear / mean motor power"}),
+            "efficiency": (
+                dim,
+                efficiency,
+                {"units": "1", "long_name": "mean power out of the gear / mean motor power"},
+            ),
             "periods": (dim, periods, {"units": "1", "long_name": "periods followed"}),
             "periodicity": (dim, residual, {"units": "1", "long_name": "largest relative change over one period"}),
         },

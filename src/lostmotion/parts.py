@@ -172,14 +172,20 @@ class LossMap(Part):
         if self.speeds[0] != 0.0:
             raise ValueError(f"has speeds that begin at {self.speeds[0]}; the first must be 0, for sticking")
         if len(self.values) != len(self.loads):
-            raise ValueError(f"has {len(self.values)} rows of values for {len(self.loads)} loads; it needs one for each")
+            raise ValueError(
+                f"has {len(self.values)} rows of values for {len(self.loads)} loads; it needs one for each"
+            )
         for j, row in enumerate(self.values):
             if len(row) != len(self.speeds):
-                raise ValueError(f"has a hole: row {j} (load {self.loads[j]}) has {len(row)} values for {len(self.speeds)} speeds")
+                raise ValueError(
+                    f"has a hole: row {j} (load {self.loads[j]}) has {len(row)} values for {len(self.speeds)} speeds"
+                )
         if self.mirrored and self.loads[0] != 0.0:
             raise ValueError(f"is mirrored, so its loads must begin at 0, not {self.loads[0]}")
         if not self.mirrored and not self.loads[0] < 0.0 < self.loads[-1]:
-            raise ValueError("covers only one direction of power flow; add loads of the other sign or set mirrored = true")
+            raise ValueError(
+                "covers only one direction of power flow; add loads of the other sign or set mirrored = true"
+            )
         return self
 
     def whole(self) -> tuple[list[float], list[float], list[list[float]]]:

@@ -35,7 +35,8 @@ def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) 
     data["motor_power"] = data["motor_torque"] * data["motor_speed"]
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     variables: dict[str, Any] = {
-        v.name: (("time",), data[v.name], {"units": v.unit, "long_name": v.meaning, "symbol": v.symbol}) for v in VARIABLES
+        v.name: (("time",), data[v.name], {"units": v.unit, "long_name": v.meaning, "symbol": v.symbol})
+        for v in VARIABLES
     }
     variables |= _switching_variables(switchings)
     attributes = {
@@ -158,6 +159,15 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
             temporary.unlink(missing_ok=True)
 
 
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all."""
+
+    def write(target: Path) -> None:
+        target.write_bytes(content)
+
+    write_whole(path, write)
+
+
 def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
@@ -206,7 +216,9 @@ def open_result(path: str | Path) -> xarray.Dataset:
     path = Path(path)
     readers = {".nc": _read_netcdf, ".csv": _read_csv, ".parquet": _read_parquet}
     if path.suffix not in readers:
-        raise InputError(f"{path}: the ending {path.suffix or '(none)'} is not known; it must be one of {', '.join(readers)}")
+        raise InputError(
+            f"{path}: the ending {path.suffix or '(none)'} is not known; it must be one of {', '.join(readers)}"
+        )
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; check the name")
     try:
@@ -214,7 +226,9 @@ def open_result(path: str | Path) -> xarray.Dataset:
     except InputError:
         raise
     except Exception as error:  # whatever the format's library makes of a damaged file
-        raise InputError(f"{path}: cannot be read as a result ({type(error).__name__}: {str(error).splitlines()[0]})") from None
+        raise InputError(
+            f"{path}: cannot be read as a result ({type(error).__name__}: {str(error).splitlines()[0]})"
+        ) from None
 
 
 def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
@@ -248,12 +262,18 @@ def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Datase
     except (json.JSONDecodeError, KeyError):
         raise InputError(f"{path}: is no result of lostmotion; its header or its time column is missing") from None
     variables: dict[str, Any] = {
-        name: (("time",), values, {"units": known[name].unit, "long_name": known[name].meaning, "symbol": known[name].symbol})
+        name: (
+            ("time",),
+            values,
+            {"units": known[name].unit, "long_name": known[name].meaning, "symbol": known[name].symbol},
+        )
         for name, values in columns.items()
     }
     for name, s in meta["switchings"].items():
         variables[name] = (("switching",), np.asarray(s["values"], dtype=s["type"]), s["attributes"])
-    return xr.Dataset(variables, coords={"time": ("time", time, {"units": "s", "long_name": "time"})}, attrs=meta["attributes"])
+    return xr.Dataset(
+        variables, coords={"time": ("time", time, {"units": "s", "long_name": "time"})}, attrs=meta["attributes"]
+    )
 
 
 def _columns(dataset: xarray.Dataset) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import ValidationError, model_validator
 
 from .errors import InputError
 from .parts import Drive, Gearbox, Load, Motor, Rigid
@@ -214,7 +214,9 @@ def describe(error: ValidationError) -> str:
     # Names of classes that the choice between kinds puts into the location are not keys of the file.
     kinds = {"curve", "linear", "rigid", "constant_efficiency", "map"}
     location = list(first["loc"])
-    keys = [k for n, k in enumerate(location) if not (k in kinds and n > 0 and location[n - 1] in ("stiffness", "losses"))]
+    keys = [
+        k for n, k in enumerate(location) if not (k in kinds and n > 0 and location[n - 1] in ("stiffness", "losses"))
+    ]
     name = _dotted(keys)
     text = _explain(first, keys)
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
@@ -256,10 +258,7 @@ def _known_keys(keys: list[int | str]) -> list[str]:
     node: Any = schema
     for key in keys:
         node = _resolve(node, schema)
-        if isinstance(key, int):
-            node = node.get("items", {})
-        else:
-            node = node.get("properties", {}).get(key, {})
+        node = node.get("items", {}) if isinstance(key, int) else node.get("properties", {}).get(key, {})
     return sorted(_resolve(node, schema).get("properties", {}))
 
 

@@ -50,6 +50,7 @@ class Simulation:
 
     @property
     def drive(self) -> Drive:
+        """The drive that is simulated."""
         return self._drive
 
     @property

@@ -34,9 +34,11 @@ def to_si(text: str, unit: str) -> float:
 
     example = f'such as "1 {unit}"' if unit else 'such as "0.5" or "50 percent"'
     try:
-        quantity = registry().Quantity(text)
+        quantity: pint.Quantity[Any] = registry().Quantity(text)
     except (pint.errors.PintError, AttributeError, TypeError, ValueError, AssertionError, SyntaxError):
-        raise ValueError(f"is not a number with a unit that is known; write a value in {unit or '1'}, {example}") from None
+        raise ValueError(
+            f"is not a number with a unit that is known; write a value in {unit or '1'}, {example}"
+        ) from None
     except Exception as error:  # the registry's parser raises its tokenizer's errors as they come
         raise ValueError(f"cannot be read as a number with a unit ({type(error).__name__}); {example}") from None
     if unit and quantity.dimensionless and quantity.units == registry().Unit(""):
@@ -44,7 +46,9 @@ def to_si(text: str, unit: str) -> float:
     try:
         return float(quantity.to(unit).magnitude)
     except pint.errors.PintError:
-        raise ValueError(f"has the unit of something else ({quantity.units:~}); it must be in {unit or '1'}, {example}") from None
+        raise ValueError(
+            f"has the unit of something else ({quantity.units:~}); it must be in {unit or '1'}, {example}"
+        ) from None
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Variable:
+    """One result variable."""
+
     name: str
     symbol: str
     unit: str  # SI; "1" for pure numbers

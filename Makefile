@@ -1,0 +1,57 @@
+# make demo, make test, make bench, make docs, make lint: each sets up all it needs in .venv on a fresh machine.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := $(wildcard core/lostmotion/*.hpp bindings/*.cpp scenarios/*.toml) CMakeLists.txt pyproject.toml
+
+.PHONY: demo test bench docs lint format clean
+.DELETE_ON_ERROR:
+
+demo: $(VENV)/built
+	$(BIN)/lostmotion reproduce -o out
+
+test: lint test-core $(VENV)/built
+	$(BIN)/pytest
+
+.PHONY: test-core
+test-core: $(VENV)/tools
+	$(BIN)/cmake -S . -B build/core -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_TESTS=ON >build/core.log
+	$(BIN)/cmake --build build/core
+	$(BIN)/ctest --test-dir build/core --output-on-failure
+
+bench: $(VENV)/built
+	$(BIN)/cmake -S . -B build/bench -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_BENCHMARKS=ON >build/bench.log
+	$(BIN)/cmake --build build/bench
+	$(BIN)/python benchmarks/bench.py build/bench/bench_core
+
+docs: $(VENV)/built
+	$(BIN)/pip install -q --group docs
+	$(BIN)/python docs/generate.py
+	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build
+
+lint: $(VENV)/built
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/clang-format --dry-run --Werror core/lostmotion/*.hpp core/tests/*.cpp core/tests/*.hpp bindings/*.cpp benchmarks/*.cpp
+
+format: $(VENV)/tools
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(BIN)/clang-format -i core/lostmotion/*.hpp core/tests/*.cpp core/tests/*.hpp bindings/*.cpp benchmarks/*.cpp
+
+# Tools and libraries, then the package itself; only what changed is compiled again.
+$(VENV)/tools: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { apt-get update -q && apt-get install -qy python3-venv && $(PYTHON) -m venv $(VENV); }
+	command -v c++ >/dev/null || { apt-get update -q && apt-get install -qy g++; }
+	$(BIN)/pip install -q --upgrade "pip>=25.1"
+	$(BIN)/pip install -q --group dev
+	mkdir -p build
+	touch $@
+
+$(VENV)/built: $(VENV)/tools $(SOURCES)
+	$(BIN)/pip install -q --no-build-isolation --editable .
+	touch $@
+
+clean:
+	rm -rf build out docs/_build docs/_generated $(VENV)

@@ -1,0 +1,220 @@
+"""The command `lostmotion`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import xarray
+
+app = typer.Typer(
+    name="lostmotion",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly.",
+    epilog="Exit code 0 only if all went well; errors are one line on stderr.",
+)
+
+
+def main() -> None:
+    """Entry point: known errors end in one line and exit code 1, Ctrl-C in 130."""
+    from .errors import InputError
+
+    try:
+        app()
+    except InputError as error:
+        _fail(str(error))
+    except KeyboardInterrupt:
+        _fail("interrupted; nothing was written", 130)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except (RuntimeError, ValueError) as error:
+        # What a solver or a check of a whole scenario reports is a result for the user; anything else is our defect.
+        _fail(" ".join(str(error).split()))
+
+
+def _fail(text: str, code: int = 1) -> None:
+    print(f"lostmotion: {text}", file=sys.stderr)
+    sys.exit(code)
+
+
+@contextmanager
+def _progress(total: int, what: str) -> Iterator[Callable[[], None]]:
+    """A progress bar on stderr where that is a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda: bar.advance(task)
+
+
+@app.command()
+def reproduce(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
+        "out"
+    ),
+) -> None:
+    """Reproduce the paper: figures 5 and 9 to 18, their data, its constants, and a report.
+
+    Writes PNG, SVG and CSV for each figure, constants.csv, and report.html, which needs nothing beside it.
+    """
+    if output.exists() and not output.is_dir():
+        from .errors import InputError
+
+        raise InputError(f"{output}: is a file; -o names a directory")
+    from .reproduce import WORK
+    from .reproduce import reproduce as work
+
+    try:
+        with _progress(WORK, "Reproducing") as step:
+            report = work(output, step)
+    except OSError as error:
+        from .errors import InputError
+
+        raise InputError(f"{output}: cannot be written: {error.strerror}") from None
+    print(f"The report is at {report}")
+
+
+@app.command()
+def run(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="Scenario file.")],
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help='Change a value, e.g. --set command.amplitude=0.1 or "load.inertia=1 kg*m^2".',
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Result file: .nc, .csv or .parquet.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", metavar="FILE", help="Figure of the run: .png, .svg or .pdf.")
+    ] = None,
+    explain: Annotated[
+        float | None, typer.Option("--explain", metavar="TIME", help="Say what each contact holds at this instant [s].")
+    ] = None,
+    solver: Annotated[str, typer.Option("--solver", help="exact, or dormand-prince as a second opinion.")] = "exact",
+    tolerance: Annotated[float, typer.Option("--tolerance", help="Relative tolerance of dormand-prince.")] = 1e-8,
+) -> None:
+    """Run a scenario; print what came out, write the result, draw it, explain an instant.
+
+    \b
+    lostmotion run drive.toml
+    lostmotion run drive.toml --set command.amplitude=0.1 -o result.nc --plot result.png
+    lostmotion run drive.toml --explain 0.25
+    """
+    from .errors import InputError
+    from .results import check_output, save, write_whole
+    from .scenario import load
+
+    if output is not None:
+        check_output(output)
+    if plot is not None and plot.suffix not in (".png", ".svg", ".pdf"):
+        raise InputError(
+            f"{plot}: the ending {plot.suffix or '(none)'} is not known; it must be one of .png, .svg, .pdf"
+        )
+    loaded = load(scenario, overrides or ())
+    if explain is not None and not 0.0 <= explain <= loaded.simulation.duration:
+        raise InputError(
+            f"--explain {explain}: must lie between 0 and simulation.duration, {loaded.simulation.duration} s"
+        )
+    from .simulate import simulate
+
+    if solver not in ("exact", "dormand-prince"):
+        raise InputError(f"--solver {solver}: must be exact or dormand-prince")
+    if not tolerance > 0.0:
+        raise InputError(f"--tolerance {tolerance}: must be greater than 0")
+    try:
+        result = simulate(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
+    except RuntimeError as error:
+        raise InputError(f"{scenario}: {error}") from None
+    print(summary(result))
+    if explain is not None:
+        from .explain import explain as explain_instant
+
+        print(explain_instant(loaded, explain))
+    if output is not None:
+        save(result, output)
+        print(f"Result written to {output}")
+    if plot is not None:
+        from .plots import overview
+
+        figure = overview(result)
+        write_whole(plot, figure.savefig)
+        print(f"Figure written to {plot}")
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of scenario files, for editors.
+
+    \b
+    lostmotion schema > scenario.schema.json
+    """
+    import json
+
+    from .scenario import json_schema
+
+    print(json.dumps(json_schema(), indent=2))
+
+
+@app.command()
+def version() -> None:
+    """Print the version."""
+    from importlib.metadata import version as installed
+
+    print(installed("lostmotion"))
+
+
+def summary(result: xarray.Dataset) -> str:
+    """A run in a few lines: the end, the extremes, the contacts, the energy."""
+    from .results import energy_of
+
+    last = result.isel(time=-1)
+    stuck = float((result["input_contact"] == 0).mean())
+    lines = [
+        result.attrs["title"] or "(no title)",
+        f"  {float(last['time']):g} s, {result.attrs['switching_count']} switchings, solver {result.attrs['solver']}",
+        f"  at the end: motor {float(last['motor_speed']):.6g} rad/s, load {float(last['load_speed']):.6g} rad/s "
+        f"at {float(last['load_angle']):.6g} rad, twist {1e3 * float(last['twist']):.4g} mrad",
+        f"  largest: motor torque {float(abs(result['motor_torque']).max()):.4g} N·m, output torque "
+        f"{float(abs(result['output_torque']).max()):.4g} N·m, load speed {float(abs(result['load_speed']).max()):.4g} rad/s",
+        f"  input shaft stuck for {100.0 * stuck:.1f} % of the samples",
+    ]
+    if "energy" in result.attrs:
+        e = energy_of(result)
+        names = (
+            "gear_losses",
+            "hysteresis",
+            "motor_friction",
+            "input_damper",
+            "load_damper",
+            "load_friction",
+            "load_work",
+        )
+        parts = ", ".join(f"{name.replace('_', ' ')} {e[name]:.4g}" for name in names if e[name] != 0.0)
+        lines.append(
+            f"  energy [J]: from the motor {e['source']:.4g}; {parts}; stored {e['kinetic_change'] + e['elastic_change']:.4g}"
+        )
+        if e["turned_over"] > 0.0:
+            lines.append(f"  energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}")
+    lines += [f"  warning: {result.attrs['warning']}"] if "warning" in result.attrs else []
+    lines += [f"  note: {result.attrs['note']}"] if "note" in result.attrs else []
+    return "\n".join(lines)

@@ -1,0 +1,195 @@
+"""Figures. The same model has the same colour and line everywhere; all are readable in grey."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from .variables import VARIABLES
+
+if TYPE_CHECKING:
+    import xarray
+
+# Dark to light as nonlinear to simple, so that they differ in grey too.
+STYLES: dict[str, dict[str, Any]] = {
+    "2-DOF-NL": {"color": "#0b3c5d", "linestyle": "-", "linewidth": 1.7},
+    "2-DOF-L": {"color": "#d9730d", "linestyle": "--", "linewidth": 1.3},
+    "1-DOF-L": {"color": "#7fae3f", "linestyle": "-.", "linewidth": 1.3},
+}
+COMMAND_STYLE: dict[str, Any] = {"color": "0.45", "linestyle": ":", "linewidth": 1.3}
+
+mpl.rcParams.update(
+    {
+        "figure.constrained_layout.use": True,
+        "figure.dpi": 110,
+        "savefig.dpi": 150,
+        "font.size": 9.5,
+        "axes.grid": True,
+        "grid.color": "0.9",
+        "grid.linewidth": 0.7,
+        "axes.axisbelow": True,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "legend.frameon": False,
+        "svg.hashsalt": "lostmotion",
+        "svg.fonttype": "path",
+    }
+)
+
+LABELS = {v.name: v for v in VARIABLES}
+
+
+def axis_label(name: str) -> str:
+    """Name and unit of a result variable."""
+    unit = LABELS[name].unit.replace("*", "·")
+    return name.replace("_", " ") + (f" [{unit}]" if unit != "1" else " [-]")
+
+
+def scientific(value: float) -> str:
+    """Two digits and a power of ten, as text."""
+    if value <= 0.0:
+        return "0"
+    exponent = math.floor(math.log10(value))
+    return f"{value / 10.0**exponent:.1f}·10^{exponent}"
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One line of a figure, with the names its data get in the figure's CSV."""
+
+    label: str
+    x: Any
+    y: Any
+    style: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes."""
+
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...]
+    x_range: tuple[float, float] | None = None
+    y_range: tuple[float, float] | None = None
+    log_x: bool = False
+    log_y: bool = False
+
+
+def draw(panels: Iterable[Panel], columns: int, size: tuple[float, float], note: str = "") -> Figure:
+    """Panels in rows of `columns`, `size` [inch] in all; `note` stands below."""
+    panels = list(panels)
+    figure = Figure(figsize=size)
+    rows = -(-len(panels) // columns)
+    for k, panel in enumerate(panels):
+        axes = figure.add_subplot(rows, columns, k + 1)
+        for curve in panel.curves:
+            axes.plot(curve.x, curve.y, label=curve.label, **curve.style)
+        if panel.log_x:
+            axes.set_xscale("log")
+        if panel.log_y:
+            axes.set_yscale("log")
+        axes.set(title=panel.title, xlabel=panel.x_label, ylabel=panel.y_label)
+        axes.title.set_fontsize(10)
+        if panel.x_range is not None:
+            axes.set_xlim(*panel.x_range)
+        if panel.y_range is not None:
+            axes.set_ylim(*panel.y_range)
+        elif panel.x_range is not None:
+            axes.set_ylim(*_range_within(panel.curves, panel.x_range))
+    labels = [[c.label for c in panel.curves] for panel in panels]
+    if len(labels[0]) > 1 and all(names == labels[0] for names in labels):
+        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=8.5)
+    else:
+        for axes, names in zip(figure.axes, labels, strict=True):
+            if len(names) > 1:
+                axes.legend(fontsize=8, loc="best")
+    if note:
+        figure.supxlabel(note, fontsize=8, color="0.35")
+    return figure
+
+
+def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tuple[float, float]:
+    """Limits that hold all points within a range of x, with a margin."""
+    inside = [np.asarray(c.y)[(np.asarray(c.x) >= x_range[0]) & (np.asarray(c.x) <= x_range[1])] for c in curves]
+    low, high = min(float(np.nanmin(y)) for y in inside), max(float(np.nanmax(y)) for y in inside)
+    margin = 0.05 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def overview(result: xarray.Dataset) -> Figure:
+    """A run at a glance: command and motor, speeds, torques, twist and contacts."""
+    t = result["time"].values
+    ink = STYLES["2-DOF-NL"]
+    second = STYLES["2-DOF-L"]
+    ratio = _ratio(result)
+
+    def curve(name: str, style: Mapping[str, Any], factor: float = 1.0, label: str = "") -> Curve:
+        return Curve(label or name.replace("_", " "), t, factor * result[name].values, style)
+
+    panels = [
+        Panel("", "time [s]", "command [-]", (curve("command", ink),)),
+        Panel("", "time [s]", "torque [N·m]", (curve("motor_torque", ink),)),
+        Panel(
+            "",
+            "time [s]",
+            "speed at the load [rad/s]",
+            (curve("motor_speed", second, 1.0 / ratio, "motor speed / ratio"), curve("load_speed", ink)),
+        ),
+        Panel(
+            "",
+            "time [s]",
+            "torque [N·m]",
+            (
+                curve("input_torque", second, ratio, "input torque x ratio"),
+                curve("output_torque", ink),
+                curve("load_torque", COMMAND_STYLE),
+            ),
+        ),
+        Panel("", "time [s]", "twist [mrad]", (curve("twist", ink, 1e3),)),
+        Panel(
+            "",
+            "time [s]",
+            "contact: -1, 0 stuck, +1",
+            (curve("input_contact", ink), curve("twist_contact", {**second, "linewidth": 1.0})),
+            y_range=(-1.15, 1.15),
+        ),
+    ]
+    figure = draw(panels, 2, (10.0, 8.0), note=result.attrs.get("warning", "") or result.attrs.get("note", ""))
+    if result.attrs.get("title"):
+        figure.suptitle(result.attrs["title"])
+    return figure
+
+
+def _ratio(result: xarray.Dataset) -> float:
+    import json
+
+    return float(json.loads(result.attrs["scenario"])["gearbox"]["ratio"])
+
+
+def loss_map(speeds: Any, loads: Any, values: Any, note: str = "") -> Figure:
+    """Figure 5: the loss coefficient as a surface and as curves. values[load, speed], driving side only."""
+    figure = Figure(figsize=(10.0, 4.2))
+    surface: Any = figure.add_subplot(1, 2, 1, projection="3d")
+    v, mu = np.meshgrid(speeds, loads)
+    surface.plot_surface(v, mu, values, cmap="cividis", edgecolor="0.25", linewidth=0.4, alpha=0.95)
+    surface.set(xlabel="relative speed v [-]", ylabel="relative load µ [-]", zlabel="$m_{2B}$ [-]")
+    surface.tick_params(labelsize=7.5, pad=0)
+    surface.view_init(elev=24, azim=-125)
+    surface.set_box_aspect(None, zoom=0.88)
+    curves = figure.add_subplot(1, 2, 2)
+    shades = mpl.colormaps["cividis"](np.linspace(0.0, 0.85, len(loads)))
+    for row, load, colour in zip(values, loads, shades, strict=True):
+        curves.plot(speeds, row, color=colour, marker="o", markersize=3, label=f"µ = {load:g}")
+    curves.set(xlabel="relative speed v [-]", ylabel="loss coefficient $m_{2B}$ [-]", ylim=(0.0, None))
+    curves.legend(fontsize=8, ncols=2)
+    if note:
+        figure.supxlabel(note, fontsize=8, color="0.35")
+    return figure
