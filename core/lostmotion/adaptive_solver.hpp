@@ -127,6 +127,7 @@ class AdaptiveSolver {
     }
     void set_inputs() {
         input_.anchor(time_);
+        now_.time = time_;
         now_.input = input_.jet();
     }
 
@@ -258,7 +259,9 @@ class AdaptiveSolver {
                          const Guard*& crossed) {
         constexpr int looks = 16;
         const auto value = [&](double t) { return evaluate(guard.form, dense(t), now_.memory, input_at(t)); };
-        const double noise = noise_factor * magnitude(guard.form, dense.x, now_.memory, input_at(dense.begin));
+        // A solution of finite accuracy may tremble about a guard that the exact one only approaches.
+        double noise = rounding * magnitude(guard.form, dense.x, now_.memory, input_at(dense.begin));
+        for (int k = 0; k < n_states; ++k) noise += noise_factor * std::fabs(guard.form.c[k]) * scale_[k];
         double low = dense.begin;
         for (int k = 1; k <= looks; ++k) {
             double high = k == looks ? end : dense.begin + dense.length * k / looks;

@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <tuple>
+#include <utility>
 
 #include "drive.hpp"
 #include "regime.hpp"
@@ -14,13 +16,17 @@
 namespace lostmotion {
 
 struct Instant {
+    double time = 0.0;  // [s]
     State x{};
     Memory memory;
     InputJet input{};
 };
 
-// Rounding of a form is taken as this multiple of the sum of the magnitudes of its terms.
-inline constexpr double rounding = 64.0 * std::numeric_limits<double>::epsilon();
+// A form counts as zero within this multiple of the sum of the magnitudes of its terms. Its coefficients come from an
+// elimination and carry more than one rounding.
+inline constexpr double rounding = 0x1p14 * std::numeric_limits<double>::epsilon();
+// Rounding of an instant, relative to the time since the start.
+inline constexpr double time_rounding = 4.0 * std::numeric_limits<double>::epsilon();
 
 // Time derivatives of the state along the flow of one regime, computed as far as they are asked for.
 class Flow {
@@ -32,21 +38,32 @@ class Flow {
 
     // Sign of the guard just after now; 0 if it stays at zero.
     int sign(const Guard& guard) {
-        const auto& u = now_.input;
-        double value = evaluate(guard.form, now_.x, now_.memory, u[0]);
-        double size = magnitude(guard.form, now_.x, now_.memory, u[0]);
-        for (int k = 1;; ++k) {
-            if (value > rounding * size) return +1;
-            if (value < -rounding * size) return -1;
-            if (k == n_derivatives) return 0;
-            if (k > order_) extend();
-            value = evaluate_rate(guard.form, x_[k], u[k]);
-            size = std::fabs(guard.form.c[command] * u[k][0]) + std::fabs(guard.form.c[load_torque] * u[k][1]);
-            for (int j = 0; j < n_states; ++j) size += std::fabs(guard.form.c[j]) * size_[k][j];
+        double value = evaluate(guard.form, now_.x, now_.memory, now_.input[0]);
+        double size = magnitude(guard.form, now_.x, now_.memory, now_.input[0]);
+        for (int k = 1; k < n_derivatives; ++k) {
+            // The instant itself is known to its rounding only, so a value may be off by that times its rate.
+            const auto [rate, rate_size] = derivative(guard.form, k);
+            const double noise = rounding * size + time_rounding * std::fabs(now_.time * rate);
+            if (std::fabs(value) > noise) return value > 0.0 ? +1 : -1;
+            value = rate;
+            size = rate_size;
         }
+        return 0;
     }
 
  private:
+    // Value of the k-th derivative of a form and the sum of the magnitudes of its terms.
+    std::pair<double, double> derivative(const LinearForm& f, int k) {
+        if (k > order_) extend();
+        return rate_of(f, x_[k], size_[k], now_.input[k]);
+    }
+    static std::pair<double, double> rate_of(const LinearForm& f, const State& x, const State& x_size,
+                                             const std::array<double, n_inputs>& u) {
+        double size = std::fabs(f.c[command] * u[0]) + std::fabs(f.c[load_torque] * u[1]);
+        for (int j = 0; j < n_states; ++j) size += std::fabs(f.c[j]) * x_size[j];
+        return {evaluate_rate(f, x, u), size};
+    }
+
     void extend() {
         const int k = order_++;
         for (int row = 0; row < n_states; ++row) {
@@ -57,10 +74,7 @@ class Flow {
                 size_[1][row] = magnitude(f, now_.x, now_.memory, u);
                 continue;
             }
-            double size = std::fabs(f.c[command] * u[0]) + std::fabs(f.c[load_torque] * u[1]);
-            for (int j = 0; j < n_states; ++j) size += std::fabs(f.c[j]) * size_[k][j];
-            x_[k + 1][row] = evaluate_rate(f, x_[k], u);
-            size_[k + 1][row] = size;
+            std::tie(x_[k + 1][row], size_[k + 1][row]) = rate_of(f, x_[k], size_[k], u);
         }
     }
 
@@ -86,7 +100,7 @@ class SwitchedDrive {
         std::array<bool, n_contacts> at_rest = at_exact_rest(now.x);
         if (drive_.rigid()) at_rest[twist_contact] = true;
         const double P = drive_.rigid() ? now.memory.held_torque : drive_.gearbox.curve.torque(now.x[twist]);
-        return find(cache, now, at_rest, P, key);
+        return find(cache, now, at_rest, P, Ended{false, {}, nullptr}, key);
     }
 
     // Regime that follows `key` at this instant: after one of its guards has reached zero, or (fired = nullptr)
@@ -95,6 +109,7 @@ class SwitchedDrive {
     template <class Cache>
     Found next(Cache& cache, Instant& now, const Guard* fired, RegimeKey& key) const {
         const Regime& old = cache.regime(key);
+        const Ended ended{fired != nullptr && fired->kind != Guard::speed, key, fired};
         const double T_2 = evaluate(old.output_torque, now.x, now.memory, now.input[0]);
         std::array<bool, n_contacts> at_rest = old.at_rest;
         for (int k = 0; k < old.n_guards; ++k) {
@@ -107,10 +122,29 @@ class SwitchedDrive {
         stop(now.x, at_rest);
         if (at_rest[twist_contact] && !old.at_rest[twist_contact] && drive_.gearbox.has_hysteresis())
             now.memory.hysteresis_capacity = drive_.gearbox.hysteresis_capacity(now.x[twist]);
-        return find(cache, now, at_rest, T_2, key);
+        return find(cache, now, at_rest, T_2, ended, key);
     }
 
  private:
+    // A regime that the solver has seen to its end. Where the motion has all but come to rest, the derivatives at the
+    // instant alone may be too small to tell that it ends.
+    struct Ended {
+        bool known;
+        RegimeKey key;
+        const Guard* fired;
+    };
+
+    // Crosses into the neighbour that a guard of the curve, the map or the amplifier leads to.
+    static void cross(const Guard& guard, RegimeKey& key) {
+        switch (guard.kind) {
+            case Guard::torsion_piece: key.piece = static_cast<std::int16_t>(guard.neighbour); break;
+            case Guard::loss_cell: key.cell = guard.neighbour; break;
+            case Guard::loss_cell_back: key.cell_back = guard.neighbour; break;
+            case Guard::amplifier: key.amplifier = static_cast<std::int8_t>(guard.neighbour); break;
+            default: break;
+        }
+    }
+
     std::array<bool, n_contacts> at_exact_rest(const State& x) const {
         const double w_M = x[motor_speed], w = x[load_speed];
         return {w_M == 0.0, w_M * (1.0 / drive_.gearbox.ratio) == w, w == 0.0};
@@ -126,7 +160,7 @@ class SwitchedDrive {
     // Tries the combinations of modes, those with most contacts stuck first.
     template <class Cache>
     Found find(Cache& cache, Instant& now, const std::array<bool, n_contacts>& at_rest, double T_2,
-               RegimeKey& key) const {
+               const Ended& ended, RegimeKey& key) const {
         std::array<std::array<std::int8_t, 3>, n_contacts> choices{};
         std::array<int, n_contacts> n{};
         for (int k = 0; k < n_contacts; ++k) {
@@ -151,7 +185,7 @@ class SwitchedDrive {
                         const Modes modes{choices[0][a], choices[1][b], choices[2][c]};
                         if ((modes[0] != 0) + (modes[1] != 0) + (modes[2] != 0) != slips) continue;
                         now = before;
-                        const Found found = settle(cache, now, modes, at_rest, T_2, key);
+                        const Found found = settle(cache, now, modes, at_rest, T_2, ended, key);
                         if (found == Found::yes) return found;
                         if (found == Found::outside) worst = found;
                     }
@@ -162,7 +196,7 @@ class SwitchedDrive {
     // walking across each of their edges that is violated; load and cell depend on each other while the twist is stuck.
     template <class Cache>
     Found settle(Cache& cache, Instant& now, const Modes& modes, const std::array<bool, n_contacts>& at_rest,
-                 double T_2, RegimeKey& key) const {
+                 double T_2, const Ended& ended, RegimeKey& key) const {
         RegimeKey trial;
         trial.modes = modes;
         const Gearbox& gearbox = drive_.gearbox;
@@ -203,15 +237,14 @@ class SwitchedDrive {
             }
             if (left == nullptr) {
                 if (overcome) return Found::inconsistent;
+                if (ended.known && trial == ended.key) {
+                    if (ended.fired->kind == Guard::capacity) return Found::inconsistent;
+                    cross(*ended.fired, trial);
+                }
                 key = trial;
                 return Found::yes;
             }
-            switch (left->kind) {
-                case Guard::torsion_piece: trial.piece = static_cast<std::int16_t>(left->neighbour); break;
-                case Guard::loss_cell_back: trial.cell_back = left->neighbour; break;
-                case Guard::amplifier: trial.amplifier = static_cast<std::int8_t>(left->neighbour); break;
-                default: trial.cell = left->neighbour;
-            }
+            cross(*left, trial);
         }
         return Found::inconsistent;
     }

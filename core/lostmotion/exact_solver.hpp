@@ -74,7 +74,7 @@ class Cursor {
     const InputState& input() const { return input_; }
     State rate() const { return propagator_->rate(x_, *constant_, input_.values()); }
 
-    void anchor(double time) { input_.anchor(time); }
+    void anchor(double time) { input_.follow(time); }
 
     void step(int level) {
         x_ = propagator_->step(level, x_, rate(), input_.weights());
@@ -91,7 +91,7 @@ class Cursor {
             }
         }
         if (h != 0.0) x_ = propagator_->series(h, x_, rate(), input_);
-        input_.anchor(target);
+        input_.follow(target);
     }
 
  private:
@@ -236,6 +236,7 @@ class ExactSolver {
     void anchor_inputs() {
         InputState input(signals_, basis_);
         input.anchor(time_);
+        now_.time = time_;
         now_.input = input.jet();
     }
     Status status_of(Found found) {
@@ -323,8 +324,9 @@ class ExactSolver {
                     continue;
                 }
                 if (verdict == Verdict::crossing) {
-                    const double s = first_crossing(r, e, segment.memory, cursor, look, h, end, fired);
-                    time_ += s;
+                    cursor.anchor(time_);  // so that the inputs at the event are those that the next regime sees
+                    first_crossing(r, e, segment.memory, cursor, look, h, end, fired);
+                    time_ = end.time();
                     now_.x = end.x();
                     last_level_ = level;
                     return Status::done;
@@ -370,7 +372,9 @@ class ExactSolver {
             const double bound = h * h * h * look.fourth[g], error = h / 384.0 * bound;
             const double least = c.least();
             if (least > error) continue;
-            const double tolerance = rounding * magnitude(r.guards[g].form, cursor.x(), memory, u);
+            const double tolerance =
+                rounding * magnitude(r.guards[g].form, cursor.x(), memory, u) +
+                time_rounding * std::fabs(time_) * std::max(std::fabs(look.slope[g]), std::fabs(look.end_slope[g]));
             if (least - error >= -tolerance) continue;
             const double slope_error = 0.00802 * bound;
             const double d0 = 3.0 / h * (c.c1 - c.c0), d1 = 3.0 / h * (c.c2 - c.c1), d2 = 3.0 / h * (c.c3 - c.c2);
@@ -388,8 +392,8 @@ class ExactSolver {
         return n_crossing_ > 0 ? Verdict::crossing : Verdict::clear;
     }
 
-    // Earliest of the certified crossings; `end` is left there. Returns the time from the cursor.
-    double first_crossing(const Regime& r, typename Cache::Entry& e, const Memory& memory, const Cursor& cursor,
+    // Earliest of the certified crossings; `end` is left there.
+    void first_crossing(const Regime& r, typename Cache::Entry& e, const Memory& memory, const Cursor& cursor,
                           const Look& look, double h, Cursor& end, const Guard*& fired) {
         double best = std::numeric_limits<double>::infinity();
         Cursor at = end;
@@ -409,7 +413,7 @@ class ExactSolver {
                 double next = s - value / evaluate_rate(guard.form, at.rate(), u[1]);
                 if (!(next >= low && next <= high)) next = 0.5 * (low + high);
                 const double moved = next - s;
-                if (value == 0.0 || std::fabs(moved) <= 2.0 * std::numeric_limits<double>::epsilon() * s) break;
+                if (value == 0.0 || at.time() + moved == at.time()) break;
                 if (std::fabs(moved) < e.propagator.level(0).length) {
                     at.advance(moved);
                 } else {
@@ -417,7 +421,6 @@ class ExactSolver {
                     at.advance(next);
                 }
                 s = next;
-                if (std::fabs(moved) <= 0.25 * std::numeric_limits<double>::epsilon() * std::fabs(time_)) break;
             }
             if (s < best) {
                 best = s;
@@ -425,7 +428,6 @@ class ExactSolver {
                 fired = &r.guards[g];
             }
         }
-        return best;
     }
 
     const System& system_;

@@ -25,8 +25,8 @@ class LossMap {
     // speeds: v, rising from 0; loads: mu, rising; values: m_2B >= 0, values[j * speeds.size() + i] at (loads[j],
     // speeds[i]).
     //
-    // Outside its data the map goes on with the slope of the last interval where the losses rise outwards, and
-    // stays constant where they fall (a loss must not become negative); in_data() tells the two apart.
+    // Outside its data the map goes on with the steepest slope by which its losses rise towards that edge, or level if
+    // they fall (a loss must not become negative); in_data() tells inside from outside.
     LossMap(std::vector<double> speeds, std::vector<double> loads, std::vector<double> values)
         : speeds_(std::move(speeds)), loads_(std::move(loads)), values_(std::move(values)) {
         extend();
@@ -112,7 +112,7 @@ class LossMap {
 
  private:
     int cells_along_speed() const { return static_cast<int>(speeds_.size()) - 1; }
-    double value(int j, int i) const { return values_[j * speeds_.size() + i]; }
+    double value(std::size_t j, std::size_t i) const { return values_[j * speeds_.size() + i]; }
     // Diagonals rise for mu > 0 and fall for mu < 0, so that a map mirrored in its data is mirrored in its triangles.
     bool rising(int j) const { return loads_[j] + loads_[j + 1] >= 0.0; }
 
@@ -122,32 +122,30 @@ class LossMap {
         return k;
     }
 
-    // One more row on each side of the load axis and one more column at the fast end, far away.
+    // One more row on each side of the load axis and one more column at the fast end, far away. Each continues its
+    // whole edge with one slope, so that the far cells are no more crooked than the last ones of the data.
     void extend() {
         constexpr double far = 1e3;
-        const auto beyond = [](double inner, double last, double step, double distance) {
-            return last + std::fmax(0.0, (last - inner) / step) * distance;
-        };
         const std::size_t n = speeds_.size(), m = loads_.size();
-        const double speed_step = speeds_[n - 1] - speeds_[n - 2], speed_reach = far * (speeds_[n - 1] + 1.0);
-        const double low_step = loads_[1] - loads_[0], high_step = loads_[m - 1] - loads_[m - 2];
-        const double load_reach = far * (loads_[m - 1] - loads_[0]);
-        std::vector<double> wide;
-        for (std::size_t j = 0; j < m; ++j) {
-            const double* row = &values_[j * n];
-            wide.insert(wide.end(), row, row + n);
-            wide.push_back(beyond(row[n - 2], row[n - 1], speed_step, speed_reach));
+        const double speed_reach = far * (speeds_[n - 1] + 1.0), load_reach = far * (loads_[m - 1] - loads_[0]);
+        double fast = 0.0, low = 0.0, high = 0.0;  // steepest rise outwards along each edge
+        for (std::size_t j = 0; j < m; ++j)
+            fast = std::fmax(fast, (value(j, n - 1) - value(j, n - 2)) / (speeds_[n - 1] - speeds_[n - 2]));
+        for (std::size_t i = 0; i < n; ++i) {
+            low = std::fmax(low, (value(0, i) - value(1, i)) / (loads_[1] - loads_[0]));
+            high = std::fmax(high, (value(m - 1, i) - value(m - 2, i)) / (loads_[m - 1] - loads_[m - 2]));
         }
-        const std::size_t w = n + 1;
-        std::vector<double> full;
-        for (std::size_t i = 0; i < w; ++i) full.push_back(beyond(wide[w + i], wide[i], low_step, load_reach));
-        full.insert(full.end(), wide.begin(), wide.end());
-        for (std::size_t i = 0; i < w; ++i)
-            full.push_back(beyond(wide[(m - 2) * w + i], wide[(m - 1) * w + i], high_step, load_reach));
+        std::vector<double> all;
+        for (std::size_t row = 0; row < m + 2; ++row) {
+            const std::size_t j = row == 0 ? 0 : row == m + 1 ? m - 1 : row - 1;
+            const double beyond = row == 0 ? low * load_reach : row == m + 1 ? high * load_reach : 0.0;
+            for (std::size_t i = 0; i < n; ++i) all.push_back(value(j, i) + beyond);
+            all.push_back(value(j, n - 1) + beyond + fast * speed_reach);
+        }
         speeds_.push_back(speeds_.back() + speed_reach);
         loads_.insert(loads_.begin(), loads_.front() - load_reach);
         loads_.push_back(loads_.back() + load_reach);
-        values_ = std::move(full);
+        values_ = std::move(all);
     }
 
     std::vector<double> speeds_, loads_, values_;

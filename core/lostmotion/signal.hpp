@@ -92,12 +92,27 @@ class InputState {
         anchor(0.0);
     }
 
-    // Sets all from absolute time, so that no phase error accumulates however long the run.
+    // Sets all from absolute time, so that no phase error accumulates however long the run. At a knot: the right limit.
     void anchor(double t) {
+        for (int i = 0; i < n_inputs; ++i) knot_[i] = &(*signals_)[i].knots[(*signals_)[i].segment(t)];
+        follow(t);
+    }
+    // The same, the left limit.
+    void anchor_left(double t) {
+        for (int i = 0; i < n_inputs; ++i) {
+            const Signal& s = (*signals_)[i];
+            std::size_t k = s.segment(t);
+            while (k > 0 && s.knots[k].time >= t) --k;
+            knot_[i] = &s.knots[k];
+        }
+        follow(t);
+    }
+    // The same, on the stretches between knots that were last anchored to, also at their far end.
+    void follow(double t) {
         time_ = t;
         std::size_t q = 0;
         for (int i = 0; i < n_inputs; ++i) {
-            const Knot& k = (*signals_)[i].knots[(*signals_)[i].segment(t)];
+            const Knot& k = *knot_[i];
             linear_[i] = k.value + k.slope * (t - k.time);
             slope_[i] = k.slope;
             if (q < basis_->size() && (*basis_)[q].kind == InputBasis::ramp && (*basis_)[q].input == i)
@@ -110,18 +125,6 @@ class InputState {
                 weights_[q++] = s.amplitude * std::sin(angle);
                 weights_[q++] = s.amplitude * std::cos(angle);
             }
-    }
-
-    // The left limit: as anchor(t), with the piecewise-linear parts continued from before t.
-    void anchor_left(double t) {
-        anchor(t);
-        for (int i = 0; i < n_inputs; ++i) {
-            const Signal& s = (*signals_)[i];
-            std::size_t k = s.segment(t);
-            while (k > 0 && s.knots[k].time >= t) --k;
-            linear_[i] = s.knots[k].value + s.knots[k].slope * (t - s.knots[k].time);
-            slope_[i] = s.knots[k].slope;
-        }
     }
 
     double time() const { return time_; }
@@ -183,6 +186,7 @@ class InputState {
     const Signals* signals_;
     const std::vector<InputBasis>* basis_;
     double time_ = 0.0;
+    std::array<const Knot*, n_inputs> knot_{};
     std::array<double, n_inputs> linear_{}, slope_{};
     std::vector<double> weights_;  // ramp: slope; cosine: a sin(psi); sine: a cos(psi)
 };

@@ -75,7 +75,7 @@ def frequency_response(
         points.append((*_harmonics(dict(zip((v.name for v in CHANNELS), table, strict=True))), periods, residual))
         if progress is not None:
             progress()
-    response, distortion, efficiency, periods, residual = (np.array(column) for column in zip(*points, strict=True))
+    response, distortion, efficiency, followed, residuals = (np.array(column) for column in zip(*points, strict=True))
     dim = ("frequency",)
     return xr.Dataset(
         {
@@ -90,8 +90,8 @@ def frequency_response(
                 efficiency,
                 {"units": "1", "long_name": "mean power out of the gear / mean motor power"},
             ),
-            "periods": (dim, periods, {"units": "1", "long_name": "periods followed"}),
-            "periodicity": (dim, residual, {"units": "1", "long_name": "largest relative change over one period"}),
+            "periods": (dim, followed, {"units": "1", "long_name": "periods followed"}),
+            "periodicity": (dim, residuals, {"units": "1", "long_name": "largest relative change over one period"}),
         },
         coords={"frequency": (dim, np.asarray(frequencies, dtype=float), {"units": "Hz", "long_name": "frequency"})},
         attrs={"amplitude": amplitude, "samples_per_period": SAMPLES_PER_PERIOD},

@@ -1,0 +1,72 @@
+// Exact against adaptive solver on random drives: two methods that share nothing but the regimes.
+#include <doctest/doctest.h>
+
+#include <cstdio>
+
+#include "support.hpp"
+
+using namespace lostmotion;
+
+namespace {
+
+// Largest difference of the five states at the samples, in units of each state's largest magnitude (or a millionth of
+// its rated size, if it hardly moves).
+double difference(const Drive& drive, const Samples& a, const Samples& b) {
+    double worst = 0.0;
+    constexpr std::array<Channel, n_states> channels{ch_motor_torque, ch_motor_speed, ch_load_speed, ch_twist,
+                                                     ch_load_angle};
+    for (int state = 0; state < n_states; ++state) {
+        const Channel c = channels[state];
+        double size = 1e-6 * drive.rated_scale()[state], gap = 0.0;
+        for (std::size_t k = 0; k < a.count; ++k) {
+            size = std::fmax(size, std::fabs(a(c, k)));
+            gap = std::fmax(gap, std::fabs(a(c, k) - b(c, k)));
+        }
+        worst = std::fmax(worst, gap / size);
+    }
+    return worst;
+}
+
+}  // namespace
+
+TEST_SUITE("differential") {
+    // The adaptive solver is run at two tolerances. How far its two results lie apart shows how much this motion
+    // amplifies errors (a turning point missed by a hair sets the hysteresis anew): the exact result must lie as near to
+    // the finer one as that explains. Most motions are well conditioned; their gap must be small outright.
+    TEST_CASE("exact and adaptive solver agree on 600 random drives") {
+        constexpr double duration = 0.5;
+        constexpr int drives = 4000;
+        RandomDrives random(20260101);
+        int compared = 0, refused = 0;
+        double worst_energy = 0.0;
+        std::vector<double> gaps;
+        for (int n = 0; n < drives; ++n) {
+            const Drive drive = random.drive();
+            const Signals signals = random.signals(drive, duration);
+            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) {
+                ++refused;
+                continue;
+            }
+            CAPTURE(n);
+            const Samples exact = run(drive, signals, duration, 5e-3);
+            CHECK_MESSAGE(exact.report.status == Status::done, "status ", static_cast<int>(exact.report.status),
+                            " at ", exact.report.time);
+            const Samples coarse = run(drive, signals, duration, 5e-3, {}, 1e-8);
+            const Samples fine = run(drive, signals, duration, 5e-3, {}, 1e-11);
+            REQUIRE(fine.report.status == Status::done);
+            const double spread = difference(drive, coarse, fine), gap = difference(drive, exact, fine);
+            CHECK_MESSAGE(gap <= 2.0 * spread + 1e-9, "gap ", gap, ", spread ", spread);
+            gaps.push_back(gap);
+            const EnergyLedger& e = exact.report.energy;
+            const double balance = std::fabs(e.residual()) / std::fmax(1e-300, e.turned_over);
+            CHECK_MESSAGE(balance <= 1e-9, "energy balance ", balance);
+            worst_energy = std::fmax(worst_energy, balance);
+            ++compared;
+        }
+        CHECK(compared >= 500);
+        std::sort(gaps.begin(), gaps.end());
+        CHECK(gaps[gaps.size() * 95 / 100] < 1e-7);
+        std::printf("differential: %d drives (%d jamming ones refused), median gap %.1e, largest %.1e, energy %.1e\n",
+                    compared, refused, gaps[gaps.size() / 2], gaps.back(), worst_energy);
+    }
+}
