@@ -51,12 +51,13 @@ class Flow {
         return 0;
     }
 
- private:
     // Value of the k-th derivative of a form and the sum of the magnitudes of its terms.
     std::pair<double, double> derivative(const LinearForm& f, int k) {
         if (k > order_) extend();
         return rate_of(f, x_[k], size_[k], now_.input[k]);
     }
+
+ private:
     static std::pair<double, double> rate_of(const LinearForm& f, const State& x, const State& x_size,
                                              const std::array<double, n_inputs>& u) {
         double size = std::fabs(f.c[command] * u[0]) + std::fabs(f.c[load_torque] * u[1]);
@@ -159,8 +160,8 @@ class SwitchedDrive {
 
     // Tries the combinations of modes, those with most contacts stuck first.
     template <class Cache>
-    Found find(Cache& cache, Instant& now, const std::array<bool, n_contacts>& at_rest, double T_2,
-               const Ended& ended, RegimeKey& key) const {
+    Found find(Cache& cache, Instant& now, const std::array<bool, n_contacts>& at_rest, double T_2, const Ended& ended,
+               RegimeKey& key) const {
         std::array<std::array<std::int8_t, 3>, n_contacts> choices{};
         std::array<int, n_contacts> n{};
         for (int k = 0; k < n_contacts; ++k) {

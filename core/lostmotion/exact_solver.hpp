@@ -117,11 +117,17 @@ struct Cubic {
         const double r = 1.0 - s;
         return 3.0 * (r * r * (c1 - c0) + 2.0 * r * s * (c2 - c1) + s * s * (c3 - c2));
     }
-    // First of sixteen equidistant points where the cubic lies below the threshold; 2 if there is none.
-    double first_negative(double threshold) const {
-        for (int k = 1; k <= 16; ++k)
-            if ((*this)(k / 16.0) < threshold) return k / 16.0;
-        return 2.0;
+    // Where on [0, 1] it is least.
+    double lowest_at() const {
+        const double d0 = c1 - c0, d1 = c2 - c1, d2 = c3 - c2;
+        double best = (*this)(1.0) < (*this)(0.0) ? 1.0 : 0.0;
+        // Zeros of the slope, (d0 - 2 d1 + d2) s^2 + 2 (d1 - d0) s + d0, in the form that does not cancel.
+        const double a = d0 - 2.0 * d1 + d2, b = d1 - d0, discriminant = b * b - a * d0;
+        if (discriminant < 0.0) return best;
+        const double q = -(b + std::copysign(std::sqrt(discriminant), b));
+        for (const double s : {q / a, d0 / q})
+            if (s > 0.0 && s < 1.0 && (*this)(s) < (*this)(best)) best = s;
+        return best;
     }
     // Zero between 0, where it is positive, and `b`, where it is negative: Newton, kept in its bracket by bisection.
     double root(double b) const {
@@ -224,6 +230,7 @@ class ExactSolver {
 
  private:
     // Accumulation of switching instants: this many of them within a few thousand roundings of the time.
+    static constexpr int first_level = 6;  // of the first look
     static constexpr int zeno_count = 100;
     static constexpr double zeno_span = 1e4 * std::numeric_limits<double>::epsilon();
 
@@ -231,6 +238,7 @@ class ExactSolver {
         time_ = time;
         recent_ = 0;
         jump_pending_ = false;
+        last_level_ = first_level;  // so that what follows depends on the state alone
     }
     double next_knot() const { return std::fmin(signals_[0].next_knot(time_), signals_[1].next_knot(time_)); }
     void anchor_inputs() {
@@ -293,6 +301,7 @@ class ExactSolver {
         Cursor cursor(p, signals_, basis_, segment.constant, time_, now_.x), end = cursor;
         Look look;
         int level = std::min(last_level_, p.level_below(limit - time_));
+        const double shortest = 1e-7 * p.level(0).length;
         for (long count = 1; time_ < limit; ++count) {
             ++looks_;
             if (count % 1024 == 0 && interrupted != nullptr && interrupted(interrupted_context))
@@ -305,10 +314,9 @@ class ExactSolver {
             e.evaluate_guards(&constant, cursor.x(), u[0], look.value);
             e.evaluate_guards(nullptr, rate, u[1], look.slope);
             const double left = limit - time_;
+            double h = std::min(p.level(level).length, left);
             while (true) {
-                const double length = p.level(level).length;
-                const bool whole = length <= left;
-                const double h = whole ? length : left;
+                const bool whole = h == p.level(level).length;
                 end = cursor;
                 if (whole)
                     end.step(level);
@@ -318,9 +326,9 @@ class ExactSolver {
                 e.evaluate_guards(&constant, end.x(), v[0], look.end_value);
                 e.evaluate_guards(nullptr, end.rate(), v[1], look.end_slope);
                 bound_fourth(e, p.level(level).growth, fourth, h, look.fourth);
-                const Verdict verdict = judge(r, cursor, look, h, level == 0, segment.memory, u[0]);
-                if (verdict == Verdict::uncertain) {
-                    --level;
+                const Verdict verdict = judge(r, Instant{time_, cursor.x(), segment.memory, u}, look, h, h < shortest);
+                if (verdict == Verdict::uncertain) {  // below the shortest level, by plain halves
+                    h = level > 0 ? std::min(p.level(--level).length, left) : 0.5 * h;
                     continue;
                 }
                 if (verdict == Verdict::crossing) {
@@ -331,7 +339,7 @@ class ExactSolver {
                     last_level_ = level;
                     return Status::done;
                 }
-                time_ = whole ? time_ + h : limit;
+                time_ = h == left ? limit : time_ + h;
                 break;
             }
             std::swap(cursor, end);
@@ -364,8 +372,8 @@ class ExactSolver {
                      c[5][g] * input_bound_[0] + c[6][g] * input_bound_[1];
     }
 
-    Verdict judge(const Regime& r, const Cursor& cursor, Look& look, double h, bool shortest, const Memory& memory,
-                  const std::array<double, n_inputs>& u) {
+    Verdict judge(const Regime& r, const Instant& now, const Look& look, double h, bool shortest) {
+        Flow flow(r, now);
         n_crossing_ = 0;
         for (int g = 0; g < r.n_guards; ++g) {
             const Cubic c(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
@@ -373,7 +381,7 @@ class ExactSolver {
             const double least = c.least();
             if (least > error) continue;
             const double tolerance =
-                rounding * magnitude(r.guards[g].form, cursor.x(), memory, u) +
+                rounding * magnitude(r.guards[g].form, now.x, now.memory, now.input[0]) +
                 time_rounding * std::fabs(time_) * std::max(std::fabs(look.slope[g]), std::fabs(look.end_slope[g]));
             if (least - error >= -tolerance) continue;
             const double slope_error = 0.00802 * bound;
@@ -385,22 +393,42 @@ class ExactSolver {
                 crossing_[n_crossing_++] = g;
                 continue;
             }
-            if (!shortest) return Verdict::uncertain;
-            // At the shortest length the cubic is the guard to rounding; does it dip below zero?
-            if (c.first_negative(-tolerance) <= 1.0) crossing_[n_crossing_++] = g;
+            if (c.c0 <= tolerance && departs(r.guards[g].form, flow, h, look.fourth[g])) continue;
+            if (error > tolerance && !shortest) return Verdict::uncertain;
+            // The cubic is the guard to rounding; does it dip below zero?
+            if (c(c.lowest_at()) < -tolerance) crossing_[n_crossing_++] = g;
         }
         return n_crossing_ > 0 ? Verdict::crossing : Verdict::clear;
     }
 
+    // A guard that starts on zero: does its first derivative that is not zero carry it away, all through the look?
+    static bool departs(const LinearForm& form, Flow& flow, double h, double fourth) {
+        std::array<double, 4> derivative{};
+        int first = 0;
+        for (int k = 1; k < 4; ++k) {
+            const auto [value, size] = flow.derivative(form, k);
+            derivative[k] = value;
+            if (first == 0 && value < -rounding * size) return false;
+            if (first == 0 && value > rounding * size) first = k;
+        }
+        if (first == 0) return false;
+        // value = h^k (derivative_k / k! + what follows), bounded at the far end.
+        constexpr std::array<double, 4> factorial{1.0, 1.0, 2.0, 6.0};
+        double least = derivative[first] / factorial[first] - fourth * std::pow(h, 4 - first) / 24.0;
+        for (int k = first + 1; k < 4; ++k)
+            least += std::min(0.0, derivative[k]) * std::pow(h, k - first) / factorial[k];
+        return least > 0.0;
+    }
+
     // Earliest of the certified crossings; `end` is left there.
     void first_crossing(const Regime& r, typename Cache::Entry& e, const Memory& memory, const Cursor& cursor,
-                          const Look& look, double h, Cursor& end, const Guard*& fired) {
+                        const Look& look, double h, Cursor& end, const Guard*& fired) {
         double best = std::numeric_limits<double>::infinity();
         Cursor at = end;
         for (int k = 0; k < n_crossing_; ++k) {
             const int g = crossing_[k];
             const Cubic c(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
-            const double z = c.root(c.c3 < 0.0 ? 1.0 : std::fmin(1.0, c.first_negative(0.0)));
+            const double z = c.root(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
             // Newton on the guard itself, kept within its bracket by bisection.
             double low = 0.0, high = h, s = z * h;
             at = cursor;
@@ -441,7 +469,7 @@ class ExactSolver {
     double time_ = 0.0;
     Instant now_;
     RegimeKey key_;
-    int last_level_ = 4;
+    int last_level_ = first_level;
     long looks_ = 0;
     std::array<int, max_guards> crossing_{};
     int n_crossing_ = 0;

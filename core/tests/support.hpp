@@ -95,7 +95,7 @@ inline Samples run(const Drive& drive, const Signals& signals, double duration, 
 
 // Random drives that mix all parts and signals. Sizes are drawn by the logarithm, over what real drives have.
 class RandomDrives {
-   public:
+ public:
     explicit RandomDrives(unsigned seed) : random_(seed) {}
 
     double uniform(double a, double b) { return std::uniform_real_distribution<double>(a, b)(random_); }
@@ -152,8 +152,8 @@ class RandomDrives {
             loads.insert(loads.begin(), -mu);
         }
         if (loads.size() < 3) loads = {-1.0, 0.0, 1.0};
-        const double m_0 = spread(0.005, 0.08), rise = uniform(0.0, 0.06), a = uniform(0.02, 0.3), b = uniform(0.02, 0.5),
-                     start = uniform(1.0, 1.4);
+        const double m_0 = spread(0.005, 0.08), rise = uniform(0.0, 0.06), a = uniform(0.02, 0.3),
+                     b = uniform(0.02, 0.5), start = uniform(1.0, 1.4);
         std::vector<double> values;
         for (const double mu : loads)
             for (const double v : speeds)
@@ -188,7 +188,7 @@ class RandomDrives {
         return {signal(1.0, duration), coin(0.5) ? signal(0.5 * d.gearbox.rated_output_torque, duration) : Signal{}};
     }
 
-   private:
+ private:
     std::mt19937_64 random_;
 };
 

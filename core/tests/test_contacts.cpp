@@ -1,0 +1,167 @@
+// Sticking, sliding, jamming: the set-valued contacts.
+#include <doctest/doctest.h>
+
+#include "lostmotion/explain.hpp"
+#include "support.hpp"
+
+using namespace lostmotion;
+using doctest::Approx;
+
+namespace {
+
+Drive sticky_paper_drive() { return paper_drive(plane_map(0.02, 0.04, 0.06)); }
+
+}  // namespace
+
+TEST_SUITE("contacts") {
+    TEST_CASE("a stuck shaft does not creep in one hour") {
+        const Drive drive = sticky_paper_drive();
+        const double below = 0.9 * smallest_command(drive, 0.0, 0.0, +1);
+        const Samples s = run(drive, {sine(below, 3.0), Signal{}}, 3600.0, 60.0);
+        REQUIRE(s.report.status == Status::done);
+        CHECK(s.report.x[motor_speed] == 0.0);
+        CHECK(s.report.x[load_angle] == 0.0);
+        CHECK(s.report.x[twist] == 0.0);
+        CHECK(s.report.switching_count == 0);
+    }
+
+    TEST_CASE("the smallest command that moves the load does, and a little less does not") {
+        for (const double T_f : {0.0, 0.4}) {
+            Drive drive = sticky_paper_drive();
+            drive.load.friction_torque = T_f;
+            const double smallest = smallest_command(drive, 0.0, 0.0, +1);
+            for (const double factor : {0.995, 1.005}) {
+                // Approached slowly: the formula leaves inertia out.
+                const Samples s = run(
+                    drive, {lines({{0.0, 0.0, factor * smallest / 20.0}, {20.0, factor * smallest, 0.0}}), Signal{}},
+                    40.0, 1.0);
+                CHECK((std::fabs(s.report.x[load_speed]) > 1e-6) == (factor > 1.0));
+            }
+        }
+    }
+
+    TEST_CASE("no contact, damper or hysteresis ever gives energy") {
+        RandomDrives random(7);
+        for (int n = 0; n < 150; ++n) {
+            const Drive drive = random.drive();
+            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) continue;
+            const Samples s = run(drive, random.signals(drive, 0.4), 0.4, 0.01);
+            REQUIRE(s.report.status == Status::done);
+            const auto& flow = s.report.energy.flow;
+            const double slack = -1e-12 * s.report.energy.turned_over;
+            for (const int f : {in_input_damper, in_motor_friction, in_hysteresis, in_load_damper, in_load_friction})
+                CHECK(flow[f] >= slack);
+            if (drive.gearbox.losses == Gearbox::loss_map) CHECK(flow[in_gear] >= slack);
+        }
+    }
+
+    TEST_CASE("a constant efficiency creates energy while the load drives, and the ledger shows it") {
+        Drive d = plain_drive(10.0, 1e-4, 0.5);
+        d.gearbox.efficiency = 0.8;
+        const Samples s = run(d, {Signal{}, constant(-2.0)}, 1.0, 0.01);
+        // T_1 w_M all goes into the input's own kinetic energy, and the gear adds a share of 1 - 0.8 to it.
+        const double kinetic = 0.5 * 1e-4 * s.report.x[motor_speed] * s.report.x[motor_speed];
+        CHECK(kinetic > 0.01);
+        CHECK(s.report.energy.flow[in_gear] == Approx(-(1.0 - 0.8) * kinetic).epsilon(1e-11));
+        CHECK(std::fabs(s.report.energy.residual()) < 1e-12 * s.report.energy.turned_over);
+    }
+
+    TEST_CASE("self-locking: a gear with negative back-driving efficiency holds any load") {
+        Drive d = plain_drive(60.0, 1e-4, 0.5);
+        d.gearbox.compliance = Gearbox::torsion_curve;
+        d.gearbox.curve = TorsionCurve({}, {5e3});
+        d.gearbox.losses = Gearbox::loss_map;
+        d.gearbox.rated_output_torque = 70.0;
+        d.gearbox.rated_input_speed = 300.0;
+        d.load.viscous_friction = 1.0;
+        for (const double eta_back : {-0.1, 0.1}) {
+            const double a = 1.0 - eta_back;
+            d.gearbox.map = LossMap({0.0, 1.0}, {-1.0, 0.0, 1.0}, {a, a, 0.0, 0.0, 2.0, 2.0});
+            const Samples s = run(d, {Signal{}, lines({{0.0, 0.0, 25.0}, {2.0, 50.0, 0.0}})}, 10.0, 0.1);
+            REQUIRE(s.report.status == Status::done);
+            if (eta_back < 0.0)
+                CHECK(std::fabs(s.report.x[load_speed]) < 1e-6);
+            else
+                CHECK(s.report.x[load_speed] < -1.0);
+        }
+    }
+
+    TEST_CASE("a rigid self-locking gear with a large load inertia jams, and a compliance cures it") {
+        Drive d = plain_drive(60.0, 1e-4, 50.0);
+        d.gearbox.losses = Gearbox::loss_map;
+        d.gearbox.rated_output_torque = 70.0;
+        const double a = 1.0 - -0.5;
+        d.gearbox.map = LossMap({0.0, 1.0}, {-1.0, 0.0, 1.0}, {a, a, 0.0, 0.0, 2.0, 2.0});
+        CHECK(d.smallest_rigid_inertia() < 0.0);
+        Start start;
+        start.x[motor_speed] = 60.0;
+        start.x[load_speed] = 1.0;
+        d.gearbox.compliance = Gearbox::torsion_curve;
+        d.gearbox.curve = TorsionCurve({}, {5e4});
+        const Samples s = run(d, {constant(-0.5), Signal{}}, 5.0, 0.01, start);
+        CHECK(s.report.status == Status::done);
+    }
+
+    TEST_CASE("everything stuck: the load's friction takes what the twist does not, and each breaks in its turn") {
+        Drive d = plain_drive(10.0, 1e-4, 0.5);
+        d.motor.friction_torque = 0.5;
+        d.load.friction_torque = 2.0;
+        d.gearbox.compliance = Gearbox::torsion_curve;
+        d.gearbox.curve = TorsionCurve({}, {1e3});
+        // M_Z alone: the load holds up to T_f, then moves against the spring whose other end is held by the motor.
+        const Samples s = run(d, {Signal{}, lines({{0.0, 0.0, 1.0}})}, 3.0, 0.01);
+        REQUIRE(s.report.status == Status::done);
+        REQUIRE(s.report.switching_count >= 1);
+        CHECK(s.report.switchings[0].time == Approx(2.0).epsilon(1e-13));
+        CHECK(s.report.switchings[0].contact == load_contact);
+    }
+
+    TEST_CASE("what a stuck contact holds lies within its capacity") {
+        const Drive drive = sticky_paper_drive();
+        const SwitchedDrive system(drive);
+        const Signals signals{sine(0.025, 1.0), Signal{}};
+        ExactSolver<SwitchedDrive> solver(system, signals, 1e-3, drive.balanced_scale());
+        struct {
+            bool segment(const Segment<SwitchedDrive>&, const std::vector<InputBasis>&) { return true; }
+            void switching(const Switching&) {}
+        } nothing;
+        REQUIRE(solver.begin(0.0, {}, {}) == Status::done);
+        int stuck = 0;
+        for (int k = 1; k <= 400; ++k) {
+            REQUIRE(solver.advance(0.005 * k, nothing) == Status::done);
+            InputState input(signals, solver.basis());
+            input.anchor(solver.time());
+            const ContactReport c =
+                explain_contact(drive, solver.regime(), input_contact, solver.state(), solver.memory(), input.values());
+            if (c.mode != 0) continue;
+            ++stuck;
+            CHECK(c.torque <= c.capacity_forward * (1.0 + 1e-12));
+            CHECK(c.torque >= -c.capacity_backward * (1.0 + 1e-12));
+        }
+        CHECK(stuck > 50);
+    }
+
+    TEST_CASE("mirror the inputs and the motion mirrors, bit for bit") {
+        RandomDrives random(11);
+        for (int n = 0; n < 60; ++n) {
+            Drive drive = random.drive();
+            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) continue;
+            Signals signals = random.signals(drive, 0.3), mirrored = signals;
+            for (Signal& s : mirrored) {
+                for (Knot& k : s.knots) {
+                    k.value = -k.value;
+                    k.slope = -k.slope;
+                }
+                for (Sine& a : s.sines) a.amplitude = -a.amplitude;
+            }
+            const Samples a = run(drive, signals, 0.3, 0.01), b = run(drive, mirrored, 0.3, 0.01);
+            REQUIRE(a.report.status == Status::done);
+            REQUIRE(b.report.status == Status::done);
+            for (std::size_t k = 0; k < a.count; ++k)
+                for (const Channel c : {ch_motor_torque, ch_motor_speed, ch_load_speed, ch_twist, ch_output_torque}) {
+                    CAPTURE(n);
+                    CHECK(a(c, k) == doctest::Approx(-b(c, k)).epsilon(1e-9));
+                }
+        }
+    }
+}

@@ -1,0 +1,177 @@
+// Switching instants: found to rounding, and none missed.
+#include <doctest/doctest.h>
+
+#include <limits>
+
+#include "support.hpp"
+
+using namespace lostmotion;
+using doctest::Approx;
+
+namespace {
+
+// Counts the torsion-piece switchings of a run.
+int piece_switchings(const Samples& s) {
+    int n = 0;
+    for (const Switching& w : s.report.switchings) n += w.kind == Guard::torsion_piece;
+    return n;
+}
+
+// One mass on a spring that swings with amplitude 1 mrad at 10 Hz; the curve breaks at `at` (slope unchanged, so the
+// motion stays the sine and each crossing is known).
+Samples swinging(double at, double duration, double interval) {
+    Drive d = plain_drive(1.0, 1e12, 2.0);
+    d.gearbox.compliance = Gearbox::torsion_curve;
+    const double k = 2.0 * std::pow(2.0 * pi * 10.0, 2);
+    d.gearbox.curve = TorsionCurve({at}, {k, k});
+    Start start;
+    start.x[twist] = 1e-3;
+    return run(d, {}, duration, interval, start);
+}
+
+// A ball that loses half its speed at each bounce: switchings accumulate at a known time.
+struct BouncingBall {
+    double restitution = 0.5;
+    Regime build(const RegimeKey& key) const {
+        Regime r;
+        r.key = key;
+        r.rate[load_angle] = LinearForm::unit(load_speed);
+        r.rate[load_speed] = LinearForm::unit(one, -9.81);
+        r.guards[r.n_guards++] = Guard{LinearForm::unit(load_angle), Guard::speed, load_contact, 0};
+        return r;
+    }
+    template <class Cache>
+    Found start(Cache&, Instant&, RegimeKey&) const {
+        return Found::yes;
+    }
+    template <class Cache>
+    Found next(Cache&, Instant& now, const Guard*, RegimeKey&) const {
+        now.x[load_angle] = 0.0;
+        now.x[load_speed] *= -restitution;
+        return Found::yes;
+    }
+};
+
+}  // namespace
+
+TEST_SUITE("events") {
+    TEST_CASE("two crossings between two samples are both found, however close") {
+        for (const double gap : {1e-3, 1e-6, 1e-9, 1e-10}) {
+            // The sine rises above the break for a moment around each extreme: four crossings a period.
+            const double at = 1e-3 * (1.0 - gap);
+            const Samples s = swinging(at, 0.975, 0.5);
+            CHECK(piece_switchings(s) == 39);  // the first extreme is at t = 0, from inside
+            const double first = std::acos(1.0 - gap) / (2.0 * pi * 10.0);
+            CHECK(s.report.switchings[0].time == Approx(first).epsilon(1e-4));
+        }
+    }
+    TEST_CASE("a boundary that is not reached is not crossed, however close") {
+        for (const double gap : {1e-3, 1e-6, 1e-9, 1e-11}) {
+            const Samples s = swinging(1e-3 * (1.0 + gap), 0.975, 0.5);
+            CHECK(piece_switchings(s) == 0);
+        }
+    }
+    TEST_CASE("grazing changes nothing in the motion") {
+        const Samples touching = swinging(1e-3, 1.0, 1e-3), free = swinging(1.0, 1.0, 1e-3);
+        for (std::size_t k = 0; k < free.count; ++k)
+            CHECK(touching(ch_twist, k) == Approx(free(ch_twist, k)).epsilon(1e-10).scale(1e-3));
+    }
+    TEST_CASE("crossings are located to rounding") {
+        const double at = 0.3e-3;
+        const Samples s = swinging(at, 1.0, 0.5);
+        for (std::size_t k = 0; k < s.report.switchings.size(); ++k) {
+            const double angle = 2.0 * pi * 10.0 * s.report.switchings[k].time;
+            // A thousand roundings of a phase of 63 rad: 1.4e-14 each.
+            CHECK(std::fabs(std::fabs(std::cos(angle)) - 0.3) < 2e-11);
+        }
+    }
+    TEST_CASE("an event at t = 0: a load that is let go falls at once") {
+        Drive d = plain_drive(10.0, 1e-4, 0.5);
+        d.motor.friction_torque = 0.1;
+        const Samples s = run(d, {Signal{}, constant(-5.0)}, 0.1, 0.01);
+        REQUIRE(s.report.status == Status::done);
+        const double J = 1e-4 + 0.5 / 100.0;
+        CHECK(s.report.x[motor_speed] == Approx((5.0 / 10.0 - 0.1) / J * 0.1).epsilon(1e-12));
+    }
+    TEST_CASE("an event that leads straight to another: breaking away into backlash, stop and reversal at a jump") {
+        Drive d = plain_drive(10.0, 1e-4, 0.5);
+        d.motor.friction_torque = 0.1;
+        d.load.friction_torque = 0.2;
+        d.gearbox.compliance = Gearbox::torsion_curve;
+        d.gearbox.curve = TorsionCurve({1e-3}, {0.0, 1e4});
+        d.gearbox.hysteresis_efficiency = 0.9;
+        const Signals signals{lines({{0.0, 0.0, 0.0}, {0.1, 0.5, 0.0}, {0.2, -0.5, 0.0}, {0.3, 0.0, 0.0}}), Signal{}};
+        const Samples exact = run(d, signals, 0.6), fine = run(d, signals, 0.6, 1e-3, {}, 1e-12);
+        REQUIRE(exact.report.status == Status::done);
+        CHECK(exact.report.x[load_angle] == Approx(fine.report.x[load_angle]).epsilon(1e-7));
+        CHECK(exact.report.x[motor_speed] == 0.0);
+    }
+    TEST_CASE("simultaneous events: two contacts stop at the same instant") {
+        // Input and load of the same deceleration, uncoupled within the backlash.
+        Drive d = plain_drive(1.0, 1e-3, 1e-3);
+        d.motor.friction_torque = 0.01;
+        d.load.friction_torque = 0.01;
+        d.gearbox.compliance = Gearbox::torsion_curve;
+        d.gearbox.curve = TorsionCurve({1.0}, {0.0, 1e3});
+        Start start;
+        start.x[motor_speed] = start.x[load_speed] = 2.0;
+        const Samples s = run(d, {}, 1.0, 0.1, start);
+        REQUIRE(s.report.status == Status::done);
+        CHECK(s.report.x[motor_speed] == 0.0);
+        CHECK(s.report.x[load_speed] == 0.0);
+        CHECK(s.report.x[load_angle] == Approx(0.2).epsilon(1e-12));
+        CHECK(s.report.switching_count <= 2);
+    }
+    TEST_CASE("accumulating switchings end in a report of time and contact, not in a hang") {
+        const BouncingBall ball;
+        const Signals none;
+        ExactSolver<BouncingBall> solver(ball, none, 1e-3, {1, 1, 1, 1, 1, 1});
+        struct {
+            int count = 0;
+            bool segment(const Segment<BouncingBall>&, const std::vector<InputBasis>&) { return true; }
+            void switching(const Switching&) { ++count; }
+        } counter;
+        State x{};
+        x[load_angle] = 1.0;
+        REQUIRE(solver.begin(0.0, x, {}) == Status::done);
+        CHECK(solver.advance(10.0, counter) == Status::zeno);
+        const double fall = std::sqrt(2.0 / 9.81);
+        CHECK(solver.time() == Approx(fall * (1.0 + 2.0 * 0.5 / (1.0 - 0.5))).epsilon(1e-12));
+        CHECK(solver.stopped_at() == load_contact);
+        CHECK(counter.count < 500);
+    }
+    TEST_CASE("one hour at 1 Hz keeps its phase") {
+        Drive d = paper_drive(plane_map(0.02, 0.04, 0.06));
+        const Signals signals{sine(1.0275, 1.0), Signal{}};
+        // The motion is periodic after a few seconds: the states after 20 s and after 3600 s are the same.
+        const Samples early = run(d, signals, 20.0, 1.0), late = run(d, signals, 3600.0, 60.0);
+        REQUIRE(late.report.status == Status::done);
+        for (const int k : {motor_torque, motor_speed, load_speed, twist})
+            CHECK(late.report.x[k] == Approx(early.report.x[k]).epsilon(1e-9));
+    }
+    TEST_CASE("the adaptive solver takes a nonlinear remainder: a pendulum under gravity") {
+        // J w' = -m g l sin(phi), small friction none: period 4 K(sin(a/2)) / omega_0.
+        Drive d = plain_drive(1.0, 1e-3, 1.0);
+        struct Gravity {
+            void operator()(double, const State& x, State& rate) const {
+                const double a = -25.0 * std::sin(x[load_angle]) / 1.001;
+                rate[load_speed] += a;
+                rate[motor_speed] += a;
+            }
+        };
+        const SwitchedDrive system(d);
+        const Signals none;
+        AdaptiveSolver<SwitchedDrive, Gravity> solver(system, none, 1e-11, {1, 1, 1, 1, 1, 1});
+        State x{};
+        x[load_angle] = 1.0;
+        REQUIRE(solver.begin(0.0, x, {}) == Status::done);
+        struct {
+            void step(const Regime&, const Memory&, const DenseStep&, bool) {}
+            void switching(const Switching&) {}
+        } nothing;
+        const double period = 4.0 * std::comp_ellint_1(std::sin(0.5)) / std::sqrt(25.0 / 1.001);
+        REQUIRE(solver.advance(period, nothing) == Status::done);
+        CHECK(solver.state()[load_angle] == Approx(1.0).epsilon(1e-8));
+        CHECK(solver.state()[load_speed] == Approx(0.0).scale(1.0).epsilon(1e-7));
+    }
+}

@@ -1,0 +1,175 @@
+// Curves, maps, propagation and the Runge-Kutta tableau on their own.
+#include <doctest/doctest.h>
+
+#include "support.hpp"
+
+using namespace lostmotion;
+using doctest::Approx;
+
+namespace {
+
+using Long = long double;
+using LongMatrix = std::array<std::array<Long, n_states>, n_states>;  // [row][column]
+
+// exp(A t) by a plain Taylor series of many short steps in extended precision.
+LongMatrix reference_exponential(const Regime& r, Long t) {
+    constexpr int steps = 1 << 14;
+    const Long h = t / steps;
+    LongMatrix step{}, term{};
+    for (int i = 0; i < n_states; ++i) step[i][i] = term[i][i] = 1.0L;
+    const auto multiply = [](const LongMatrix& a, const LongMatrix& b) {
+        LongMatrix c{};
+        for (int i = 0; i < n_states; ++i)
+            for (int k = 0; k < n_states; ++k)
+                for (int j = 0; j < n_states; ++j) c[i][j] += a[i][k] * b[k][j];
+        return c;
+    };
+    LongMatrix A{};
+    for (int i = 0; i < n_states; ++i)
+        for (int j = 0; j < n_states; ++j) A[i][j] = r.rate[i].c[j] * h;
+    for (int k = 1; k < 30; ++k) {
+        term = multiply(term, A);
+        for (auto& row : term)
+            for (Long& v : row) v /= k;
+        for (int i = 0; i < n_states; ++i)
+            for (int j = 0; j < n_states; ++j) step[i][j] += term[i][j];
+    }
+    LongMatrix power = step;
+    for (int k = 0; k < 14; ++k) power = multiply(power, power);
+    return power;
+}
+
+}  // namespace
+
+TEST_SUITE("parts") {
+    TEST_CASE("torsion curve is odd, continuous and has the published values") {
+        const TorsionCurve curve({0.6e-3, 3e-3}, {2.65e3, 21.2e3, 26.5e3});
+        CHECK(curve.torque(0.6e-3) == Approx(1.59));
+        CHECK(curve.torque(3e-3) == Approx(52.47));
+        for (const double d : {0.0, 1e-4, 0.6e-3, 1e-3, 3e-3, 5e-3}) {
+            CHECK(curve.torque(-d) == -curve.torque(d));
+            CHECK(curve.torque(d + 1e-12) == Approx(curve.torque(d)).scale(1.0).epsilon(1e-6));
+        }
+        // The energy is the integral of the torque.
+        double sum = 0.0;
+        for (int k = 0; k < 100000; ++k) sum += curve.torque((k + 0.5) * 4e-8) * 4e-8;
+        CHECK(curve.energy(4e-3) == Approx(sum).epsilon(1e-9));
+        CHECK(curve.energy(-4e-3) == curve.energy(4e-3));
+    }
+    TEST_CASE("loss map is continuous, takes its nodes, mirrors, and is never negative beyond them") {
+        RandomDrives random(5);
+        for (int n = 0; n < 50; ++n) {
+            const LossMap map = random.loss_map();
+            for (int t = 0; t < map.triangles(); ++t) {
+                Edge edges[3];
+                const int m = map.edges(t, edges);
+                for (int k = 0; k < m; ++k) {
+                    if (edges[k].neighbour < 0) continue;
+                    // Walking back over the same edge leads home, and both planes agree on it.
+                    Edge back[3];
+                    const int l = map.edges(edges[k].neighbour, back);
+                    bool home = false;
+                    for (int j = 0; j < l; ++j) home |= back[j].neighbour == t;
+                    CHECK(home);
+                    const Plane a = map.plane(t), b = map.plane(edges[k].neighbour), e = edges[k].inside;
+                    for (const double along : {0.1, 0.7}) {
+                        const double v = std::fabs(e.per_load) > 0.0 ? along : -e.at_zero / e.per_speed;
+                        const double mu =
+                            std::fabs(e.per_load) > 0.0 ? -(e.at_zero + e.per_speed * v) / e.per_load : along;
+                        CHECK(a.at_zero + a.per_speed * v + a.per_load * mu ==
+                              Approx(b.at_zero + b.per_speed * v + b.per_load * mu).epsilon(1e-8));
+                    }
+                }
+            }
+            for (int k = 0; k < 200; ++k) CHECK(map(random.uniform(-9.0, 9.0), random.uniform(0.0, 9.0)) >= 0.0);
+        }
+        const LossMap mirrored = plane_map(0.02, 0.04, 0.06);
+        CHECK(mirrored(0.5, 0.3) == Approx(0.02 + 0.012 + 0.03));
+        CHECK(mirrored(-0.5, 0.3) == Approx(mirrored(0.5, 0.3)));
+    }
+    TEST_CASE("propagation agrees with an exponential in extended precision, over nine decades of time") {
+        RandomDrives random(3);
+        for (int n = 0; n < 12; ++n) {
+            const Drive drive = random.drive();
+            const SwitchedDrive system(drive);
+            RegimeCache<SwitchedDrive> cache(system);
+            Instant now;
+            RegimeKey key;
+            REQUIRE(system.start(cache, now, key) == Found::yes);
+            for (int c = 0; c < n_contacts; ++c)
+                if (key.modes[c] == 0 && !(c == twist_contact && drive.rigid())) key.modes[c] = 1;
+            const Regime r = drive.build(key);
+            Propagator p;
+            const std::vector<InputBasis> none;
+            p.prepare(r, 1e-3, drive.balanced_scale(), none);
+            const State scale = drive.balanced_scale();
+            for (int level = 0; p.level(level).length < 1.0; level += 2) {
+                const Step& step = p.level(level);
+                const LongMatrix expected = reference_exponential(r, step.length);
+                for (int i = 0; i < n_states; ++i)
+                    for (int j = 0; j < n_states; ++j) {
+                        const double e = static_cast<double>(expected[i][j]) - (i == j ? 1.0 : 0.0);
+                        // In balanced units; doubling adds about one rounding a level.
+                        CHECK(std::fabs(step.change.column[j][i] - e) * scale[j] / scale[i] < 1e-10);
+                    }
+            }
+        }
+    }
+    TEST_CASE("a guard's growth bound really bounds the exponential") {
+        RandomDrives random(4);
+        for (int n = 0; n < 20; ++n) {
+            const Drive drive = random.drive();
+            const SwitchedDrive system(drive);
+            RegimeCache<SwitchedDrive> cache(system);
+            Instant now;
+            RegimeKey key;
+            REQUIRE(system.start(cache, now, key) == Found::yes);
+            Propagator p;
+            const std::vector<InputBasis> none;
+            p.prepare(drive.build(key), 1e-3, drive.balanced_scale(), none);
+            for (int level = 3; level < 9; ++level)
+                for (int inner = 0; inner <= level; ++inner)
+                    for (int j = 0; j < n_states; ++j)
+                        for (int i = 0; i < n_states; ++i)
+                            CHECK(std::fabs(p.level(inner).change.column[j][i] + (i == j ? 1.0 : 0.0)) <=
+                                  p.level(level).growth.column[j][i] * (1.0 + 1e-9) + 1e-300);
+        }
+    }
+    TEST_CASE("Dormand-Prince tableau satisfies its conditions of order") {
+        using DP = DormandPrince;
+        for (int i = 0; i < DP::stages; ++i) {
+            double row = 0.0;
+            for (int j = 0; j < i; ++j) row += DP::a[i][j];
+            CHECK(row == Approx(DP::c[i]).epsilon(1e-14).scale(1.0));
+        }
+        // The last row holds the weights of order five: sum b c^k = 1/(k + 1). The error weights sum to zero likewise
+        // up to order four, and the dense output ends in the solution.
+        for (int k = 0; k < 5; ++k) {
+            double b = 0.0, e = 0.0;
+            for (int i = 0; i < DP::stages; ++i) {
+                const double power = std::pow(DP::c[i], k);
+                b += DP::a[6][i] * (k == 0 ? 1.0 : power);
+                e += DP::error[i] * (k == 0 ? 1.0 : power);
+            }
+            CHECK(b == Approx(1.0 / (k + 1)).epsilon(1e-13));
+            if (k < 4) CHECK(e == Approx(0.0).scale(1.0).epsilon(1e-14));
+        }
+        for (int i = 0; i < DP::stages; ++i) {
+            const double end = DP::dense[i][0] + DP::dense[i][1] + DP::dense[i][2] + DP::dense[i][3];
+            CHECK(end == Approx(DP::a[6][i]).scale(1.0).epsilon(1e-12));
+        }
+    }
+    TEST_CASE("the adaptive solver's error falls with its tolerance") {
+        Drive d = plain_drive(1.0, 0.005, 0.005);
+        d.gearbox.compliance = Gearbox::torsion_curve;
+        d.gearbox.curve = TorsionCurve({}, {700.0});
+        const Signals signals{sine(1.0, 20.0), Signal{}};
+        const double exact = run(d, signals, 0.5).report.x[load_speed];
+        double previous = 1.0;
+        for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10}) {
+            const double error = std::fabs(run(d, signals, 0.5, 1e-3, {}, tolerance).report.x[load_speed] - exact);
+            CHECK(error < 0.1 * previous);
+            previous = error;
+        }
+    }
+}
