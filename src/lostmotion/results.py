@@ -232,7 +232,8 @@ def open_result(path: str | Path) -> xarray.Dataset:
 
 
 def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
-    dataset.to_netcdf(path, engine="h5netcdf")
+    # By way of memory: the library's own writer leaves a half-open file behind when the disk is full.
+    path.write_bytes(dataset.to_netcdf(engine="h5netcdf"))
 
 
 def _read_netcdf(path: Path) -> xarray.Dataset:

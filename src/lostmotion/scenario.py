@@ -209,7 +209,8 @@ def _set(data: dict[str, Any], key: str, value: Any) -> None:
 
 def describe(error: ValidationError) -> str:
     """One line for a failed validation: the key, the value and what would be right."""
-    problems = error.errors()
+    # A misspelt key is the cause of the missing one.
+    problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
     first = problems[0]
     # Names of classes that the choice between kinds puts into the location are not keys of the file.
     kinds = {"curve", "linear", "rigid", "constant_efficiency", "map"}

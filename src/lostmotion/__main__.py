@@ -1,0 +1,5 @@
+"""``python -m lostmotion``."""
+
+from .cli import main
+
+main()

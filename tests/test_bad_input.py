@@ -1,0 +1,265 @@
+"""Bad input ends in one line that names the file, the key and the remedy, and in exit code 1; nothing is left behind."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import lostmotion as lm
+import pytest
+from lostmotion.scenario import Scenario
+
+GOOD = """
+[command]
+amplitude = 1.0
+frequency = 1.0
+
+[motor]
+rotor_inertia = 8e-6
+friction_torque = 0.016
+rated_torque = 0.521
+rated_speed = "3300 rpm"
+rated_voltage = 24
+electrical_time_constant = "0.1286 ms"
+armature_voltage_constant = 3.1169
+
+[gearbox]
+ratio = 90
+inertia = 6.7e-6
+rated_input_speed = "3630 rpm"
+rated_output_torque = 51.6
+
+[gearbox.stiffness]
+kind = "curve"
+breaks = ["0.6 mrad", "3 mrad"]
+slopes = [2650, 21200, 26500]
+
+[gearbox.hysteresis]
+efficiency = 0.93
+
+[gearbox.losses]
+kind = "map"
+mirrored = true
+speeds = [0, 1]
+loads = [0, 1]
+values = [[0.02, 0.06], [0.08, 0.12]]
+
+[load]
+inertia = 2.0
+torque = 0.0
+
+[simulation]
+duration = 0.01
+sample_interval = 0.001
+"""
+
+# (what is wrong, text to replace, its replacement, words that the message must contain)
+BROKEN = [
+    ("missing inertia of the load", "inertia = 2.0\n", "", ["load.inertia", "missing"]),
+    ("missing ratio", "ratio = 90\n", "", ["gearbox.ratio", "missing"]),
+    ("missing table", "[simulation]\nduration = 0.01\nsample_interval = 0.001\n", "", ["simulation", "missing"]),
+    ("missing kind of stiffness", 'kind = "curve"\n', "", ["gearbox.stiffness", "kind"]),
+    ("missing kind of losses", 'kind = "map"\n', "", ["gearbox.losses", "kind"]),
+    ("missing speed of a dc motor", 'rated_speed = "3300 rpm"\n', "", ["motor", "rated_speed"]),
+    ("missing time constant of a dc motor", 'electrical_time_constant = "0.1286 ms"\n', "", ["electrical_time_constant"]),
+    ("missing duration", "duration = 0.01\n", "", ["simulation.duration", "missing"]),
+    ("misspelt key", "rotor_inertia", "rotor_inertai", ["motor.rotor_inertai", "did you mean rotor_inertia"]),
+    ("misspelt table", "[load]", "[laod]", ["laod", "did you mean load"]),
+    ("misspelt nested table", "[gearbox.hysteresis]", "[gearbox.histeresis]", ["gearbox.histeresis", "hysteresis"]),
+    ("misspelt kind", 'kind = "curve"', 'kind = "curv"', ["gearbox.stiffness", "curv", "linear"]),
+    ("key of another kind", "mirrored = true", "mirrored = true\nefficiency = 0.9", ["gearbox.losses.efficiency", "known"]),
+    ("unknown key at the top", "[command]", "speed = 1\n[command]", ["speed", "not known"]),
+    ("unknown key in the command", "amplitude = 1.0", "amplitud = 1.0", ["command.amplitud", "did you mean amplitude"]),
+    ("unit of something else", '"3300 rpm"', '"3300 N*m"', ["motor.rated_speed", "3300 N*m", "rad/s"]),
+    ("unknown unit", '"3300 rpm"', '"3300 rmp"', ["motor.rated_speed", "3300 rmp", "rad/s"]),
+    ("number as text without unit", '"3300 rpm"', '"3300"', ["motor.rated_speed", "no unit"]),
+    ("nonsense text", '"3300 rpm"', '"fast"', ["motor.rated_speed", "fast"]),
+    ("empty text", '"3300 rpm"', '""', ["motor.rated_speed"]),
+    ("text with brackets", '"3300 rpm"', '"(3300 rpm"', ["motor.rated_speed"]),
+    ("angle where a time belongs", '"0.1286 ms"', '"0.1286 mrad"', ["electrical_time_constant", "mrad"]),
+    ("time where an angle belongs", '"0.6 mrad"', '"0.6 ms"', ["gearbox.stiffness.breaks[0]", "rad"]),
+    ("unit on a pure number", "armature_voltage_constant = 3.1169", 'armature_voltage_constant = "3 V"', ["armature_voltage_constant"]),
+    ("unit on the command", "amplitude = 1.0", 'amplitude = "1 V"', ["command.amplitude"]),
+    ("truth value", "ratio = 90", "ratio = true", ["gearbox.ratio", "truth value"]),
+    ("list for a number", "ratio = 90", "ratio = [90]", ["gearbox.ratio"]),
+    ("table for a number", "ratio = 90", "ratio = { value = 90 }", ["gearbox.ratio"]),
+    ("key in the table of another", "[gearbox.hysteresis]\nefficiency", "hysteresis", ["gearbox.stiffness.hysteresis"]),
+    ("date for a number", "ratio = 90", "ratio = 2026-01-01", ["gearbox.ratio"]),
+    ("negative inertia", "inertia = 2.0", "inertia = -2.0", ["load.inertia", "-2.0", "greater than 0"]),
+    ("zero inertia of the load", "inertia = 2.0", "inertia = 0.0", ["load.inertia", "greater than 0"]),
+    ("negative inertia of the gearbox", "inertia = 6.7e-6", "inertia = -6.7e-6", ["gearbox.inertia"]),
+    ("zero ratio", "ratio = 90", "ratio = 0", ["gearbox.ratio", "greater than 0"]),
+    ("negative ratio", "ratio = 90", "ratio = -90", ["gearbox.ratio", "greater than 0"]),
+    ("negative friction", "friction_torque = 0.016", "friction_torque = -0.016", ["motor.friction_torque"]),
+    ("zero time constant", '"0.1286 ms"', '"0 ms"', ["electrical_time_constant", "greater than 0"]),
+    ("voltage constant below one", "3.1169", "0.9", ["armature_voltage_constant", "greater than 1"]),
+    ("hysteresis above one", "efficiency = 0.93", "efficiency = 1.93", ["gearbox.hysteresis.efficiency"]),
+    ("NaN", "ratio = 90", "ratio = nan", ["gearbox.ratio", "finite"]),
+    ("infinity", "inertia = 2.0", "inertia = inf", ["load.inertia", "finite"]),
+    ("NaN in the map", "[0.02, 0.06]", "[0.02, nan]", ["gearbox.losses.values[0][1]", "finite"]),
+    ("negative loss", "[0.02, 0.06]", "[0.02, -0.06]", ["gearbox.losses.values[0][1]"]),
+    ("hole in the map", "[0.02, 0.06]", "[0.02]", ["gearbox.losses", "hole", "row 0"]),
+    ("missing row of the map", ", [0.08, 0.12]]", "]", ["gearbox.losses", "1 rows", "2 loads"]),
+    ("unsorted speeds", "speeds = [0, 1]", "speeds = [0, -1]", ["gearbox.losses.speeds"]),
+    ("repeated loads", "loads = [0, 1]", "loads = [0, 0]", ["gearbox.losses.loads", "rise"]),
+    ("map that does not begin at standstill", "speeds = [0, 1]", "speeds = [0.1, 1]", ["gearbox.losses", "first must be 0"]),
+    ("mirrored map with negative loads", "loads = [0, 1]", "loads = [-1, 1]", ["gearbox.losses", "mirrored"]),
+    ("map for one direction only", "mirrored = true", "mirrored = false", ["gearbox.losses", "one direction"]),
+    ("map with one speed", "speeds = [0, 1]", "speeds = [0]", ["gearbox.losses.speeds"]),
+    ("unsorted curve", '["0.6 mrad", "3 mrad"]', '["3 mrad", "0.6 mrad"]', ["gearbox.stiffness", "rise"]),
+    ("too many breaks", '["0.6 mrad", "3 mrad"]', '["0.6 mrad", "3 mrad", "4 mrad"]', ["gearbox.stiffness", "3 slopes and 3 breaks"]),
+    ("negative slope", "[2650, 21200, 26500]", "[2650, -1, 26500]", ["gearbox.stiffness.slopes[1]"]),
+    ("curve that ends slack", "[2650, 21200, 26500]", "[2650, 21200, 0]", ["gearbox.stiffness", "slope 0"]),
+    ("no slopes", "[2650, 21200, 26500]", "[]", ["gearbox.stiffness.slopes"]),
+    ("backlash and preload", 'kind = "curve"', 'kind = "curve"\nbacklash = 1e-3\npreload = 1.0', ["gearbox.stiffness", "preload"]),
+    ("amplitude without frequency", "frequency = 1.0\n", "", ["command", "lacks frequency"]),
+    ("phase without sine", "amplitude = 1.0\nfrequency = 1.0", "phase = 1.0", ["command", "phase"]),
+    ("negative frequency", "frequency = 1.0", "frequency = -1.0", ["command.frequency"]),
+    ("samples that go back in time", "\ntorque = 0.0", "\ntorque.samples = { times = [0, 2, 1], values = [0, 1, 2] }", ["load.torque.samples", "rise"]),
+    ("samples of unequal length", "\ntorque = 0.0", "\ntorque.samples = { times = [0, 2], values = [0, 1, 2] }", ["load.torque.samples", "2 times and 3 values"]),
+    ("command samples as torque", "\ntorque = 0.0", '\ntorque = "3 rad"', ["load.torque"]),
+    ("voltage limit without rated voltage", "rated_voltage = 24", "voltage_limit = 24", ["motor", "rated_voltage"]),
+    ("voltage limit of a torque source", "rated_voltage = 24", 'kind = "torque_source"\nvoltage_limit = 24', ["motor", "voltage_limit"]),
+    ("zero duration", "duration = 0.01", "duration = 0", ["simulation.duration"]),
+    ("interval beyond the duration", "sample_interval = 0.001", "sample_interval = 1", ["simulation", "longer than its duration"]),
+    ("too many samples", "sample_interval = 0.001", "sample_interval = 1e-12", ["simulation", "samples"]),
+    ("twist of a rigid gear", 'kind = "curve"\nbreaks = ["0.6 mrad", "3 mrad"]\nslopes = [2650, 21200, 26500]', 'kind = "rigid"', ["gearbox", "rigid"]),
+    ("rigid start that does not fit", "[simulation]", "[initial]\nhysteresis_capacity = -1\n[simulation]", ["initial.hysteresis_capacity"]),
+    ("broken TOML", "ratio = 90", "ratio = = 90", ["not valid TOML", "line"]),
+    ("key given twice", "ratio = 90", "ratio = 90\nratio = 91", ["not valid TOML"]),
+    ("base that does not exist", "[command]", 'base = "nowhere.toml"\n[command]', ["nowhere.toml", "no such file"]),
+    ("base that is no name", "[command]", "base = 3\n[command]", ["base"]),
+    ("base that leads back", "[command]", 'base = "broken.toml"\n[command]', ["base", "circle"]),
+]  # fmt: skip
+
+
+def test_the_unbroken_file_loads(tmp_path: Path) -> None:
+    (tmp_path / "good.toml").write_text(GOOD)
+    assert isinstance(lm.load(tmp_path / "good.toml"), Scenario)
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [b[1:] for b in BROKEN], ids=[b[0] for b in BROKEN])
+def test_broken_scenario_is_refused_in_one_clear_line(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
+    assert old in GOOD
+    path = tmp_path / "broken.toml"
+    path.write_text(GOOD.replace(old, new, 1))
+    with pytest.raises(lm.InputError) as caught:
+        lm.load(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert str(tmp_path) in message
+    for word in words:
+        assert word in message
+
+
+def test_an_input_shaft_without_inertia_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "broken.toml"
+    path.write_text(GOOD.replace("rotor_inertia = 8e-6", "rotor_inertia = 0").replace("inertia = 6.7e-6", "inertia = 0"))
+    with pytest.raises(lm.InputError, match="no inertia on the input shaft"):
+        lm.load(path)
+
+
+def test_a_jamming_gear_is_refused_with_the_advice_to_give_it_a_compliance(tmp_path: Path) -> None:
+    text = GOOD.replace('kind = "curve"\nbreaks = ["0.6 mrad", "3 mrad"]\nslopes = [2650, 21200, 26500]', 'kind = "rigid"')
+    text = text.replace("[gearbox.hysteresis]\nefficiency = 0.93\n", "").replace("inertia = 2.0", "inertia = 2000.0")
+    text = text.replace("mirrored = true\nspeeds = [0, 1]\nloads = [0, 1]", "speeds = [0, 1]\nloads = [-1, 0, 1]")
+    text = text.replace("[[0.02, 0.06], [0.08, 0.12]]", "[[1.4, 1.4], [0, 0], [2, 2]]")
+    path = tmp_path / "jams.toml"
+    path.write_text(text)
+    with pytest.raises(lm.InputError, match=r"jams.*compliance"):
+        lm.load(path)
+
+
+# --- the command line --------------------------------------------------------------------------------------
+
+
+def lostmotion(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "lostmotion", *map(str, arguments)], cwd=cwd, capture_output=True, text=True, check=False
+    )
+
+
+CALLS = [
+    ("a file that is not there", ["run", "nothing.toml"], ["nothing.toml", "no such file"]),
+    ("a file with a near name", ["run", "goood.toml"], ["did you mean good.toml"]),
+    ("a directory", ["run", "."], ["directory"]),
+    ("a binary file", ["run", "binary.toml"], ["UTF-8"]),
+    ("an override without value", ["run", "good.toml", "--set", "ratio"], ["KEY=VALUE"]),
+    ("an override of an unknown key", ["run", "good.toml", "--set", "gearbox.ration=3"], ["gearbox.ration", "ratio"]),
+    ("an override with a wrong unit", ["run", "good.toml", "--set", "load.inertia=3 rad"], ["load.inertia", "3 rad"]),
+    ("a number for a table", ["run", "good.toml", "--set", "gearbox.hysteresis=0.9"], ["gearbox.hysteresis", "0.9"]),
+    ("an override into a value", ["run", "good.toml", "--set", "gearbox.ratio.big=3"], ["gearbox.ratio", "not a table"]),
+    ("an unknown ending", ["run", "good.toml", "-o", "out.xlsx"], ["out.xlsx", ".parquet"]),
+    ("no ending", ["run", "good.toml", "-o", "out"], ["ending"]),
+    ("a directory as output", ["run", "good.toml", "-o", "folder.csv"], ["directory"]),
+    ("an output in no directory", ["run", "good.toml", "-o", "none/out.csv"], ["none/out.csv", "directory"]),
+    ("a plot of an unknown ending", ["run", "good.toml", "--plot", "out.txt"], ["out.txt", ".png"]),
+    ("an explanation after the end", ["run", "good.toml", "--explain", "99"], ["--explain 99", "0.01"]),
+    ("an unknown solver", ["run", "good.toml", "--solver", "euler"], ["euler", "exact"]),
+    ("a tolerance of zero", ["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "0"], ["tolerance"]),
+    ("a report into a file", ["reproduce", "-o", "good.toml"], ["good.toml", "directory"]),
+    ("a run that leaves all bounds", ["run", "good.toml", "--set", "command.amplitude=1e12"], ["t ="]),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), [c[1:] for c in CALLS], ids=[c[0] for c in CALLS])
+def test_bad_call_ends_in_one_line_and_exit_code_1(tmp_path: Path, arguments: list[str], words: list[str]) -> None:
+    (tmp_path / "good.toml").write_text(GOOD)
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00\x01")
+    (tmp_path / "folder.csv").mkdir()
+    before = sorted(tmp_path.iterdir())
+    done = lostmotion(*arguments, cwd=tmp_path)
+    assert done.returncode == 1
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert "Traceback" not in done.stderr
+    for word in words:
+        assert word in done.stderr
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("ending", [".csv", ".nc", ".parquet"])
+def test_a_full_disk_ends_in_one_line_and_leaves_nothing(tmp_path: Path, ending: str) -> None:
+    (tmp_path / "good.toml").write_text(GOOD)
+    (tmp_path / f"full{ending}").symlink_to("/dev/full")
+    done = lostmotion("run", "good.toml", "-o", f"full{ending}", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "full" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == [f"full{ending}", "good.toml"]
+
+
+def test_an_old_result_survives_a_failed_write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "good.toml").write_text(GOOD)
+    result = lm.simulate(lm.load(tmp_path / "good.toml"))
+    target = tmp_path / "result.csv"
+    lm.save(result, target)
+    old = target.read_bytes()
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("lostmotion.results._header", full)
+    with pytest.raises(lm.InputError, match="No space left"):
+        lm.save(result, target)
+    assert target.read_bytes() == old
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["good.toml", "result.csv"]
+
+
+def test_an_unreadable_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "secret.toml"
+    path.write_text(GOOD)
+
+    def refuse(*_: object, **__: object) -> str:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_text", refuse)  # a test that runs as root could read anything
+    with pytest.raises(lm.InputError, match=r"secret\.toml: cannot be read: Permission denied"):
+        lm.load(path)
+
+
+def test_damaged_result_files_are_refused(tmp_path: Path) -> None:
+    for name in ("a.csv", "a.nc", "a.parquet"):
+        (tmp_path / name).write_bytes(b"not a result\n1,2\n")
+        with pytest.raises(lm.InputError, match=name):
+            lm.open_result(tmp_path / name)
+    with pytest.raises(lm.InputError, match="no such file"):
+        lm.open_result(tmp_path / "none.csv")
