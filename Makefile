@@ -35,6 +35,10 @@ lint: $(VENV)/built
 	$(BIN)/mypy
 	$(BIN)/clang-format --dry-run --Werror core/lostmotion/*.hpp core/tests/*.cpp core/tests/*.hpp bindings/*.cpp benchmarks/*.cpp
 
+.PHONY: stub
+stub: $(VENV)/built
+	$(BIN)/python -m nanobind.stubgen -q -m lostmotion._core -o src/lostmotion/_core.pyi
+
 format: $(VENV)/tools
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .

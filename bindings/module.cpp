@@ -192,7 +192,8 @@ void advance(Simulation& s, double interval, double c0, double c1, double m0, do
 }  // namespace
 
 NB_MODULE(_core, m) {
-    nb::exception<SolverError>(m, "SolverError", PyExc_RuntimeError);
+    nb::exception<SolverError>(m, "SolverError", PyExc_RuntimeError).attr("__doc__") =
+        "The motion has no continuation; the message names time and contact.";
 
     nb::class_<Motor>(m, "Motor")
         .def(nb::init<>())

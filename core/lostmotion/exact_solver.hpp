@@ -304,7 +304,7 @@ class ExactSolver {
         const double shortest = 1e-7 * p.level(0).length;
         for (long count = 1; time_ < limit; ++count) {
             ++looks_;
-            if (count % 1024 == 0 && interrupted != nullptr && interrupted(interrupted_context))
+            if (looks_ % 1024 == 0 && interrupted != nullptr && interrupted(interrupted_context))
                 return Status::interrupted;
             if (count % 64 == 0) cursor.anchor(time_);
             const InputJet u = cursor.input().jet();

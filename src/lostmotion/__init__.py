@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ._core import SolverError as SolverError
     from .errors import InputError as InputError
-    from .explain import explain as explain
+    from .explanation import explain as explain
     from .parts import ConstantEfficiency as ConstantEfficiency
     from .parts import Drive as Drive
     from .parts import Gearbox as Gearbox
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .scenario import load as load
     from .signals import CommandSignal as CommandSignal
     from .signals import TorqueSignal as TorqueSignal
-    from .simulate import simulate as simulate
+    from .run import simulate as simulate
     from .stepping import Simulation as Simulation
     from .variables import VARIABLES as VARIABLES
 
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "_core": ("SolverError",),
     "errors": ("InputError",),
-    "explain": ("explain",),
+    "explanation": ("explain",),
     "parts": (
         "ConstantEfficiency",
         "Drive",
@@ -57,7 +57,7 @@ _HOMES = {
     "results": ("energy_of", "open_result", "save", "scenario_of"),
     "scenario": ("Initial", "Scenario", "load"),
     "signals": ("CommandSignal", "TorqueSignal"),
-    "simulate": ("simulate",),
+    "run": ("simulate",),
     "stepping": ("Simulation",),
     "variables": ("VARIABLES",),
 }

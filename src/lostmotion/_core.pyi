@@ -5,7 +5,7 @@ import numpy.typing
 
 
 class SolverError(RuntimeError):
-    pass
+    """The motion has no continuation; the message names time and contact."""
 
 class Motor:
     def __init__(self) -> None: ...

@@ -135,7 +135,7 @@ def run(
         raise InputError(
             f"--explain {explain}: must lie between 0 and simulation.duration, {loaded.simulation.duration} s"
         )
-    from .simulate import simulate
+    from .run import simulate
 
     if solver not in ("exact", "dormand-prince"):
         raise InputError(f"--solver {solver}: must be exact or dormand-prince")
@@ -147,7 +147,7 @@ def run(
         raise InputError(f"{scenario}: {error}") from None
     print(summary(result))
     if explain is not None:
-        from .explain import explain as explain_instant
+        from .explanation import explain as explain_instant
 
         print(explain_instant(loaded, explain))
     if output is not None:

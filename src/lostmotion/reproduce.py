@@ -18,7 +18,7 @@ from .paper import AMPLITUDES, MODELS, Constant, constants, paper_scenario
 from .parts import LossMap
 from .plots import COMMAND_STYLE, STYLES, Curve, Panel
 from .results import energy_of, write_bytes
-from .simulate import simulate
+from .run import simulate
 
 if TYPE_CHECKING:
     import xarray

@@ -100,7 +100,7 @@ class Scenario(Part):
 
     def to_json(self) -> str:
         """All values in SI, as JSON that `from_json` reads."""
-        return self.model_dump_json(exclude_defaults=True)
+        return self.model_dump_json(exclude_none=True)
 
     @classmethod
     def from_json(cls, text: str) -> Scenario:
@@ -247,6 +247,8 @@ def _explain(problem: Any, keys: list[int | str]) -> str:
         return f"kind {context['tag']!r} is not known; it must be one of {context['expected_tags']}"
     if kind == "union_tag_not_found":
         return "lacks kind, which says what it is"
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return f"{shown} must be a table with some of the keys {', '.join(_known_keys(keys))}"
     if kind == "finite_number":
         return f"{shown} must be a finite number"
     message = problem["msg"]

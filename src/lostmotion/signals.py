@@ -190,5 +190,9 @@ def _polyline(times: Any, values: list[float]) -> list[Knot]:
     return [*lines, (times[-1], values[-1], 0.0)]
 
 
-CommandSignal = Signal[Number]
-TorqueSignal = Signal[Torque]
+class CommandSignal(Signal[Number]):
+    """A command E_C over time: the sum of all that is given."""
+
+
+class TorqueSignal(Signal[Torque]):
+    """A torque [N·m] over time: the sum of all that is given."""

@@ -8,7 +8,7 @@ from typing import Any
 from . import _core
 from .parts import Drive
 from .scenario import Initial
-from .simulate import start_state
+from .run import start_state
 from .variables import CHANNELS
 
 

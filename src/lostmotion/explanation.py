@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from . import _core
 from .parts import Drive
 from .scenario import Scenario
-from .simulate import start_state
+from .run import start_state
 from .stepping import Simulation
 from .variables import CHANNELS
 

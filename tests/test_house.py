@@ -1,0 +1,86 @@
+"""The rules of the house: one-way imports, quick start-up, stub and docs in step with the code."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import lostmotion
+import pytest
+
+from conftest import ROOT
+
+PACKAGE = ROOT / "src" / "lostmotion"
+
+# Each module may import only from rooms before its own. The way of the data: parts -> scenario -> run -> dataset ->
+# analysis -> plots -> report -> command line.
+ROOMS = [
+    {"_core", "errors", "variables", "units"},
+    {"quantities"},
+    {"signals", "parts"},
+    {"scenario"},
+    {"results"},
+    {"run"},
+    {"stepping"},
+    {"explanation"},
+    {"frequency_response"},
+    {"paper"},
+    {"plots"},
+    {"reproduce", "report"},
+    {"cli"},
+    {"__init__", "__main__"},
+]
+
+
+def imports_of(path: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level == 1:
+            found |= {node.module.split(".")[0]} if node.module else {a.name for a in node.names}
+    return found
+
+
+def test_every_module_has_its_room() -> None:
+    assert {p.stem for p in PACKAGE.glob("*.py")} | {"_core"} == set.union(*ROOMS)
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.glob("*.py")), ids=lambda p: p.stem)
+def test_imports_go_one_way(path: Path) -> None:
+    room = next(k for k, names in enumerate(ROOMS) if path.stem in names)
+    allowed = set.union(*ROOMS[: room + 1])
+    assert imports_of(path) <= allowed
+
+
+def test_importing_takes_no_plotting_or_data_library_along() -> None:
+    script = "import sys, lostmotion; print([m for m in ('matplotlib', 'xarray', 'pydantic', 'pint', 'numpy') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_every_public_name_exists_and_is_documented() -> None:
+    for name in lostmotion.__all__:
+        value = getattr(lostmotion, name)
+        assert name == "VARIABLES" or value.__doc__
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        _ = lostmotion.simulat
+
+
+def test_the_extension_s_stub_is_current(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "nanobind.stubgen", "-q", "-m", "lostmotion._core", "-o", str(tmp_path / "_core.pyi")]
+    subprocess.run(command, check=True)
+    assert (tmp_path / "_core.pyi").read_text() == (PACKAGE / "_core.pyi").read_text(), "run: make stub"
+
+
+def test_typing_marker_is_shipped() -> None:
+    assert (PACKAGE / "py.typed").exists()
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda p: p.stem)
+def test_examples_run(path: Path, tmp_path: Path) -> None:
+    subprocess.run([sys.executable, str(path)], cwd=tmp_path, check=True, capture_output=True, timeout=120)
+
+
+def test_help_names_every_command() -> None:
+    done = subprocess.run([sys.executable, "-m", "lostmotion", "--help"], capture_output=True, text=True, check=True)
+    for command in ("reproduce", "run", "schema"):
+        assert f"  {command} " in done.stdout

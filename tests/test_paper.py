@@ -1,0 +1,117 @@
+"""The paper's constants, its frequency response, and everything that `reproduce` writes."""
+
+import csv
+from pathlib import Path
+
+import lostmotion as lm
+import numpy as np
+import pytest
+from lostmotion.frequency_response import PERIODICITY, frequency_response, rigid_constants
+from lostmotion.paper import constants, paper_scenario
+from lostmotion.parts import Drive
+from lostmotion.reproduce import WORK, reproduce
+
+# model.md, section 3: name, recomputed, from the printed t_m0 and T_RC (where it differs).
+EXPECTED = {
+    "f_T0": (65.495, 65.495),
+    "T_MR": (62.357, 62.357),
+    "T_ZR": (269.386, 269.386),
+    "j_RC": (36.131, 36.131),
+    "beta_RC": (5.3201, 5.3201),
+    "T_RC": (230.47, 233.4),
+    "t_m0": (2.507, 2.31),
+    "T_mc": (65.02, 61.478),
+    "f_RC": (55.04, 56.603),
+    "xi_RC": (11.25, 10.938),
+    "omega_MRC": (365.3, 374.82),
+    "f_-3dB": (2.451, 2.593),
+    "lambda_-3dB": (0.0445, 0.0458),
+}
+
+
+def test_constants_are_those_of_the_repaired_table() -> None:
+    table = {c.name: c for c in constants()}
+    assert set(table) == set(EXPECTED)
+    for name, (recomputed, from_printed) in EXPECTED.items():
+        digits = len(str(recomputed).replace(".", "").lstrip("0"))
+        assert table[name].recomputed == pytest.approx(recomputed, rel=0.6 * 10.0 ** (1 - digits))
+        assert table[name].from_printed == pytest.approx(from_printed, rel=6e-4)
+
+
+def frictionless(drive: Drive) -> Drive:
+    motor = drive.motor.model_copy(update={"friction_torque": 0.0})
+    return Drive(motor=motor, gearbox=drive.gearbox, load=drive.load)
+
+
+def test_rigid_drive_without_friction_follows_the_closed_form() -> None:
+    drive = frictionless(paper_scenario("1-DOF-L", "large").drive())
+    frequencies = np.geomspace(0.1, 100.0, 7)
+    response = frequency_response(drive, list(frequencies), 0.5)
+    closed = rigid_constants(drive).response(frequencies, 90.0)
+    # The transient is followed to a residual of 1e-10 per period; it decays by exp(-T/T_mc) per period, so the motion
+    # is that near to its limit times 1/(1 - exp(-T/T_mc)), at 100 Hz seven.
+    assert np.max(np.abs(response["response"].values / closed - 1.0)) < 10 * PERIODICITY
+
+
+def test_first_harmonics_come_from_periodic_motions() -> None:
+    drive = paper_scenario("2-DOF-NL", "small").drive()
+    response = frequency_response(drive, [0.5, 5.0, 50.0], 0.025)
+    assert np.all(response["periodicity"].values <= PERIODICITY)
+    # Followed on for as long again, the motion is still the same.
+    for frequency, periods, value in zip([0.5, 5.0, 50.0], response["periods"].values, response["response"].values, strict=True):
+        duration = 2 * periods / frequency
+        run = lm.simulate(
+            drive,
+            command=lm.CommandSignal(amplitude=0.025, frequency=frequency),
+            duration=duration,
+            sample_interval=1.0 / (1024 * frequency),
+        )
+        last = np.fft.rfft(run["load_speed"].values[-1025:-1])[1] / np.fft.rfft(run["command"].values[-1025:-1])[1]
+        assert abs(last / value - 1.0) < 1e-5  # aliasing of 1024 against 2048 samples
+
+
+def test_response_depends_on_amplitude_as_in_the_paper() -> None:
+    drive = paper_scenario("2-DOF-NL", "large").drive()
+    large, small = (abs(frequency_response(drive, [0.1], a)["response"].values[0]) for a in (1.0275, 0.025))
+    assert small < 0.5 * large
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int]:
+    steps = []
+    directory = tmp_path_factory.mktemp("paper")
+    reproduce(directory / "new", lambda: steps.append(1))
+    return directory / "new", len(steps)
+
+
+def test_reproduce_writes_every_figure_its_data_and_the_report(report: tuple[Path, int]) -> None:
+    directory, _ = report
+    numbers = ["05", "09", *map(str, range(10, 19))]
+    expected = {f"figure-{n}.{e}" for n in numbers for e in ("png", "svg", "csv")} | {"constants.csv", "report.html"}
+    assert {p.name for p in directory.iterdir()} == expected
+    for n in numbers:
+        assert (directory / f"figure-{n}.png").read_bytes().startswith(b"\x89PNG")
+        assert "<svg" in (directory / f"figure-{n}.svg").read_text()[:2000]
+
+
+def test_progress_reaches_its_end(report: tuple[Path, int]) -> None:
+    assert report[1] == WORK
+
+
+def test_the_report_needs_nothing_beside_it(report: tuple[Path, int]) -> None:
+    page = (report[0] / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == 11
+    assert 'src="http' not in page
+    assert "href=" not in page
+    assert "stand-in" in page
+    for name in EXPECTED:
+        assert f"<td>{name}</td>" in page
+
+
+def test_figure_data_are_the_runs(report: tuple[Path, int]) -> None:
+    rows = list(csv.DictReader((report[0] / "figure-11.csv").read_text().splitlines()))
+    chosen = [r for r in rows if r["panel"] == "speed, E_CA = 0.025" and r["curve"] == "2-DOF-NL"]
+    run = lm.simulate(paper_scenario("2-DOF-NL", "small"))
+    assert [float(r["y"]) for r in chosen] == run["load_speed"].values.tolist()
+    response = list(csv.DictReader((report[0] / "figure-17.csv").read_text().splitlines()))
+    assert len([r for r in response if "0.025" in r["curve"]]) >= 60

@@ -1,0 +1,103 @@
+"""Datasets and their files."""
+
+import json
+from pathlib import Path
+
+import lostmotion as lm
+import numpy as np
+import pytest
+import xarray as xr
+from lostmotion.variables import VARIABLES
+
+
+@pytest.fixture(scope="module")
+def result(request: pytest.FixtureRequest) -> xr.Dataset:
+    return lm.simulate(lm.load(request.config.rootpath / "scenarios" / "paper-2dof-nl-small.toml"))
+
+
+def test_every_variable_is_there_with_unit_and_meaning(result: xr.Dataset) -> None:
+    for variable in VARIABLES:
+        assert result[variable.name].attrs["units"] == variable.unit
+        assert result[variable.name].attrs["long_name"] == variable.meaning
+        assert result[variable.name].dims == ("time",)
+    sampled = {name for name, v in result.data_vars.items() if v.dims == ("time",)}
+    assert sampled == {v.name for v in VARIABLES}
+    assert result["time"].attrs["units"] == "s"
+
+
+@pytest.mark.parametrize("ending", [".nc", ".csv", ".parquet"])
+def test_a_result_file_reads_back_unchanged(result: xr.Dataset, tmp_path: Path, ending: str) -> None:
+    lm.save(result, tmp_path / f"r{ending}")
+    back = lm.open_result(tmp_path / f"r{ending}")
+    xr.testing.assert_identical(back.drop_attrs(), result.drop_attrs())
+    for name in result.variables:
+        assert {k: np.asarray(v).tolist() for k, v in back[name].attrs.items()} == {
+            k: np.asarray(v).tolist() for k, v in result[name].attrs.items()
+        }
+    assert {k: str(v) for k, v in back.attrs.items()} == {k: str(v) for k, v in result.attrs.items()}
+
+
+@pytest.mark.parametrize("ending", [".nc", ".csv", ".parquet"])
+def test_a_result_file_alone_can_be_run_again(result: xr.Dataset, tmp_path: Path, ending: str) -> None:
+    lm.save(result, tmp_path / f"r{ending}")
+    again = lm.simulate(lm.scenario_of(lm.open_result(tmp_path / f"r{ending}")))
+    xr.testing.assert_identical(again, result)
+
+
+def test_other_programs_read_the_files(result: xr.Dataset, tmp_path: Path) -> None:
+    import pandas as pd
+
+    lm.save(result, tmp_path / "r.csv")
+    lm.save(result, tmp_path / "r.parquet")
+    csv = pd.read_csv(tmp_path / "r.csv", comment="#")
+    assert csv["load_speed [rad/s]"].to_numpy() == pytest.approx(result["load_speed"].values, abs=0.0)
+    parquet = pd.read_parquet(tmp_path / "r.parquet")
+    assert parquet["twist"].to_numpy() == pytest.approx(result["twist"].values, abs=0.0)
+
+
+def test_energy_balance_closes_to_rounding(result: xr.Dataset) -> None:
+    ledger = lm.energy_of(result)
+    assert abs(ledger["residual"]) < 1e-9 * ledger["turned_over"]
+    heat = ("input_damper", "motor_friction", "gear_losses", "hysteresis", "load_damper", "load_friction")
+    stored = ledger["kinetic_change"] + ledger["elastic_change"]
+    balance = ledger["source"] - sum(ledger[k] for k in heat) - ledger["load_work"] - stored
+    assert balance == pytest.approx(ledger["residual"], abs=1e-15)
+
+
+def test_switchings_carry_both_limits_of_the_output_torque(result: xr.Dataset) -> None:
+    # At a turning point of the twist the hysteresis torque jumps; elsewhere the output torque is continuous.
+    jump = np.abs(result["switching_output_torque_after"] - result["switching_output_torque_before"]).values
+    twist_changes = (result["switching_twist_contact_before"] != result["switching_twist_contact_after"]).values
+    assert jump[twist_changes].max() > 0.01
+    assert np.all(jump[~twist_changes] < 1e-9)
+    assert np.all(np.diff(result["switching_time"].values) >= 0.0)
+    assert result.sizes["switching"] == result.attrs["switching_count"]
+
+
+def test_samples_at_a_jump_are_right_limits(large: Path) -> None:
+    steps = {"steps": [{"height": 0.5, "time": 0.01}]}
+    scenario = lm.load(large, {"command": steps, "simulation.duration": 0.02, "simulation.sample_interval": 0.005})
+    assert lm.simulate(scenario)["command"].values.tolist() == [0.0, 0.0, 0.5, 0.5, 0.5]
+
+
+def test_efficiency_is_useful_over_fed_in_torque(result: xr.Dataset) -> None:
+    eta = result["efficiency"].values
+    moving = result["motor_speed"].values != 0.0
+    assert np.all(np.isnan(eta[~moving]))
+    assert np.all((eta[moving] >= 0.0) & (eta[moving] < 1.0))
+    mu = result["output_torque"].values * np.sign(result["motor_speed"].values) / 51.6
+    driving = moving & (mu > 0.0)
+    m = result["loss_coefficient"].values
+    assert eta[driving] == pytest.approx(mu[driving] / (mu[driving] + m[driving]), rel=1e-12)
+
+
+def test_leaving_the_data_of_the_loss_map_is_said(large: Path) -> None:
+    inside = lm.simulate(lm.load(large))
+    assert "warning" not in inside.attrs
+    outside = lm.simulate(lm.load(large, {"load.torque": 100.0}))
+    assert "outside its data" in outside.attrs["warning"]
+
+
+def test_the_note_on_the_stand_in_table_travels_with_the_result(result: xr.Dataset) -> None:
+    assert "stand-in" in result.attrs["note"]
+    assert json.loads(result.attrs["scenario"])["gearbox"]["note"] == result.attrs["note"]

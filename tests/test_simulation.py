@@ -1,0 +1,211 @@
+"""Runs from Python: agreement of solvers, laws, stepping, interruption."""
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from pathlib import Path
+
+import lostmotion as lm
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from conftest import SCENARIOS
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
+def test_both_solvers_agree_on_every_scenario(path: Path) -> None:
+    scenario = lm.load(path)
+    exact = lm.simulate(scenario)
+    coarse, fine = (
+        lm.simulate(scenario, solver="dormand-prince", relative_tolerance=tolerance) for tolerance in (1e-8, 1e-11)
+    )
+    for name in ("motor_speed", "load_speed", "twist", "load_angle"):
+        size = float(abs(exact[name]).max()) or 1.0
+        # What the adaptive solver's own two results differ by is what its tolerance leaves open.
+        open_by = float(abs(coarse[name] - fine[name]).max()) / size
+        assert float(abs(exact[name] - fine[name]).max()) / size <= 2.0 * open_by + 1e-9
+    ledger = lm.energy_of(exact)
+    assert abs(ledger["residual"]) <= 1e-9 * ledger["turned_over"]
+
+
+def test_the_lossy_rigid_gear_switches_at_the_closed_form_instants() -> None:
+    path = next(p for p in SCENARIOS if p.stem == "lossy-rigid-gear")
+    result = lm.simulate(lm.load(path))
+    changes = result["switching_input_contact_before"] != result["switching_input_contact_after"]
+    instants = result["switching_time"].values[changes.values]
+    expected = [0.0804771339, 0.1995199008, 0.3713427780, 0.4645394616]
+    assert instants == pytest.approx(expected, abs=1e-9)
+    assert float(result["load_speed"][-1]) == pytest.approx(-0.01626192938, abs=1e-10)
+
+
+def test_shift_the_time_and_the_motion_shifts(small: Path) -> None:
+    scenario = lm.load(small, {"simulation.sample_interval": 0.01})
+    shift = 0.37
+    steps = {"steps": [{"height": 0.03, "time": 0.1}, {"height": -0.05, "time": 0.9}]}
+    late = {"steps": [{**s, "time": s["time"] + shift} for s in steps["steps"]]}  # type: ignore[dict-item]
+    a = lm.simulate(scenario, command=lm.CommandSignal(**steps), duration=1.5)
+    b = lm.simulate(scenario, command=lm.CommandSignal(**late), duration=1.5 + shift)
+    for name in ("motor_speed", "load_speed", "twist"):
+        shifted = b[name].values[37:]
+        assert shifted == pytest.approx(a[name].values, abs=1e-9 * float(abs(a[name]).max()))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    amplitude=st.floats(0.005, 1.2),
+    frequency=st.floats(0.3, 30.0),
+    mean=st.floats(-0.3, 0.3),
+    torque=st.floats(-20.0, 20.0),
+)
+def test_mirror_the_command_and_the_motion_mirrors(amplitude: float, frequency: float, mean: float, torque: float) -> None:
+    scenario = lm.load(SCENARIOS[0].parent / "paper-2dof-nl-large.toml", {"simulation.duration": 0.5})
+    command = lm.CommandSignal(mean=mean, amplitude=amplitude, frequency=frequency)
+    a = lm.simulate(scenario, command=command, load_torque=torque)
+    b = lm.simulate(scenario, command=command.mirrored(), load_torque=-torque)
+    for name in ("motor_torque", "motor_speed", "load_speed", "twist", "output_torque"):
+        assert b[name].values == pytest.approx(-a[name].values, abs=1e-10 * (1e-9 + float(abs(a[name]).max())))
+
+
+def test_sampling_does_not_affect_the_motion(small: Path) -> None:
+    fine, coarse = (
+        lm.simulate(lm.load(small, {"simulation.sample_interval": interval})) for interval in (1e-3, 0.1)
+    )
+    for name in ("load_speed", "twist", "load_angle"):
+        assert coarse[name].values == pytest.approx(fine[name].values[::100], rel=1e-9, abs=1e-13)
+
+
+def test_step_by_step_equals_one_run(small: Path) -> None:
+    scenario = lm.load(small)
+    sim = lm.Simulation(scenario.drive(), step=0.01)
+    times = np.arange(101) * 0.01
+    values = 0.03 * np.sin(7.0 * times)
+    for k in range(100):
+        sim.advance(0.01, command=(values[k], values[k + 1]))
+    command = lm.CommandSignal(samples={"times": times.tolist(), "values": values.tolist()})
+    run = lm.simulate(scenario, command=command, duration=1.0, sample_interval=0.01)
+    for name in ("motor_speed", "load_speed", "twist", "output_torque"):
+        assert sim[name] == pytest.approx(float(run[name][-1]), rel=1e-9, abs=1e-12)
+
+
+def test_a_restored_simulation_continues_bit_for_bit(small: Path) -> None:
+    drive = lm.load(small).drive()
+    a, b = lm.Simulation(drive), lm.Simulation(drive)
+    for k in range(300):
+        a.advance(1e-3, command=0.03 * math.sin(0.05 * k), load_torque=0.1)
+    b.state = a.state
+    for k in range(300, 600):
+        for sim in (a, b):
+            sim.advance(1e-3, command=0.03 * math.sin(0.05 * k), load_torque=0.1)
+        assert a.read() == b.read()
+    assert a.time == b.time
+
+
+def test_a_bad_step_is_refused_and_changes_nothing(small: Path) -> None:
+    sim = lm.Simulation(lm.load(small).drive())
+    sim.advance(1e-3, command=0.1)
+    before = sim.state
+    for arguments in ((0.0, 0.1), (-1.0, 0.1), (1e-3, math.nan), (1e-3, 0.1, math.inf)):
+        with pytest.raises(ValueError, match="must be positive"):
+            sim.advance(*arguments)
+    assert sim.state == before
+
+
+def test_explain_names_what_holds_and_what_would_free(small: Path) -> None:
+    scenario = lm.load(small)
+    explanation = lm.explain(scenario, 1.0)
+    shaft = explanation.contacts[0]
+    assert shaft.mode == 0
+    assert -shaft.capacity_backward <= shaft.torque <= shaft.capacity_forward
+    assert "stuck" in str(explanation)
+    # T_10 + M_2B/i at rest and without load: 0.016 + 0.020 * 51.6/90 N·m against a stall torque of k_N M_DR a unit.
+    rest = lm.explain(lm.Simulation(scenario.drive()))
+    expected = (0.016 + 0.020 * 51.6 / 90.0) / (3.1169 * 0.521)
+    assert rest.command_forward == pytest.approx(expected, rel=1e-12)
+    assert rest.command_backward == pytest.approx(-expected, rel=1e-12)
+    limited = lm.load(small, {"motor.voltage_limit": "0.1 V"})
+    assert "cannot reach" in str(lm.explain(limited, 0.1))
+
+
+def test_the_smallest_command_moves_the_load_and_less_does_not(small: Path) -> None:
+    scenario = lm.load(small)
+    smallest = lm.explain(lm.Simulation(scenario.drive())).command_forward
+    for factor, moves in ((0.99, False), (1.01, True)):
+        command = lm.CommandSignal(ramps=[{"rise": factor * smallest, "duration": 5.0}])
+        result = lm.simulate(scenario, command=command, duration=20.0, sample_interval=0.1)
+        assert (float(abs(result["load_speed"][-1])) > 1e-6) == moves
+
+
+def test_two_runs_in_two_threads_give_the_same_bits(large: Path) -> None:
+    scenario = lm.load(large)
+    results: list[np.ndarray] = []
+
+    def work() -> None:
+        results.append(lm.simulate(scenario)["load_speed"].values)
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for t in threads:
+        t.start()
+    for t in threads:
+        t.join()
+    assert all(np.array_equal(r, results[0]) for r in results)
+
+
+def test_ctrl_c_ends_a_long_run_at_once(small: Path) -> None:
+    script = textwrap.dedent(f"""
+        import lostmotion as lm
+        scenario = lm.load({str(small)!r}, {{"simulation.duration": 1e6, "simulation.sample_interval": 1e3}})
+        print("running", flush=True)
+        lm.simulate(scenario)
+    """)
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "running\n"
+    time.sleep(1.0)
+    os.kill(process.pid, signal.SIGINT)
+    _, error = process.communicate(timeout=5.0)
+    assert "KeyboardInterrupt" in error
+    assert process.returncode != 0
+
+
+def test_memory_does_not_grow_with_the_duration(small: Path) -> None:
+    script = textwrap.dedent(f"""
+        import resource
+        import lostmotion as lm
+        peaks = []
+        for duration in (2.0, 2.0, 5000.0):
+            scenario = lm.load({str(small)!r}, {{"simulation.duration": duration, "simulation.sample_interval": duration / 100}})
+            result = lm.simulate(scenario)
+            peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+        print(peaks[2] - peaks[1], result.attrs["switching_count"], result.sizes["switching"])
+    """)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    grown, count, kept = map(int, done.stdout.split())
+    assert count > 100_000 >= kept  # all are counted, a bounded number is kept
+    assert grown < 60_000  # KiB: the kept switchings
+
+
+def test_misspelt_arguments_fail(small: Path) -> None:
+    scenario = lm.load(small)
+    with pytest.raises(TypeError, match="comand"):
+        lm.simulate(scenario, comand=0.1)  # type: ignore[call-arg]
+    with pytest.raises(ValueError, match="euler"):
+        lm.simulate(scenario, solver="euler")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="duration"):
+        lm.simulate(scenario.drive(), command=0.1)
+
+
+def test_end_state_continues_a_run(small: Path) -> None:
+    scenario = lm.load(small)
+    whole = lm.simulate(scenario, duration=2.0)
+    half = lm.simulate(scenario, duration=1.0)
+    end = json.loads(half.attrs["end_state"])
+    rest = lm.simulate(scenario, duration=1.0, initial=lm.Initial(**end))
+    assert float(rest["load_speed"][-1]) == pytest.approx(float(whole["load_speed"][-1]), rel=1e-6)
