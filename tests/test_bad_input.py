@@ -4,8 +4,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import lostmotion as lm
 import pytest
+
+import lostmotion as lm
 from lostmotion.scenario import Scenario
 
 GOOD = """
@@ -153,13 +154,17 @@ def test_broken_scenario_is_refused_in_one_clear_line(tmp_path: Path, old: str, 
 
 def test_an_input_shaft_without_inertia_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "broken.toml"
-    path.write_text(GOOD.replace("rotor_inertia = 8e-6", "rotor_inertia = 0").replace("inertia = 6.7e-6", "inertia = 0"))
+    path.write_text(
+        GOOD.replace("rotor_inertia = 8e-6", "rotor_inertia = 0").replace("inertia = 6.7e-6", "inertia = 0")
+    )
     with pytest.raises(lm.InputError, match="no inertia on the input shaft"):
         lm.load(path)
 
 
 def test_a_jamming_gear_is_refused_with_the_advice_to_give_it_a_compliance(tmp_path: Path) -> None:
-    text = GOOD.replace('kind = "curve"\nbreaks = ["0.6 mrad", "3 mrad"]\nslopes = [2650, 21200, 26500]', 'kind = "rigid"')
+    text = GOOD.replace(
+        'kind = "curve"\nbreaks = ["0.6 mrad", "3 mrad"]\nslopes = [2650, 21200, 26500]', 'kind = "rigid"'
+    )
     text = text.replace("[gearbox.hysteresis]\nefficiency = 0.93\n", "").replace("inertia = 2.0", "inertia = 2000.0")
     text = text.replace("mirrored = true\nspeeds = [0, 1]\nloads = [0, 1]", "speeds = [0, 1]\nloads = [-1, 0, 1]")
     text = text.replace("[[0.02, 0.06], [0.08, 0.12]]", "[[1.4, 1.4], [0, 0], [2, 2]]")
@@ -187,7 +192,11 @@ CALLS = [
     ("an override of an unknown key", ["run", "good.toml", "--set", "gearbox.ration=3"], ["gearbox.ration", "ratio"]),
     ("an override with a wrong unit", ["run", "good.toml", "--set", "load.inertia=3 rad"], ["load.inertia", "3 rad"]),
     ("a number for a table", ["run", "good.toml", "--set", "gearbox.hysteresis=0.9"], ["gearbox.hysteresis", "0.9"]),
-    ("an override into a value", ["run", "good.toml", "--set", "gearbox.ratio.big=3"], ["gearbox.ratio", "not a table"]),
+    (
+        "an override into a value",
+        ["run", "good.toml", "--set", "gearbox.ratio.big=3"],
+        ["gearbox.ratio", "not a table"],
+    ),
     ("an unknown ending", ["run", "good.toml", "-o", "out.xlsx"], ["out.xlsx", ".parquet"]),
     ("no ending", ["run", "good.toml", "-o", "out"], ["ending"]),
     ("a directory as output", ["run", "good.toml", "-o", "folder.csv"], ["directory"]),

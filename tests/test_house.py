@@ -5,9 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import lostmotion
 import pytest
 
+import lostmotion
 from conftest import ROOT
 
 PACKAGE = ROOT / "src" / "lostmotion"
@@ -66,7 +66,16 @@ def test_every_public_name_exists_and_is_documented() -> None:
 
 
 def test_the_extension_s_stub_is_current(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "nanobind.stubgen", "-q", "-m", "lostmotion._core", "-o", str(tmp_path / "_core.pyi")]
+    command = [
+        sys.executable,
+        "-m",
+        "nanobind.stubgen",
+        "-q",
+        "-m",
+        "lostmotion._core",
+        "-o",
+        str(tmp_path / "_core.pyi"),
+    ]
     subprocess.run(command, check=True)
     assert (tmp_path / "_core.pyi").read_text() == (PACKAGE / "_core.pyi").read_text(), "run: make stub"
 

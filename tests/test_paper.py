@@ -3,9 +3,10 @@
 import csv
 from pathlib import Path
 
-import lostmotion as lm
 import numpy as np
 import pytest
+
+import lostmotion as lm
 from lostmotion.frequency_response import PERIODICITY, frequency_response, rigid_constants
 from lostmotion.paper import constants, paper_scenario
 from lostmotion.parts import Drive
@@ -58,7 +59,9 @@ def test_first_harmonics_come_from_periodic_motions() -> None:
     response = frequency_response(drive, [0.5, 5.0, 50.0], 0.025)
     assert np.all(response["periodicity"].values <= PERIODICITY)
     # Followed on for as long again, the motion is still the same.
-    for frequency, periods, value in zip([0.5, 5.0, 50.0], response["periods"].values, response["response"].values, strict=True):
+    for frequency, periods, value in zip(
+        [0.5, 5.0, 50.0], response["periods"].values, response["response"].values, strict=True
+    ):
         duration = 2 * periods / frequency
         run = lm.simulate(
             drive,

@@ -3,10 +3,11 @@
 import json
 from pathlib import Path
 
-import lostmotion as lm
 import numpy as np
 import pytest
 import xarray as xr
+
+import lostmotion as lm
 from lostmotion.variables import VARIABLES
 
 

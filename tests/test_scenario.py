@@ -4,12 +4,12 @@ import json
 import math
 from pathlib import Path
 
-import lostmotion as lm
 import numpy as np
 import pytest
-from lostmotion.scenario import json_schema
 
+import lostmotion as lm
 from conftest import ROOT, SCENARIOS
+from lostmotion.scenario import json_schema
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
@@ -23,7 +23,9 @@ def test_units_are_converted_to_si(small: Path) -> None:
     assert s.gearbox.rated_input_speed == pytest.approx(3630 * math.pi / 30, rel=1e-14)
     assert s.load.inertia == pytest.approx(2.0, rel=1e-14)
     stiff = {"kind": "linear", "stiffness": "23 N*m/arcmin"}
-    assert lm.load(small, {"gearbox.stiffness": stiff}).gearbox.stiffness.stiffness == pytest.approx(23 * 10800 / math.pi)
+    assert lm.load(small, {"gearbox.stiffness": stiff}).gearbox.stiffness.stiffness == pytest.approx(
+        23 * 10800 / math.pi
+    )
     assert lm.load(small, {"gearbox.hysteresis.efficiency": "93 percent"}).gearbox.hysteresis.efficiency == 0.93
 
 

@@ -11,12 +11,12 @@ import threading
 import time
 from pathlib import Path
 
-import lostmotion as lm
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import lostmotion as lm
 from conftest import SCENARIOS
 
 
@@ -65,7 +65,9 @@ def test_shift_the_time_and_the_motion_shifts(small: Path) -> None:
     mean=st.floats(-0.3, 0.3),
     torque=st.floats(-20.0, 20.0),
 )
-def test_mirror_the_command_and_the_motion_mirrors(amplitude: float, frequency: float, mean: float, torque: float) -> None:
+def test_mirror_the_command_and_the_motion_mirrors(
+    amplitude: float, frequency: float, mean: float, torque: float
+) -> None:
     scenario = lm.load(SCENARIOS[0].parent / "paper-2dof-nl-large.toml", {"simulation.duration": 0.5})
     command = lm.CommandSignal(mean=mean, amplitude=amplitude, frequency=frequency)
     a = lm.simulate(scenario, command=command, load_torque=torque)
@@ -75,9 +77,7 @@ def test_mirror_the_command_and_the_motion_mirrors(amplitude: float, frequency: 
 
 
 def test_sampling_does_not_affect_the_motion(small: Path) -> None:
-    fine, coarse = (
-        lm.simulate(lm.load(small, {"simulation.sample_interval": interval})) for interval in (1e-3, 0.1)
-    )
+    fine, coarse = (lm.simulate(lm.load(small, {"simulation.sample_interval": interval})) for interval in (1e-3, 0.1))
     for name in ("load_speed", "twist", "load_angle"):
         assert coarse[name].values == pytest.approx(fine[name].values[::100], rel=1e-9, abs=1e-13)
 
@@ -165,7 +165,9 @@ def test_ctrl_c_ends_a_long_run_at_once(small: Path) -> None:
         print("running", flush=True)
         lm.simulate(scenario)
     """)
-    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     assert process.stdout is not None
     assert process.stdout.readline() == "running\n"
     time.sleep(1.0)

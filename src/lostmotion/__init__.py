@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from .results import open_result as open_result
     from .results import save as save
     from .results import scenario_of as scenario_of
+    from .run import simulate as simulate
     from .scenario import Initial as Initial
     from .scenario import Scenario as Scenario
     from .scenario import load as load
     from .signals import CommandSignal as CommandSignal
     from .signals import TorqueSignal as TorqueSignal
-    from .run import simulate as simulate
     from .stepping import Simulation as Simulation
     from .variables import VARIABLES as VARIABLES
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from . import _core
 from .parts import Drive
-from .scenario import Scenario
 from .run import start_state
+from .scenario import Scenario
 from .stepping import Simulation
 from .variables import CHANNELS
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from . import _core
 from .parts import Drive
-from .scenario import Initial
 from .run import start_state
+from .scenario import Initial
 from .variables import CHANNELS
 
 

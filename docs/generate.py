@@ -1,0 +1,108 @@
+"""Writes the pages of the documentation that are made from the code: the scenario reference and the variables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from lostmotion.scenario import json_schema
+from lostmotion.variables import VARIABLES
+
+OUT = Path(__file__).parent / "_generated"
+
+
+def resolve(node: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
+    return schema["$defs"][node["$ref"].rsplit("/", 1)[1]] | {"name": node["$ref"]} if "$ref" in node else node
+
+
+def unit_of(node: dict[str, Any]) -> str:
+    if "x-unit" in node:
+        return node["x-unit"].replace("*", "·") or "–"
+    for key in ("anyOf", "oneOf", "allOf"):
+        for option in node.get(key, []):
+            if unit := unit_of(option):
+                return unit
+    if isinstance(node.get("items"), dict):
+        return unit_of(node["items"])
+    return ""
+
+
+def limits_of(node: dict[str, Any]) -> str:
+    signs = {"exclusiveMinimum": "> ", "minimum": "≥ ", "exclusiveMaximum": "< ", "maximum": "≤ "}
+    found = [sign + f"{node[key]:g}" for key, sign in signs.items() if key in node]
+    for key in ("anyOf", "oneOf", "allOf"):
+        for option in node.get(key, []):
+            if isinstance(option, dict) and (inner := limits_of(option)):
+                found.append(inner)
+    return ", ".join(dict.fromkeys(found))
+
+
+def tables_in(node: dict[str, Any], schema: dict[str, Any]) -> list[dict[str, Any]]:
+    """The tables that a key may hold."""
+    options = [node, *node.get("anyOf", []), *node.get("oneOf", []), *node.get("allOf", [])]
+    if isinstance(node.get("items"), dict):
+        options.append(node["items"])
+    found = [resolve(o, schema) for o in options if isinstance(o, dict)]
+    return [t for t in found if "properties" in t]
+
+
+def write_table(title: str, table: dict[str, Any], schema: dict[str, Any], lines: list[str], done: set[str]) -> None:
+    lines += [f"## `[{title}]`", "", (table.get("description") or "").split("\n\n")[0].replace("\n", " "), ""]
+    lines += ["| key | unit | range | default | meaning |", "|---|---|---|---|---|"]
+    later = []
+    for key, node in table["properties"].items():
+        inner = tables_in(node, schema)
+        default = "needed" if key in table.get("required", []) else repr(node.get("default", "")).strip("'")
+        default = {"None": "", "()": ""}.get(default, default if len(default) < 20 else "")
+        if "const" in node:
+            default = f'"{node["const"]}"'
+        meaning = "" if "x-unit" in str(node.get("description", "")) else node.get("description", "")
+        meaning = "" if meaning.startswith("Number ") else meaning.replace("\n", " ")
+        kind = "table" if inner else unit_of(node)
+        lines.append(f"| `{key}` | {kind} | {limits_of(node)} | {default} | {meaning} |")
+        later += [(f"{title}.{key}" if title != "top level" else key, t) for t in inner]
+    lines.append("")
+    for name, inner in later:
+        identity = f"{name}:{inner.get('title', '')}"
+        if identity not in done:
+            done.add(identity)
+            kind = inner["properties"].get("kind", {}).get("const") or inner["properties"].get("kind", {}).get(
+                "default"
+            )
+            shown = f'{name}] kind = "{kind}"' if kind and "." in name else f"{name}]"
+            write_table(shown.removesuffix("]"), inner, schema, lines, done)
+
+
+def scenario_reference() -> str:
+    schema = json_schema()
+    lines = [
+        "# Scenario files",
+        "",
+        'A scenario is a TOML file. Numbers are SI and radians; strings carry a unit, such as `"3300 rpm"`, `"0.6 mrad"` or',
+        '`"23 N*m/arcmin"`. An unknown key, a missing one, a wrong unit or a value out of range ends in one line that says so.',
+        'With `base = "other.toml"` a file only says what differs from another one. A signal (`command`, `load.torque`) is the',
+        "sum of all its parts; a bare number is a constant. This page is made from the schema that `lostmotion schema` prints.",
+        "",
+    ]
+    write_table("top level", schema, schema, lines, set())
+    return "\n".join(lines).replace("[top level]", "top level")
+
+
+def variables() -> str:
+    lines = ["# Result variables", "", "Over the coordinate `time` [s].", ""]
+    lines += ["| variable | symbol | unit | meaning |", "|---|---|---|---|"]
+    lines += [f"| `{v.name}` | {v.symbol} | {v.unit.replace('*', '·')} | {v.meaning} |" for v in VARIABLES]
+    lines += [
+        "",
+        "Over the dimension `switching` stand the switching instants, what ended the regime, the contact modes before and after,",
+        "and the left and right limit of the output torque. Attributes: `scenario` (all values, can be run again), `energy`,",
+        "`end_state`, `solver`, `switching_count`, and, where they apply, `note` and `warning`.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    OUT.mkdir(exist_ok=True)
+    (OUT / "scenario.md").write_text(scenario_reference(), encoding="utf-8")
+    (OUT / "variables.md").write_text(variables(), encoding="utf-8")
