@@ -51,6 +51,11 @@ class Flow {
         return 0;
     }
 
+    // First derivative of the state.
+    const State& rate() {
+        if (order_ < 1) extend();
+        return x_[1];
+    }
     // Value of the k-th derivative of a form and the sum of the magnitudes of its terms.
     std::pair<double, double> derivative(const LinearForm& f, int k) {
         if (k > order_) extend();
@@ -220,16 +225,21 @@ class SwitchedDrive {
         }
         constexpr int longest_walk = 400;
         for (int step = 0; step < longest_walk; ++step) {
-            const Regime& r = cache.regime(trial);
+            const auto& entry = cache.entry(trial);
+            const Regime& r = entry.regime;
             if (!r.solvable) return Found::inconsistent;
             Flow flow(r, now);
+            const std::array<double, max_guards> room = entry.guard_room(now.x, now.memory, now.input[0]);
+            std::array<double, max_guards> rates;
+            entry.evaluate_guards(nullptr, flow.rate(), now.input[1], rates);
             const Guard* left = nullptr;
             bool overcome = false;
             for (int k = 0; k < r.n_guards && left == nullptr; ++k) {
                 const Guard& g = r.guards[k];
                 // The mode of a contact that moves was chosen by its speed.
                 if (g.kind == Guard::speed && !at_rest[g.contact]) continue;
-                if (flow.sign(g) >= 0) continue;
+                // Only what is near zero needs a closer look.
+                if (room[k] > 16.0 * time_rounding * std::fabs(now.time * rates[k]) || flow.sign(g) >= 0) continue;
                 if (g.kind == Guard::outside) return Found::outside;
                 if (g.kind == Guard::speed || g.kind == Guard::capacity)
                     overcome = true;

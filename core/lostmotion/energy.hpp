@@ -98,7 +98,7 @@ class EnergyMeter {
         return j;
     }
 
-    void powers(const Regime& r, const Propagator& p, const Cursor& c, const Memory& m, Powers& out) const {
+    void powers(const Regime& r, const Propagator& p, Cursor& c, const Memory& m, Powers& out) const {
         const InputJet u = c.input().jet();
         std::array<State, orders> x;
         x[0] = c.x();

@@ -61,24 +61,40 @@ inline State constant_rate(const Regime& r, const Memory& m) {
 // A point that moves along one regime.
 class Cursor {
  public:
+    Cursor(const Signals& signals, const std::vector<InputBasis>& basis) : input_(signals, basis) {}
     Cursor(Propagator& propagator, const Signals& signals, const std::vector<InputBasis>& basis, const State& constant,
            double time, const State& x)
-        : propagator_(&propagator), constant_(&constant), input_(signals, basis), x_(x) {
-        input_.anchor(time);
+        : Cursor(signals, basis) {
+        place(propagator, constant, time, x);
     }
-    Cursor& operator=(const Cursor&) = default;
-    Cursor(const Cursor&) = default;
+
+    // On a regime, at an instant of it.
+    void place(Propagator& propagator, const State& constant, double time, const State& x) {
+        propagator_ = &propagator;
+        constant_ = &constant;
+        input_.anchor(time);
+        x_ = x;
+        rate_known_ = false;
+    }
 
     double time() const { return input_.time(); }
     const State& x() const { return x_; }
     const InputState& input() const { return input_; }
-    State rate() const { return propagator_->rate(x_, *constant_, input_.values()); }
+    const State& rate() {
+        if (!rate_known_) rate_ = propagator_->rate(x_, *constant_, input_.values());
+        rate_known_ = true;
+        return rate_;
+    }
 
-    void anchor(double time) { input_.follow(time); }
+    void anchor(double time) {
+        input_.follow(time);
+        rate_known_ = false;
+    }
 
     void step(int level) {
         x_ = propagator_->step(level, x_, rate(), input_.weights());
         input_.advance(propagator_->level(level).length, propagator_->rotations(level));
+        rate_known_ = false;
     }
     // By any length: whole levels from the longest down, then the Taylor series. Backward by a base interval at most.
     void advance(double h) {
@@ -91,14 +107,15 @@ class Cursor {
             }
         }
         if (h != 0.0) x_ = propagator_->series(h, x_, rate(), input_);
-        input_.follow(target);
+        anchor(target);
     }
 
  private:
-    Propagator* propagator_;
-    const State* constant_;
+    Propagator* propagator_ = nullptr;
+    const State* constant_ = nullptr;
     InputState input_;
-    State x_;
+    State x_{}, rate_{};
+    bool rate_known_ = false;
 };
 
 // Cubic on [0, 1] in Bernstein form, from values and slopes at both ends of an interval of length h.
@@ -298,8 +315,11 @@ class ExactSolver {
         const Regime& r = e.regime;
         Propagator& p = e.propagator;
         const std::array<double, max_guards> constant = e.guard_constants(segment.memory);
-        Cursor cursor(p, signals_, basis_, segment.constant, time_, now_.x), end = cursor;
+        Cursor &cursor = cursor_, &end = end_;
+        cursor.place(p, segment.constant, time_, now_.x);
         Look look;
+        e.evaluate_guards(&constant, cursor.x(), cursor.input().values(), look.value);
+        e.evaluate_guards(nullptr, cursor.rate(), cursor.input().jet<2>()[1], look.slope);
         int level = std::min(last_level_, p.level_below(limit - time_));
         const double shortest = 1e-7 * p.level(0).length;
         for (long count = 1; time_ < limit; ++count) {
@@ -308,11 +328,9 @@ class ExactSolver {
                 return Status::interrupted;
             if (count % 64 == 0) cursor.anchor(time_);
             const InputJet u = cursor.input().jet();
-            const State rate = cursor.rate();
+            const State& rate = cursor.rate();
             if (!(std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100)) return Status::outside;
             const State fourth = p.higher_rate(p.higher_rate(p.higher_rate(rate, u[1]), u[2]), u[3]);
-            e.evaluate_guards(&constant, cursor.x(), u[0], look.value);
-            e.evaluate_guards(nullptr, rate, u[1], look.slope);
             const double left = limit - time_;
             double h = std::min(p.level(level).length, left);
             while (true) {
@@ -322,7 +340,7 @@ class ExactSolver {
                     end.step(level);
                 else
                     end.advance(h);
-                const InputJet v = end.input().jet();
+                const auto v = end.input().jet<2>();
                 e.evaluate_guards(&constant, end.x(), v[0], look.end_value);
                 e.evaluate_guards(nullptr, end.rate(), v[1], look.end_slope);
                 bound_fourth(e, p.level(level).growth, fourth, h, look.fourth);
@@ -342,8 +360,11 @@ class ExactSolver {
                 time_ = h == left ? limit : time_ + h;
                 break;
             }
-            std::swap(cursor, end);
-            if (p.can_double(level, limit - time_)) ++level;
+            cursor = end;
+            std::swap(look.value, look.end_value);
+            std::swap(look.slope, look.end_slope);
+            // Twice the length has at least sixteen times the error; try it where there is room for more than that.
+            if (room_ > 64.0 && p.can_double(level, limit - time_)) ++level;
         }
         now_.x = cursor.x();
         last_level_ = level;
@@ -375,11 +396,15 @@ class ExactSolver {
     Verdict judge(const Regime& r, const Instant& now, const Look& look, double h, bool shortest) {
         Flow flow(r, now);
         n_crossing_ = 0;
+        room_ = std::numeric_limits<double>::infinity();
         for (int g = 0; g < r.n_guards; ++g) {
             const Cubic c(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
             const double bound = h * h * h * look.fourth[g], error = h / 384.0 * bound;
             const double least = c.least();
-            if (least > error) continue;
+            if (least > error) {
+                room_ = std::min(room_, error > 0.0 ? least / error : room_);
+                continue;
+            }
             const double tolerance =
                 rounding * magnitude(r.guards[g].form, now.x, now.memory, now.input[0]) +
                 time_rounding * std::fabs(time_) * std::max(std::fabs(look.slope[g]), std::fabs(look.end_slope[g]));
@@ -424,7 +449,7 @@ class ExactSolver {
     void first_crossing(const Regime& r, typename Cache::Entry& e, const Memory& memory, const Cursor& cursor,
                         const Look& look, double h, Cursor& end, const Guard*& fired) {
         double best = std::numeric_limits<double>::infinity();
-        Cursor at = end;
+        Cursor& at = trial_;
         for (int k = 0; k < n_crossing_; ++k) {
             const int g = crossing_[k];
             const Cubic c(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
@@ -471,6 +496,8 @@ class ExactSolver {
     RegimeKey key_;
     int last_level_ = first_level;
     long looks_ = 0;
+    Cursor cursor_{signals_, basis_}, end_ = cursor_, trial_ = cursor_;
+    double room_ = 0.0;  // least value of a guard / error of its cubic, in the last look
     std::array<int, max_guards> crossing_{};
     int n_crossing_ = 0;
     int recent_ = 0;
