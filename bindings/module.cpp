@@ -174,7 +174,7 @@ nb::tuple explain_at(const Drive& drive, const Signals& signals, const std::arra
     InputState input(signals, solver.basis());
     input.anchor(time);
     const auto u = input.values();
-    const Reading reading = read(drive, solver.regime(), solver.state(), solver.memory(), u);
+    const Reading reading = Reader(drive, solver.regime(), solver.memory())(solver.state(), u);
     return nb::make_tuple(std::vector<double>(reading.value.begin(), reading.value.end()),
                           explain_state(drive, solver.regime(), solver.state(), solver.memory(), u));
 }

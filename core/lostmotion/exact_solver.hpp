@@ -118,6 +118,53 @@ class Cursor {
     bool rate_known_ = false;
 };
 
+// Equal steps along one regime, as sampling takes them. Everything that does not change from step to step is summed up
+// beforehand:
+//     x(t + h) = x + E x + f + sum_q w_q Y_q,
+// with f from all that is constant (growing by a constant if the inputs ramp) and Y_q the whole answers to the sines.
+class Stride {
+ public:
+    Stride(Propagator& propagator, int level, const State& constant, const InputState& input)
+        : step_(&propagator.level(level)), rotations_(propagator.rotations(level)), input_(input), forced_(constant) {
+        const State* responses = propagator.responses(level);
+        const std::vector<InputBasis>& basis = input_.basis();
+        State ramp{};
+        for (int i = 0; i < n_inputs; ++i) {
+            add_scaled(forced_, input_.linear()[i], propagator.input_column(i));
+            add_scaled(ramp, input_.slope()[i] * step_->length, propagator.input_column(i));
+        }
+        forced_ = step_->integral * forced_;
+        growth_ = step_->integral * ramp;
+        for (std::size_t q = 0; q < basis.size(); ++q) {
+            answers_.push_back(responses[q]);
+            if (basis[q].kind == InputBasis::ramp) {
+                add_scaled(forced_, input_.weights()[q], responses[q]);
+                answers_.back() = {};
+            } else if (basis[q].kind == InputBasis::cosine) {
+                add_scaled(answers_.back(), 1.0, step_->integral * propagator.input_column(basis[q].input));
+            }
+        }
+    }
+
+    const InputState& input() const { return input_; }
+    void anchor(double time) { input_.follow(time); }
+
+    void advance(State& x) {
+        const State change = step_->change * x;
+        for (int r = 0; r < lanes; ++r) x[r] += change[r] + forced_[r];
+        for (std::size_t q = 0; q < answers_.size(); ++q) add_scaled(x, input_.weights()[q], answers_[q]);
+        add_scaled(forced_, 1.0, growth_);
+        input_.advance(step_->length, rotations_);
+    }
+
+ private:
+    const Step* step_;
+    const double* rotations_;
+    InputState input_;
+    State forced_, growth_;
+    std::vector<State> answers_;
+};
+
 // Cubic on [0, 1] in Bernstein form, from values and slopes at both ends of an interval of length h.
 struct Cubic {
     double c0, c1, c2, c3;
@@ -247,6 +294,7 @@ class ExactSolver {
 
  private:
     // Accumulation of switching instants: this many of them within a few thousand roundings of the time.
+    static constexpr double settled = 1e-8;
     static constexpr int first_level = 6;  // of the first look
     static constexpr int zeno_count = 100;
     static constexpr double zeno_span = 1e4 * std::numeric_limits<double>::epsilon();
@@ -259,10 +307,9 @@ class ExactSolver {
     }
     double next_knot() const { return std::fmin(signals_[0].next_knot(time_), signals_[1].next_knot(time_)); }
     void anchor_inputs() {
-        InputState input(signals_, basis_);
-        input.anchor(time_);
+        input_.anchor(time_);
         now_.time = time_;
-        now_.input = input.jet();
+        now_.input = input_.jet();
     }
     Status status_of(Found found) {
         if (found == Found::yes) return Status::done;
@@ -283,9 +330,8 @@ class ExactSolver {
         }
         anchor_inputs();
         if (s.input_jump) {
-            InputState before(signals_, basis_);
-            before.anchor_left(time_);
-            s.torque_before = evaluate(cache_.regime(key_).output_torque, now_.x, now_.memory, before.values());
+            input_.anchor_left(time_);
+            s.torque_before = evaluate(cache_.regime(key_).output_torque, now_.x, now_.memory, input_.values());
         } else {
             s.torque_before = evaluate(cache_.regime(key_).output_torque, now_.x, now_.memory, now_.input[0]);
         }
@@ -474,6 +520,7 @@ class ExactSolver {
                     at.advance(next);
                 }
                 s = next;
+                if (std::fabs(moved) < settled * s) break;  // Newton has converged: the next correction is its square
             }
             if (s < best) {
                 best = s;
@@ -496,6 +543,7 @@ class ExactSolver {
     RegimeKey key_;
     int last_level_ = first_level;
     long looks_ = 0;
+    InputState input_{signals_, basis_};
     Cursor cursor_{signals_, basis_}, end_ = cursor_, trial_ = cursor_;
     double room_ = 0.0;  // least value of a guard / error of its cubic, in the last look
     std::array<int, max_guards> crossing_{};

@@ -10,7 +10,8 @@
 // state at rest stays at rest to the last bit.
 #pragma once
 
-#include <memory>
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "regime.hpp"
@@ -127,23 +128,30 @@ class Propagator {
 
     // Taylor series over at most one base interval, forward or backward.
     State series(double s, const State& x, const State& rate, const InputState& input) const {
-        const auto u = input.jet<series_terms + 1>();
-        State term = rate, sum = x;
-        double power = s;
-        double left = 1.0;  // bound on the relative size of the next term
-        for (int k = 1; k <= series_terms; ++k) {
-            add_scaled(sum, power, term);
-            left *= norm_ * std::fabs(s) / k;
-            if (left < 1e-19) break;
-            term = rate_ * term;
-            for (int i = 0; i < n_inputs; ++i) add_scaled(term, u[k][i], input_column_[i]);
-            power *= s / (k + 1);
-        }
-        return sum;
+        double left = norm_ * std::fabs(s);  // bound on the relative size of what follows
+        int terms = 1;
+        while (left >= 1e-19 && terms < series_terms) left *= norm_ * std::fabs(s) / ++terms;
+        return terms < n_derivatives ? series<n_derivatives>(terms, s, x, rate, input)
+                                     : series<series_terms + 1>(terms, s, x, rate, input);
     }
 
  private:
     static constexpr int series_terms = 12;  // 0.125^13/13! < 1e-21
+
+    template <int N>
+    State series(int terms, double s, const State& x, const State& rate, const InputState& input) const {
+        const auto u = input.jet<N>();
+        State term = rate, sum = x;
+        double power = s;
+        for (int k = 1;; ++k) {
+            add_scaled(sum, power, term);
+            if (k == terms) return sum;
+            term = rate_ * term;
+            for (int i = 0; i < n_inputs; ++i)
+                if (u[k][i] != 0.0) add_scaled(term, u[k][i], input_column_[i]);
+            power *= s / (k + 1);
+        }
+    }
 
     void add_base(double h) {
         Step& s = steps_.emplace_back();
@@ -205,7 +213,14 @@ class Propagator {
             add_scaled(b.change.column[c], 2.0, a.change.column[c]);
             add_scaled(b.integral.column[c], 2.0, a.integral.column[c]);
         }
-        b.growth = a.growth * a.growth;
+        // |exp(A (h + s))| <= |exp(A s)| |exp(A h)|, of which the second is known.
+        Matrix size;
+        for (int c = 0; c < n_states; ++c)
+            for (int r = 0; r < n_states; ++r) size.column[c][r] = std::fabs(a.change.column[c][r] + (r == c ? 1.0 : 0.0));
+        b.growth = a.growth * size;
+        for (int c = 0; c < n_states; ++c)
+            for (int r = 0; r < n_states; ++r)
+                b.growth.column[c][r] = std::max(b.growth.column[c][r], a.growth.column[c][r]);
         responses_.resize(responses_.size() + n_basis_);
         const State* from = responses(k);
         for (int q = 0; q < n_basis_; ++q) {

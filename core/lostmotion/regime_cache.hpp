@@ -62,6 +62,7 @@ class RegimeCache {
     const Regime& regime(const RegimeKey& key) { return entry(key).regime; }
 
     Entry& entry(const RegimeKey& key) {
+        if (last_ != nullptr && last_->regime.key == key) return *last_;
         const std::uint64_t packed = key.packed();
         std::unique_ptr<Entry>& found = entries_[packed];
         if (!found) {
@@ -77,6 +78,7 @@ class RegimeCache {
             for (int k = 0; k < n_states + n_inputs; ++k)
                 for (int g = 0; g < r.n_guards; ++g) found->guard_sizes[k][g] = std::fabs(found->guard_columns[k][g]);
         }
+        last_ = found.get();
         return *found;
     }
 
@@ -87,6 +89,7 @@ class RegimeCache {
 
  private:
     const System& system_;
+    Entry* last_ = nullptr;  // the one asked for last
     std::unordered_map<std::uint64_t, std::unique_ptr<Entry>> entries_;
 };
 

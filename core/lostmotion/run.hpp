@@ -101,7 +101,7 @@ class AdaptiveRecorder {
         for (; next_ < options_.samples; ++next_) {
             const double t = static_cast<double>(next_) * options_.sample_interval;
             if (!(t < dense.end || (last && t <= dense.end * (1.0 + 1e-15)))) return;
-            const Reading reading = read(drive_, r, dense(t), m, solver_.input_at(t));
+            const Reading reading = Reader(drive_, r, m)(dense(t), solver_.input_at(t));
             for (int c = 0; c < n_channels; ++c) out_[c * options_.samples + next_] = reading.value[c];
         }
     }

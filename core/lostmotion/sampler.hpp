@@ -33,44 +33,56 @@ struct Reading {
 
 inline double sign_of(double v) { return (v > 0.0) - (v < 0.0); }
 
-// Shown mode of a contact: +-1 slipping, 0 stuck. One that the drive does not have shows the sign of its speed.
-inline double shown_mode(const Drive& drive, const Regime& r, Contact c, const State& x) {
-    if (r.at_rest[c]) return 0.0;
-    const int mode = r.key.modes[c];
-    if (mode != absent) return mode;
-    return sign_of(evaluate(drive.contact_speed(c), x, {}, {}));
-}
+// Reads the channels in one regime.
+class Reader {
+ public:
+    Reader(const Drive& drive, const Regime& r, const Memory& m) : drive_(drive), regime_(r) {
+        const std::array<const LinearForm*, 4> forms{&r.source_torque, &r.output_torque, &r.input_torque,
+                                                     &r.input_friction};
+        for (int k = 0; k < 4; ++k) {
+            const LinearForm& f = *forms[k];
+            for (int c = 0; c < n_states; ++c) columns_.column[c][k] = f.c[c];
+            for (int i = 0; i < n_inputs; ++i) input_columns_[i][k] = f.c[first_input + i];
+            constant_[k] = f.c[one] + f.c[hysteresis_capacity] * m.hysteresis_capacity + f.c[held_torque] * m.held_torque;
+        }
+    }
 
-// `T_2` and so on are values of the regime's forms. While the input contact is stuck, the torque F that it holds is
-// shared by bearing and gear in proportion to their capacities.
-inline Reading read(const Drive& drive, const Regime& r, const State& x, const std::array<double, n_inputs>& u,
-                    double M_D, double T_2, double T_1, double F) {
-    const Gearbox& gearbox = drive.gearbox;
-    double loss = 0.0;
-    if (gearbox.losses == Gearbox::loss_map) {
-        if (r.key.modes[input_contact] == 0) {
+    Reading operator()(const State& x, const std::array<double, n_inputs>& u) const {
+        State out = columns_ * x;
+        for (int k = 0; k < lanes; ++k) out[k] += constant_[k] + input_columns_[0][k] * u[0] + input_columns_[1][k] * u[1];
+        const auto [M_D, T_2, T_1_moving, F, unused_0, unused_1] = out;
+        const Gearbox& gearbox = drive_.gearbox;
+        double T_1 = T_1_moving, loss;
+        const int mode = regime_.key.modes[input_contact];
+        if (gearbox.losses == Gearbox::loss_map && mode == 0) {
+            // The torque F that the standing contact holds is shared by bearing and gear as their capacities are.
             const double s = F >= 0.0 ? 1.0 : -1.0;
-            const double mu = s * T_2 / gearbox.rated_output_torque;
-            const double M_2B = gearbox.loss_torque(mu, 0.0);
-            const double capacity = drive.motor.friction_torque + M_2B / gearbox.ratio;
+            const double M_2B = gearbox.loss_torque(s * T_2 / gearbox.rated_output_torque, 0.0);
+            const double capacity = drive_.motor.friction_torque + M_2B / gearbox.ratio;
             if (capacity > 0.0) T_1 += F * (M_2B / gearbox.ratio) / capacity;
             loss = M_2B / gearbox.rated_output_torque;
         } else {
-            loss = (gearbox.ratio * T_1 - T_2) * r.key.modes[input_contact] / gearbox.rated_output_torque;
+            const double s = gearbox.losses == Gearbox::loss_map ? mode : sign_of(x[motor_speed]);
+            loss = (gearbox.ratio * T_1 - T_2) * s / gearbox.rated_output_torque;
         }
-    } else {
-        loss = (gearbox.ratio * T_1 - T_2) * sign_of(x[motor_speed]) / gearbox.rated_output_torque;
+        return {{u[0], u[1], M_D, x[motor_speed], x[load_speed], x[load_angle], x[twist], T_2, T_1, loss,
+                 shown_mode(input_contact, x), shown_mode(twist_contact, x), shown_mode(load_contact, x)}};
     }
-    return {{u[0], u[1], M_D, x[motor_speed], x[load_speed], x[load_angle], x[twist], T_2, T_1, loss,
-             shown_mode(drive, r, input_contact, x), shown_mode(drive, r, twist_contact, x),
-             shown_mode(drive, r, load_contact, x)}};
-}
 
-inline Reading read(const Drive& drive, const Regime& r, const State& x, const Memory& m,
-                    const std::array<double, n_inputs>& u) {
-    return read(drive, r, x, u, evaluate(r.source_torque, x, m, u), evaluate(r.output_torque, x, m, u),
-                evaluate(r.input_torque, x, m, u), evaluate(r.input_friction, x, m, u));
-}
+ private:
+    // Mode of a contact: +-1 slipping, 0 stuck. One that the drive does not have shows the sign of its speed.
+    double shown_mode(Contact c, const State& x) const {
+        if (regime_.at_rest[c]) return 0.0;
+        const int mode = regime_.key.modes[c];
+        return mode != absent ? mode : sign_of(evaluate(drive_.contact_speed(c), x, {}, {}));
+    }
+
+    const Drive& drive_;
+    const Regime& regime_;
+    Matrix columns_;  // M_D, T_2, T_1, F, over the states
+    std::array<State, n_inputs> input_columns_{};
+    State constant_{};
+};
 
 // Writes `count` samples at begin + k * interval, channel by channel: out[channel * count + k].
 class Sampler {
@@ -93,15 +105,23 @@ class Sampler {
         Cursor cursor(p, s.signals, basis, s.constant, s.begin, s.x);
         const int level = level_of_interval(p);
         cursor.advance(instant(next_) - s.begin);
-        for (std::size_t count = 1;; ++count) {
-            write(r, cursor.x(), s.memory, cursor.input().values());
-            if (++next_ >= count_ || !due(s)) return true;
-            if (count % 4096 == 0 && interrupted != nullptr && interrupted(interrupted_context)) return false;
-            if (level >= 0)
-                cursor.step(level);
-            else
-                cursor.advance(interval_);
-            if (count % 64 == 0) cursor.anchor(instant(next_));
+        const Reader reader(drive_, r, s.memory);
+        if (level < 0) {
+            while (true) {
+                write(reader(cursor.x(), cursor.input().values()));
+                if (next_ >= count_ || !due(s)) return true;
+                if (stop()) return false;
+                cursor.advance(instant(next_) - cursor.time());
+            }
+        }
+        Stride stride(p, level, s.constant, cursor.input());
+        State x = cursor.x();
+        while (true) {
+            write(reader(x, stride.input().values()));
+            if (next_ >= count_ || !due(s)) return true;
+            if (stop()) return false;
+            stride.advance(x);
+            if (next_ % 64 == 0) stride.anchor(instant(next_));
         }
     }
     void switching(const Switching&) {}
@@ -117,10 +137,11 @@ class Sampler {
         const int k = p.level_below(interval_);
         return p.level(k).length == interval_ ? k : -1;
     }
-    void write(const Regime& r, const State& x, const Memory& m, const std::array<double, n_inputs>& u) {
-        const Reading reading = read(drive_, r, x, m, u);
+    void write(const Reading& reading) {
         for (int c = 0; c < n_channels; ++c) out_[c * count_ + next_] = reading.value[c];
+        ++next_;
     }
+    bool stop() const { return next_ % 4096 == 0 && interrupted != nullptr && interrupted(interrupted_context); }
 
     const Drive& drive_;
     double begin_, interval_;

@@ -138,6 +138,7 @@ class InputState {
         return u;
     }
 
+    const std::array<double, n_inputs>& slope() const { return slope_; }
     // The piecewise-linear parts alone.
     const std::array<double, n_inputs>& linear() const { return linear_; }
 

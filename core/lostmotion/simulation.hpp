@@ -56,7 +56,8 @@ class Simulation {
     // Variables at the present instant, with the inputs at their last values.
     Reading reading() {
         if (!now_.started) advance_nowhere();
-        return read(drive_, system_.build(now_.key), now_.x, now_.memory, now_.input);
+        const Regime regime = system_.build(now_.key);
+        return Reader(drive_, regime, now_.memory)(now_.x, now_.input);
     }
     Regime regime() const { return system_.build(now_.key); }
 

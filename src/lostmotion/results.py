@@ -6,6 +6,7 @@ import json
 import os
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,12 @@ if TYPE_CHECKING:
 CAUSES = ("came to rest", "broke away", "torsion piece", "loss cell", "loss cell", "voltage limit", "", "input changed")
 
 FORMATS = {".nc": "NetCDF", ".csv": "CSV", ".parquet": "Parquet"}
+
+
+@cache
+def installed_version() -> str:
+    """Version of this package."""
+    return version("lostmotion")
 
 
 def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) -> xarray.Dataset:
@@ -43,7 +50,7 @@ def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) 
         "title": scenario.title,
         "scenario": scenario.to_json(),
         "solver": solver,
-        "lostmotion_version": version("lostmotion"),
+        "lostmotion_version": installed_version(),
         "switching_count": int(count),
         "end_state": json.dumps(dict(zip(STATES, state, strict=True)) | {"hysteresis_capacity": capacity}),
         "steps": int(steps),
