@@ -7,6 +7,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <memory>
+#include <mutex>
 
 #include "lostmotion/explain.hpp"
 #include "lostmotion/periodic.hpp"
@@ -20,6 +21,29 @@ using namespace lostmotion;
 namespace {
 
 using Vector = std::vector<double>;
+
+// A drive and what runs of it have left for the next ones. Each run takes a workspace for itself.
+class SharedDrive {
+ public:
+    const Drive drive;
+    explicit SharedDrive(const Drive& d) : drive(d) {}
+
+    std::unique_ptr<Workspace> take() {
+        const std::lock_guard<std::mutex> hold(mutex_);
+        if (idle_.empty()) return std::make_unique<Workspace>(drive);
+        std::unique_ptr<Workspace> w = std::move(idle_.back());
+        idle_.pop_back();
+        return w;
+    }
+    void give_back(std::unique_ptr<Workspace> w) {
+        const std::lock_guard<std::mutex> hold(mutex_);
+        idle_.push_back(std::move(w));
+    }
+
+ private:
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<Workspace>> idle_;
+};
 
 bool poll_signals(void*) {
     nb::gil_scoped_acquire hold;
@@ -104,10 +128,10 @@ nb::dict ledger_dict(const EnergyLedger& e) {
     return d;
 }
 
-nb::tuple run(const Drive& drive, const Signals& signals, const std::array<double, n_states>& x, double capacity,
+nb::tuple run(SharedDrive& shared, const Signals& signals, const std::array<double, n_states>& x, double capacity,
               double duration, double interval, std::size_t samples, bool energy, double tolerance,
               std::size_t max_switchings) {
-    auto data = std::make_unique<double[]>(n_channels * samples);
+    auto data = std::make_unique_for_overwrite<double[]>(n_channels * samples);
     RunOptions options;
     options.duration = duration;
     options.sample_interval = interval;
@@ -119,8 +143,13 @@ nb::tuple run(const Drive& drive, const Signals& signals, const std::array<doubl
     RunReport report;
     {
         nb::gil_scoped_release release;
-        report = tolerance > 0.0 ? run_adaptive(drive, signals, start, options, tolerance, data.get())
-                                 : run_exact(drive, signals, start, options, data.get());
+        if (tolerance > 0.0) {
+            report = run_adaptive(shared.drive, signals, start, options, tolerance, data.get());
+        } else {
+            std::unique_ptr<Workspace> workspace = shared.take();
+            report = run_exact(*workspace, signals, start, options, data.get());
+            shared.give_back(std::move(workspace));
+        }
     }
     check(report.status, report.time, report.contact);
     return nb::make_tuple(as_array(std::move(data), n_channels, samples), switching_table(report),
@@ -242,17 +271,17 @@ NB_MODULE(_core, m) {
                 g.map = map;
             },
             "loss_map"_a);
-    nb::class_<Drive>(m, "Drive")
+    nb::class_<SharedDrive>(m, "Drive")
         .def(
             "__init__",
-            [](Drive* self, const Motor& motor, const Gearbox& gearbox, const Load& load) {
-                new (self) Drive{motor, gearbox, load};
+            [](SharedDrive* self, const Motor& motor, const Gearbox& gearbox, const Load& load) {
+                new (self) SharedDrive(Drive{motor, gearbox, load});
             },
             "motor"_a, "gearbox"_a, "load"_a)
-        .def("smallest_rigid_inertia", &Drive::smallest_rigid_inertia)
+        .def("smallest_rigid_inertia", [](const SharedDrive& d) { return d.drive.smallest_rigid_inertia(); })
         .def(
             "smallest_command",
-            [](const Drive& d, double T_2, double M_Z, int s) { return smallest_command(d, T_2, M_Z, s); },
+            [](const SharedDrive& d, double T_2, double M_Z, int s) { return smallest_command(d.drive, T_2, M_Z, s); },
             "output_torque"_a, "load_torque"_a, "direction"_a);
 
     nb::class_<Signal>(m, "Signal")
@@ -271,7 +300,7 @@ NB_MODULE(_core, m) {
     // Tuples are spelled out for the stub.
     m.def(
         "run",
-        [](const Drive& drive, const Signal& command, const Signal& load_torque, const std::array<double, n_states>& x,
+        [](SharedDrive& drive, const Signal& command, const Signal& load_torque, const std::array<double, n_states>& x,
            double capacity, double duration, double interval, std::size_t samples, bool energy, double tolerance,
            std::size_t max_switchings) {
             return run(drive, Signals{command, load_torque}, x, capacity, duration, interval, samples, energy,
@@ -286,9 +315,9 @@ NB_MODULE(_core, m) {
                 "int, dict[str, float], list[float], float, float, int]"));
     m.def(
         "follow_to_periodic",
-        [](const Drive& drive, const Signal& command, const Signal& load_torque, double period, std::size_t samples,
+        [](SharedDrive& drive, const Signal& command, const Signal& load_torque, double period, std::size_t samples,
            int max_periods, double tolerance) {
-            return follow(drive, Signals{command, load_torque}, period, samples, max_periods, tolerance);
+            return follow(drive.drive, Signals{command, load_torque}, period, samples, max_periods, tolerance);
         },
         "drive"_a, "command"_a, "load_torque"_a, "period"_a, "samples"_a, "max_periods"_a, "tolerance"_a,
         nb::sig("def follow_to_periodic(drive: Drive, command: Signal, load_torque: Signal, period: float, "
@@ -297,16 +326,19 @@ NB_MODULE(_core, m) {
                 "float, float]"));
     m.def(
         "explain_at",
-        [](const Drive& drive, const Signal& command, const Signal& load_torque, const std::array<double, n_states>& x,
+        [](SharedDrive& drive, const Signal& command, const Signal& load_torque, const std::array<double, n_states>& x,
            double capacity,
-           double time) { return explain_at(drive, Signals{command, load_torque}, x, capacity, time); },
+           double time) { return explain_at(drive.drive, Signals{command, load_torque}, x, capacity, time); },
         "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a, "time"_a,
         nb::sig("def explain_at(drive: Drive, command: Signal, load_torque: Signal, state: "
                 "collections.abc.Sequence[float], "
                 "hysteresis_capacity: float, time: float) -> tuple[list[float], list[tuple[float, ...]]]"));
 
     nb::class_<Simulation>(m, "Simulation")
-        .def(nb::init<const Drive&, double>(), "drive"_a, "step"_a)
+        .def(
+            "__init__",
+            [](Simulation* self, const SharedDrive& d, double step) { new (self) Simulation(d.drive, step); },
+            "drive"_a, "step"_a)
         .def("advance", &advance, "interval"_a, "command_begin"_a, "command_end"_a, "load_begin"_a, "load_end"_a)
         .def("time", &Simulation::time)
         .def("read",

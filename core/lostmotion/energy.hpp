@@ -137,13 +137,16 @@ class EnergyMeter {
             difference += std::fabs(sums[f] - lower);
             size += std::fabs(sums[f]);
         }
-        if (!shortest && difference > 1e-10 * std::fmax(size, mean_power_ * h)) return false;
+        if (!shortest && difference > panel_tolerance * std::fmax(size, mean_power_ * h)) return false;
         for (int f = 0; f < n_flows; ++f) ledger.flow[f] += sums[f];
         ledger.turned_over += size;
         elapsed_ += h;
         mean_power_ = ledger.turned_over / elapsed_;
         return true;
     }
+
+    // The rule that is used is two orders finer than this, the difference from the coarser one.
+    static constexpr double panel_tolerance = 2e-9;
 
     const Drive& drive_;
     int level_ = 4;

@@ -12,6 +12,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "contact.hpp"
 #include "regime_cache.hpp"
@@ -124,8 +125,14 @@ class Cursor {
 // with f from all that is constant (growing by a constant if the inputs ramp) and Y_q the whole answers to the sines.
 class Stride {
  public:
-    Stride(Propagator& propagator, int level, const State& constant, const InputState& input)
-        : step_(&propagator.level(level)), rotations_(propagator.rotations(level)), input_(input), forced_(constant) {
+    explicit Stride(const InputState& input) : input_(input), answers_(input.basis().size()) {}
+
+    // On a regime, with steps of one level, from the instant of the inputs on.
+    void place(Propagator& propagator, int level, const State& constant, const InputState& input) {
+        step_ = &propagator.level(level);
+        rotations_ = propagator.rotations(level);
+        input_ = input;
+        forced_ = constant;
         const State* responses = propagator.responses(level);
         const std::vector<InputBasis>& basis = input_.basis();
         State ramp{};
@@ -136,12 +143,12 @@ class Stride {
         forced_ = step_->integral * forced_;
         growth_ = step_->integral * ramp;
         for (std::size_t q = 0; q < basis.size(); ++q) {
-            answers_.push_back(responses[q]);
+            answers_[q] = responses[q];
             if (basis[q].kind == InputBasis::ramp) {
                 add_scaled(forced_, input_.weights()[q], responses[q]);
-                answers_.back() = {};
+                answers_[q] = {};
             } else if (basis[q].kind == InputBasis::cosine) {
-                add_scaled(answers_.back(), 1.0, step_->integral * propagator.input_column(basis[q].input));
+                add_scaled(answers_[q], 1.0, step_->integral * propagator.input_column(basis[q].input));
             }
         }
     }
@@ -158,10 +165,10 @@ class Stride {
     }
 
  private:
-    const Step* step_;
-    const double* rotations_;
+    const Step* step_ = nullptr;
+    const double* rotations_ = nullptr;
     InputState input_;
-    State forced_, growth_;
+    State forced_{}, growth_{};
     std::vector<State> answers_;
 };
 
@@ -215,9 +222,15 @@ class ExactSolver {
 
     // unit: a length of time [s] that is to be a power-of-two multiple of the elementary steps, such as the
     // sampling interval. scale: natural sizes of the states.
-    ExactSolver(const System& system, const Signals& signals, double unit, const State& scale)
-        : system_(system), signals_(signals), basis_(input_basis(signals)), cache_(system), scale_(scale), unit_(unit) {
-        while (unit_ > 1e-2) unit_ *= 0.5;
+    // shared: regimes of the same system that an earlier solver has left, if any.
+    ExactSolver(const System& system, const Signals& signals, double unit, const State& scale, Cache* shared = nullptr)
+        : system_(system),
+          signals_(signals),
+          own_(shared == nullptr ? std::make_unique<Cache>(system) : nullptr),
+          cache_(shared == nullptr ? *own_ : *shared),
+          scale_(scale),
+          unit_(elementary(unit)),
+          basis_(cache_.serve(unit_, input_basis(signals))) {
         const auto bound = InputState(signals_, basis_).fourth_derivative_bound();
         for (int i = 0; i < n_inputs; ++i) input_bound_[i] = bound[i];
     }
@@ -299,6 +312,10 @@ class ExactSolver {
     static constexpr int zeno_count = 100;
     static constexpr double zeno_span = 1e4 * std::numeric_limits<double>::epsilon();
 
+    static double elementary(double unit) {
+        while (unit > 1e-2) unit *= 0.5;
+        return unit;
+    }
     void set_time(double time) {
         time_ = time;
         recent_ = 0;
@@ -532,8 +549,8 @@ class ExactSolver {
 
     const System& system_;
     Signals signals_;
-    std::vector<InputBasis> basis_;
-    Cache cache_;
+    std::unique_ptr<Cache> own_;
+    Cache& cache_;
     State scale_;
     double unit_;
     std::array<double, n_inputs> input_bound_{};
@@ -543,6 +560,7 @@ class ExactSolver {
     RegimeKey key_;
     int last_level_ = first_level;
     long looks_ = 0;
+    const std::vector<InputBasis>& basis_;
     InputState input_{signals_, basis_};
     Cursor cursor_{signals_, basis_}, end_ = cursor_, trial_ = cursor_;
     double room_ = 0.0;  // least value of a guard / error of its cubic, in the last look

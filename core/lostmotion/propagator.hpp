@@ -216,7 +216,8 @@ class Propagator {
         // |exp(A (h + s))| <= |exp(A s)| |exp(A h)|, of which the second is known.
         Matrix size;
         for (int c = 0; c < n_states; ++c)
-            for (int r = 0; r < n_states; ++r) size.column[c][r] = std::fabs(a.change.column[c][r] + (r == c ? 1.0 : 0.0));
+            for (int r = 0; r < n_states; ++r)
+                size.column[c][r] = std::fabs(a.change.column[c][r] + (r == c ? 1.0 : 0.0));
         b.growth = a.growth * size;
         for (int c = 0; c < n_states; ++c)
             for (int r = 0; r < n_states; ++r)

@@ -82,13 +82,25 @@ class RegimeCache {
         return *found;
     }
 
-    // Forgets what depends on the frequencies of the inputs.
-    void reset_propagators() {
-        for (auto& [key, entry] : entries_) entry->propagator.reset();
+    // Makes ready for runs with this unit of length and these inputs; propagators for others are forgotten.
+    const std::vector<InputBasis>& serve(double unit, const std::vector<InputBasis>& basis) {
+        if (entries_.size() > most_kept) {
+            entries_.clear();
+            last_ = nullptr;
+        }
+        if (unit != unit_ || basis != basis_)
+            for (auto& [key, entry] : entries_) entry->propagator.reset();
+        unit_ = unit;
+        basis_ = basis;
+        return basis_;
     }
 
  private:
+    static constexpr std::size_t most_kept = 1000;  // from run to run; each takes some tens of kilobytes
+
     const System& system_;
+    double unit_ = 0.0;
+    std::vector<InputBasis> basis_;
     Entry* last_ = nullptr;  // the one asked for last
     std::unordered_map<std::uint64_t, std::unique_ptr<Entry>> entries_;
 };

@@ -68,12 +68,24 @@ class Recorder {
     RunReport& report_;
 };
 
+// A drive with the regimes that runs have visited so far, for the next run. One run at a time.
+struct Workspace {
+    explicit Workspace(const Drive& d) : drive(d) {}
+    Workspace(const Workspace&) = delete;
+    Workspace& operator=(const Workspace&) = delete;
+
+    const Drive drive;
+    const SwitchedDrive system{drive};
+    RegimeCache<SwitchedDrive> cache{system};
+};
+
 // out: n_channels x samples, channel by channel.
-inline RunReport run_exact(const Drive& drive, const Signals& signals, const Start& start, const RunOptions& options,
+inline RunReport run_exact(Workspace& workspace, const Signals& signals, const Start& start, const RunOptions& options,
                            double* out) {
     RunReport report;
-    const SwitchedDrive system(drive);
-    ExactSolver<SwitchedDrive> solver(system, signals, options.sample_interval, drive.balanced_scale());
+    const Drive& drive = workspace.drive;
+    ExactSolver<SwitchedDrive> solver(workspace.system, signals, options.sample_interval, drive.balanced_scale(),
+                                      &workspace.cache);
     solver.interrupted = options.interrupted;
     solver.interrupted_context = options.interrupted_context;
     Recorder recorder(drive, options, out, report);
@@ -87,6 +99,12 @@ inline RunReport run_exact(const Drive& drive, const Signals& signals, const Sta
     report.memory = solver.memory();
     report.steps = solver.looks();
     return report;
+}
+
+inline RunReport run_exact(const Drive& drive, const Signals& signals, const Start& start, const RunOptions& options,
+                           double* out) {
+    Workspace workspace(drive);
+    return run_exact(workspace, signals, start, options, out);
 }
 
 // Observer of the adaptive solver.

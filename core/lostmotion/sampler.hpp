@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <optional>
 
 #include "exact_solver.hpp"
 
@@ -43,13 +44,15 @@ class Reader {
             const LinearForm& f = *forms[k];
             for (int c = 0; c < n_states; ++c) columns_.column[c][k] = f.c[c];
             for (int i = 0; i < n_inputs; ++i) input_columns_[i][k] = f.c[first_input + i];
-            constant_[k] = f.c[one] + f.c[hysteresis_capacity] * m.hysteresis_capacity + f.c[held_torque] * m.held_torque;
+            constant_[k] =
+                f.c[one] + f.c[hysteresis_capacity] * m.hysteresis_capacity + f.c[held_torque] * m.held_torque;
         }
     }
 
     Reading operator()(const State& x, const std::array<double, n_inputs>& u) const {
         State out = columns_ * x;
-        for (int k = 0; k < lanes; ++k) out[k] += constant_[k] + input_columns_[0][k] * u[0] + input_columns_[1][k] * u[1];
+        for (int k = 0; k < lanes; ++k)
+            out[k] += constant_[k] + input_columns_[0][k] * u[0] + input_columns_[1][k] * u[1];
         const auto [M_D, T_2, T_1_moving, F, unused_0, unused_1] = out;
         const Gearbox& gearbox = drive_.gearbox;
         double T_1 = T_1_moving, loss;
@@ -102,7 +105,9 @@ class Sampler {
         if (!r.in_data) left_data_at = std::fmin(left_data_at, s.begin);
         if (next_ >= count_ || !due(s)) return true;
         Propagator& p = s.entry.propagator;
-        Cursor cursor(p, s.signals, basis, s.constant, s.begin, s.x);
+        if (!cursor_) cursor_.emplace(s.signals, basis);
+        Cursor& cursor = *cursor_;
+        cursor.place(p, s.constant, s.begin, s.x);
         const int level = level_of_interval(p);
         cursor.advance(instant(next_) - s.begin);
         const Reader reader(drive_, r, s.memory);
@@ -114,7 +119,9 @@ class Sampler {
                 cursor.advance(instant(next_) - cursor.time());
             }
         }
-        Stride stride(p, level, s.constant, cursor.input());
+        if (!stride_) stride_.emplace(cursor.input());
+        Stride& stride = *stride_;
+        stride.place(p, level, s.constant, cursor.input());
         State x = cursor.x();
         while (true) {
             write(reader(x, stride.input().values()));
@@ -147,6 +154,8 @@ class Sampler {
     double begin_, interval_;
     std::size_t count_, next_ = 0;
     double* out_;
+    std::optional<Cursor> cursor_;  // kept from segment to segment for their memory
+    std::optional<Stride> stride_;
 };
 
 }  // namespace lostmotion

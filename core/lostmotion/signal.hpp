@@ -66,6 +66,8 @@ struct InputBasis {
     enum Kind { ramp, cosine, sine } kind;
     int input;
     double omega;  // [rad/s]
+
+    friend bool operator==(const InputBasis&, const InputBasis&) = default;
 };
 
 inline std::vector<InputBasis> input_basis(const Signals& signals) {
