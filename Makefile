@@ -15,6 +15,7 @@ test: lint test-core $(VENV)/built
 
 .PHONY: test-core
 test-core: $(VENV)/tools
+	echo '#include <doctest/doctest.h>' | c++ -E -x c++ - >/dev/null 2>&1 || { apt-get update -q && apt-get install -qy doctest-dev; }
 	$(BIN)/cmake -S . -B build/core -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_TESTS=ON >build/core.log
 	$(BIN)/cmake --build build/core
 	$(BIN)/ctest --test-dir build/core --output-on-failure

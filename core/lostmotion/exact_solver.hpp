@@ -513,10 +513,21 @@ class ExactSolver {
                         const Look& look, double h, Cursor& end, const Guard*& fired) {
         double best = std::numeric_limits<double>::infinity();
         Cursor& at = trial_;
+        const auto cubic = [&](int g) {
+            return Cubic(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
+        };
+        std::array<double, max_guards> estimate{};
+        for (int k = 0; k < n_crossing_; ++k) {
+            const Cubic c = cubic(crossing_[k]);
+            estimate[crossing_[k]] = c.root(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
+        }
+        std::sort(crossing_.begin(), crossing_.begin() + n_crossing_,
+                  [&](int a, int b) { return estimate[a] < estimate[b]; });
         for (int k = 0; k < n_crossing_; ++k) {
             const int g = crossing_[k];
-            const Cubic c(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
-            const double z = c.root(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
+            const double z = estimate[g];
+            // Still positive where another has crossed: later.
+            if (k > 0 && cubic(g)(best / h) > h * h * h * h / 384.0 * look.fourth[g]) continue;
             // Newton on the guard itself, kept within its bracket by bisection.
             double low = 0.0, high = h, s = z * h;
             at = cursor;

@@ -105,8 +105,9 @@ class Propagator {
 
     // The highest level not longer than s (level 0 even if it is longer).
     int level_below(double s) {
-        int k = 0;
-        while (can_double(k, s)) level(++k);
+        const double base = steps_[0].length, longest = fastest_input_ > 0.0 ? std::min(s, 1.0 / fastest_input_) : s;
+        int k = longest > base ? std::min(std::ilogb(longest / base), max_levels - 1) : 0;
+        while (k > 0 && level(k).length > longest) --k;  // the quotient may have been rounded up
         return k;
     }
     // Whether twice the level is a step within s. Steps stay below a sixth of the fastest input period: the doubling
