@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from lostmotion import signals
 from lostmotion.scenario import json_schema
 from lostmotion.variables import VARIABLES
 
@@ -15,9 +16,16 @@ def resolve(node: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
     return schema["$defs"][node["$ref"].rsplit("/", 1)[1]] | {"name": node["$ref"]} if "$ref" in node else node
 
 
+def purpose_of(table: dict[str, Any]) -> str:
+    """First paragraph of the docstring of the part that a table is read into."""
+    generic = getattr(signals, table.get("title", "").split("[")[0], None)  # a generic class keeps its docstring
+    text = table.get("description") or (generic.__doc__ if generic else "") or ""
+    return text.split("\n\n")[0].replace("\n", " ").replace("``", "`")
+
+
 def unit_of(node: dict[str, Any]) -> str:
     if "x-unit" in node:
-        return node["x-unit"].replace("*", "·") or "–"
+        return node["x-unit"].replace("*", "·") or "1"
     for key in ("anyOf", "oneOf", "allOf"):
         for option in node.get(key, []):
             if unit := unit_of(option):
@@ -47,7 +55,12 @@ def tables_in(node: dict[str, Any], schema: dict[str, Any]) -> list[dict[str, An
 
 
 def write_table(title: str, table: dict[str, Any], schema: dict[str, Any], lines: list[str], done: set[str]) -> None:
-    lines += [f"## `[{title}]`", "", (table.get("description") or "").split("\n\n")[0].replace("\n", " "), ""]
+    lines += [
+        f"## `[{title}]`" if title != "top level" else "## The whole file",
+        "",
+        purpose_of(table),
+        "",
+    ]
     lines += ["| key | unit | range | default | meaning |", "|---|---|---|---|---|"]
     later = []
     for key, node in table["properties"].items():
@@ -56,8 +69,7 @@ def write_table(title: str, table: dict[str, Any], schema: dict[str, Any], lines
         default = {"None": "", "()": ""}.get(default, default if len(default) < 20 else "")
         if "const" in node:
             default = f'"{node["const"]}"'
-        meaning = "" if "x-unit" in str(node.get("description", "")) else node.get("description", "")
-        meaning = "" if meaning.startswith("Number ") else meaning.replace("\n", " ")
+        meaning = (node.get("description") or (purpose_of(inner[0]) if inner else "")).replace("\n", " ")
         kind = "table" if inner else unit_of(node)
         lines.append(f"| `{key}` | {kind} | {limits_of(node)} | {default} | {meaning} |")
         later += [(f"{title}.{key}" if title != "top level" else key, t) for t in inner]

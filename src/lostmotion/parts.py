@@ -13,6 +13,7 @@ from . import _core
 from .quantities import (
     Angle,
     Inertia,
+    Limit,
     NotNegative,
     Number,
     Part,
@@ -45,7 +46,7 @@ class Motor(Part):
     """u_ZR"""
     electrical_time_constant: Annotated[Time, Positive] | None = None
     """tau_a"""
-    armature_voltage_constant: Annotated[Number, Field(gt=1)] | None = None
+    armature_voltage_constant: Annotated[Number, Limit(gt=1.0)] | None = None
     """k_N, stall torque / rated torque at rated voltage"""
     voltage_limit: Annotated[Voltage, Positive] | None = None
     """largest voltage of the amplifier"""
@@ -135,7 +136,7 @@ class Rigid(Part):
 class Hysteresis(Part):
     """Turning-point hysteresis (16)."""
 
-    efficiency: Annotated[Number, Field(gt=0, le=1)]
+    efficiency: Annotated[Number, Limit(gt=0.0, le=1.0)]
     """eta_H, average efficiency of the hysteresis process; 1: none"""
 
 
@@ -143,7 +144,7 @@ class ConstantEfficiency(Part):
     """T_1 = T_2/(i eta) in both directions of power flow (5b), so it creates energy while the load drives."""
 
     kind: Literal["constant_efficiency"]
-    efficiency: Annotated[Number, Field(gt=0, le=1)]
+    efficiency: Annotated[Number, Limit(gt=0.0, le=1.0)]
 
 
 class LossMap(Part):

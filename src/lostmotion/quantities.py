@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
+from pydantic_core import CoreSchema
 
 from .units import Unit
 
@@ -19,8 +21,24 @@ Voltage = Annotated[float, Unit("V")]
 Stiffness = Annotated[float, Unit("N*m/rad")]
 ViscousFriction = Annotated[float, Unit("N*m*s/rad")]
 
-Positive = Field(gt=0)
-NotNegative = Field(ge=0)
+
+@dataclass(frozen=True)
+class Limit:
+    """Annotation of a quantity: the range of its value."""
+
+    gt: float | None = None
+    ge: float | None = None
+    le: float | None = None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        # Into the number itself, behind the reading of units, so that the JSON Schema tells it too.
+        schema: Any = handler(source)
+        schema["schema"].update({name: value for name, value in asdict(self).items() if value is not None})
+        return schema  # type: ignore[no-any-return]
+
+
+Positive = Limit(gt=0.0)
+NotNegative = Limit(ge=0.0)
 
 
 class Part(BaseModel):

@@ -102,10 +102,13 @@ class Signal(Part, Generic[V]):
     """The sum of all that is given; a bare number is a constant."""
 
     mean: V = 0.0  # type: ignore[assignment]
+    """constant part"""
     amplitude: V | None = None
+    """of one sine, with frequency and phase"""
     frequency: Annotated[Frequency, Positive] | None = None
     phase: Angle = 0.0
     sines: tuple[Sine[V], ...] = ()
+    """more sines"""
     steps: tuple[Step[V], ...] = ()
     ramps: tuple[Ramp[V], ...] = ()
     chirp: Chirp[V] | None = None

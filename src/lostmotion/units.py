@@ -71,5 +71,4 @@ class Unit:
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         inner = handler(schema)
-        described = f"Number in {self.unit}, or a string with a unit." if self.unit else "Number without unit."
-        return {"anyOf": [inner, {"type": "string"}], "description": described, "x-unit": self.unit}
+        return {"anyOf": [inner, {"type": "string"}], "x-unit": self.unit}
