@@ -19,7 +19,7 @@ gearbox = lm.Gearbox(
     rated_output_torque=rated_torque,
     stiffness=lm.TorsionCurve(slopes=(23 / ARCMIN,), backlash=3 * ARCMIN),
     losses=lm.LossMap(
-        kind="map", mirrored=True, speeds=(0, 1), loads=(0, 1), values=((0.7 * running, running), (0.7 * running, full))
+        mirrored=True, speeds=(0, 1), loads=(0, 1), values=((0.7 * running, running), (0.7 * running, full))
     ),
 )
 motor = lm.Motor(

@@ -90,8 +90,8 @@ def value(signal: lm.CommandSignal, times: np.ndarray) -> np.ndarray:
             ratio=1,
             rated_input_speed=1,
             rated_output_torque=1,
-            stiffness=lm.Rigid(kind="rigid"),
-            losses=lm.ConstantEfficiency(kind="constant_efficiency", efficiency=1),
+            stiffness=lm.Rigid(),
+            losses=lm.ConstantEfficiency(efficiency=1),
         ),
         load=lm.Load(inertia=1.0),
     )
@@ -112,6 +112,23 @@ def test_signals_have_their_closed_forms() -> None:
     assert value(ramp, t) == pytest.approx(np.clip((t - 0.4) / 0.8, 0, 1) * 2.0, abs=1e-13)
     samples = lm.CommandSignal(samples={"times": [0.2, 0.7, 1.5], "values": [1.0, -1.0, 4.0]})
     assert value(samples, t) == pytest.approx(np.interp(t, [0.2, 0.7, 1.5], [1.0, -1.0, 4.0]), abs=1e-12)
+
+
+def test_a_sampled_series_is_read_from_a_file(small: Path, tmp_path: Path) -> None:
+    (tmp_path / "points.csv").write_text("time,value\n0,0\n0.5,0.02\n1.5,-0.01\n")
+    path = tmp_path / "sampled.toml"
+    path.write_text(f'base = "{small}"\ncommand.samples.file = "points.csv"\n')
+    command = lm.load(path).command
+    assert command.samples is not None
+    assert command.samples.times == (0.0, 0.5, 1.5)
+    assert command.samples.values == (0.0, 0.02, -0.01)
+    for content in ("0,0\n1,x\n", "0\n1\n", "0,0\n"):
+        (tmp_path / "points.csv").write_text(content)
+        with pytest.raises(lm.InputError, match=r"command\.samples"):
+            lm.load(path)
+    (tmp_path / "points.csv").unlink()
+    with pytest.raises(lm.InputError, match=r"points\.csv.*cannot be read"):
+        lm.load(path)
 
 
 def test_a_chirp_departs_from_its_sine_by_no_more_than_stated() -> None:

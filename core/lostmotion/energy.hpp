@@ -63,14 +63,16 @@ class EnergyMeter {
             else
                 end.advance(length);
             powers(r, p, end, s.memory, there);
-            if (!add_panel(here, there, length, level == 0)) {
+            const double error = add_panel(here, there, length, level == 0);
+            if (error > 1.0) {
                 --level;
                 continue;
             }
             t = whole ? t + length : s.end;
             std::swap(cursor, end);
             std::swap(here, there);
-            if (p.can_double(level, s.end - t)) ++level;
+            // Twice the length has 2^9 times the error.
+            if (error < 0x1p-9 && p.can_double(level, s.end - t)) ++level;
         }
         level_ = level;
         return true;
@@ -126,7 +128,9 @@ class EnergyMeter {
         out[to_load] = product({u[0][1], u[1][1], u[2][1], u[3][1], u[4][1]}, w);
     }
 
-    bool add_panel(const Powers& a, const Powers& b, double h, bool shortest) {
+    // Returns the error of the panel in units of what is allowed; beyond 1 (unless it is the shortest) nothing is
+    // added.
+    double add_panel(const Powers& a, const Powers& b, double h, bool shortest) {
         std::array<double, n_flows> sums;
         double difference = 0.0, size = 0.0;
         for (int f = 0; f < n_flows; ++f) {
@@ -137,12 +141,14 @@ class EnergyMeter {
             difference += std::fabs(sums[f] - lower);
             size += std::fabs(sums[f]);
         }
-        if (!shortest && difference > panel_tolerance * std::fmax(size, mean_power_ * h)) return false;
+        const double allowed = panel_tolerance * std::fmax(size, mean_power_ * h);
+        const double error = allowed > 0.0 ? difference / allowed : 0.0;
+        if (!shortest && error > 1.0) return error;
         for (int f = 0; f < n_flows; ++f) ledger.flow[f] += sums[f];
         ledger.turned_over += size;
         elapsed_ += h;
         mean_power_ = ledger.turned_over / elapsed_;
-        return true;
+        return std::fmin(error, 1.0);
     }
 
     // The rule that is used is two orders finer than this, the difference from the coarser one.

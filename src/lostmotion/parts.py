@@ -120,7 +120,7 @@ class TorsionCurve(Part):
 class LinearStiffness(Part):
     """One stiffness for all twists (5a)."""
 
-    kind: Literal["linear"]
+    kind: Literal["linear"] = "linear"
     stiffness: Annotated[Stiffness, Positive]
 
     def core(self) -> _core.TorsionCurve:
@@ -130,7 +130,7 @@ class LinearStiffness(Part):
 class Rigid(Part):
     """No twist at all (7)."""
 
-    kind: Literal["rigid"]
+    kind: Literal["rigid"] = "rigid"
 
 
 class Hysteresis(Part):
@@ -143,14 +143,14 @@ class Hysteresis(Part):
 class ConstantEfficiency(Part):
     """T_1 = T_2/(i eta) in both directions of power flow (5b), so it creates energy while the load drives."""
 
-    kind: Literal["constant_efficiency"]
+    kind: Literal["constant_efficiency"] = "constant_efficiency"
     efficiency: Annotated[Number, Limit(gt=0.0, le=1.0)]
 
 
 class LossMap(Part):
     """Loss coefficient m_2B over relative speed and signed relative load (12), linear on triangles."""
 
-    kind: Literal["map"]
+    kind: Literal["map"] = "map"
     speeds: tuple[Annotated[Number, NotNegative], ...] = Field(min_length=2)
     """v = |w_M|/n_1R, rising from 0"""
     loads: tuple[Number, ...] = Field(min_length=2)

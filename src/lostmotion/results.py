@@ -38,8 +38,7 @@ def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) 
 
     table, switchings, count, energy, state, capacity, left_data_at, steps = result
     data = dict(zip((v.name for v in CHANNELS), table, strict=True))
-    data["efficiency"] = gear_efficiency(data, scenario)
-    data["motor_power"] = data["motor_torque"] * data["motor_speed"]
+    add_derived(data, scenario.gearbox.ratio)
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     variables: dict[str, Any] = {
         v.name: (("time",), data[v.name], {"units": v.unit, "long_name": v.meaning, "symbol": v.symbol})
@@ -67,13 +66,19 @@ def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) 
     return xr.Dataset(variables, coords={"time": ("time", time, {"units": "s", "long_name": "time"})}, attrs=attributes)
 
 
-def gear_efficiency(data: dict[str, Any], scenario: Scenario) -> Any:
+def add_derived(data: dict[str, Any], ratio: float) -> None:
+    """Adds the variables that follow from those of the solver."""
+    data["efficiency"] = gear_efficiency(data, ratio)
+    data["motor_power"] = data["motor_torque"] * data["motor_speed"]
+
+
+def gear_efficiency(data: dict[str, Any], ratio: float) -> Any:
     """Useful torque / torque fed in [-], by the direction of the load; NaN where the input shaft stands still.
 
     Driving (T_2 has the sign of w_M) it is T_2/(i T_1), overrunning i T_1/T_2; 0 where both sides feed the losses.
     """
     driving = data["output_torque"] * np.sign(data["motor_speed"])
-    fed_in = scenario.gearbox.ratio * data["input_torque"] * np.sign(data["motor_speed"])
+    fed_in = ratio * data["input_torque"] * np.sign(data["motor_speed"])
     with np.errstate(divide="ignore", invalid="ignore"):
         eta = np.where(driving >= 0.0, driving / fed_in, np.where(fed_in < 0.0, fed_in / driving, 0.0))
     return np.where(data["motor_speed"] == 0.0, np.nan, eta)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import difflib
 import json
 import tomllib
@@ -163,12 +164,47 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
+    _read_series(data, path, ())
     if "base" not in data:
         return data
     base = data.pop("base")
     if not isinstance(base, str):
         raise InputError(f"{path}: key base: {base!r} must be the name of a scenario file")
     return _merge(_read(path.parent / base, (*including, path.resolve())), data)
+
+
+def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...]) -> None:
+    """Puts the points of `samples.file`, a CSV file beside the scenario, in its place."""
+    for key, value in data.items():
+        if not isinstance(value, dict):
+            continue
+        where = (*keys, key)
+        if key != "samples" or "file" not in value:
+            _read_series(value, path, where)
+            continue
+        name = value.pop("file")
+        problem = f"{path}: key {'.'.join(where)}.file: {name!r}"
+        if value:
+            raise InputError(f"{problem} leaves no room for {', '.join(value)}; give the file alone")
+        if not isinstance(name, str):
+            raise InputError(f"{problem} must be the name of a CSV file with columns time [s] and value")
+        try:
+            with (path.parent / name).open(newline="", encoding="utf-8") as file:
+                rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
+            points = [(float(time), float(number)) for time, number in rows[_has_heading(rows) :]]
+        except OSError as error:
+            raise InputError(f"{problem} cannot be read: {error.strerror}") from None
+        except ValueError:
+            raise InputError(f"{problem} is not a CSV file with two columns of numbers, time [s] and value") from None
+        value["times"], value["values"] = [t for t, _ in points], [v for _, v in points]
+
+
+def _has_heading(rows: list[list[str]]) -> bool:
+    try:
+        float(rows[0][0])
+    except (ValueError, IndexError):
+        return bool(rows)
+    return False
 
 
 def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

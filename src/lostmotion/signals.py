@@ -74,7 +74,10 @@ class Chirp(Part, Generic[V]):
 
 
 class Samples(Part, Generic[V]):
-    """Straight lines through the points given; before the first and after the last the value stays."""
+    """Straight lines through the points given; before the first and after the last the value stays.
+
+    In a scenario file, `file = "points.csv"` may stand for both keys: two columns, time [s] and value.
+    """
 
     times: tuple[Time, ...]
     values: tuple[V, ...]

@@ -7,6 +7,7 @@ from typing import Any
 
 from . import _core
 from .parts import Drive
+from .results import add_derived
 from .run import start_state
 from .scenario import Initial
 from .variables import CHANNELS
@@ -87,12 +88,23 @@ class Simulation:
         self._core.advance(interval, c0, c1, m0, m1)
 
     def __getitem__(self, name: str) -> float:
-        """Value of a result variable now, with the inputs at their last values."""
-        return self.read()[name]
+        """Value of a result variable now, with the inputs at their last values.
+
+        Raises
+        ------
+        KeyError
+            There is no such variable.
+        """
+        values = self.read()
+        if name not in values:
+            raise KeyError(f"{name!r} is no variable; the variables are {', '.join(values)}")
+        return values[name]
 
     def read(self) -> dict[str, float]:
-        """All variables that the solver knows, by name."""
-        return dict(zip((v.name for v in CHANNELS), self._core.read(), strict=True))
+        """All result variables, by name."""
+        values = dict(zip((v.name for v in CHANNELS), self._core.read(), strict=True))
+        add_derived(values, self._drive.gearbox.ratio)
+        return {name: float(value) for name, value in values.items()}
 
     @property
     def state(self) -> SimulationState:
