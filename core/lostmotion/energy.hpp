@@ -5,6 +5,8 @@
 // (exact for polynomials of degree nine); its difference from the rule with one derivative less sets the panel length.
 #pragma once
 
+#include <optional>
+
 #include "exact_solver.hpp"
 
 namespace lostmotion {
@@ -47,9 +49,12 @@ class EnergyMeter {
         const Regime& r = s.entry.regime;
         if (r.at_rest[input_contact] && r.at_rest[load_contact]) return true;
         Propagator& p = s.entry.propagator;
-        Cursor cursor(p, s.signals, basis, s.constant, s.begin, s.x), end = cursor;
+        if (!cursor_) end_ = cursor_.emplace(s.signals, basis);
+        Cursor &cursor = *cursor_, &end = *end_;
+        cursor.place(p, s.constant, s.begin, s.x);
+        const Factors factors(drive_, r, s.memory);
         Powers here, there;
-        powers(r, p, cursor, s.memory, here);
+        factors.powers(p, cursor, here);
         int level = std::min(level_, p.level_below(s.end - s.begin));
         double t = s.begin;
         for (long count = 1; t < s.end; ++count) {
@@ -62,15 +67,15 @@ class EnergyMeter {
                 end.step(level);
             else
                 end.advance(length);
-            powers(r, p, end, s.memory, there);
+            factors.powers(p, end, there);
             const double error = add_panel(here, there, length, level == 0);
             if (error > 1.0) {
                 --level;
                 continue;
             }
             t = whole ? t + length : s.end;
-            std::swap(cursor, end);
-            std::swap(here, there);
+            cursor = end;
+            here = there;
             // Twice the length has 2^9 times the error.
             if (error < 0x1p-9 && p.can_double(level, s.end - t)) ++level;
         }
@@ -81,51 +86,77 @@ class EnergyMeter {
 
  private:
     static constexpr int orders = 5;  // value and four derivatives
-    using Jet = std::array<double, orders>;
-    using Powers = std::array<Jet, n_flows>;
+    using Powers = std::array<std::array<double, n_flows>, orders>;
+
+    // Every power is a product of two linear forms; all are evaluated at once, as columns.
+    struct Factors {
+        std::array<std::array<double, n_flows>, n_terms> left{}, right{};
+        std::array<double, n_flows> left_constant{}, right_constant{};
+
+        Factors(const Drive& drive, const Regime& r, const Memory& m) {
+            const LinearForm w_M = LinearForm::unit(motor_speed), w = LinearForm::unit(load_speed);
+            const auto friction = [&](Contact c, double torque) {
+                const int mode = r.key.modes[c];
+                return LinearForm::unit(one, mode == absent ? 0.0 : mode * torque);
+            };
+            set(from_source, r.source_torque, w_M, m);
+            set(in_input_damper, drive.gearbox.viscous_friction * w_M, w_M, m);
+            set(in_motor_friction, friction(input_contact, drive.motor.friction_torque), w_M, m);
+            set(in_gear, r.input_torque - r.output_torque / drive.gearbox.ratio, w_M, m);
+            if (!r.at_rest[twist_contact])
+                set(in_hysteresis, r.hysteresis_torque, drive.contact_speed(twist_contact), m);
+            set(in_load_damper, drive.load.viscous_friction * w, w, m);
+            set(in_load_friction, friction(load_contact, drive.load.friction_torque), w, m);
+            set(to_load, LinearForm::unit(load_torque), w, m);
+        }
+
+        void powers(const Propagator& p, Cursor& c, Powers& out) const {
+            const auto u = c.input().jet<orders>();
+            Powers a, b;
+            State x = c.x();
+            for (int k = 0; k < orders; ++k) {
+                if (k == 1) x = c.rate();
+                if (k > 1) x = p.higher_rate(x, u[k - 1]);
+                evaluate(left, k == 0 ? left_constant : none, x, u[k], a[k]);
+                evaluate(right, k == 0 ? right_constant : none, x, u[k], b[k]);
+            }
+            for (int f = 0; f < n_flows; ++f) {
+                out[0][f] = a[0][f] * b[0][f];
+                out[1][f] = a[1][f] * b[0][f] + a[0][f] * b[1][f];
+                out[2][f] = a[2][f] * b[0][f] + 2.0 * a[1][f] * b[1][f] + a[0][f] * b[2][f];
+                out[3][f] = a[3][f] * b[0][f] + 3.0 * (a[2][f] * b[1][f] + a[1][f] * b[2][f]) + a[0][f] * b[3][f];
+                out[4][f] = a[4][f] * b[0][f] + 4.0 * (a[3][f] * b[1][f] + a[1][f] * b[3][f]) +
+                            6.0 * a[2][f] * b[2][f] + a[0][f] * b[4][f];
+            }
+        }
+
+     private:
+        static constexpr std::array<double, n_flows> none{};
+
+        void set(EnergyFlow flow, const LinearForm& a, const LinearForm& b, const Memory& m) {
+            for (int k = 0; k < n_terms; ++k) {
+                left[k][flow] = a.c[k];
+                right[k][flow] = b.c[k];
+            }
+            const auto constant = [&m](const LinearForm& f) {
+                return f.c[one] + f.c[hysteresis_capacity] * m.hysteresis_capacity + f.c[held_torque] * m.held_torque;
+            };
+            left_constant[flow] = constant(a);
+            right_constant[flow] = constant(b);
+        }
+        static void evaluate(const std::array<std::array<double, n_flows>, n_terms>& c,
+                             const std::array<double, n_flows>& constant, const State& x,
+                             const std::array<double, n_inputs>& u, std::array<double, n_flows>& out) {
+            for (int f = 0; f < n_flows; ++f)
+                out[f] = constant[f] + c[0][f] * x[0] + c[1][f] * x[1] + c[2][f] * x[2] + c[3][f] * x[3] +
+                         c[4][f] * x[4] + c[command][f] * u[0] + c[load_torque][f] * u[1];
+        }
+    };
 
     void store(const State& x, double& kinetic, double& elastic) const {
         kinetic = 0.5 * drive_.input_inertia() * x[motor_speed] * x[motor_speed] +
                   0.5 * drive_.load.inertia * x[load_speed] * x[load_speed];
         elastic = drive_.rigid() ? 0.0 : drive_.gearbox.curve.energy(x[twist]);
-    }
-
-    static Jet product(const Jet& a, const Jet& b) {
-        return {a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2],
-                a[3] * b[0] + 3.0 * (a[2] * b[1] + a[1] * b[2]) + a[0] * b[3],
-                a[4] * b[0] + 4.0 * (a[3] * b[1] + a[1] * b[3]) + 6.0 * a[2] * b[2] + a[0] * b[4]};
-    }
-    static Jet scaled(double factor, Jet j) {
-        for (double& v : j) v *= factor;
-        return j;
-    }
-
-    void powers(const Regime& r, const Propagator& p, Cursor& c, const Memory& m, Powers& out) const {
-        const InputJet u = c.input().jet();
-        std::array<State, orders> x;
-        x[0] = c.x();
-        x[1] = c.rate();
-        for (int k = 2; k < orders; ++k) x[k] = p.higher_rate(x[k - 1], u[k - 1]);
-        const auto jet = [&](const LinearForm& f) {
-            Jet j;
-            j[0] = evaluate(f, x[0], m, u[0]);
-            for (int k = 1; k < orders; ++k) j[k] = evaluate_rate(f, x[k], u[k]);
-            return j;
-        };
-        const auto state = [&](int k) { return Jet{x[0][k], x[1][k], x[2][k], x[3][k], x[4][k]}; };
-        const Jet w_M = state(motor_speed), w = state(load_speed);
-        out[from_source] = product(jet(r.source_torque), w_M);
-        out[in_input_damper] = scaled(drive_.gearbox.viscous_friction, product(w_M, w_M));
-        const int mode = r.key.modes[input_contact];
-        out[in_motor_friction] = scaled(mode == absent ? 0.0 : mode * drive_.motor.friction_torque, w_M);
-        out[in_gear] = product(jet(r.input_torque - r.output_torque / drive_.gearbox.ratio), w_M);
-        out[in_hysteresis] = r.at_rest[twist_contact]
-                                 ? Jet{}
-                                 : product(jet(r.hysteresis_torque), jet(drive_.contact_speed(twist_contact)));
-        out[in_load_damper] = scaled(drive_.load.viscous_friction, product(w, w));
-        const int bearing = r.key.modes[load_contact];
-        out[in_load_friction] = scaled(bearing == absent ? 0.0 : bearing * drive_.load.friction_torque, w);
-        out[to_load] = product({u[0][1], u[1][1], u[2][1], u[3][1], u[4][1]}, w);
     }
 
     // Returns the error of the panel in units of what is allowed; beyond 1 (unless it is the shortest) nothing is
@@ -134,8 +165,8 @@ class EnergyMeter {
         std::array<double, n_flows> sums;
         double difference = 0.0, size = 0.0;
         for (int f = 0; f < n_flows; ++f) {
-            const double s0 = a[f][0] + b[f][0], s1 = h * (a[f][1] - b[f][1]), s2 = h * h * (a[f][2] + b[f][2]),
-                         s3 = h * h * h * (a[f][3] - b[f][3]), s4 = h * h * h * h * (a[f][4] + b[f][4]);
+            const double s0 = a[0][f] + b[0][f], s1 = h * (a[1][f] - b[1][f]), s2 = h * h * (a[2][f] + b[2][f]),
+                         s3 = h * h * h * (a[3][f] - b[3][f]), s4 = h * h * h * h * (a[4][f] + b[4][f]);
             sums[f] = h * (s0 / 2.0 + s1 / 9.0 + s2 / 72.0 + s3 / 1008.0 + s4 / 30240.0);
             const double lower = h * (s0 / 2.0 + 3.0 * s1 / 28.0 + s2 / 84.0 + s3 / 1680.0);
             difference += std::fabs(sums[f] - lower);
@@ -155,6 +186,7 @@ class EnergyMeter {
     static constexpr double panel_tolerance = 2e-9;
 
     const Drive& drive_;
+    std::optional<Cursor> cursor_, end_;  // kept from segment to segment for their memory
     int level_ = 4;
     double elapsed_ = 0.0, mean_power_ = 0.0;
 };
