@@ -12,7 +12,7 @@ from lostmotion.paper import constants, paper_scenario
 from lostmotion.parts import Drive
 from lostmotion.reproduce import WORK, reproduce
 
-# model.md, section 3: name, recomputed, from the printed t_m0 and T_RC (where it differs).
+# From the data and formulas of the paper, worked out by hand: name, recomputed, from the printed t_m0 and T_RC (where it differs).
 EXPECTED = {
     "f_T0": (65.495, 65.495),
     "T_MR": (62.357, 62.357),

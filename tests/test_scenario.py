@@ -35,7 +35,7 @@ def test_the_paper_s_constants_stand_in_the_scenario(large: Path) -> None:
     J_MR, k_20 = 147e-7, 0.65 * 26.5e3
     assert s.gearbox.viscous_friction == pytest.approx(0.04 * math.sqrt(k_20 / (90**2 * 0.9 * J_MR)) * J_MR, rel=1e-14)
     assert s.load.viscous_friction == pytest.approx(0.04 * math.sqrt(k_20 / 2.0) * 2.0, rel=1e-14)
-    # The stand-in table follows its formula, and has the efficiency that model.md states at rated load and speed.
+    # The stand-in table follows its formula, and has the efficiency that is stated for it (0.893) at rated load and speed.
     losses = s.gearbox.losses
     for mu, row in zip(losses.loads, losses.values, strict=True):
         for v, m in zip(losses.speeds, row, strict=True):

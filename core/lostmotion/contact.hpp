@@ -1,4 +1,4 @@
-// Set-valued dry contacts: which combination of stuck and slipping is consistent (model.md, section 4).
+// Set-valued dry contacts: which combination of stuck and slipping is consistent (docs/theory.md, contacts).
 //
 // A regime holds just after t if each of its guards g is positive there. Since the flow of a regime is known, that
 // is decided at t itself: by the sign of the first of g, g', g'', ... that is not zero. So break-away, reversal,

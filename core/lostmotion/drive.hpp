@@ -1,4 +1,4 @@
-// The drive: composes its parts into the equations and guards of a regime (model.md, sections 2 and 4).
+// The drive: composes its parts into the equations and guards of a regime (docs/theory.md).
 #pragma once
 
 #include <algorithm>

@@ -12,7 +12,7 @@ namespace lostmotion {
 
 inline constexpr double pi = std::numbers::pi;
 
-// The published drive (model.md, section 1), with omega_DR = 345.6 rad/s and n_1R = 3630 rpm exactly.
+// The published drive, with omega_DR = 345.6 rad/s and n_1R = 3630 rpm exactly.
 inline Drive paper_drive(const LossMap& map) {
     Drive d;
     d.motor.rotor_inertia = 80e-7;

@@ -169,14 +169,14 @@ TEST_SUITE("closed_forms") {
         }
     }
 
-    // Known as LossyGearDemo1 of the Modelica Standard Library; the instants are its closed form (model.md, section 7).
+    // Known as LossyGearDemo1 of the Modelica Standard Library; the instants are its closed form.
     TEST_CASE("lossy rigid gear between two inertias switches at the closed-form instants") {
         Drive d = plain_drive(2.0, 1.0, 1.5);
         d.gearbox.losses = Gearbox::loss_map;
         // Efficiency 0.5 both ways: m = mu (1/0.5 - 1) driving, |mu| (1 - 0.5) overrunning.
         d.gearbox.map = LossMap({0.0, 1.0}, {-1.0, 0.0, 1.0}, {0.5, 0.5, 0.0, 0.0, 1.0, 1.0});
         d.gearbox.rated_output_torque = 10.0;
-        // model.md's torques act on the two flanges: tau_2 accelerates the load, M_Z brakes it.
+        // In the published case both torques act on their flanges: tau_2 accelerates the load, M_Z brakes it.
         const Samples s = run(d, {sine(10.0, 1.0), lines({{0.0, 10.0, -2.5}})}, 0.5, 0.01);
         REQUIRE(s.report.status == Status::done);
         std::vector<double> instants;

@@ -1,4 +1,4 @@
-// The published drive, against the two end states that two unlike methods agree on (model.md, section 6).
+// The published drive, against the two end states that two unlike methods agree on.
 #include <doctest/doctest.h>
 
 #include "support.hpp"

@@ -50,7 +50,7 @@ class Constant:
 
 
 def constants() -> list[Constant]:
-    """The constants that the paper prints, recomputed (model.md, section 3)."""
+    """The constants that the paper prints, recomputed."""
     rigid = paper_scenario("1-DOF-L", "large").drive()
     g = paper_scenario("2-DOF-L", "large").drive().gearbox
     stiffness = g.stiffness.stiffness  # type: ignore[union-attr]

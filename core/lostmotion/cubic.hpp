@@ -1,0 +1,52 @@
+// Cubic Hermite interpolant of a guard over one look, enclosed by its Bernstein coefficients.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+namespace lostmotion {
+
+// Cubic on [0, 1] in Bernstein form, from values and slopes at both ends of an interval of length h.
+struct Cubic {
+    double c0, c1, c2, c3;
+
+    Cubic(double value, double slope, double end_value, double end_slope, double h)
+        : c0(value), c1(value + h / 3.0 * slope), c2(end_value - h / 3.0 * end_slope), c3(end_value) {}
+
+    double least() const { return std::min(std::min(c0, c1), std::min(c2, c3)); }  // a lower bound
+    double operator()(double s) const {
+        const double r = 1.0 - s;
+        return r * r * (r * c0 + 3.0 * s * c1) + s * s * (3.0 * r * c2 + s * c3);
+    }
+    double slope(double s) const {
+        const double r = 1.0 - s;
+        return 3.0 * (r * r * (c1 - c0) + 2.0 * r * s * (c2 - c1) + s * s * (c3 - c2));
+    }
+    // Where on [0, 1] it is least.
+    double lowest_at() const {
+        const double d0 = c1 - c0, d1 = c2 - c1, d2 = c3 - c2;
+        double best = (*this)(1.0) < (*this)(0.0) ? 1.0 : 0.0;
+        // Zeros of the slope, (d0 - 2 d1 + d2) s^2 + 2 (d1 - d0) s + d0, in the form that does not cancel.
+        const double a = d0 - 2.0 * d1 + d2, b = d1 - d0, discriminant = b * b - a * d0;
+        if (discriminant < 0.0) return best;
+        const double q = -(b + std::copysign(std::sqrt(discriminant), b));
+        for (const double s : {q / a, d0 / q})
+            if (s > 0.0 && s < 1.0 && (*this)(s) < (*this)(best)) best = s;
+        return best;
+    }
+    // Zero between 0, where it is positive, and `b`, where it is negative: Newton, kept in its bracket by bisection.
+    double root(double b) const {
+        double a = 0.0, z = 0.5 * b;
+        for (int k = 0; k < 60 && b - a > 1e-9; ++k) {
+            const double value = (*this)(z);
+            (value > 0.0 ? a : b) = z;
+            const double next = z - value / slope(z), moved = std::fabs(next - z);
+            const bool inside = next > a && next < b;
+            z = inside ? next : 0.5 * (a + b);
+            if (inside && moved < 1e-9) break;
+        }
+        return z;
+    }
+};
+
+}  // namespace lostmotion
