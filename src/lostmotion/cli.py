@@ -69,9 +69,9 @@ def reproduce(
         "out"
     ),
 ) -> None:
-    """Reproduce the paper: figures 5 and 9 to 18, their data, its constants, and a report.
+    """Reproduce the paper: figures, data and a report.
 
-    Writes PNG, SVG and CSV for each figure, constants.csv, and report.html, which needs nothing beside it.
+    Writes PNG, SVG and CSV for each of the figures 5 and 9 to 18, the constants as constants.csv, and report.html, which needs nothing beside it.
     """
     if output.exists() and not output.is_dir():
         from .errors import InputError
@@ -113,7 +113,7 @@ def run(
     solver: Annotated[str, typer.Option("--solver", help="exact, or dormand-prince as a second opinion.")] = "exact",
     tolerance: Annotated[float, typer.Option("--tolerance", help="Relative tolerance of dormand-prince.")] = 1e-8,
 ) -> None:
-    """Run a scenario; print what came out, write the result, draw it, explain an instant.
+    """Run a scenario: print, save, draw, explain.
 
     \b
     lostmotion run drive.toml
@@ -163,7 +163,9 @@ def run(
 
 @app.command()
 def schema() -> None:
-    """Print the JSON Schema of scenario files, for editors.
+    """Print the JSON Schema of scenario files.
+
+    Editors complete and check scenario files with it.
 
     \b
     lostmotion schema > scenario.schema.json
