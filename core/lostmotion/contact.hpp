@@ -114,6 +114,7 @@ class SwitchedDrive {
     // sets the hysteresis capacity anew (16).
     template <class Cache>
     Found next(Cache& cache, Instant& now, const Guard* fired, RegimeKey& key) const {
+        if (fired != nullptr && goes_on(cache, now, *fired, key)) return Found::yes;
         const Regime& old = cache.regime(key);
         const Ended ended{fired != nullptr && fired->kind != Guard::speed, key, fired};
         const double T_2 = evaluate(old.output_torque, now.x, now.memory, now.input[0]);
@@ -226,26 +227,10 @@ class SwitchedDrive {
         constexpr int longest_walk = 400;
         for (int step = 0; step < longest_walk; ++step) {
             const auto& entry = cache.entry(trial);
-            const Regime& r = entry.regime;
-            if (!r.solvable) return Found::inconsistent;
-            Flow flow(r, now);
-            const std::array<double, max_guards> room = entry.guard_room(now.x, now.memory, now.input[0]);
-            std::array<double, max_guards> rates;
-            entry.evaluate_guards(nullptr, flow.rate(), now.input[1], rates);
-            const Guard* left = nullptr;
-            bool overcome = false;
-            for (int k = 0; k < r.n_guards && left == nullptr; ++k) {
-                const Guard& g = r.guards[k];
-                // The mode of a contact that moves was chosen by its speed.
-                if (g.kind == Guard::speed && !at_rest[g.contact]) continue;
-                // Only what is near zero needs a closer look.
-                if (room[k] > 16.0 * time_rounding * std::fabs(now.time * rates[k]) || flow.sign(g) >= 0) continue;
-                if (g.kind == Guard::outside) return Found::outside;
-                if (g.kind == Guard::speed || g.kind == Guard::capacity)
-                    overcome = true;
-                else
-                    left = &g;
-            }
+            if (!entry.regime.solvable) return Found::inconsistent;
+            // The mode of a contact that moves was chosen by its speed.
+            const auto [left, overcome] = violated(entry, now, at_rest);
+            if (left != nullptr && left->kind == Guard::outside) return Found::outside;
             if (left == nullptr) {
                 if (overcome) return Found::inconsistent;
                 if (ended.known && trial == ended.key) {
@@ -258,6 +243,43 @@ class SwitchedDrive {
             cross(*left, trial);
         }
         return Found::inconsistent;
+    }
+
+    // A guard of the curve, the map or the amplifier that does not hold just after now, and whether a contact's does
+    // not. Speeds are tested for the given contacts only.
+    template <class Entry>
+    static std::pair<const Guard*, bool> violated(const Entry& entry, const Instant& now,
+                                                  const std::array<bool, n_contacts>& test_speed) {
+        const Regime& r = entry.regime;
+        Flow flow(r, now);
+        const std::array<double, max_guards> room = entry.guard_room(now.x, now.memory, now.input[0]);
+        std::array<double, max_guards> rates;
+        entry.evaluate_guards(nullptr, flow.rate(), now.input[1], rates);
+        bool overcome = false;
+        for (int k = 0; k < r.n_guards; ++k) {
+            const Guard& g = r.guards[k];
+            if (g.kind == Guard::speed && !test_speed[g.contact]) continue;
+            // Only what is near zero needs a closer look.
+            if (room[k] > 16.0 * time_rounding * std::fabs(now.time * rates[k]) || flow.sign(g) >= 0) continue;
+            if (g.kind != Guard::speed && g.kind != Guard::capacity) return {&g, overcome};
+            overcome = true;
+        }
+        return {nullptr, overcome};
+    }
+
+    // Across an edge of the curve, the map or the amplifier the motion is smooth enough for every contact to go on as
+    // it was; if that is consistent there is nothing to search.
+    template <class Cache>
+    bool goes_on(Cache& cache, const Instant& now, const Guard& fired, RegimeKey& key) const {
+        if (fired.kind == Guard::speed || fired.kind == Guard::capacity || fired.kind == Guard::outside) return false;
+        RegimeKey trial = key;
+        cross(fired, trial);
+        const auto& entry = cache.entry(trial);
+        if (!entry.regime.solvable) return false;
+        const auto [left, overcome] = violated(entry, now, {true, true, true});
+        if (left != nullptr || overcome) return false;
+        key = trial;
+        return true;
     }
 
     // Everything stands: T_2 stays where it was, or at the nearest value that twist and load contact can hold.
