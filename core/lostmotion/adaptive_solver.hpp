@@ -129,6 +129,7 @@ class AdaptiveSolver {
         input_.anchor(time_);
         now_.time = time_;
         now_.input = input_.jet();
+        now_.input_size = input_.sizes();
     }
 
     template <class Observer>

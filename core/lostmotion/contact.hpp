@@ -20,6 +20,7 @@ struct Instant {
     State x{};
     Memory memory;
     InputJet input{};
+    std::array<double, n_inputs> input_size{};  // sums of the magnitudes of the inputs' parts
 };
 
 // A form counts as zero within this multiple of the sum of the magnitudes of its terms. Its coefficients come from an
@@ -39,7 +40,7 @@ class Flow {
     // Sign of the guard just after now; 0 if it stays at zero.
     int sign(const Guard& guard) {
         double value = evaluate(guard.form, now_.x, now_.memory, now_.input[0]);
-        double size = magnitude(guard.form, now_.x, now_.memory, now_.input[0]);
+        double size = magnitude(guard.form, now_.x, now_.memory, now_.input_size);
         for (int k = 1; k < n_derivatives; ++k) {
             // The instant itself is known to its rounding only, so a value may be off by that times its rate.
             const auto [rate, rate_size] = derivative(guard.form, k);
@@ -77,7 +78,7 @@ class Flow {
             const auto& u = now_.input[k];
             if (k == 0) {
                 x_[1][row] = evaluate(f, now_.x, now_.memory, u);
-                size_[1][row] = magnitude(f, now_.x, now_.memory, u);
+                size_[1][row] = magnitude(f, now_.x, now_.memory, now_.input_size);
                 continue;
             }
             std::tie(x_[k + 1][row], size_[k + 1][row]) = rate_of(f, x_[k], size_[k], u);
@@ -252,7 +253,7 @@ class SwitchedDrive {
                                                   const std::array<bool, n_contacts>& test_speed) {
         const Regime& r = entry.regime;
         Flow flow(r, now);
-        const std::array<double, max_guards> room = entry.guard_room(now.x, now.memory, now.input[0]);
+        const std::array<double, max_guards> room = entry.guard_room(now.x, now.memory, now.input[0], now.input_size);
         std::array<double, max_guards> rates;
         entry.evaluate_guards(nullptr, flow.rate(), now.input[1], rates);
         bool overcome = false;

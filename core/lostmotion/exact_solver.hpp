@@ -173,6 +173,7 @@ class ExactSolver {
         input_.anchor(time_);
         now_.time = time_;
         now_.input = input_.jet();
+        now_.input_size = input_.sizes();
     }
     Status status_of(Found found) {
         if (found == Found::yes) return Status::done;
@@ -253,7 +254,8 @@ class ExactSolver {
                 e.evaluate_guards(&constant, end.x(), v[0], look.end_value);
                 e.evaluate_guards(nullptr, end.rate(), v[1], look.end_slope);
                 bound_fourth(e, p.level(level).growth, fourth, h, look.fourth);
-                const Verdict verdict = judge(r, Instant{time_, cursor.x(), segment.memory, u}, look, h, h < shortest);
+                const Verdict verdict = judge(r, Instant{time_, cursor.x(), segment.memory, u, cursor.input().sizes()},
+                                              look, h, h < shortest);
                 if (verdict == Verdict::uncertain) {  // below the shortest level, by plain halves
                     h = level > 0 ? std::min(p.level(--level).length, left) : 0.5 * h;
                     continue;
@@ -315,7 +317,7 @@ class ExactSolver {
                 continue;
             }
             const double tolerance =
-                rounding * magnitude(r.guards[g].form, now.x, now.memory, now.input[0]) +
+                rounding * magnitude(r.guards[g].form, now.x, now.memory, now.input_size) +
                 time_rounding * std::fabs(time_) * std::max(std::fabs(look.slope[g]), std::fabs(look.end_slope[g]));
             if (least - error >= -tolerance) continue;
             const double slope_error = 0.00802 * bound;

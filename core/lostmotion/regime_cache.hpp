@@ -32,7 +32,8 @@ class RegimeCache {
         }
         // How far the guards lie above a ten-thousandth of the sizes of their terms.
         std::array<double, max_guards> guard_room(const State& x, const Memory& m,
-                                                  const std::array<double, n_inputs>& u) const {
+                                                  const std::array<double, n_inputs>& u,
+                                                  const std::array<double, n_inputs>& input_size) const {
             const std::array<double, max_guards> constant = guard_constants(m);
             std::array<double, max_guards> value, size;
             evaluate_guards(&constant, x, u, value);
@@ -40,7 +41,7 @@ class RegimeCache {
             for (int g = 0; g < guard_lanes; ++g) {
                 size[g] = std::fabs(constant[g]) + c[0][g] * std::fabs(x[0]) + c[1][g] * std::fabs(x[1]) +
                           c[2][g] * std::fabs(x[2]) + c[3][g] * std::fabs(x[3]) + c[4][g] * std::fabs(x[4]) +
-                          c[5][g] * std::fabs(u[0]) + c[6][g] * std::fabs(u[1]);
+                          c[5][g] * input_size[0] + c[6][g] * input_size[1];
                 value[g] -= 1e-4 * size[g];
             }
             return value;

@@ -140,6 +140,13 @@ class InputState {
         return u;
     }
 
+    // Sums of the magnitudes of the parts: what the rounding of the values is relative to.
+    std::array<double, n_inputs> sizes() const {
+        std::array<double, n_inputs> size{std::fabs(linear_[0]), std::fabs(linear_[1])};
+        for (std::size_t q = 0; q < basis_->size(); ++q)
+            if ((*basis_)[q].kind != InputBasis::ramp) size[(*basis_)[q].input] += std::fabs(weights_[q]);
+        return size;
+    }
     const std::array<double, n_inputs>& slope() const { return slope_; }
     // The piecewise-linear parts alone.
     const std::array<double, n_inputs>& linear() const { return linear_; }
