@@ -104,7 +104,7 @@ class AdaptiveSolver {
     template <class Observer>
     Status advance(double t_end, Observer& observer) {
         while (time_ < t_end) {
-            const double knot = std::fmin(signals_[0].next_knot(time_), signals_[1].next_knot(time_));
+            const double knot = next_knot(signals_, time_);
             const Guard* fired = nullptr;
             const Status status = run_regime(std::fmin(t_end, knot), fired, observer);
             if (status != Status::done) return status;
@@ -121,10 +121,6 @@ class AdaptiveSolver {
     }
 
  private:
-    Status status_of(Found found) {
-        if (found == Found::yes) return Status::done;
-        return found == Found::outside ? Status::outside : Status::jammed;
-    }
     void set_inputs() {
         input_.anchor(time_);
         now_.time = time_;

@@ -138,11 +138,8 @@ class EnergyMeter {
                 left[k][flow] = a.c[k];
                 right[k][flow] = b.c[k];
             }
-            const auto constant = [&m](const LinearForm& f) {
-                return f.c[one] + f.c[hysteresis_capacity] * m.hysteresis_capacity + f.c[held_torque] * m.held_torque;
-            };
-            left_constant[flow] = constant(a);
-            right_constant[flow] = constant(b);
+            left_constant[flow] = constant_part(a, m);
+            right_constant[flow] = constant_part(b, m);
         }
         static void evaluate(const std::array<std::array<double, n_flows>, n_terms>& c,
                              const std::array<double, n_flows>& constant, const State& x,

@@ -29,6 +29,11 @@ enum class Status {
     zeno,     // switching instants accumulate
 };
 
+inline Status status_of(Found found) {
+    if (found == Found::yes) return Status::done;
+    return found == Found::outside ? Status::outside : Status::jammed;
+}
+
 // What ended a regime.
 struct Switching {
     double time = 0.0;
@@ -55,9 +60,7 @@ struct Segment {
 // Constant part of a regime's rates.
 inline State constant_rate(const Regime& r, const Memory& m) {
     State c{};
-    for (int k = 0; k < n_states; ++k)
-        c[k] = r.rate[k].c[one] + r.rate[k].c[hysteresis_capacity] * m.hysteresis_capacity +
-               r.rate[k].c[held_torque] * m.held_torque;
+    for (int k = 0; k < n_states; ++k) c[k] = constant_part(r.rate[k], m);
     return c;
 }
 
@@ -134,7 +137,7 @@ class ExactSolver {
             if (!entry.propagator.ready()) entry.propagator.prepare(entry.regime, unit_, scale_, basis_);
             Segment<System> segment{entry, signals_, time_,       t_end,
                                     true,  now_.x,   now_.memory, constant_rate(entry.regime, now_.memory)};
-            const double knot = next_knot();
+            const double knot = next_knot(signals_, time_);
             const double limit = std::fmin(t_end, knot);
             const Guard* fired = nullptr;
             const Status status = run_regime(segment, limit, fired);
@@ -168,16 +171,11 @@ class ExactSolver {
         jump_pending_ = false;
         last_level_ = first_level;  // so that what follows depends on the state alone
     }
-    double next_knot() const { return std::fmin(signals_[0].next_knot(time_), signals_[1].next_knot(time_)); }
     void anchor_inputs() {
         input_.anchor(time_);
         now_.time = time_;
         now_.input = input_.jet();
         now_.input_size = input_.sizes();
-    }
-    Status status_of(Found found) {
-        if (found == Found::yes) return Status::done;
-        return found == Found::outside ? Status::outside : Status::jammed;
     }
 
     template <class Observer>

@@ -70,6 +70,11 @@ struct Memory {
 inline constexpr int n_derivatives = 6;
 using InputJet = std::array<std::array<double, n_inputs>, n_derivatives>;
 
+// The part of a form that depends on neither state nor inputs: constant within a regime.
+inline double constant_part(const LinearForm& f, const Memory& m) {
+    return f.c[one] + f.c[hysteresis_capacity] * m.hysteresis_capacity + f.c[held_torque] * m.held_torque;
+}
+
 inline double evaluate(const LinearForm& f, const State& x, const Memory& m, const std::array<double, n_inputs>& u) {
     double sum = f.c[one] + f.c[hysteresis_capacity] * m.hysteresis_capacity + f.c[held_torque] * m.held_torque +
                  f.c[command] * u[0] + f.c[load_torque] * u[1];

@@ -51,8 +51,7 @@ class RegimeCache {
             std::array<double, max_guards> constant{};
             for (int g = 0; g < regime.n_guards; ++g) {
                 const LinearForm& f = regime.guards[g].form;
-                constant[g] =
-                    f.c[one] + f.c[hysteresis_capacity] * m.hysteresis_capacity + f.c[held_torque] * m.held_torque;
+                constant[g] = constant_part(f, m);
             }
             return constant;
         }

@@ -44,8 +44,7 @@ class Reader {
             const LinearForm& f = *forms[k];
             for (int c = 0; c < n_states; ++c) columns_.column[c][k] = f.c[c];
             for (int i = 0; i < n_inputs; ++i) input_columns_[i][k] = f.c[first_input + i];
-            constant_[k] =
-                f.c[one] + f.c[hysteresis_capacity] * m.hysteresis_capacity + f.c[held_torque] * m.held_torque;
+            constant_[k] = constant_part(f, m);
         }
     }
 

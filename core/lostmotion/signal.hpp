@@ -40,18 +40,14 @@ struct Signal {
     }
     double next_knot(double t) const {
         const std::size_t k = segment(t) + 1;
-        return k < knots.size() ? (knots[k].time > t ? knots[k].time : next_after(k, t))
-                                : std::numeric_limits<double>::infinity();
-    }
-
- private:
-    double next_after(std::size_t k, double t) const {
-        while (k < knots.size() && knots[k].time <= t) ++k;
         return k < knots.size() ? knots[k].time : std::numeric_limits<double>::infinity();
     }
 };
 
 using Signals = std::array<Signal, n_inputs>;  // command, load torque
+
+// The first knot of either input after t.
+inline double next_knot(const Signals& s, double t) { return std::fmin(s[0].next_knot(t), s[1].next_knot(t)); }
 
 // Inputs that will be set to ramps from outside, step by step.
 inline Signals ramped_inputs() {
@@ -189,8 +185,6 @@ class InputState {
             weights_[q + 1] = c * cos_sin[q] - s * cos_sin[q + 1];
         }
     }
-
-    double next_knot(double t) const { return std::fmin((*signals_)[0].next_knot(t), (*signals_)[1].next_knot(t)); }
 
  private:
     const Signals* signals_;

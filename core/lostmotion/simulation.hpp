@@ -39,13 +39,9 @@ class Simulation {
     // On any status but done the state is left as it was.
     Status advance(double interval, double command_begin, double command_end, double load_begin, double load_end) {
         const std::array<double, n_inputs> begin{command_begin, load_begin}, end{command_end, load_end};
-        Status status = Status::done;
-        if (now_.started) solver_.resume(now_.time, now_.x, now_.memory, now_.key);
-        for (int i = 0; i < n_inputs; ++i) {
-            if (!now_.started) solver_.resume(now_.time, now_.x, now_.memory, now_.key);
-            solver_.set_ramp(i, begin[i], (end[i] - begin[i]) / interval);
-        }
-        status = now_.started ? solver_.inputs_changed() : solver_.begin(now_.time, now_.x, now_.memory);
+        solver_.resume(now_.time, now_.x, now_.memory, now_.key);
+        for (int i = 0; i < n_inputs; ++i) solver_.set_ramp(i, begin[i], (end[i] - begin[i]) / interval);
+        Status status = now_.started ? solver_.inputs_changed() : solver_.begin(now_.time, now_.x, now_.memory);
         Nothing nothing;
         if (status == Status::done) status = solver_.advance(now_.time + interval, nothing);
         if (status != Status::done) return status;
