@@ -75,7 +75,11 @@ class AdaptiveSolver {
           tolerance_(relative_tolerance),
           scale_(scale),
           remainder_(remainder),
-          input_(signals_, basis_) {}
+          input_(signals_, basis_) {
+        // A drive that stands has nothing to control the error of; its inputs are to be looked at all the same.
+        for (const InputBasis& b : basis_)
+            if (b.omega > 0.0) longest_step_ = std::min(longest_step_, 0.4 / b.omega);
+    }
     AdaptiveSolver(const AdaptiveSolver&) = delete;
     AdaptiveSolver& operator=(const AdaptiveSolver&) = delete;
 
@@ -190,11 +194,13 @@ class AdaptiveSolver {
             entry.evaluate_guards(nullptr, rate, u[1], g_rate);
         };
         double h = step_ > 0.0 ? step_ : 1e-6;
+        off_zero_ = false;
         dense.k[0] = rates(equations, time_, now_.x);
         look(time_, now_.x, dense.k[0], value, slope);
         while (time_ < limit) {
             if (++steps_ % 256 == 0 && interrupted != nullptr && interrupted(interrupted_context))
                 return Status::interrupted;
+            h = std::min(h, longest_step_);
             const bool last = h >= limit - time_;
             if (last) h = limit - time_;
             dense.x = now_.x;
@@ -228,6 +234,7 @@ class AdaptiveSolver {
             for (int g = 0; g < r.n_guards; ++g) {
                 const Cubic c(value[g], slope[g], end_value[g], end_slope[g], h);
                 if (c.least() <= 0.0) refine_crossing(r.guards[g], dense, end, t_event, crossed);
+                if (r.guards[g].by_touch) find_touch(r.guards[g], c, dense, t_event, crossed);
             }
             if (crossed != nullptr) {
                 dense.end = t_event;
@@ -280,7 +287,23 @@ class AdaptiveSolver {
         }
     }
 
+    // Does the guard touch zero, as far as this solution can tell, and rise again?
+    void find_touch(const Guard& guard, const Cubic& c, const DenseStep& dense, double& t_event,
+                    const Guard*& crossed) {
+        const double t = dense.begin + dense.length * c.lowest_at();
+        double near = 0.0;
+        for (int k = 0; k < n_states; ++k)
+            near += touch_factor * tolerance_ * std::fabs(guard.form.c[k]) * (scale_[k] + std::fabs(dense.x[k]));
+        off_zero_ |= c.c0 > near;
+        if (!off_zero_ || c.c3 <= near || t >= t_event ||
+            std::fabs(evaluate(guard.form, dense(t), now_.memory, input_at(t))) > near)
+            return;
+        t_event = t;
+        crossed = &guard;
+    }
+
     static constexpr double noise_factor = 1e-14;
+    static constexpr double touch_factor = 10.0;
 
     const System& system_;
     Signals signals_;
@@ -291,11 +314,13 @@ class AdaptiveSolver {
     Remainder remainder_;
     InputState input_;
 
+    double longest_step_ = std::numeric_limits<double>::infinity();
     double time_ = 0.0, step_ = 0.0;
     Instant now_;
     RegimeKey key_;
     long steps_ = 0;
     int repeats_ = 0;
+    bool off_zero_ = false;  // whether the guard that may touch has been off zero in this regime
     double last_event_ = -1.0;
     Contact stopped_at_ = input_contact;
 };

@@ -32,7 +32,9 @@ inline constexpr double time_rounding = 4.0 * std::numeric_limits<double>::epsil
 // Time derivatives of the state along the flow of one regime, computed as far as they are asked for.
 class Flow {
  public:
-    Flow(const Regime& regime, const Instant& now) : regime_(regime), now_(now) {
+    // coarseness: how many times `rounding` counts as zero.
+    Flow(const Regime& regime, const Instant& now, double coarseness = 1.0)
+        : regime_(regime), now_(now), rounding_(coarseness * rounding) {
         x_[0] = now.x;
         for (int k = 0; k < n_states; ++k) size_[0][k] = std::fabs(now.x[k]);
     }
@@ -44,7 +46,7 @@ class Flow {
         for (int k = 1; k < n_derivatives; ++k) {
             // The instant itself is known to its rounding only, so a value may be off by that times its rate.
             const auto [rate, rate_size] = derivative(guard.form, k);
-            const double noise = rounding * size + time_rounding * std::fabs(now_.time * rate);
+            const double noise = rounding_ * size + time_rounding * std::fabs(now_.time * rate);
             if (std::fabs(value) > noise) return value > 0.0 ? +1 : -1;
             value = rate;
             size = rate_size;
@@ -87,6 +89,7 @@ class Flow {
 
     const Regime& regime_;
     const Instant& now_;
+    double rounding_;
     int order_ = 0;
     std::array<State, n_derivatives + 1> x_{}, size_{};
 };
@@ -165,11 +168,14 @@ class SwitchedDrive {
         if (at_rest[twist_contact]) x[load_speed] = x[motor_speed] * (1.0 / drive_.gearbox.ratio);
     }
 
-    // Tries the combinations of modes, those with most contacts stuck first.
+    using Choices = std::array<std::array<std::int8_t, 3>, n_contacts>;  // the modes that each contact may take
+
+    // Tries the combinations of modes. Where the motion has all but died out, rounding may make each of them look
+    // wrong; then what is zero is decided more coarsely. A drive that jams is wrong by more than that.
     template <class Cache>
     Found find(Cache& cache, Instant& now, const std::array<bool, n_contacts>& at_rest, double T_2, const Ended& ended,
                RegimeKey& key) const {
-        std::array<std::array<std::int8_t, 3>, n_contacts> choices{};
+        Choices choices{};
         std::array<int, n_contacts> n{};
         for (int k = 0; k < n_contacts; ++k) {
             const auto c = static_cast<Contact>(k);
@@ -184,6 +190,18 @@ class SwitchedDrive {
                 choices[k][n[k]++] = speed > 0.0 ? +1 : -1;
             }
         }
+        for (const double coarseness : {1.0, 0x1p6, 0x1p12}) {
+            const Found found = search(cache, now, choices, n, at_rest, T_2, ended, coarseness, key);
+            if (found != Found::inconsistent) return found;
+        }
+        return Found::inconsistent;
+    }
+
+    // Those with most contacts stuck first.
+    template <class Cache>
+    Found search(Cache& cache, Instant& now, const Choices& choices, const std::array<int, n_contacts>& n,
+                 const std::array<bool, n_contacts>& at_rest, double T_2, const Ended& ended, double coarseness,
+                 RegimeKey& key) const {
         const Instant before = now;
         Found worst = Found::inconsistent;
         for (int slips = 0; slips <= n_contacts; ++slips)
@@ -193,7 +211,7 @@ class SwitchedDrive {
                         const Modes modes{choices[0][a], choices[1][b], choices[2][c]};
                         if ((modes[0] != 0) + (modes[1] != 0) + (modes[2] != 0) != slips) continue;
                         now = before;
-                        const Found found = settle(cache, now, modes, at_rest, T_2, ended, key);
+                        const Found found = settle(cache, now, modes, at_rest, T_2, ended, coarseness, key);
                         if (found == Found::yes) return found;
                         if (found == Found::outside) worst = found;
                     }
@@ -204,7 +222,7 @@ class SwitchedDrive {
     // walking across each of their edges that is violated; load and cell depend on each other while the twist is stuck.
     template <class Cache>
     Found settle(Cache& cache, Instant& now, const Modes& modes, const std::array<bool, n_contacts>& at_rest,
-                 double T_2, const Ended& ended, RegimeKey& key) const {
+                 double T_2, const Ended& ended, double coarseness, RegimeKey& key) const {
         RegimeKey trial;
         trial.modes = modes;
         const Gearbox& gearbox = drive_.gearbox;
@@ -230,7 +248,7 @@ class SwitchedDrive {
             const auto& entry = cache.entry(trial);
             if (!entry.regime.solvable) return Found::inconsistent;
             // The mode of a contact that moves was chosen by its speed.
-            const auto [left, overcome] = violated(entry, now, at_rest);
+            const auto [left, overcome] = violated(entry, now, at_rest, coarseness);
             if (left != nullptr && left->kind == Guard::outside) return Found::outside;
             if (left == nullptr) {
                 if (overcome) return Found::inconsistent;
@@ -250,9 +268,10 @@ class SwitchedDrive {
     // not. Speeds are tested for the given contacts only.
     template <class Entry>
     static std::pair<const Guard*, bool> violated(const Entry& entry, const Instant& now,
-                                                  const std::array<bool, n_contacts>& test_speed) {
+                                                  const std::array<bool, n_contacts>& test_speed,
+                                                  double coarseness = 1.0) {
         const Regime& r = entry.regime;
-        Flow flow(r, now);
+        Flow flow(r, now, coarseness);
         const std::array<double, max_guards> room = entry.guard_room(now.x, now.memory, now.input[0], now.input_size);
         std::array<double, max_guards> rates;
         entry.evaluate_guards(nullptr, flow.rate(), now.input[1], rates);

@@ -238,7 +238,10 @@ inline void Drive::add_guards(const RegimeKey& key, const Equations& e, Regime& 
     for (int k = 0; k < n_contacts; ++k) {
         const auto c = static_cast<Contact>(k);
         const int mode = key.modes[k];
-        if (mode == +1 || mode == -1) add(static_cast<double>(mode) * contact_speed(c), Guard::speed, c, 0);
+        if (mode != +1 && mode != -1) continue;
+        add(static_cast<double>(mode) * contact_speed(c), Guard::speed, c, 0);
+        // (16) sets the hysteresis anew whenever the twist rate reaches zero, whether it then changes sign or not.
+        r.guards[r.n_guards - 1].by_touch = c == twist_contact;
     }
     if (key.modes[twist_contact] == 0 && !rigid()) {
         const LinearForm h = LinearForm::unit(hysteresis_capacity), H = closed(e.H);

@@ -226,6 +226,8 @@ class ExactSolver {
         Cursor &cursor = cursor_, &end = end_;
         cursor.place(p, segment.constant, time_, now_.x);
         Look look;
+        off_zero_ = false;
+        touch_size_ = 0.0;
         e.evaluate_guards(&constant, cursor.x(), cursor.input().values(), look.value);
         e.evaluate_guards(nullptr, cursor.rate(), cursor.input().jet<2>()[1], look.slope);
         int level = std::min(last_level_, p.level_below(limit - time_));
@@ -310,27 +312,45 @@ class ExactSolver {
             const Cubic c(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
             const double bound = h * h * h * look.fourth[g], error = h / 384.0 * bound;
             const double least = c.least();
-            if (least > error) {
+            const bool by_touch = r.guards[g].by_touch;
+            if (least > error && !by_touch) {
                 room_ = std::min(room_, error > 0.0 ? least / error : room_);
                 continue;
             }
+            const double size = magnitude(r.guards[g].form, now.x, now.memory, now.input_size);
             const double tolerance =
-                rounding * magnitude(r.guards[g].form, now.x, now.memory, now.input_size) +
+                rounding * size +
                 time_rounding * std::fabs(time_) * std::max(std::fabs(look.slope[g]), std::fabs(look.end_slope[g]));
-            if (least - error >= -tolerance) continue;
-            const double slope_error = 0.00802 * bound;
-            const double d0 = 3.0 / h * (c.c1 - c.c0), d1 = 3.0 / h * (c.c2 - c.c1), d2 = 3.0 / h * (c.c3 - c.c2);
-            if (std::fmin(d0, std::fmin(d1, d2)) > slope_error && c.c0 >= -tolerance) continue;  // rises all the way
-            const bool falls = std::fmax(d0, std::fmax(d1, d2)) < -slope_error;
-            if (falls && c.c3 >= -tolerance) continue;
-            if (falls) {
-                crossing_[n_crossing_++] = g;
+            bool touches = false;
+            if (by_touch) {
+                touch_size_ = std::max(touch_size_, size);
+                off_zero_ |= c.c0 > rounding * touch_size_;
+                touches = off_zero_ && least - error <= rounding * touch_size_ && c.c3 > rounding * touch_size_;
+            }
+            if (least > error && !touches) {
+                room_ = std::min(room_, error > 0.0 ? least / error : room_);
                 continue;
             }
-            if (c.c0 <= tolerance && departs(r.guards[g].form, flow, h, look.fourth[g])) continue;
-            if (error > tolerance && !shortest) return Verdict::uncertain;
+            if (least - error >= -tolerance && !touches) continue;
+            const double slope_error = 0.00802 * bound;
+            const double d0 = 3.0 / h * (c.c1 - c.c0), d1 = 3.0 / h * (c.c2 - c.c1), d2 = 3.0 / h * (c.c3 - c.c2);
+            const bool rises = std::fmin(d0, std::fmin(d1, d2)) > slope_error;
+            const bool falls = std::fmax(d0, std::fmax(d1, d2)) < -slope_error;
+            if (rises && c.c0 >= -tolerance && !(touches && c.c0 <= rounding * touch_size_)) continue;
+            if (falls && c.c3 >= -tolerance) continue;
+            if (falls) {
+                crossing_[n_crossing_++] = {g, false};
+                continue;
+            }
+            if (c.c0 <= tolerance && !touches && departs(r.guards[g].form, flow, h, look.fourth[g])) continue;
+            const double resolved = touches ? rounding * touch_size_ : tolerance;
+            if (error > resolved && !shortest) return Verdict::uncertain;
             // The cubic is the guard to rounding; does it dip below zero?
-            if (c(c.lowest_at()) < -tolerance) crossing_[n_crossing_++] = g;
+            const double lowest = c(c.lowest_at());
+            if (lowest < -tolerance)
+                crossing_[n_crossing_++] = {g, false};
+            else if (touches && lowest <= resolved)
+                crossing_[n_crossing_++] = {g, true};
         }
         return n_crossing_ > 0 ? Verdict::crossing : Verdict::clear;
     }
@@ -364,13 +384,14 @@ class ExactSolver {
         };
         std::array<double, max_guards> estimate{};
         for (int k = 0; k < n_crossing_; ++k) {
-            const Cubic c = cubic(crossing_[k]);
-            estimate[crossing_[k]] = c.root(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
+            const auto [g, touch] = crossing_[k];
+            const Cubic c = cubic(g);
+            estimate[g] = touch ? c.lowest_at() : c.root(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
         }
         std::sort(crossing_.begin(), crossing_.begin() + n_crossing_,
-                  [&](int a, int b) { return estimate[a] < estimate[b]; });
+                  [&](const Crossing& a, const Crossing& b) { return estimate[a.guard] < estimate[b.guard]; });
         for (int k = 0; k < n_crossing_; ++k) {
-            const int g = crossing_[k];
+            const auto [g, touch] = crossing_[k];
             const double z = estimate[g];
             // Still positive where another has crossed: later.
             if (k > 0 && cubic(g)(best / h) > h * h * h * h / 384.0 * look.fourth[g]) continue;
@@ -378,7 +399,7 @@ class ExactSolver {
             double low = 0.0, high = h, s = z * h;
             at = cursor;
             at.advance(s);
-            for (int m = 0; m < 100; ++m) {
+            for (int m = 0; m < 100 && !touch; ++m) {
                 const Guard& guard = r.guards[g];
                 const InputJet u = at.input().jet();
                 const double value = evaluate(guard.form, at.x(), memory, u[0]);
@@ -421,8 +442,16 @@ class ExactSolver {
     InputState input_{signals_, basis_};
     Cursor cursor_{signals_, basis_}, end_ = cursor_, trial_ = cursor_;
     double room_ = 0.0;  // least value of a guard / error of its cubic, in the last look
-    std::array<int, max_guards> crossing_{};
+    struct Crossing {
+        int guard;
+        bool touch;
+    };
+    std::array<Crossing, max_guards> crossing_{};
     int n_crossing_ = 0;
+    // Of the guard that may end this regime by a touch: has it been off zero, and the largest size of its terms. What
+    // rounding leaves of a zero is relative to the latter. (A regime has at most one such guard.)
+    bool off_zero_ = false;
+    double touch_size_ = 0.0;
     int recent_ = 0;
     double recent_since_ = 0.0;
     bool jump_pending_ = false;

@@ -48,7 +48,8 @@ struct Guard {
     LinearForm form;
     Kind kind = outside;
     Contact contact = input_contact;  // for speed and capacity
-    int neighbour = 0;  // for pieces, cells and the amplifier: the index beyond; capacity: the sign of slip
+    int neighbour = 0;      // for pieces, cells and the amplifier: the index beyond; capacity: the sign of slip
+    bool by_touch = false;  // ends the regime also by touching zero without falling through it
 };
 
 inline constexpr int max_guards = 16;

@@ -76,6 +76,33 @@ TEST_SUITE("events") {
         for (std::size_t k = 0; k < free.count; ++k)
             CHECK(touching(ch_twist, k) == Approx(free(ch_twist, k)).epsilon(1e-10).scale(1e-3));
     }
+    // A locked input, an undamped load on a spring k with hysteresis, a load torque that grows as a t. The twist rate
+    // is (a/k)(1 - cos(Omega t)): after each period T it touches zero without changing sign. There (16) sets h anew,
+    // h_n = (1 - eta)/2 a n T, and the twist stands until the load torque has grown by h_n - h_(n-1) = (1 - eta)/2 a T.
+    TEST_CASE("a twist rate that touches zero has reached it: the hysteresis is set anew, the twist stands") {
+        Drive d = plain_drive(1.0, 1e18, 2.0);
+        d.gearbox.compliance = Gearbox::torsion_curve;
+        for (const double frequency : {3.0, 7.3, 10.0, 41.7}) {
+            d.gearbox.curve = TorsionCurve({}, {2.0 * std::pow(2.0 * pi * frequency, 2)});
+            d.gearbox.hysteresis_efficiency = 0.8;
+            const Signals signals{constant(0.0), lines({{0.0, 0.0, -37.0}})};
+            const double T = 1.0 / frequency, stands = 0.1 * T;
+            for (const double tolerance : {0.0, 1e-11}) {
+                const Samples s = run(d, signals, 5.0 * (T + stands), 1e-3, {}, tolerance);
+                REQUIRE(s.report.status == Status::done);
+                REQUIRE(s.report.switchings.size() >= 8);
+                for (int n = 1; n <= 4; ++n) {
+                    const Switching &stop = s.report.switchings[2 * n - 2], &go = s.report.switchings[2 * n - 1];
+                    CHECK(stop.after.modes[twist_contact] == 0);
+                    CHECK(stop.before.modes[twist_contact] == go.after.modes[twist_contact]);
+                    // A double zero is located to the root of what one zero is.
+                    CHECK(std::fabs(stop.time - (n * T + (n - 1) * stands)) < 1e-5 * T);
+                    CHECK(std::fabs(go.time - n * (T + stands)) < 1e-9 * T);
+                }
+            }
+        }
+    }
+
     TEST_CASE("crossings are located to rounding") {
         const double at = 0.3e-3;
         const Samples s = swinging(at, 1.0, 0.5);
