@@ -40,6 +40,11 @@ class Cursor {
         input_.follow(time);
         rate_known_ = false;
     }
+    // To a state of the same stretch that is known already.
+    void move_to(double time, const State& x) {
+        x_ = x;
+        anchor(time);
+    }
 
     void step(int level) {
         x_ = propagator_->step(level, x_, rate(), input_.weights());

@@ -66,7 +66,7 @@ class EnergyMeter {
             if (whole)
                 end.step(level);
             else
-                end.advance(length);
+                end.move_to(s.end, s.x_end);
             factors.powers(p, end, there);
             const double error = add_panel(here, there, length, level == 0);
             if (error > 1.0) {

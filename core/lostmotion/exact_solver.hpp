@@ -55,6 +55,7 @@ struct Segment {
     State x;            // at begin
     Memory memory;
     State constant;  // the part of dx/dt that depends on neither state nor inputs
+    State x_end{};   // at end, before any stop there
 };
 
 // Constant part of a regime's rates.
@@ -143,6 +144,7 @@ class ExactSolver {
             const Status status = run_regime(segment, limit, fired);
             if (status != Status::done) return status;
             segment.end = time_;
+            segment.x_end = now_.x;
             segment.last = fired == nullptr && time_ >= t_end;
             if (!observer.segment(segment, basis_)) return Status::interrupted;
             if (segment.last) {

@@ -51,6 +51,7 @@ struct Step {
 class Propagator {
  public:
     static constexpr int max_levels = 40;
+    static constexpr int usual_levels = 12;
     static constexpr double base_norm = 0.125;  // |A| h of the base interval, in scaled units
 
     // unit: a length [s] of which some power-of-two multiple or fraction is the base interval.
@@ -76,6 +77,8 @@ class Propagator {
         steps_.clear();
         responses_.clear();
         rotations_.clear();
+        steps_.reserve(usual_levels);
+        responses_.reserve(usual_levels * basis.size());
         add_base(h);
     }
 
@@ -103,11 +106,11 @@ class Propagator {
     const State* responses(int k) const { return responses_.data() + static_cast<std::size_t>(k) * n_basis_; }
     const double* rotations(int k) const { return rotations_.data() + static_cast<std::size_t>(k) * n_basis_; }
 
-    // The highest level not longer than s (level 0 even if it is longer).
-    int level_below(double s) {
+    // The highest level not longer than s (level 0 even if it is longer). Computes no level.
+    int level_below(double s) const {
         const double base = steps_[0].length, longest = fastest_input_ > 0.0 ? std::min(s, 1.0 / fastest_input_) : s;
         int k = longest > base ? std::min(std::ilogb(longest / base), max_levels - 1) : 0;
-        while (k > 0 && level(k).length > longest) --k;  // the quotient may have been rounded up
+        while (k > 0 && std::ldexp(base, k) > longest) --k;  // the quotient may have been rounded up
         return k;
     }
     // Whether twice the level is a step within s. Steps stay below a sixth of the fastest input period: the doubling

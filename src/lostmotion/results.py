@@ -34,17 +34,10 @@ def installed_version() -> str:
 
 def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) -> xarray.Dataset:
     """Label what the solver returned."""
-    import xarray as xr
-
     table, switchings, count, energy, state, capacity, left_data_at, steps = result
     data = dict(zip((v.name for v in CHANNELS), table, strict=True))
     add_derived(data, scenario.gearbox.ratio)
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
-    variables: dict[str, Any] = {
-        v.name: (("time",), data[v.name], {"units": v.unit, "long_name": v.meaning, "symbol": v.symbol})
-        for v in VARIABLES
-    }
-    variables |= _switching_variables(switchings)
     attributes = {
         "title": scenario.title,
         "scenario": scenario.to_json(),
@@ -63,7 +56,33 @@ def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) 
         )
     if scenario.gearbox.note:
         attributes["note"] = scenario.gearbox.note
-    return xr.Dataset(variables, coords={"time": ("time", time, {"units": "s", "long_name": "time"})}, attrs=attributes)
+    return _dataset(time, data, _switching_variables(switchings), attributes)
+
+
+def _dataset(time: Any, data: dict[str, Any], switchings: dict[str, Any], attributes: dict[str, Any]) -> xarray.Dataset:
+    import xarray as xr
+
+    variables = {
+        v.name: ("time", data[v.name], {"units": v.unit, "long_name": v.meaning, "symbol": v.symbol})
+        for v in VARIABLES
+        if v.name in data
+    }
+    coordinates = xr.Coordinates(
+        {
+            "time": ("time", time, {"units": "s", "long_name": "time"}),
+            "contact": ("contact", list(CONTACTS), {"long_name": "dry contact"}),
+        },
+        indexes={"time": xr.indexes.PandasIndex(time, "time"), "contact": _contact_index()},
+    )
+    return xr.Dataset(variables | switchings, coords=coordinates, attrs=attributes)
+
+
+@cache
+def _contact_index() -> Any:
+    """The same in every result, and dear to make."""
+    import xarray as xr
+
+    return xr.indexes.PandasIndex(CONTACTS, "contact")
 
 
 def add_derived(data: dict[str, Any], ratio: float) -> None:
@@ -85,31 +104,26 @@ def gear_efficiency(data: dict[str, Any], ratio: float) -> Any:
 
 
 def _switching_variables(table: Any) -> dict[str, Any]:
-    columns = table.T if len(table) else np.zeros((11, 0))
-    dim = ("switching",)
-    kind = columns[1].astype(int)
+    rows = table if len(table) else np.zeros((0, 11))
+    kind = rows[:, 1].astype(np.int8)
     out: dict[str, Any] = {
-        "switching_time": (dim, columns[0].copy(), {"units": "s", "long_name": "instant of switching"}),
+        "switching_time": ("switching", rows[:, 0].copy(), {"units": "s", "long_name": "instant of switching"}),
         "switching_cause": (
-            dim,
-            kind.astype(np.int8),
+            "switching",
+            kind,
             {"long_name": "what ended the regime", "flag_values": list(range(-1, 6)), "flag_meanings": _flags()},
         ),
     }
-    for c, name in enumerate(CONTACTS):
-        meaning = name.replace("_", " ")
-        # 2 stands for a contact that the drive does not have.
-        for when, first in (("before", 3), ("after", 6)):
-            out[f"switching_{name}_{when}"] = (
-                dim,
-                columns[first + c].astype(np.int8),
-                {"long_name": f"{meaning} {when} the switching; 2: there is none"},
-            )
-    for when, column in (("before", 9), ("after", 10)):
+    for when, side, modes, torque in (("before", "left", 3, 9), ("after", "right", 6, 10)):
+        out[f"switching_contacts_{when}"] = (
+            ("switching", "contact"),
+            rows[:, modes : modes + 3].astype(np.int8),
+            {"long_name": f"modes of the contacts {when} the switching; 2: there is none"},
+        )
         out[f"switching_output_torque_{when}"] = (
-            dim,
-            columns[column].copy(),
-            {"units": "N*m", "long_name": f"output torque, {'left' if when == 'before' else 'right'} limit"},
+            "switching",
+            rows[:, torque].copy(),
+            {"units": "N*m", "long_name": f"output torque, {side} limit"},
         )
     return out
 
@@ -258,35 +272,25 @@ def _read_netcdf(path: Path) -> xarray.Dataset:
 def _header(dataset: xarray.Dataset) -> str:
     """All but the samples, as JSON: attributes, and the switchings with theirs."""
     switchings = {
-        str(name): {"values": v.values.tolist(), "type": str(v.dtype), "attributes": v.attrs}
+        str(name): {"dims": v.dims, "values": v.values.ravel().tolist(), "type": str(v.dtype), "attributes": v.attrs}
         for name, v in dataset.variables.items()
-        if v.dims == ("switching",)
+        if "switching" in v.dims
     }
     return json.dumps({"attributes": dataset.attrs, "switchings": switchings})
 
 
 def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Dataset:
-    import xarray as xr
-
-    known = {v.name: v for v in VARIABLES}
     try:
         meta = json.loads(header)
         time = columns.pop("time")
     except (json.JSONDecodeError, KeyError):
         raise InputError(f"{path}: is no result of lostmotion; its header or its time column is missing") from None
-    variables: dict[str, Any] = {
-        name: (
-            ("time",),
-            values,
-            {"units": known[name].unit, "long_name": known[name].meaning, "symbol": known[name].symbol},
-        )
-        for name, values in columns.items()
-    }
-    for name, s in meta["switchings"].items():
-        variables[name] = (("switching",), np.asarray(s["values"], dtype=s["type"]), s["attributes"])
-    return xr.Dataset(
-        variables, coords={"time": ("time", time, {"units": "s", "long_name": "time"})}, attrs=meta["attributes"]
-    )
+    switchings = {}
+    for name, v in meta["switchings"].items():
+        shape = [len(CONTACTS) if dim == "contact" else -1 for dim in v["dims"]]
+        values = np.asarray(v["values"], dtype=v["type"]).reshape(shape)
+        switchings[name] = (v["dims"], values, v["attributes"])
+    return _dataset(time, columns, switchings, meta["attributes"])
 
 
 def _columns(dataset: xarray.Dataset) -> dict[str, Any]:
