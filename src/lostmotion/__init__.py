@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from .parts import Motor as Motor
     from .parts import Rigid as Rigid
     from .parts import TorsionCurve as TorsionCurve
+    from .records import catalogue as catalogue
+    from .records import gearbox as gearbox
+    from .records import motor as motor
     from .results import energy_of as energy_of
     from .results import open_result as open_result
     from .results import save as save
@@ -54,6 +57,7 @@ _HOMES = {
         "Rigid",
         "TorsionCurve",
     ),
+    "records": ("catalogue", "gearbox", "motor"),
     "results": ("energy_of", "open_result", "save", "scenario_of"),
     "scenario": ("Initial", "Scenario", "load"),
     "signals": ("CommandSignal", "TorqueSignal"),

@@ -18,15 +18,32 @@ from .quantities import (
     Number,
     Part,
     Positive,
+    Resistance,
     Speed,
     Stiffness,
+    Temperature,
+    ThermalResistance,
     Time,
     Torque,
+    TorqueConstant,
     ViscousFriction,
     Voltage,
 )
 
 MAX_PIECES = 100  # of a torsion curve, on each side
+
+
+class MotorLimits(Part):
+    """What a motor can stand. No run depends on it; the drive check compares with it."""
+
+    continuous_torque: Annotated[Torque, Positive] | None = None
+    max_speed: Annotated[Speed, Positive] | None = None
+    resistance: Annotated[Resistance, Positive] | None = None
+    """of the winding, at 25 °C"""
+    torque_constant: Annotated[TorqueConstant, Positive] | None = None
+    thermal_resistance: Annotated[ThermalResistance, Positive] | None = None
+    """winding to ambient"""
+    max_winding_temperature: Temperature | None = None
 
 
 class Motor(Part):
@@ -50,6 +67,7 @@ class Motor(Part):
     """k_N, stall torque / rated torque at rated voltage"""
     voltage_limit: Annotated[Voltage, Positive] | None = None
     """largest voltage of the amplifier"""
+    limits: MotorLimits | None = None
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -202,6 +220,17 @@ class LossMap(Part):
         return _core.LossMap(speeds, loads, [x for row in values for x in row])
 
 
+class GearboxLimits(Part):
+    """What a gearbox can stand. No run depends on it; the drive check compares with it."""
+
+    average_output_torque: Annotated[Torque, Positive] | None = None
+    peak_output_torque: Annotated[Torque, Positive] | None = None
+    """repeated, as in acceleration"""
+    momentary_output_torque: Annotated[Torque, Positive] | None = None
+    """in an emergency stop"""
+    max_input_speed: Annotated[Speed, Positive] | None = None
+
+
 class Gearbox(Part):
     """A compliance and a loss law, each chosen freely."""
 
@@ -218,6 +247,7 @@ class Gearbox(Part):
     stiffness: Annotated[TorsionCurve | LinearStiffness | Rigid, Field(discriminator="kind")]
     hysteresis: Hysteresis | None = None
     losses: Annotated[ConstantEfficiency | LossMap, Field(discriminator="kind")]
+    limits: GearboxLimits | None = None
     note: str = ""
     """what a reader of the results must know, such as that a loss table is a stand-in"""
 

@@ -20,6 +20,13 @@ Frequency = Annotated[float, Unit("Hz")]
 Voltage = Annotated[float, Unit("V")]
 Stiffness = Annotated[float, Unit("N*m/rad")]
 ViscousFriction = Annotated[float, Unit("N*m*s/rad")]
+Current = Annotated[float, Unit("A")]
+Resistance = Annotated[float, Unit("ohm")]
+Inductance = Annotated[float, Unit("H")]
+TorqueConstant = Annotated[float, Unit("N*m/A")]
+KinematicViscosity = Annotated[float, Unit("m^2/s")]
+Temperature = Annotated[float, Unit("degC")]
+ThermalResistance = Annotated[float, Unit("K/W")]
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import base64
 import re
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
+from .pages import embed, render_page
 from .paper import AMPLITUDES, Constant
 from .plots import scientific
 
@@ -16,24 +15,20 @@ if TYPE_CHECKING:
 
 def render(specs: list[FigureSpec], images: dict[str, bytes], table: list[Constant], facts: dict[str, Any]) -> str:
     """The page, with the figures inside."""
-    import jinja2
     from markupsafe import Markup, escape
 
     by_number = {spec.number: spec for spec in specs}
 
     def figure(number: str) -> Markup:
         spec = by_number[number]
-        data = base64.b64encode(images[number]).decode()
-        mark = '<span class="stand-in">stand-in loss table</span>' if spec.stand_in else ""
-        return Markup(
-            f'<figure id="figure-{number}"><img alt="{escape(spec.title)}" src="data:image/png;base64,{data}">'
-            f"<figcaption><b>Figure {int(number)}. {escape(spec.title)}.</b> {_powers(str(escape(spec.caption)))} {mark}"
-            "</figcaption></figure>\n"
+        mark = Markup('<span class="stand-in">stand-in loss table</span>') if spec.stand_in else ""
+        caption = Markup("<b>Figure {}. {}.</b> {} {}").format(
+            int(number), spec.title, Markup(_powers(str(escape(spec.caption)))), mark
         )
+        return embed(images[number], spec.title, caption, f"figure-{number}")
 
-    template = files("lostmotion").joinpath("report.html.jinja").read_text(encoding="utf-8")
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    return environment.from_string(template).render(
+    return render_page(
+        "report.html.jinja",
         facts=facts,
         constants=table,
         amplitudes=AMPLITUDES,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -14,10 +12,11 @@ import numpy as np
 
 from . import plots
 from .frequency_response import frequency_response, rigid_constants
+from .pages import panels_csv, save_figure, table_csv, write_text
 from .paper import AMPLITUDES, MODELS, Constant, constants, paper_scenario
 from .parts import LossMap
 from .plots import COMMAND_STYLE, STYLES, Curve, Panel
-from .results import energy_of, write_bytes
+from .results import energy_of
 from .run import simulate
 
 if TYPE_CHECKING:
@@ -73,17 +72,17 @@ def reproduce(directory: Path, progress: Callable[[], None] = lambda: None) -> P
     directory.mkdir(parents=True, exist_ok=True)
     results = compute(progress)
     table = constants()
-    _write_text(directory / "constants.csv", constants_csv(table))
+    write_text(directory / "constants.csv", constants_csv(table))
     images = {}
     specs = figure_specs(results)
     for spec in specs:
         figure = draw(spec)
         name = f"figure-{spec.number}"
         images[spec.number] = save_figure(figure, directory, name)
-        _write_text(directory / f"{name}.csv", figure_csv(spec))
+        write_text(directory / f"{name}.csv", figure_csv(spec))
         progress()
     report = directory / "report.html"
-    _write_text(report, render(specs, images, table, facts(results)))
+    write_text(report, render(specs, images, table, facts(results)))
     return report
 
 
@@ -320,51 +319,21 @@ def draw(spec: FigureSpec) -> Figure:
 
 def figure_csv(spec: FigureSpec) -> str:
     """The data of a figure: long form, one row a point."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    if spec.number == "05":
-        speeds, loads, values = _stand_in_table()
-        writer.writerow(["relative_speed", "relative_load", "loss_coefficient (stand-in)"])
-        for load, row in zip(loads, values, strict=True):
-            writer.writerows([speed, load, value] for speed, value in zip(speeds, row, strict=True))
-        return out.getvalue()
-    writer.writerow(["panel", "curve", "x", "y", "x_label", "y_label"])
-    for panel in spec.panels:
-        labels = (_plain(panel.x_label), _plain(panel.y_label))
-        for curve in panel.curves:
-            for x, y in zip(curve.x.tolist(), curve.y.tolist(), strict=True):
-                writer.writerow([_plain(panel.title), _plain(curve.label), x, y, *labels])
-    return out.getvalue()
-
-
-def _plain(label: str) -> str:
-    """A label without its markup."""
-    return label.replace("$", "").replace("{", "").replace("}", "")
-
-
-def save_figure(figure: Figure, directory: Path, name: str) -> bytes:
-    """Write a figure as PNG and SVG; returns the PNG."""
-    png = io.BytesIO()
-    figure.savefig(png, format="png", metadata={"Software": None})
-    svg = io.BytesIO()
-    figure.savefig(svg, format="svg", metadata={"Date": None})
-    write_bytes(directory / f"{name}.png", png.getvalue())
-    write_bytes(directory / f"{name}.svg", svg.getvalue())
-    return png.getvalue()
+    if spec.number != "05":
+        return panels_csv(spec.panels)
+    speeds, loads, values = _stand_in_table()
+    rows = [
+        [speed, load, v] for load, row in zip(loads, values, strict=True) for speed, v in zip(speeds, row, strict=True)
+    ]
+    return table_csv(["relative_speed", "relative_load", "loss_coefficient (stand-in)"], rows)
 
 
 def constants_csv(table: list[Constant]) -> str:
     """The constants table, one row each."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["constant", "unit", "printed", "recomputed", "from printed t_m0 and T_RC", "remark"])
-    for c in table:
-        writer.writerow([c.name, c.unit, c.printed, f"{c.recomputed:.5g}", f"{c.from_printed:.5g}", c.remark])
-    return out.getvalue()
-
-
-def _write_text(path: Path, text: str) -> None:
-    write_bytes(path, text.encode())
+    return table_csv(
+        ["constant", "unit", "printed", "recomputed", "from printed t_m0 and T_RC", "remark"],
+        ([c.name, c.unit, c.printed, f"{c.recomputed:.5g}", f"{c.from_printed:.5g}", c.remark] for c in table),
+    )
 
 
 # --- what the report states --------------------------------------------------------------------------------

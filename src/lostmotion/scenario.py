@@ -15,6 +15,7 @@ from pydantic import ValidationError, model_validator
 from .errors import InputError
 from .parts import Drive, Gearbox, Load, Motor, Rigid
 from .quantities import Angle, NotNegative, Part, Positive, Speed, Time, Torque
+from .records import Conditions, gearbox_table, motor
 from .signals import CommandSignal, TorqueSignal
 
 MAX_SAMPLES = 100_000_000
@@ -132,9 +133,12 @@ def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) ->
         except KeyError as error:
             raise InputError(f"--set {key}: {error.args[0]}") from None
     try:
+        _use_records(data)
         return Scenario(**data)
     except ValidationError as error:
         raise InputError(f"{path}: {describe(error)}") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def json_schema() -> dict[str, Any]:
@@ -142,6 +146,16 @@ def json_schema() -> dict[str, Any]:
     schema = Scenario.model_json_schema()
     schema["properties"]["base"] = {"type": "string", "description": "scenario file that this one changes"}
     schema["required"] = []  # with a base, none
+    for table in ("gearbox", "motor"):
+        whole = schema["properties"][table]
+        name = {"type": "string", "description": "name of a record of the catalogue, or a file with one (.toml)"}
+        from_record = {
+            "type": "object",
+            "properties": {"from": name},
+            "required": ["from"],
+            "description": "a record; the other keys of the table take the place of its values",
+        }
+        schema["properties"][table] = {"anyOf": [whole, name, from_record]}
     return schema
 
 
@@ -165,6 +179,12 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
     _read_series(data, path, ())
+    for table in ("gearbox", "motor"):
+        if isinstance(data.get(table), str):
+            data[table] = {"from": data[table]}
+        record = data.get(table, {}).get("from") if isinstance(data.get(table), dict) else None
+        if isinstance(record, str) and record.endswith(".toml"):
+            data[table]["from"] = str(path.parent / record)
     if "base" not in data:
         return data
     base = data.pop("base")
@@ -208,15 +228,37 @@ def _has_heading(rows: list[list[str]]) -> bool:
 
 
 def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Tables are merged; one of another `kind` takes the place of the old one."""
+    """Tables are merged; one of another `kind`, or `from` a record, takes the place of the old one."""
     merged = dict(base)
     for key, value in changes.items():
         old = base.get(key)
-        if isinstance(value, dict) and isinstance(old, dict) and value.get("kind", old.get("kind")) == old.get("kind"):
+        if not isinstance(value, dict) or not isinstance(old, dict) or "from" in value:
+            merged[key] = value
+        elif value.get("kind", old.get("kind")) == old.get("kind"):
             merged[key] = _merge(old, value)
         else:
             merged[key] = value
     return merged
+
+
+def _use_records(data: dict[str, Any]) -> None:
+    """Puts the values of a record in the place of `from`; the other keys of the table go before them."""
+    for table in ("gearbox", "motor"):
+        changes = data.get(table)
+        if isinstance(changes, str):
+            changes = {"from": changes}
+        if not isinstance(changes, dict) or "from" not in changes:
+            continue
+        changes = dict(changes)
+        record = changes.pop("from")
+        if not isinstance(record, str):
+            raise InputError(f"key {table}.from: {record!r} must be the name of a record, or of a file with one")
+        if table == "gearbox":
+            values, _ = gearbox_table(record, changes)
+            changes = {key: value for key, value in changes.items() if key not in Conditions.model_fields}
+        else:
+            values = motor(record).model_dump()
+        data[table] = _merge(values, changes)
 
 
 def _parse_override(text: str) -> tuple[str, Any]:
@@ -231,6 +273,11 @@ def _parse_override(text: str) -> tuple[str, Any]:
 
 def _set(data: dict[str, Any], key: str, value: Any) -> None:
     *tables, name = key.split(".")
+    if name == "from" and len(tables) == 1:  # the record takes the place of the whole table
+        data[tables[0]] = {"from": value}
+        return
+    if tables and isinstance(data.get(tables[0]), str):
+        data[tables[0]] = {"from": data[tables[0]]}
     for table in tables:
         inner = data.setdefault(table, {})
         if table == "torque" and not isinstance(inner, dict):

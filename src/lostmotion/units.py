@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ def registry() -> pint.UnitRegistry[Any]:
     return units
 
 
+@lru_cache(maxsize=10_000)  # data sheets say the same again and again
 def to_si(text: str, unit: str) -> float:
     """Value of `text`, such as ``"3300 rpm"``, in `unit` (SI; ``""`` for a plain number).
 
