@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from lostmotion import signals
+from lostmotion.quantities import unit_in_schema
 from lostmotion.scenario import json_schema
 from lostmotion.variables import VARIABLES
 
@@ -24,15 +25,8 @@ def purpose_of(table: dict[str, Any]) -> str:
 
 
 def unit_of(node: dict[str, Any]) -> str:
-    if "x-unit" in node:
-        return node["x-unit"].replace("*", "·") or "1"
-    for key in ("anyOf", "oneOf", "allOf"):
-        for option in node.get(key, []):
-            if unit := unit_of(option):
-                return unit
-    if isinstance(node.get("items"), dict):
-        return unit_of(node["items"])
-    return ""
+    unit = unit_in_schema(node)
+    return "" if unit is None else unit.replace("*", "·") or "1"
 
 
 def limits_of(node: dict[str, Any]) -> str:

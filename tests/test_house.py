@@ -25,6 +25,7 @@ ROOMS = [
     {"results"},
     {"run"},
     {"test_rig"},
+    {"drive_check"},
     {"stepping"},
     {"explanation"},
     {"frequency_response"},
@@ -32,6 +33,7 @@ ROOMS = [
     {"plots"},
     {"pages"},
     {"rig_sheet"},
+    {"listing"},
     {"reproduce", "report"},
     {"cli"},
     {"__init__", "__main__"},
@@ -97,5 +99,5 @@ def test_examples_run(path: Path, tmp_path: Path) -> None:
 
 def test_help_names_every_command() -> None:
     done = subprocess.run([sys.executable, "-m", "lostmotion", "--help"], capture_output=True, text=True, check=True)
-    for command in ("reproduce", "run", "schema"):
+    for command in ("reproduce", "run", "rig", "catalogue", "drive", "schema"):
         assert f"  {command} " in done.stdout

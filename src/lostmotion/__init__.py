@@ -12,8 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ._core import SolverError as SolverError
+    from .data_sheet import GearboxSheet as GearboxSheet
+    from .data_sheet import MotorSheet as MotorSheet
+    from .drive_check import check_drive as check_drive
     from .errors import InputError as InputError
     from .explanation import explain as explain
+    from .loss_map_builder import build_loss_map as build_loss_map
     from .parts import ConstantEfficiency as ConstantEfficiency
     from .parts import Drive as Drive
     from .parts import Gearbox as Gearbox
@@ -38,13 +42,17 @@ if TYPE_CHECKING:
     from .signals import CommandSignal as CommandSignal
     from .signals import TorqueSignal as TorqueSignal
     from .stepping import Simulation as Simulation
+    from .test_rig import TestRig as TestRig
     from .variables import VARIABLES as VARIABLES
 
 # Where each public name lives; it is imported when first used, so that `import lostmotion` stays quick.
 _HOMES = {
     "_core": ("SolverError",),
+    "drive_check": ("check_drive",),
     "errors": ("InputError",),
     "explanation": ("explain",),
+    "data_sheet": ("GearboxSheet", "MotorSheet"),
+    "loss_map_builder": ("build_loss_map",),
     "parts": (
         "ConstantEfficiency",
         "Drive",
@@ -63,6 +71,7 @@ _HOMES = {
     "signals": ("CommandSignal", "TorqueSignal"),
     "run": ("simulate",),
     "stepping": ("Simulation",),
+    "test_rig": ("TestRig",),
     "variables": ("VARIABLES",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}

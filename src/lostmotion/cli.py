@@ -162,6 +162,116 @@ def run(
 
 
 @app.command()
+def rig(
+    gearbox: Annotated[
+        str, typer.Argument(metavar="GEARBOX", help="Name in the catalogue, or a file with one record (.toml).")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
+        "rig"
+    ),
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help='Change or add a value, e.g. --set temperature="40 degC".'),
+    ] = None,
+) -> None:
+    """Measure a gearbox on the virtual test rig and compare with its data sheet.
+
+    Writes rig.html (a page like one of a catalogue), the figures as PNG and SVG, and the measurements as CSV.
+
+    \b
+    lostmotion rig schaeffler-rt1-h-20-100
+    lostmotion rig my-gearbox.toml -o sheet --set loss_factor=1.3
+    """
+    from .data_sheet import GearboxSheet
+    from .errors import InputError
+    from .records import find
+    from .scenario import gearbox_from_record
+
+    sheet = find(gearbox, "gearbox")
+    assert isinstance(sheet, GearboxSheet)
+    part, notes = gearbox_from_record(gearbox, overrides or ())
+    from .rig_sheet import summary_rows, write_sheet
+    from .test_rig import measure
+
+    report = measure(part, sheet, notes)
+    try:
+        page = write_sheet(output, sheet.name, report, sheet, notes)
+    except OSError as error:
+        raise InputError(f"{output}: cannot be written: {error.strerror}") from None
+    print(sheet.title or sheet.name)
+    for c in report.comparisons:
+        unit = "" if c.unit == "1" else f" {c.unit}"
+        remark = f"  ({c.remark})" if c.remark else ""
+        print(f"  {c.figure:<44} {c.catalogue:>10.5g} {c.rig:>10.5g} {c.difference:>+9.1e}{unit}{remark}")
+    for what, value in summary_rows(report):
+        print(f"  {what}: {value}")
+    for note in notes:
+        print(f"  note: {note}")
+    print(f"The data sheet is at {page}")
+
+
+@app.command()
+def catalogue(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME | new]", help="Show one record; `new`: a template for your own.")
+    ] = None,
+    kind: Annotated[str | None, typer.Option("--kind", help="strain_wave, planetary, worm, motor, ...")] = None,
+    ratio: Annotated[str | None, typer.Option("--ratio", metavar="MIN..MAX", help="Gear ratio.")] = None,
+    torque: Annotated[str | None, typer.Option("--torque", metavar="MIN..MAX", help="Rated torque [N·m].")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="With `new`: the file.")] = None,
+) -> None:
+    """List the components, show one with its sources and gaps, or start your own data sheet.
+
+    \b
+    lostmotion catalogue --kind strain_wave --ratio 50..120 --torque 20..100
+    lostmotion catalogue schaeffler-rt1-h-20-100
+    lostmotion catalogue new -o my-gearbox.toml
+    """
+    from .listing import list_records, record_text, template
+
+    if name == "new":
+        text = template()
+        if output is None:
+            print(text, end="")
+            return
+        from .errors import InputError
+        from .pages import write_text
+
+        if output.exists():
+            raise InputError(f"{output}: exists; name another file")
+        write_text(output, text)
+        print(f"Template written to {output}; fill in what your data sheet says and delete the rest")
+    elif name is not None:
+        print(record_text(name))
+    else:
+        print(list_records(kind, ratio, torque))
+
+
+drive_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Check a drive against its task.")
+app.add_typer(drive_app, name="drive")
+
+
+@drive_app.command()
+def check(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="Scenario file.")],
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in `run`.")
+    ] = None,
+) -> None:
+    """Torques, speeds, inertia ratio, resonance, dead zone, lost motion, holding and heat, in plain words."""
+    from .drive_check import check_drive
+    from .scenario import load
+
+    loaded = load(scenario, overrides or ())
+    findings = check_drive(loaded)
+    print(loaded.title or str(scenario))
+    for finding in findings:
+        print(f"  {finding}")
+    warnings = sum(f.verdict == "warning" for f in findings)
+    print("No warnings." if warnings == 0 else f"{warnings} warning{'s' if warnings > 1 else ''}.")
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON Schema of scenario files.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 
@@ -52,3 +53,12 @@ class Part(BaseModel):
     """Immutable; unknown keys, NaN and infinity are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
+
+
+def unit_in_schema(node: Mapping[str, Any]) -> str | None:
+    """The SI unit of a field, from its JSON Schema; ``""`` for a pure number, None for what is no quantity."""
+    if "x-unit" in node:
+        return str(node["x-unit"])
+    options = [option for key in ("anyOf", "oneOf", "allOf") for option in node.get(key, [])]
+    options += [node["items"]] if isinstance(node.get("items"), dict) else []
+    return next((unit for option in options if (unit := unit_in_schema(option)) is not None), None)

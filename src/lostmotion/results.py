@@ -98,7 +98,7 @@ def gear_efficiency(data: dict[str, Any], ratio: float) -> Any:
     """
     driving = data["output_torque"] * np.sign(data["motor_speed"])
     fed_in = ratio * data["input_torque"] * np.sign(data["motor_speed"])
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         eta = np.where(driving >= 0.0, driving / fed_in, np.where(fed_in < 0.0, fed_in / driving, 0.0))
     return np.where(data["motor_speed"] == 0.0, np.nan, eta)
 

@@ -261,6 +261,25 @@ def _use_records(data: dict[str, Any]) -> None:
         data[table] = _merge(values, changes)
 
 
+def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[Gearbox, tuple[str, ...]]:
+    """A record's gearbox with ``KEY=VALUE`` changes, as in `[gearbox]`, and the notes of its loss map.
+
+    Raises
+    ------
+    InputError
+    """
+    changes: dict[str, Any] = {}
+    for key, value in map(_parse_override, overrides):
+        _set(changes, key, value)
+    values, built = gearbox_table(reference, changes)
+    own = {key: value for key, value in changes.items() if key not in Conditions.model_fields}
+    try:
+        part = Gearbox(**_merge(values, own))
+    except ValidationError as error:
+        raise InputError(f"gearbox {reference}: {describe(error)}") from None
+    return part, built.notes if built else ()
+
+
 def _parse_override(text: str) -> tuple[str, Any]:
     key, equals, value = text.partition("=")
     if not equals or not key.strip():

@@ -43,12 +43,17 @@ class Loop:
 
     @property
     def width(self) -> float:
-        """Twist between the two crossings of zero torque [rad]."""
+        """Twist between the branches where the torque has just gone to zero, backlash included [rad]."""
         half = len(self.torque) // 2
-        falling, rising = slice(0, half + 1), slice(half, None)
-        down = np.interp(0.0, -self.torque[falling], self.twist[falling])
-        up = np.interp(0.0, self.torque[rising], self.twist[rising])
-        return abs(float(down - up))
+        return abs(self._end(slice(0, half + 1), +1.0) - self._end(slice(half, None), -1.0))
+
+    def _end(self, branch: slice, sign: float) -> float:
+        """Where a branch that unloads from this sign reaches zero torque, by its last two points before."""
+        twist, torque = self.twist[branch], sign * self.torque[branch]
+        k = np.flatnonzero(torque > 1e-3 * self.amplitude)
+        run = k[: np.argmax(np.diff(k, append=len(twist) + 1) > 1) + 1][-2:] if len(k) > 2 else k
+        (d0, d1), (T0, T1) = twist[run], torque[run]
+        return float(d1 - T1 * (d1 - d0) / (T1 - T0))
 
     @property
     def area(self) -> float:
