@@ -5,32 +5,33 @@ import math
 import lostmotion as lm
 
 ARCMIN = math.pi / 10800
-rated_torque, ratio = 81.0, 10.0  # [N·m], [-]
-efficiency, no_load_torque = 0.97, 0.64  # at full load [-]; at the input, running without load [N·m]
 
-# The loss torque at the output, relative to rated torque: at full load from the efficiency, without load from the
-# no-load torque; where the second alone exceeds the first, as here, the larger one is kept at every load.
-running = no_load_torque * ratio / rated_torque
-full = max(1.0 / efficiency - 1.0, running)
-gearbox = lm.Gearbox(
-    ratio=ratio,
-    inertia=0.40e-4,
-    rated_input_speed=3100 * math.pi / 30,
-    rated_output_torque=rated_torque,
-    stiffness=lm.TorsionCurve(slopes=(23 / ARCMIN,), backlash=3 * ARCMIN),
-    losses=lm.LossMap(
-        mirrored=True, speeds=(0, 1), loads=(0, 1), values=((0.7 * running, running), (0.7 * running, full))
-    ),
+sheet = lm.GearboxSheet(
+    name="my-gearbox",
+    kind="planetary",
+    ratio=10,
+    rated_output_torque=81,  # [N·m]
+    rated_input_speed="3100 rpm",
+    peak_output_torque=126,
+    max_input_speed="7500 rpm",
+    inertia="0.40 kg*cm^2",
+    backlash="3 arcmin",
+    stiffness={"slopes": ["23 N*m/arcmin"]},
+    losses={
+        "efficiency": [{"input_speed": "3100 rpm", "efficiency": 0.97}],
+        "no_load_torque": [{"input_speed": "3100 rpm", "torque": 0.64}],  # at the input [N·m]
+    },
 )
-motor = lm.Motor(
-    rotor_inertia=264e-7,
-    friction_torque=0.01,
-    rated_torque=0.64,
-    rated_speed=2970 * math.pi / 30,
-    electrical_time_constant=1.25e-3,
-    armature_voltage_constant=21.6,
-)
-drive = lm.Drive(motor=motor, gearbox=gearbox, load=lm.Load(inertia=0.5))
+built = lm.build_loss_map(sheet)
+print(*built.notes)  # these two figures contradict each other, as they often do
+
+gearbox = lm.gearbox("wittenstein-tp010-mf-10")  # the same from the catalogue
+assert gearbox.losses == built.losses
+rig = lm.TestRig(gearbox)
+print(f"lost motion        {rig.lost_motion() / ARCMIN:.2f} arcmin")
+print(f"efficiency at 10 % {rig.efficiency(3100 * math.pi / 30, 0.1):.2f}")
+
+drive = lm.Drive(motor=lm.motor("maxon-ec-i-52-606793"), gearbox=gearbox, load=lm.Load(inertia=0.5))
 result = lm.simulate(drive, command=lm.CommandSignal(amplitude=0.2, frequency=2.0), duration=2.0, sample_interval=1e-3)
 print(f"largest load speed {float(abs(result['load_speed']).max()):.3f} rad/s")
 print(f"largest twist      {float(abs(result['twist']).max()) / ARCMIN:.2f} arcmin")

@@ -149,11 +149,12 @@ def json_schema() -> dict[str, Any]:
     for table in ("gearbox", "motor"):
         whole = schema["properties"][table]
         name = {"type": "string", "description": "name of a record of the catalogue, or a file with one (.toml)"}
+        conditions = Conditions.model_json_schema()["properties"] if table == "gearbox" else {}
         from_record = {
             "type": "object",
-            "properties": {"from": name},
+            "properties": {"from": name} | conditions,
             "required": ["from"],
-            "description": "a record; the other keys of the table take the place of its values",
+            "description": f"A {table} of the catalogue, or of a sheet file; other keys take the place of its values.",
         }
         schema["properties"][table] = {"anyOf": [whole, name, from_record]}
     return schema
