@@ -4,13 +4,14 @@
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <memory>
 #include <mutex>
 
 #include "lostmotion/explain.hpp"
-#include "lostmotion/periodic.hpp"
+#include "lostmotion/response.hpp"
 #include "lostmotion/run.hpp"
 #include "lostmotion/simulation.hpp"
 
@@ -23,19 +24,19 @@ namespace {
 using Vector = std::vector<double>;
 
 // A drive and what runs of it have left for the next ones. Each run takes a workspace for itself.
-class SharedDrive {
+class SharedDrive : public WorkspacePool {
  public:
     const Drive drive;
     explicit SharedDrive(const Drive& d) : drive(d) {}
 
-    std::unique_ptr<Workspace> take() {
+    std::unique_ptr<Workspace> take() override {
         const std::lock_guard<std::mutex> hold(mutex_);
         if (idle_.empty()) return std::make_unique<Workspace>(drive);
         std::unique_ptr<Workspace> w = std::move(idle_.back());
         idle_.pop_back();
         return w;
     }
-    void give_back(std::unique_ptr<Workspace> w) {
+    void give_back(std::unique_ptr<Workspace> w) override {
         const std::lock_guard<std::mutex> hold(mutex_);
         idle_.push_back(std::move(w));
     }
@@ -157,18 +158,101 @@ nb::tuple run(SharedDrive& shared, const Signals& signals, const std::array<doub
                           report.memory.hysteresis_capacity, report.left_data_at, report.steps);
 }
 
-nb::tuple follow(const Drive& drive, const Signals& signals, double period, std::size_t samples, int max_periods,
-                 double tolerance) {
-    auto data = std::make_unique<double[]>(n_channels * samples);
-    PeriodicMotion motion;
+using Point = std::tuple<Signal, Signal, double, std::array<double, n_states>, double>;
+
+// Shape of one result and where its values lie.
+template <class F>
+nb::object column(const std::vector<ResponseResult>& results, std::vector<std::size_t> shape, F&& values) {
+    std::size_t width = 1;
+    for (const std::size_t n : shape) width *= n;
+    shape.insert(shape.begin(), results.size());
+    auto data = std::make_unique<double[]>(results.size() * width);
+    for (std::size_t k = 0; k < results.size(); ++k) values(results[k], &data[k * width]);
+    double* raw = data.release();
+    nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+    return nb::cast(nb::ndarray<nb::numpy, double>(raw, shape.size(), shape.data(), owner));
+}
+
+nb::dict respond_to(SharedDrive& drive, const std::vector<Point>& asked, const ResponseSpec& spec, unsigned threads,
+                    const nb::object& progress) {
+    std::vector<ResponsePoint> points;
+    for (const auto& [command, load_torque, period, x, capacity] : asked)
+        points.push_back({Signals{command, load_torque}, period, {to_state(x), {capacity, 0.0}}});
+    std::vector<ResponseResult> results;
+    bool raised = false;
+    const auto waiting = [&](std::size_t done) {
+        nb::gil_scoped_acquire hold;
+        raised = raised || PyErr_CheckSignals() != 0;
+        if (raised) return false;
+        if (!progress.is_none()) progress(done);
+        return true;
+    };
     {
         nb::gil_scoped_release release;
-        motion =
-            follow_to_periodic(drive, signals, {}, period, samples, max_periods, tolerance, data.get(), poll_signals);
+        results = respond_all(drive, points, spec, threads, waiting);
     }
-    check(motion.status, motion.time, motion.contact);
-    return nb::make_tuple(as_array(std::move(data), n_channels, samples), motion.converged, motion.periods,
-                          motion.residual, motion.drift);
+    if (raised) throw nb::python_error();
+    const auto harmonics = static_cast<std::size_t>(spec.harmonics) + 1;
+    nb::dict out;
+    const auto number = [&](const char* name, auto&& value) {
+        out[name] =
+            column(results, {}, [&](const ResponseResult& r, double* to) { *to = static_cast<double>(value(r)); });
+    };
+    number("status", [](const ResponseResult& r) { return static_cast<int>(r.motion.status); });
+    number("time", [](const ResponseResult& r) { return r.motion.time; });
+    number("converged", [](const ResponseResult& r) { return r.motion.converged; });
+    number("smooth", [](const ResponseResult& r) { return r.motion.smooth; });
+    number("periods", [](const ResponseResult& r) { return r.motion.periods; });
+    number("newton_steps", [](const ResponseResult& r) { return r.motion.newton_steps; });
+    number("residual", [](const ResponseResult& r) { return r.motion.residual; });
+    number("drift", [](const ResponseResult& r) { return r.motion.drift; });
+    number("hysteresis_capacity", [](const ResponseResult& r) { return r.motion.start.memory.hysteresis_capacity; });
+    number("motor_power", [](const ResponseResult& r) { return r.motor_power; });
+    number("load_power", [](const ResponseResult& r) { return r.load_power; });
+    number("gear_loss", [](const ResponseResult& r) { return r.gear_loss; });
+    out["start"] = column(results, {n_states}, [](const ResponseResult& r, double* to) {
+        std::copy_n(r.motion.start.x.begin(), n_states, to);
+    });
+    out["jacobian"] = column(results, {n_components, n_components}, [](const ResponseResult& r, double* to) {
+        for (const Components& row : r.motion.jacobian.row) to = std::copy(row.begin(), row.end(), to);
+    });
+    out["harmonics"] = column(results, {n_channels, harmonics, 2}, [](const ResponseResult& r, double* to) {
+        std::copy(r.harmonic.begin(), r.harmonic.end(), to);
+    });
+    out["mean_square"] = column(results, {n_channels}, [](const ResponseResult& r, double* to) {
+        std::copy(r.mean_square.begin(), r.mean_square.end(), to);
+    });
+    if (spec.keep_table)
+        out["table"] = column(results, {n_channels, spec.samples}, [](const ResponseResult& r, double* to) {
+            std::copy(r.table.begin(), r.table.end(), to);
+        });
+    return out;
+}
+
+// Equations of the regime that a state is in: A, B, constant rates, and C, D, constants of M_D, T_2, T_1 and the
+// friction of the input contact.
+nb::tuple linearization(const Drive& drive, const std::array<double, n_states>& x, double capacity,
+                        const std::array<double, n_inputs>& u, const std::array<double, n_inputs>& slope) {
+    Signals signals = ramped_inputs();
+    for (int i = 0; i < n_inputs; ++i) signals[i].knots[0] = {0.0, u[i], slope[i]};
+    const SwitchedDrive system(drive);
+    ExactSolver<SwitchedDrive> solver(system, signals, 1e-3, drive.balanced_scale());
+    check(solver.begin(0.0, to_state(x), {capacity, 0.0}), 0.0, input_contact);
+    const Regime& r = solver.regime();
+    const auto rows = [&](const std::vector<const LinearForm*>& forms) {
+        constexpr std::size_t width = n_states + n_inputs + 1;
+        auto data = std::make_unique<double[]>(forms.size() * width);
+        for (std::size_t k = 0; k < forms.size(); ++k) {
+            for (int c = 0; c < n_states; ++c) data[k * width + c] = forms[k]->c[c];
+            for (int i = 0; i < n_inputs; ++i) data[k * width + n_states + i] = forms[k]->c[first_input + i];
+            data[k * width + width - 1] = constant_part(*forms[k], solver.memory());
+        }
+        return as_array(std::move(data), forms.size(), width);
+    };
+    std::vector<const LinearForm*> rates;
+    for (const LinearForm& f : r.rate) rates.push_back(&f);
+    return nb::make_tuple(rows(rates), rows({&r.source_torque, &r.output_torque, &r.input_torque}),
+                          std::array<int, n_contacts>{r.key.modes[0], r.key.modes[1], r.key.modes[2]});
 }
 
 nb::list explain_state(const Drive& drive, const Regime& r, const State& x, const Memory& m,
@@ -314,16 +398,29 @@ NB_MODULE(_core, m) {
                 "numpy.typing.NDArray[numpy.float64], "
                 "int, dict[str, float], list[float], float, float, int]"));
     m.def(
-        "follow_to_periodic",
-        [](SharedDrive& drive, const Signal& command, const Signal& load_torque, double period, std::size_t samples,
-           int max_periods, double tolerance) {
-            return follow(drive.drive, Signals{command, load_torque}, period, samples, max_periods, tolerance);
+        "respond",
+        [](SharedDrive& drive, const std::vector<Point>& points, std::size_t samples, int harmonics, int max_periods,
+           double tolerance, bool keep_table, unsigned threads, const nb::object& progress) {
+            return respond_to(drive, points, {samples, harmonics, max_periods, tolerance, keep_table}, threads,
+                              progress);
         },
-        "drive"_a, "command"_a, "load_torque"_a, "period"_a, "samples"_a, "max_periods"_a, "tolerance"_a,
-        nb::sig("def follow_to_periodic(drive: Drive, command: Signal, load_torque: Signal, period: float, "
-                "samples: int, max_periods: int, tolerance: float) -> tuple[numpy.typing.NDArray[numpy.float64], bool, "
-                "int, "
-                "float, float]"));
+        "drive"_a, "points"_a, "samples"_a, "harmonics"_a, "max_periods"_a, "tolerance"_a, "keep_table"_a, "threads"_a,
+        "progress"_a = nb::none(),
+        nb::sig("def respond(drive: Drive, points: collections.abc.Sequence[tuple[Signal, Signal, float, "
+                "collections.abc.Sequence[float], float]], samples: int, harmonics: int, max_periods: int, "
+                "tolerance: float, keep_table: bool, threads: int, "
+                "progress: collections.abc.Callable[[int], None] | None = None) -> "
+                "dict[str, numpy.typing.NDArray[numpy.float64]]"));
+    m.def(
+        "linearization",
+        [](SharedDrive& drive, const std::array<double, n_states>& x, double capacity,
+           const std::array<double, n_inputs>& inputs, const std::array<double, n_inputs>& input_rates) {
+            return linearization(drive.drive, x, capacity, inputs, input_rates);
+        },
+        "drive"_a, "state"_a, "hysteresis_capacity"_a, "inputs"_a, "input_rates"_a,
+        nb::sig("def linearization(drive: Drive, state: collections.abc.Sequence[float], hysteresis_capacity: float, "
+                "inputs: collections.abc.Sequence[float], input_rates: collections.abc.Sequence[float]) -> "
+                "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], list[int]]"));
     m.def(
         "explain_at",
         [](SharedDrive& drive, const Signal& command, const Signal& load_torque, const std::array<double, n_states>& x,

@@ -3,11 +3,9 @@
 import csv
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.frequency_response import PERIODICITY, frequency_response, rigid_constants
 from lostmotion.paper import constants, paper_scenario
 from lostmotion.parts import Drive
 from lostmotion.reproduce import WORK, reproduce
@@ -42,41 +40,6 @@ def test_constants_are_those_of_the_repaired_table() -> None:
 def frictionless(drive: Drive) -> Drive:
     motor = drive.motor.model_copy(update={"friction_torque": 0.0})
     return Drive(motor=motor, gearbox=drive.gearbox, load=drive.load)
-
-
-def test_rigid_drive_without_friction_follows_the_closed_form() -> None:
-    drive = frictionless(paper_scenario("1-DOF-L", "large").drive())
-    frequencies = np.geomspace(0.1, 100.0, 7)
-    response = frequency_response(drive, list(frequencies), 0.5)
-    closed = rigid_constants(drive).response(frequencies, 90.0)
-    # The transient is followed to a residual of 1e-10 per period; it decays by exp(-T/T_mc) per period, so the motion
-    # is that near to its limit times 1/(1 - exp(-T/T_mc)), at 100 Hz seven.
-    assert np.max(np.abs(response["response"].values / closed - 1.0)) < 10 * PERIODICITY
-
-
-def test_first_harmonics_come_from_periodic_motions() -> None:
-    drive = paper_scenario("2-DOF-NL", "small").drive()
-    response = frequency_response(drive, [0.5, 5.0, 50.0], 0.025)
-    assert np.all(response["periodicity"].values <= PERIODICITY)
-    # Followed on for as long again, the motion is still the same.
-    for frequency, periods, value in zip(
-        [0.5, 5.0, 50.0], response["periods"].values, response["response"].values, strict=True
-    ):
-        duration = 2 * periods / frequency
-        run = lm.simulate(
-            drive,
-            command=lm.CommandSignal(amplitude=0.025, frequency=frequency),
-            duration=duration,
-            sample_interval=1.0 / (1024 * frequency),
-        )
-        last = np.fft.rfft(run["load_speed"].values[-1025:-1])[1] / np.fft.rfft(run["command"].values[-1025:-1])[1]
-        assert abs(last / value - 1.0) < 1e-5  # aliasing of 1024 against 2048 samples
-
-
-def test_response_depends_on_amplitude_as_in_the_paper() -> None:
-    drive = paper_scenario("2-DOF-NL", "large").drive()
-    large, small = (abs(frequency_response(drive, [0.1], a)["response"].values[0]) for a in (1.0275, 0.025))
-    assert small < 0.5 * large
 
 
 @pytest.fixture(scope="module")

@@ -40,8 +40,10 @@ struct Switching {
     Guard::Kind kind = Guard::speed;
     Contact contact = input_contact;
     bool input_jump = false;  // an input changed its value or slope; kind and contact mean nothing
+    int guard = -1;           // its number among those of the regime before; -1: an input jumped
     RegimeKey before, after;
     State x{};
+    Memory memory;                                   // after it, as x
     double torque_before = 0.0, torque_after = 0.0;  // T_2 [N m], left and right limit
 };
 
@@ -189,6 +191,7 @@ class ExactSolver {
         if (fired != nullptr) {
             s.kind = fired->kind;
             s.contact = fired->contact;
+            s.guard = static_cast<int>(fired - cache_.regime(key_).guards.data());
             stopped_at_ = fired->contact;
             if (fired->kind == Guard::outside) return Status::outside;
         }
@@ -203,6 +206,7 @@ class ExactSolver {
         if (found != Found::yes) return status_of(found);
         s.after = key_;
         s.x = now_.x;
+        s.memory = now_.memory;
         s.torque_after = evaluate(cache_.regime(key_).output_torque, now_.x, now_.memory, now_.input[0]);
         observer.switching(s);
         if (recent_ == 0 || time_ - recent_since_ > zeno_span * std::fmax(std::fabs(time_), unit_)) {

@@ -1,61 +1,223 @@
-// Periodic motion under a periodic command, found by following the transient.
+// Periodic motion under periodic inputs, by shooting: Newton's method on the map of the state over one period (the
+// Poincare map), with its exact Jacobian. Where Newton does not converge, the transient is followed for a while.
 #pragma once
 
 #include <vector>
 
 #include "run.hpp"
+#include "sensitivity.hpp"
 
 namespace lostmotion {
 
-struct PeriodicMotion {
-    Status status = Status::done;
-    double time = 0.0;
-    Contact contact = input_contact;
-    bool converged = false;
-    int periods = 0;        // followed until then
-    double residual = 0.0;  // largest change of a state over one period / its largest magnitude within it
-    double drift = 0.0;     // of the load angle over one period [rad]; the angle itself is neutral
-    Start start;            // state at the beginning of the period that is sampled
+// Where a motion stands, with all that it takes to go on.
+struct Station {
+    State x{};
+    Memory memory;
+    RegimeKey key;
 };
 
-// Follows the motion period by period until it repeats. out: n_channels x samples over the last period, which begins
-// at a multiple of the period.
-inline PeriodicMotion follow_to_periodic(const Drive& drive, const Signals& signals, const Start& start, double period,
-                                         std::size_t samples, int max_periods, double tolerance, double* out,
-                                         bool (*interrupted)(void*)) {
-    PeriodicMotion motion;
-    const SwitchedDrive system(drive);
-    ExactSolver<SwitchedDrive> solver(system, signals, period / static_cast<double>(samples), drive.balanced_scale());
-    solver.interrupted = interrupted;
-    RunOptions options;
-    options.energy = false;
-    options.max_switchings = 0;
-    motion.status = solver.begin(0.0, start.x, start.memory);
-    while (motion.status == Status::done && motion.periods < max_periods) {
-        const State before = solver.state();
-        const double capacity = solver.memory().hysteresis_capacity;
-        motion.start = {before, solver.memory()};
-        Sampler sampler(drive, motion.periods * period, period / static_cast<double>(samples), samples, out);
-        sampler.interrupted = interrupted;
-        motion.status = solver.advance((motion.periods + 1) * period, sampler);
-        ++motion.periods;
-        const State& after = solver.state();
-        motion.drift = after[load_angle] - before[load_angle];
-        motion.residual = std::fabs(solver.memory().hysteresis_capacity - capacity) /
-                          std::fmax(1e-300, drive.gearbox.rated_output_torque);
-        constexpr std::array<Channel, 4> channel{ch_motor_torque, ch_motor_speed, ch_load_speed, ch_twist};
-        for (int k = 0; k < 4; ++k) {
-            double largest = 0.0;
-            for (std::size_t j = 0; j < samples; ++j)
-                largest = std::fmax(largest, std::fabs(out[channel[k] * samples + j]));
-            if (largest > 0.0) motion.residual = std::fmax(motion.residual, std::fabs(after[k] - before[k]) / largest);
-        }
-        motion.converged = motion.residual <= tolerance;
-        if (motion.converged) break;
+struct PeriodicMotion {
+    Status status = Status::done;
+    double time = 0.0;  // [s] reached, if the status is not done
+    Contact contact = input_contact;
+    bool converged = false;
+    bool smooth = true;     // whether the Jacobian is exact: no touch or graze among the switchings
+    int periods = 0;        // followed, all in all
+    int newton_steps = 0;   // of the attempt that converged
+    double residual = 0.0;  // largest change of a state over one period / its largest magnitude within it
+    double drift = 0.0;     // of the load angle over one period [rad]; the angle itself is neutral
+    Station start;          // at t = 0
+    Jacobian jacobian;      // of the map over one period, at the start
+};
+
+struct ShootingOptions {
+    double period = 1.0;       // [s]
+    int max_periods = 20000;   // to follow
+    double tolerance = 1e-10;  // of the residual
+    bool (*interrupted)(void*) = nullptr;
+    void* interrupted_context = nullptr;
+};
+
+class Shooting {
+ public:
+    // The inputs must repeat with the period. unit: as of ExactSolver.
+    Shooting(Workspace& workspace, const Signals& signals, double unit, const ShootingOptions& options)
+        : drive_(workspace.drive),
+          options_(options),
+          solver_(workspace.system, signals, unit, workspace.drive.balanced_scale(), &workspace.cache) {
+        solver_.interrupted = options.interrupted;
+        solver_.interrupted_context = options.interrupted_context;
     }
-    motion.time = solver.time();
-    motion.contact = solver.stopped_at();
-    return motion;
-}
+
+    PeriodicMotion solve(const Start& start) {
+        PeriodicMotion motion;
+        motion.status = solver_.begin(0.0, start.x, start.memory);
+        if (motion.status != Status::done) return motion;
+        Station here{solver_.state(), solver_.memory(), solver_.key()};
+        for (int follow = first_follow; motion.periods < options_.max_periods; follow *= 2) {
+            for (int k = 0; k < follow; ++k, ++motion.periods) {
+                Image image(drive_);
+                if (!advance(here, image, motion)) return motion;
+                motion.residual = residual(here, image);
+                // A motion that repeats to the last bit needs no more.
+                if (motion.residual == 0.0) return finish(motion, here, image, 0);
+                here = image.end;
+                here.x[load_angle] = 0.0;
+            }
+            if (newton(here, motion)) return motion;
+            if (motion.status == Status::interrupted) return motion;
+            motion.status = Status::done;  // a trial that strayed is no failure of the motion
+        }
+        return motion;
+    }
+
+    // Samples one period from a station: n_channels x samples.
+    Status sample(const Station& start, std::size_t samples, double* out) {
+        Sampler sampler(drive_, 0.0, options_.period / static_cast<double>(samples), samples, out);
+        const Status status = enter(start);
+        return status == Status::done ? solver_.advance(options_.period, sampler) : status;
+    }
+
+ private:
+    static constexpr int first_follow = 2;
+    static constexpr int max_newton = 15;
+
+    // A station after one period, and how it depends on the one before.
+    struct Image {
+        explicit Image(const Drive& drive) : sensitivity(drive) {}
+        Station end;
+        Sensitivity sensitivity;
+    };
+
+    Status enter(const Station& s) {
+        solver_.resume(0.0, s.x, s.memory, s.key);
+        return solver_.inputs_changed();
+    }
+
+    bool advance(const Station& from, Image& image, PeriodicMotion& motion) {
+        motion.status = enter(from);
+        if (motion.status == Status::done) motion.status = solver_.advance(options_.period, image.sensitivity);
+        motion.time = solver_.time();
+        motion.contact = solver_.stopped_at();
+        if (motion.status != Status::done) return false;
+        image.end = {solver_.state(), solver_.memory(), solver_.key()};
+        return true;
+    }
+
+    double residual(const Station& a, const Image& image) const {
+        const Station& b = image.end;
+        double worst = std::fabs(b.memory.hysteresis_capacity - a.memory.hysteresis_capacity) / torque_size();
+        if (b.key.modes[0] == 0 && b.key.modes[1] == 0 && b.key.modes[2] == 0)
+            worst = std::fmax(worst, std::fabs(b.memory.held_torque - a.memory.held_torque) / torque_size());
+        for (int k = 0; k < n_states; ++k)
+            if (k != load_angle && image.sensitivity.size[k] > 0.0)
+                worst = std::fmax(worst, std::fabs(b.x[k] - a.x[k]) / image.sensitivity.size[k]);
+        return worst;
+    }
+    double torque_size() const { return drive_.gearbox.rated_output_torque; }
+
+    PeriodicMotion& finish(PeriodicMotion& motion, const Station& start, const Image& image, int steps) const {
+        motion.converged = true;
+        motion.smooth = image.sensitivity.smooth;
+        motion.newton_steps = steps;
+        motion.start = start;
+        motion.jacobian = image.sensitivity.jacobian;
+        motion.drift = image.end.x[load_angle] - start.x[load_angle];
+        return motion;
+    }
+
+    // Newton's method from a station, as long as each step gains; true if it ends within the tolerance.
+    bool newton(Station y, PeriodicMotion& motion) {
+        double best = std::numeric_limits<double>::infinity();
+        for (int step = 0; step <= max_newton; ++step) {
+            Image image(drive_);
+            if (!advance(y, image, motion)) return false;
+            const double now = residual(y, image), before = best;
+            if (now < best) {
+                best = motion.residual = now;
+                finish(motion, y, image, step);
+                motion.converged = now <= options_.tolerance;
+            }
+            // Rounding ends the descent; above the tolerance, a step that gains nothing is no convergence.
+            if (now == 0.0 || now >= (motion.converged ? 0.5 : 1.0) * before || !step_from(y, image)) break;
+        }
+        return motion.converged;
+    }
+
+    // y + (1 - J)^-1 (image - y), leaving out the directions in which the motion is neutral.
+    bool step_from(Station& y, const Image& image) const {
+        constexpr std::array<int, n_components - 1> active{motor_torque, motor_speed,          load_speed,
+                                                           twist,        hysteresis_component, held_component};
+        constexpr int n = active.size();
+        std::array<std::array<double, n>, n> M{};
+        std::array<double, n> rhs{}, size{};
+        const auto value = [](const Station& s, int k) {
+            return k < n_states                ? s.x[k]
+                   : k == hysteresis_component ? s.memory.hysteresis_capacity
+                                               : s.memory.held_torque;
+        };
+        for (int r = 0; r < n; ++r) {
+            size[r] = active[r] < n_states ? image.sensitivity.size[active[r]] : torque_size();
+            if (!(size[r] > 0.0)) size[r] = 1.0;
+        }
+        for (int r = 0; r < n; ++r) {
+            rhs[r] = (value(image.end, active[r]) - value(y, active[r])) / size[r];
+            for (int c = 0; c < n; ++c)
+                M[r][c] =
+                    (r == c ? 1.0 : 0.0) - image.sensitivity.jacobian.row[active[r]][active[c]] * size[c] / size[r];
+        }
+        // Elimination with full pivoting; what is left without a pivot is neutral and stays.
+        std::array<int, n> column{};
+        for (int k = 0; k < n; ++k) column[k] = k;
+        int rank = 0;
+        for (; rank < n; ++rank) {
+            int row = rank, col = rank;
+            for (int r = rank; r < n; ++r)
+                for (int c = rank; c < n; ++c)
+                    if (std::fabs(M[r][c]) > std::fabs(M[row][col])) row = r, col = c;
+            if (!(std::fabs(M[row][col]) > neutral)) break;
+            std::swap(M[rank], M[row]);
+            std::swap(rhs[rank], rhs[row]);
+            for (auto& line : M) std::swap(line[rank], line[col]);
+            std::swap(column[rank], column[col]);
+            for (int r = rank + 1; r < n; ++r) {
+                const double factor = M[r][rank] / M[rank][rank];
+                for (int c = rank; c < n; ++c) M[r][c] -= factor * M[rank][c];
+                rhs[r] -= factor * rhs[rank];
+            }
+        }
+        std::array<double, n> delta{};
+        for (int r = rank - 1; r >= 0; --r) {
+            double sum = rhs[r];
+            for (int c = r + 1; c < rank; ++c) sum -= M[r][c] * delta[c];
+            delta[r] = sum / M[r][r];
+        }
+        for (int k = 0; k < rank; ++k) {
+            const int component = active[column[k]];
+            const double change = delta[k] * size[column[k]];
+            if (!std::isfinite(change)) return false;
+            if (component < n_states)
+                y.x[component] += change;
+            else if (component == hysteresis_component)
+                y.memory.hysteresis_capacity = std::fmax(0.0, y.memory.hysteresis_capacity + change);
+            else
+                y.memory.held_torque += change;
+        }
+        // What stands at the end of the period stands at its beginning, to the last bit.
+        y.key = image.end.key;
+        const Modes& modes = y.key.modes;
+        const int stuck = (modes[0] == 0) + (modes[1] == 0) + (modes[2] == 0);
+        if (modes[input_contact] == 0 || stuck >= 2) y.x[motor_speed] = 0.0;
+        if (modes[load_contact] == 0 || stuck >= 2) y.x[load_speed] = 0.0;
+        if (modes[twist_contact] == 0) y.x[load_speed] = y.x[motor_speed] * (1.0 / drive_.gearbox.ratio);
+        return true;
+    }
+
+    static constexpr double neutral = 1e-9;  // of a pivot, in units of the sizes
+
+    const Drive& drive_;
+    ShootingOptions options_;
+    ExactSolver<SwitchedDrive> solver_;
+};
 
 }  // namespace lostmotion

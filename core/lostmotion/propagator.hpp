@@ -29,6 +29,11 @@ struct Matrix {
             for (int r = 0; r < lanes; ++r) out[r] += column[c][r] * v[c];
         return out;
     }
+    friend Matrix operator+(Matrix a, const Matrix& b) {
+        for (int c = 0; c < n_states; ++c)
+            for (int r = 0; r < lanes; ++r) a.column[c][r] += b.column[c][r];
+        return a;
+    }
     friend Matrix operator*(const Matrix& a, const Matrix& b) {
         Matrix out;
         for (int c = 0; c < n_states; ++c) out.column[c] = a * b.column[c];
@@ -130,6 +135,22 @@ class Propagator {
         return y;
     }
 
+    // G(h) for any length: whole levels from the longest down, then the Taylor series.
+    Matrix integral(double h) {
+        Matrix sum;
+        const auto append = [&sum](const Matrix& change, const Matrix& integral) {
+            sum = sum + change * sum + integral;  // G(s + h) = G(h) + exp(A h) G(s)
+        };
+        for (int k = level_below(h); k >= 0; --k)
+            for (const double length = level(k).length; h >= length; h -= length)
+                append(steps_[k].change, steps_[k].integral);
+        if (h > 0.0) {
+            const Matrix rest = integral_series(h);
+            append(rate_ * rest, rest);
+        }
+        return sum;
+    }
+
     // Taylor series over at most one base interval, forward or backward.
     State series(double s, const State& x, const State& rate, const InputState& input) const {
         double left = norm_ * std::fabs(s);  // bound on the relative size of what follows
@@ -157,12 +178,25 @@ class Propagator {
         }
     }
 
+    // G over at most one base interval.
+    Matrix integral_series(double h) const {
+        Matrix term, sum;
+        for (int c = 0; c < n_states; ++c) term.column[c][c] = h;
+        for (int k = 1; k <= series_terms; ++k) {
+            for (int c = 0; c < n_states; ++c) add_scaled(sum.column[c], 1.0, term.column[c]);
+            term = rate_ * term;
+            for (int c = 0; c < n_states; ++c)
+                for (double& v : term.column[c]) v *= h / (k + 1);
+        }
+        return sum;
+    }
+
     void add_base(double h) {
         Step& s = steps_.emplace_back();
         s.length = h;
-        Matrix term, positive;
+        s.integral = integral_series(h);
+        Matrix positive;
         for (int c = 0; c < n_states; ++c) {
-            term.column[c][c] = h;
             for (int r = 0; r < n_states; ++r) {
                 const double a = rate_.column[c][r];
                 positive.column[c][r] = h * (r == c ? std::fmax(a, 0.0) : std::fabs(a));
@@ -170,12 +204,7 @@ class Propagator {
             s.growth.column[c][c] = 1.0;
         }
         Matrix bound = s.growth;
-        for (int k = 1; k <= series_terms; ++k) {
-            for (int c = 0; c < n_states; ++c) add_scaled(s.integral.column[c], 1.0, term.column[c]);
-            term = rate_ * term;
-            for (int c = 0; c < n_states; ++c)
-                for (double& v : term.column[c]) v *= h / (k + 1);
-            if (k > 8) continue;
+        for (int k = 1; k <= 8; ++k) {
             bound = positive * bound;
             for (int c = 0; c < n_states; ++c) {
                 for (double& v : bound.column[c]) v /= k;

@@ -17,6 +17,13 @@ if TYPE_CHECKING:
     from .drive_check import check_drive as check_drive
     from .errors import InputError as InputError
     from .explanation import explain as explain
+    from .harmonic_response import characteristics as characteristics
+    from .harmonic_response import frequency_response as frequency_response
+    from .harmonic_response import periodic_motion as periodic_motion
+    from .harmonic_response import periodic_motions as periodic_motions
+    from .harmonic_response import to_control as to_control
+    from .linear_analysis import LinearModel as LinearModel
+    from .linear_analysis import linearize as linearize
     from .loss_map_builder import build_loss_map as build_loss_map
     from .parts import ConstantEfficiency as ConstantEfficiency
     from .parts import Drive as Drive
@@ -52,6 +59,14 @@ _HOMES = {
     "errors": ("InputError",),
     "explanation": ("explain",),
     "data_sheet": ("GearboxSheet", "MotorSheet"),
+    "harmonic_response": (
+        "characteristics",
+        "frequency_response",
+        "periodic_motion",
+        "periodic_motions",
+        "to_control",
+    ),
+    "linear_analysis": ("LinearModel", "linearize"),
     "loss_map_builder": ("build_loss_map",),
     "parts": (
         "ConstantEfficiency",

@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy
 import numpy.typing
@@ -152,7 +152,9 @@ class Signal:
 
 def run(drive: Drive, command: Signal, load_torque: Signal, state: Sequence[float], hysteresis_capacity: float, duration: float, interval: float, samples: int, energy: bool, tolerance: float, max_switchings: int) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int, dict[str, float], list[float], float, float, int]: ...
 
-def follow_to_periodic(drive: Drive, command: Signal, load_torque: Signal, period: float, samples: int, max_periods: int, tolerance: float) -> tuple[numpy.typing.NDArray[numpy.float64], bool, int, float, float]: ...
+def respond(drive: Drive, points: Sequence[tuple[Signal, Signal, float, Sequence[float], float]], samples: int, harmonics: int, max_periods: int, tolerance: float, keep_table: bool, threads: int, progress: Callable[[int], None] | None = None) -> dict[str, numpy.typing.NDArray[numpy.float64]]: ...
+
+def linearization(drive: Drive, state: Sequence[float], hysteresis_capacity: float, inputs: Sequence[float], input_rates: Sequence[float]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], list[int]]: ...
 
 def explain_at(drive: Drive, command: Signal, load_torque: Signal, state: Sequence[float], hysteresis_capacity: float, time: float) -> tuple[list[float], list[tuple[float, ...]]]: ...
 

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from importlib.resources import as_file, files
 
-from .frequency_response import RigidConstants, rigid_constants
+from .linear_analysis import RigidConstants, rigid_constants
 from .scenario import Scenario, load
 
 MODELS = ("1-DOF-L", "2-DOF-L", "2-DOF-NL")

@@ -1,0 +1,141 @@
+// Harmonic response over many points: the periodic motion of each, its Fourier coefficients and mean powers, on several
+// threads. Points do not know of each other, so the result does not depend on the number of threads.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <numbers>
+#include <span>
+#include <thread>
+
+#include "periodic.hpp"
+
+namespace lostmotion {
+
+struct ResponsePoint {
+    Signals signals;      // constant, or of this period
+    double period = 1.0;  // [s] of the motion that is looked for
+    Start start;
+};
+
+struct ResponseSpec {
+    std::size_t samples = 2048;  // a period
+    int harmonics = 8;           // coefficients 0 (mean) to this
+    int max_periods = 20000;
+    double tolerance = 1e-10;
+    bool keep_table = false;  // of the samples, with each result
+};
+
+struct ResponseResult {
+    PeriodicMotion motion;
+    std::vector<double> harmonic;  // n_channels x (harmonics + 1) x (cos, sin), of exp(-i n w t) from t = 0
+    std::array<double, n_channels> mean_square{};
+    double motor_power = 0.0;   // [W] mean of M_D w_M
+    double load_power = 0.0;    // [W] mean of T_2 w
+    double gear_loss = 0.0;     // [W] mean of T_1 w_M - T_2 w
+    std::vector<double> table;  // n_channels x samples, if it is kept
+};
+
+// Coefficients c_n = 2/N sum x_k exp(-2 pi i n k / N) (n = 0: the mean) of one period of samples.
+inline void add_harmonics(std::span<const double> table, std::size_t samples, int harmonics, ResponseResult& result) {
+    std::vector<double> cosine(samples), sine(samples);
+    for (std::size_t k = 0; k < samples; ++k) {
+        const double angle = 2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(samples);
+        cosine[k] = std::cos(angle);
+        sine[k] = std::sin(angle);
+    }
+    result.harmonic.assign(static_cast<std::size_t>(n_channels * (harmonics + 1) * 2), 0.0);
+    for (int c = 0; c < n_channels; ++c) {
+        const double* x = table.data() + static_cast<std::size_t>(c) * samples;
+        double square = 0.0;
+        for (std::size_t k = 0; k < samples; ++k) square += x[k] * x[k];
+        result.mean_square[c] = square / static_cast<double>(samples);
+        for (int n = 0; n <= harmonics; ++n) {
+            double re = 0.0, im = 0.0;
+            std::size_t at = 0;
+            for (std::size_t k = 0; k < samples; ++k) {
+                re += x[k] * cosine[at];
+                im -= x[k] * sine[at];
+                at += static_cast<std::size_t>(n);
+                if (at >= samples) at -= samples;
+            }
+            const double scale = (n == 0 ? 1.0 : 2.0) / static_cast<double>(samples);
+            double* out = &result.harmonic[static_cast<std::size_t>((c * (harmonics + 1) + n) * 2)];
+            out[0] = scale * re;
+            out[1] = scale * im;
+        }
+    }
+}
+
+inline ResponseResult respond(Workspace& workspace, const ResponsePoint& point, const ResponseSpec& spec,
+                              std::vector<double>& table, bool (*interrupted)(void*), void* context) {
+    ResponseResult result;
+    ShootingOptions options;
+    options.period = point.period;
+    options.max_periods = spec.max_periods;
+    options.tolerance = spec.tolerance;
+    options.interrupted = interrupted;
+    options.interrupted_context = context;
+    Shooting shooting(workspace, point.signals, point.period / static_cast<double>(spec.samples), options);
+    result.motion = shooting.solve(point.start);
+    if (result.motion.status != Status::done || !result.motion.converged) return result;
+    table.resize(n_channels * spec.samples);
+    result.motion.status = shooting.sample(result.motion.start, spec.samples, table.data());
+    if (result.motion.status != Status::done) return result;
+    add_harmonics(table, spec.samples, spec.harmonics, result);
+    const auto channel = [&](Channel c) { return table.data() + static_cast<std::size_t>(c) * spec.samples; };
+    for (std::size_t k = 0; k < spec.samples; ++k) {
+        const double in = channel(ch_input_torque)[k] * channel(ch_motor_speed)[k];
+        const double out = channel(ch_output_torque)[k] * channel(ch_load_speed)[k];
+        result.motor_power += channel(ch_motor_torque)[k] * channel(ch_motor_speed)[k];
+        result.load_power += out;
+        result.gear_loss += in - out;
+    }
+    for (double* p : {&result.motor_power, &result.load_power, &result.gear_loss})
+        *p /= static_cast<double>(spec.samples);
+    if (spec.keep_table) result.table = table;
+    return result;
+}
+
+// A place where idle workspaces wait; each thread takes one.
+struct WorkspacePool {
+    virtual ~WorkspacePool() = default;
+    virtual std::unique_ptr<Workspace> take() = 0;
+    virtual void give_back(std::unique_ptr<Workspace>) = 0;
+};
+
+// waiting(done) is called by the calling thread now and then; false stops the work, and what is missing stays
+// `interrupted`.
+inline std::vector<ResponseResult> respond_all(WorkspacePool& pool, const std::vector<ResponsePoint>& points,
+                                               const ResponseSpec& spec, unsigned threads,
+                                               const std::function<bool(std::size_t)>& waiting) {
+    std::vector<ResponseResult> results(points.size());
+    for (ResponseResult& r : results) r.motion.status = Status::interrupted;
+    std::atomic<std::size_t> next{0}, done{0};
+    std::atomic<bool> stop{false};
+    const auto stopped = [](void* flag) { return static_cast<std::atomic<bool>*>(flag)->load(); };
+    const auto work = [&] {
+        std::unique_ptr<Workspace> workspace = pool.take();
+        std::vector<double> table;
+        for (std::size_t k = next++; k < points.size() && !stop; k = next++) {
+            results[k] = respond(*workspace, points[k], spec, table, stopped, &stop);
+            ++done;
+        }
+        pool.give_back(std::move(workspace));
+    };
+    std::vector<std::jthread> crew;
+    const std::size_t most = std::min<std::size_t>(std::max(1u, threads), points.size());
+    for (std::size_t k = 0; k < most; ++k) crew.emplace_back(work);
+    using namespace std::chrono_literals;
+    for (auto pause = 200us; done < points.size() && !stop;
+         pause = std::min(pause * 2, std::chrono::microseconds(20ms))) {
+        std::this_thread::sleep_for(pause);
+        if (!waiting(done)) stop = true;
+    }
+    crew.clear();
+    waiting(done);
+    return results;
+}
+
+}  // namespace lostmotion

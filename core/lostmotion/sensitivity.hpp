@@ -1,0 +1,177 @@
+// How the state at the end of a run depends on that at its beginning: the product of the matrix exponentials of the
+// regimes and of the jump (saltation) matrices at the switchings. Exact away from grazing.
+#pragma once
+
+#include <optional>
+
+#include "exact_solver.hpp"
+
+namespace lostmotion {
+
+// What a motion is made of between two instants: the states, and what the drive remembers.
+enum Component : int { hysteresis_component = n_states, held_component, n_components };
+
+using Components = std::array<double, n_components>;
+
+struct Jacobian {
+    std::array<Components, n_components> row{};
+
+    static Jacobian identity() {
+        Jacobian j;
+        for (int k = 0; k < n_components; ++k) j.row[k][k] = 1.0;
+        return j;
+    }
+    friend Jacobian operator*(const Jacobian& a, const Jacobian& b) {
+        Jacobian out;
+        for (int r = 0; r < n_components; ++r)
+            for (int k = 0; k < n_components; ++k)
+                if (a.row[r][k] != 0.0)
+                    for (int c = 0; c < n_components; ++c) out.row[r][c] += a.row[r][k] * b.row[k][c];
+        return out;
+    }
+};
+
+// Gradient of a form over the components.
+inline Components gradient(const LinearForm& f) {
+    Components g{};
+    for (int k = 0; k < n_states; ++k) g[k] = f.c[k];
+    g[hysteresis_component] = f.c[hysteresis_capacity];
+    g[held_component] = f.c[held_torque];
+    return g;
+}
+
+// Observer of the exact solver. At a switching where a guard g falls through zero the components jump from y to R(y,
+// t); a disturbance of y shifts the instant, too, so that it becomes (Leine and Nijmeijer 2004)
+//     (dR + (f_after - dR f_before - R_t) grad g / g') times itself.
+class Sensitivity {
+ public:
+    explicit Sensitivity(const Drive& drive) : drive_(drive) {}
+
+    Jacobian jacobian = Jacobian::identity();
+    State size{};        // largest magnitude of each state at the ends of the segments
+    bool smooth = true;  // false: a switching by a touch, or with a rate that is lost in rounding
+
+    bool segment(const Segment<SwitchedDrive>& s, const std::vector<InputBasis>& basis) {
+        if (!input_) input_.emplace(s.signals, basis);
+        for (int k = 0; k < n_states; ++k)
+            size[k] = std::fmax(size[k], std::fmax(std::fabs(s.x[k]), std::fabs(s.x_end[k])));
+        const Regime& r = s.entry.regime;
+        regime_ = &r;
+        x_ = s.x_end;
+        memory_ = s.memory;
+        if (!(s.end > s.begin)) return true;
+        const Matrix G = s.entry.propagator.integral(s.end - s.begin);
+        // x(s) = x + G x', column by column.
+        for (int c = 0; c < n_components; ++c) {
+            State rate{};
+            for (int row = 0; row < n_states; ++row) {
+                const Components g = gradient(r.rate[row]);
+                for (int k = 0; k < n_components; ++k) rate[row] += g[k] * jacobian.row[k][c];
+            }
+            const State change = G * rate;
+            for (int row = 0; row < n_states; ++row) jacobian.row[row][c] += change[row];
+        }
+        return true;
+    }
+
+    void switching(const Switching& w) {
+        const Regime &old = *regime_, next = drive_.build(w.after);
+        input_->anchor_left(w.time);
+        const auto u = input_->jet<2>();
+        Jacobian jump = Jacobian::identity();
+        const Components reset_rate = reset(w, old, u, jump);
+        if (w.guard >= 0) {
+            const Guard& guard = old.guards[w.guard];
+            const Components f = flow(old, x_, memory_, u[0]), after = flow(next, w.x, w.memory, u[0]);
+            State rate{};
+            std::copy_n(f.begin(), n_states, rate.begin());
+            const double fall = evaluate_rate(guard.form, rate, u[1]);
+            double noise = 0.0;
+            for (int k = 0; k < n_states; ++k) noise += std::fabs(guard.form.c[k] * rate[k]);
+            noise = rounding * (noise + std::fabs(guard.form.c[command] * u[1][0]) +
+                                std::fabs(guard.form.c[load_torque] * u[1][1]));
+            if (!(fall < -noise)) {
+                smooth = false;
+            } else {
+                const Components g = gradient(guard.form);
+                Components gap = after;
+                for (int r = 0; r < n_components; ++r) {
+                    gap[r] -= reset_rate[r];
+                    for (int k = 0; k < n_components; ++k) gap[r] -= jump.row[r][k] * f[k];
+                }
+                for (int r = 0; r < n_components; ++r)
+                    for (int c = 0; c < n_components; ++c) jump.row[r][c] += gap[r] * g[c] / fall;
+            }
+        }
+        jacobian = jump * jacobian;
+    }
+
+ private:
+    using InputRates = std::array<std::array<double, n_inputs>, 2>;
+
+    static Components flow(const Regime& r, const State& x, const Memory& m, const std::array<double, n_inputs>& u) {
+        Components f{};
+        for (int k = 0; k < n_states; ++k) f[k] = evaluate(r.rate[k], x, m, u);
+        return f;
+    }
+
+    // Derivative of what a switching sets anew: speeds that stop, the hysteresis, the torque that is held. Returns its
+    // derivative with respect to time.
+    Components reset(const Switching& w, const Regime& old, const InputRates& u, Jacobian& jump) const {
+        Components time_rate{};
+        std::array<bool, n_contacts> at_rest = old.at_rest;
+        if (w.guard >= 0 && w.kind == Guard::speed) at_rest[w.contact] = true;
+        if (at_rest[0] + at_rest[1] + at_rest[2] >= 2) at_rest = {true, true, true};
+        if (at_rest[input_contact]) jump.row[motor_speed] = {};
+        if (at_rest[load_contact]) jump.row[load_speed] = {};
+        if (at_rest[twist_contact]) {
+            jump.row[load_speed] = {};
+            if (!at_rest[load_contact])
+                for (int c = 0; c < n_components; ++c)
+                    jump.row[load_speed][c] = jump.row[motor_speed][c] / drive_.gearbox.ratio;
+        }
+        const bool turned = at_rest[twist_contact] && !old.at_rest[twist_contact] && drive_.gearbox.has_hysteresis();
+        const TorsionCurve& curve = drive_.gearbox.curve;
+        const double d = x_[twist];
+        const double stiffness = drive_.rigid() ? 0.0 : curve.slope(curve.locate(d));
+        if (turned) {
+            jump.row[hysteresis_component] = {};
+            jump.row[hysteresis_component][twist] = hysteresis_slope(d);
+        }
+        // The held torque matters only while all contacts stand.
+        jump.row[held_component] = {};
+        const Modes& modes = w.after.modes;
+        if (modes[0] != 0 || modes[1] != 0 || modes[2] != 0) return time_rate;
+        const double T_2 = evaluate(old.output_torque, x_, memory_, u[0]), held = w.memory.held_torque;
+        if (held == T_2) {
+            jump.row[held_component] = gradient(old.output_torque);
+            time_rate[held_component] =
+                old.output_torque.c[command] * u[1][0] + old.output_torque.c[load_torque] * u[1][1];
+        } else if (!drive_.rigid() && std::fabs(std::fabs(held - curve.torque(d)) - w.memory.hysteresis_capacity) <=
+                                          rounding * std::fabs(held)) {
+            const double sign = held > curve.torque(d) ? 1.0 : -1.0;
+            jump.row[held_component] = jump.row[hysteresis_component];
+            for (double& v : jump.row[held_component]) v *= sign;
+            jump.row[held_component][twist] += stiffness;
+        } else {
+            time_rate[held_component] = u[1][1];  // it follows the load torque, a friction torque off
+        }
+        return time_rate;
+    }
+
+    // d h/d d at a turning point (16).
+    double hysteresis_slope(double d) const {
+        const TorsionCurve& curve = drive_.gearbox.curve;
+        const double P = curve.torque(d);
+        return P == 0.0 ? 0.0 : drive_.gearbox.hysteresis_capacity(d) / P * curve.slope(curve.locate(d));
+    }
+
+    const Drive& drive_;
+    std::optional<InputState> input_;
+    // Where the last segment ended.
+    const Regime* regime_ = nullptr;
+    State x_{};
+    Memory memory_;
+};
+
+}  // namespace lostmotion
