@@ -26,7 +26,7 @@ SAMPLES_PER_PERIOD = 2048
 MAX_PERIODS = 20_000
 PERIODICITY = 1e-10  # largest change of a state over one period / its magnitude, for a motion to count as periodic
 NEUTRAL = 1e-6  # a Floquet multiplier this near 1 belongs to a direction in which a sticking drive may rest anywhere
-SAME = 1e-6  # solutions that differ by less, in parts of their size, are one
+SAME = 1e-5  # solutions that differ by less, in parts of their size, are one
 
 # Of the components that the core's Jacobian goes over: all but the load angle, which is neutral.
 COMPONENTS = (*STATES, "hysteresis_capacity", "held_torque")
@@ -215,27 +215,34 @@ def periodic_motions(
                 motion = periodic_motion(drive, command, load_torque, multiple=multiple, start=start)
             except RuntimeError:
                 continue
-            if not any(_same(motion, other) for other in found):
+            if not any(_same(drive, motion, other) for other in found):
                 found.append(motion)
     return found
 
 
-def _same(a: xarray.Dataset, b: xarray.Dataset) -> bool:
+def _same(drive: Drive, a: xarray.Dataset, b: xarray.Dataset) -> bool:
     """Whether two motions are one; that of the longer period is compared at each shift by the shorter one."""
     if a.attrs["period"] < b.attrs["period"]:
         a, b = b, a
+    g = drive.gearbox
+    # What is smaller than this does not tell motions apart.
+    least = {
+        "motor_speed": SAME * g.rated_input_speed,
+        "load_speed": SAME * g.rated_input_speed / g.ratio,
+        "output_torque": SAME * g.rated_output_torque,
+        "twist": 0.0,
+    }
     times = round(a.attrs["period"] / b.attrs["period"])
-    names = ("motor_torque", "motor_speed", "load_speed", "twist")
     t = a["time"].values
+    allowed = SAME if times == 1 else 1e-3  # between samples there is a straight line
     for shift in range(times):
+        at = (t + shift * b.attrs["period"]) % b.attrs["period"]
         gaps = []
-        for name in names:
+        for name, floor in least.items():
             x, y = a[name].values, b[name].values
-            other = np.interp(
-                (t + shift * b.attrs["period"]) % b.attrs["period"], b["time"].values, y, period=b.attrs["period"]
-            )
-            gaps.append(np.max(np.abs(x - other)) / max(np.max(np.abs(x)), np.max(np.abs(y)), 1e-300))
-        if max(gaps) < max(SAME, 1e-3 if times > 1 else 0.0):
+            other = y if times == 1 else np.interp(at, b["time"].values, y, period=b.attrs["period"])
+            gaps.append(np.max(np.abs(x - other)) / max(np.max(np.abs(x)), np.max(np.abs(y)), floor, 1e-300))
+        if max(gaps) < allowed:
             return True
     return False
 

@@ -1,0 +1,378 @@
+"""Periodic motion, frequency response and linear models."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from lostmotion.harmonic_response import PERIODICITY
+from lostmotion.linear_analysis import rigid_constants
+from lostmotion.paper import paper_scenario
+from lostmotion.variables import STATES
+
+NONLINEAR = paper_scenario("2-DOF-NL", "large").drive()
+
+
+def frictionless(model: str) -> lm.Drive:
+    """The analysis (9) to (11) drops the dry friction of the motor."""
+    drive = paper_scenario(model, "large").drive()
+    motor = drive.motor.model_copy(update={"friction_torque": 0.0})
+    return lm.Drive(motor=motor, gearbox=drive.gearbox, load=drive.load)
+
+
+def oscillator(*, stiffness=4.0, inertia=0.01, friction=0.0, damping=0.0, backlash=0.0) -> lm.Drive:
+    """A load on a spring: the input is a flywheel that stands still."""
+    return lm.Drive(
+        motor=lm.Motor(kind="torque_source", rotor_inertia=1e12),
+        gearbox=lm.Gearbox(
+            ratio=1.0,
+            rated_input_speed=100.0,
+            rated_output_torque=10.0,
+            stiffness=lm.TorsionCurve(slopes=(stiffness,), backlash=backlash),
+            losses=lm.ConstantEfficiency(efficiency=1.0),
+        ),
+        load=lm.Load(inertia=inertia, viscous_friction=damping, friction_torque=friction),
+    )
+
+
+def load_response(response, amplitude: float) -> np.ndarray:
+    return response["response"].sel(output="load_speed", amplitude=amplitude).values
+
+
+# --- linear ---
+
+
+def test_rigid_drive_follows_the_closed_form_over_four_decades():
+    drive = frictionless("1-DOF-L")
+    frequencies = np.geomspace(0.1, 1000.0, 9)
+    response = load_response(lm.frequency_response(drive, frequencies, 0.5), 0.5)
+    closed = rigid_constants(drive).response(frequencies, 90.0)
+    assert np.max(np.abs(response / closed - 1.0)) < 1e-10
+
+
+def test_linear_presets_follow_python_control_over_four_decades():
+    frequencies = np.geomspace(0.1, 1000.0, 9)
+    for model in ("1-DOF-L", "2-DOF-L"):
+        drive = frictionless(model)
+        nonlinear = lm.frequency_response(drive, frequencies, 0.5)
+        system = lm.linearize(drive).to_control()
+        for output in ("load_speed", "motor_speed", "output_torque"):
+            own = nonlinear["response"].sel(output=output, amplitude=0.5).values
+            theirs = system[output, "command"](2j * np.pi * frequencies)
+            assert np.max(np.abs(own / theirs - 1.0)) < 1e-10, (model, output)
+
+
+def test_two_mass_resonance_and_antiresonance():
+    # 700 N·m/rad between two inertias of 0.005 kg m2: 84.217 and 59.550 Hz.
+    drive = lm.Drive(
+        motor=lm.Motor(kind="torque_source", rotor_inertia=0.005),
+        gearbox=lm.Gearbox(
+            ratio=1.0,
+            rated_input_speed=100.0,
+            rated_output_torque=1.0,
+            stiffness=lm.LinearStiffness(stiffness=700.0),
+            losses=lm.ConstantEfficiency(efficiency=1.0),
+        ),
+        load=lm.Load(inertia=0.005),
+    )
+    model = lm.linearize(drive)
+    ((resonance, damping),) = model.resonances()
+    assert resonance == pytest.approx(84.217, abs=5e-4)
+    assert damping == pytest.approx(0.0, abs=1e-12)
+    ((antiresonance, _),) = model.antiresonances("motor_speed")
+    assert antiresonance == pytest.approx(59.550, abs=5e-4)
+
+
+def test_linearisation_holds_where_the_input_sticks():
+    model = lm.linearize(NONLINEAR)  # at rest, command 0
+    assert model.contacts["input_contact"] == 0
+    assert np.all(model.A[1] == 0.0)  # the rotor does not move
+    moving = lm.linearize(NONLINEAR, lm.Initial(motor_speed=100.0, load_speed=100.0 / 90.0, twist=2e-3), command=0.4)
+    assert moving.contacts["input_contact"] == 1
+    # Exact: a run that stays in the regime follows the matrix exponential.
+    import scipy.linalg
+
+    start = lm.Initial(motor_speed=100.0, load_speed=1.2, twist=2e-3, hysteresis_capacity=1.0)
+    model = lm.linearize(NONLINEAR, start, command=0.4)
+    run = lm.simulate(NONLINEAR, command=0.4, initial=start, duration=2e-4, sample_interval=2e-4)
+    assert run.sizes["switching"] == 0
+    n = len(STATES)
+    whole = np.zeros((n + 1, n + 1))
+    whole[:n, :n] = model.A
+    whole[:n, n] = model.B[:, 0] * 0.4 + model.rate
+    x0 = np.array([getattr(start, s) for s in STATES] + [1.0])
+    end = scipy.linalg.expm(whole * 2e-4) @ x0
+    for k, name in enumerate(STATES):
+        assert float(run[name][-1]) == pytest.approx(end[k], rel=1e-11, abs=1e-14)
+
+
+def test_scipy_and_control_get_the_same_model():
+    model = lm.linearize(frictionless("2-DOF-L"))
+    theirs, own = model.to_scipy(), model.to_control()
+    for name in ("A", "B", "C", "D"):
+        assert np.array_equal(getattr(theirs, name), getattr(model, name))
+        assert np.array_equal(getattr(own, name), getattr(model, name))
+    assert own.input_labels == ["command", "load_torque"]
+    assert own.output_labels[2] == "load_speed"
+    with pytest.raises(KeyError, match="there is no 'load_sped'"):
+        model.response(1.0, "load_sped")
+
+
+# --- periodic motion ---
+
+
+def test_shooting_agrees_with_long_transients():
+    for amplitude, frequency in ((1.0275, 3.0), (0.025, 5.0), (0.1, 20.0)):
+        command = lm.CommandSignal(amplitude=amplitude, frequency=frequency)
+        motion = lm.periodic_motion(NONLINEAR, command)
+        assert motion.attrs["residual"] < 1e-12
+        periods = 200
+        run = lm.simulate(
+            NONLINEAR, command=command, duration=periods / frequency, sample_interval=1.0 / (64 * frequency)
+        )
+        for name in ("motor_torque", "motor_speed", "load_speed", "twist"):
+            last, own = run[name].values[-65:-1], motion[name].values[::32]
+            assert np.max(np.abs(last - own)) < 1e-9 * np.max(np.abs(own)), (amplitude, name)
+
+
+@pytest.mark.parametrize(("amplitude", "frequency"), [(0.3, 40.0), (1.0, 60.0), (0.06, 25.0), (0.025, 15.0)])
+def test_the_jacobian_agrees_with_finite_differences_of_the_return_map(amplitude: float, frequency: float):
+    command = lm.CommandSignal(amplitude=amplitude, frequency=frequency)
+    motion = lm.periodic_motion(NONLINEAR, command)
+    assert motion.attrs["smooth"]
+    names = [*STATES[:4], "hysteresis_capacity"]
+    start = {name: motion.attrs[f"start_{name}"] for name in (*STATES, "hysteresis_capacity")}
+
+    def after_one_period(changed: dict[str, float]) -> np.ndarray:
+        run = lm.simulate(
+            NONLINEAR,
+            command=command,
+            duration=1.0 / frequency,
+            sample_interval=1.0 / frequency,
+            initial=lm.Initial(**(start | changed)),
+            energy=False,
+        )
+        end = json.loads(run.attrs["end_state"])
+        return np.array([end[name] for name in names])
+
+    assert np.allclose(after_one_period({}), [start[n] for n in names], rtol=1e-9, atol=1e-13)
+    sizes = {name: float(abs(motion[name]).max()) for name in STATES[:4]} | {"hysteresis_capacity": 1.0}
+    scale = np.array([sizes[n] for n in names])
+    for name in names:
+        if name == "motor_speed" and start[name] == 0.0:
+            continue  # a standing shaft has no neighbours to both sides of it
+        # Central difference with a step of 1e-6: error 1e-12 of the curvature, and 1e-9 from rounding.
+        step = 1e-6 * sizes[name]
+        forward, backward = (after_one_period({name: start[name] + s * step}) for s in (1, -1))
+        numeric = (forward - backward) / (2.0 * step)
+        exact = motion["jacobian"].sel(by=name, to=names).values
+        assert np.max(np.abs(exact - numeric) / scale) * sizes[name] < 1e-5, name
+
+
+def test_floquet_multipliers_tell_decay():
+    # Damped oscillator: multipliers exp((-xi +- i sqrt(1 - xi^2)) omega T).
+    k, J, xi, f = 4.0, 0.01, 0.1, 5.0
+    omega = math.sqrt(k / J)
+    motion = lm.periodic_motion(
+        oscillator(damping=2.0 * xi * omega * J), load_torque=lm.TorqueSignal(amplitude=0.1, frequency=f)
+    )
+    size = math.exp(-xi * omega / f)
+    found = np.hypot(motion.attrs["multipliers_real"], motion.attrs["multipliers_imag"])
+    # motor speed stays what it is (1), twist and load speed decay; twist and angle of the flywheel are tied.
+    assert np.sum(np.abs(found - size) < 1e-9) == 2
+    assert motion.attrs["stable"]
+
+
+def test_stuck_all_period_is_a_solution_with_no_response():
+    response = lm.frequency_response(NONLINEAR, [0.5, 5.0], [0.01])
+    assert np.all(response["reason"].values == "")
+    assert np.all(load_response(response, 0.01) == 0.0)
+    # That is the dead zone: friction holds whatever the command of 0.01 gives.
+    assert lm.characteristics(response, NONLINEAR).attrs["dead_zone_forward"] > 0.01
+
+
+def test_a_drifting_load_is_periodic_all_the_same():
+    command = lm.CommandSignal(mean=0.5, amplitude=0.1, frequency=2.0)
+    motion = lm.periodic_motion(NONLINEAR, command)
+    assert motion.attrs["residual"] < 1e-12
+    assert motion.attrs["drift"] == pytest.approx(float(motion["load_speed"].mean()) * 0.5, rel=1e-9)
+    assert motion.attrs["drift"] > 0.1
+
+
+def test_coexisting_motions_and_subharmonics_of_a_load_in_backlash():
+    # A load that rattles through its backlash at three times its period, beside one that swings inside the gap.
+    k, J = 39.478, 0.01
+    drive = oscillator(stiffness=k, inertia=J, damping=2 * 0.02 * math.sqrt(k * J), backlash=2e-3)
+    torque = lm.TorqueSignal(amplitude=1e-3 * k, frequency=20.0)
+    starts = [lm.Initial(), lm.Initial(twist=5e-3), lm.Initial(twist=5e-3, load_speed=0.3)]
+    found = lm.periodic_motions(drive, load_torque=torque, starts=starts, multiples=(1, 3))
+    tall = [m for m in found if float(np.ptp(m["twist"].values)) > 2e-3]
+    assert {round(m.attrs["period"] * 20.0) for m in tall} == {3}
+    assert all(m.attrs["stable"] and m.attrs["residual"] < PERIODICITY for m in tall)
+    assert any(round(m.attrs["period"] * 20.0) == 1 for m in found)
+    # The transient from a tall motion stays with it.
+    m = tall[0]
+    start = {name: m.attrs[f"start_{name}"] for name in STATES}
+    run = lm.simulate(
+        drive,
+        load_torque=torque,
+        duration=30 * m.attrs["period"],
+        sample_interval=m.attrs["period"] / 64,
+        initial=lm.Initial(**start),
+    )
+    assert np.max(np.abs(run["twist"].values[-65:-1] - m["twist"].values[::32])) < 1e-6 * 4e-3
+
+
+# --- Coulomb friction, closed forms ---
+
+
+@pytest.mark.parametrize("r", [0.5, 0.8, 1.3, 2.0])
+def test_den_hartogs_oscillator_with_dry_friction(r: float):
+    """J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction, Trans. ASME 53 (1931) APM-53-9.
+
+    Without a stop: amplitude x0 = (P/k) sqrt(V^2 - (F/P)^2 U^2) with V = 1/(1 - r^2), U = sin(pi/r)/(r (1 + cos(pi/r))).
+    """
+    k, J, P, F = 4.0, 0.01, 1.0, 0.15
+    omega = math.sqrt(k / J)
+    drive = oscillator(stiffness=k, inertia=J, friction=F)
+    torque = lm.TorqueSignal(amplitude=P, frequency=r * omega / (2.0 * math.pi))
+    motion = lm.periodic_motion(drive, load_torque=torque)
+    V, U = 1.0 / (1.0 - r * r), math.sin(math.pi / r) / (r * (1.0 + math.cos(math.pi / r)))
+    amplitude = P / k * math.sqrt(V * V - (F / P) ** 2 * U * U)
+    assert not np.any(motion["load_contact"].values[motion["load_speed"].values != 0.0] == 0)
+    # The highest of 2048 samples lies below the crest by (pi/2048)^2/2.
+    assert 0.5 * float(np.ptp(motion["twist"].values)) == pytest.approx(amplitude, rel=3e-6)
+
+
+def stops(share: float) -> tuple[int, lm.Drive, "object"]:
+    """Number of stretches in which a free mass under P sin(wt) stands still, with friction F = share P."""
+    drive = oscillator(stiffness=1e-9, friction=share)
+    drive = drive.model_copy(
+        update={"gearbox": drive.gearbox.model_copy(update={"stiffness": lm.TorsionCurve(slopes=(1e-9,))})}
+    )
+    motion = lm.periodic_motion(drive, load_torque=lm.TorqueSignal(amplitude=1.0, frequency=1.0))
+    stuck = motion["load_contact"].values == 0
+    return int(np.sum(stuck & ~np.roll(stuck, 1))), drive, motion
+
+
+def test_stick_slip_boundary_and_two_stops_of_a_mass_with_dry_friction():
+    # Without stops the friction is a square wave in step with the speed; it may be up to P/sqrt(1 + (pi/2)^2).
+    boundary = 1.0 / math.sqrt(1.0 + (math.pi / 2.0) ** 2)
+    assert stops(0.98 * boundary)[0] == 0
+    count, _, motion = stops(1.02 * boundary)
+    assert count == 2
+    # With stops: it starts where P sin = F, and stops where the impulse since then is zero.
+    F = 0.75
+    count, _, motion = stops(F)
+    assert count == 2
+    begin = math.asin(F)
+    from scipy.optimize import brentq
+
+    end = brentq(lambda x: math.cos(begin) - math.cos(x) - F * (x - begin), begin + 0.5, begin + math.pi)
+    moving = np.flatnonzero(motion["load_contact"].values != 0)
+    moves = (end - begin) / math.pi * len(motion["time"])  # twice a period
+    assert len(moving) == pytest.approx(moves, abs=2)
+
+
+# --- the response ---
+
+
+def test_the_result_does_not_depend_on_the_number_of_threads():
+    frequencies, amplitudes = np.geomspace(0.3, 30.0, 7), [0.02, 0.3]
+    one, two, five = (lm.frequency_response(NONLINEAR, frequencies, amplitudes, threads=n) for n in (1, 2, 5))
+    assert one.identical(two)
+    assert one.identical(five)
+
+
+def test_motions_of_the_response_repeat_to_rounding():
+    response = lm.frequency_response(NONLINEAR, np.geomspace(0.1, 100.0, 16), [0.025, 0.2, 1.0275])
+    assert np.all(response["reason"].values == "")
+    assert float(response["residual"].max()) < 1e-12
+    assert np.all(response["stable"].values)
+    assert np.all(np.abs(response["drift"].values) < 1e-9)
+
+
+def test_response_depends_on_amplitude_as_in_the_paper():
+    response = lm.frequency_response(NONLINEAR, np.geomspace(0.1, 20.0, 20), [0.025, 1.0275])
+    gain = np.abs(response["response"].sel(output="load_speed").values)
+    assert gain[0, 0] < 0.5 * gain[1, 0]
+    band = lm.characteristics(response, NONLINEAR)
+    assert float(band["bandwidth"].sel(amplitude=1.0275)) == pytest.approx(2.45, rel=0.15)
+    # Mean power: what the motor gives goes into gear, dampers and friction; the gear loses some of it.
+    assert np.all(response["gear_loss"].values > 0.0)
+    assert np.all(response["motor_power"].values > response["gear_loss"].values)
+
+
+def test_load_torque_as_the_source_gives_compliance():
+    # A linear oscillator: F(twist)/F(M_Z) = 1/(k - J w^2 + i b w), with the sign of a torque that pulls back.
+    k, J, b = 4.0, 0.01, 0.02
+    frequencies = np.array([0.5, 2.0, 6.0])
+    response = lm.frequency_response(
+        oscillator(stiffness=k, inertia=J, damping=b), frequencies, [0.1], source="load_torque"
+    )
+    w = 2.0 * np.pi * frequencies
+    own = response["response"].sel(output="twist", amplitude=0.1).values
+    assert np.max(np.abs(own * (k - J * w**2 + 1j * b * w) - 1.0)) < 1e-9
+
+
+def test_frequencies_are_added_where_the_curve_bends():
+    drive = frictionless("2-DOF-L")
+    coarse = np.geomspace(10.0, 300.0, 8)
+    response = lm.frequency_response(drive, coarse, [0.1], refine=0.5)
+    added = sorted(set(response["frequency"].values.tolist()) - set(coarse.tolist()))
+    assert len(added) >= 8
+    # Most of them about the anti-resonance-resonance pair, which is all there is to see.
+    (f_r, _) = lm.linearize(drive).resonances()[-1]
+    near = [f for f in added if f_r / 3.0 < f < f_r * 3.0]
+    assert len(near) > 0.6 * len(added)
+    exact = lm.linearize(drive).response(response["frequency"].values)
+    assert np.max(np.abs(load_response(response, 0.1) / exact - 1.0)) < 1e-9
+
+
+def test_control_gets_the_response_as_data():
+    response = lm.frequency_response(NONLINEAR, [0.5, 1.0, 5.0], [0.025, 1.0275])
+    data = lm.to_control(response, 1.0275)
+    assert np.allclose(
+        data.frequency_response(2 * np.pi * np.array([1.0])).frdata.ravel(), load_response(response, 1.0275)[1]
+    )
+
+
+@pytest.mark.parametrize(
+    ("call", "match"),
+    [
+        (lambda: lm.frequency_response(NONLINEAR, [], [1.0]), "at least one"),
+        (lambda: lm.frequency_response(NONLINEAR, [-1.0], [1.0]), "positive"),
+        (lambda: lm.frequency_response(NONLINEAR, [1.0], [0.0]), "positive"),
+        (lambda: lm.frequency_response(NONLINEAR, [1.0], [0.1], source="reference"), "must be command or load_torque"),
+        (lambda: lm.periodic_motion(NONLINEAR, 0.3), "at least one sine"),
+        (lambda: lm.periodic_motion(NONLINEAR, lm.CommandSignal(steps=[{"height": 1.0}])), "mean and sines only"),
+        (
+            lambda: lm.periodic_motion(NONLINEAR, lm.CommandSignal(amplitude=1.0, frequency=1.0), multiple=0),
+            "1 or more",
+        ),
+        (
+            lambda: lm.periodic_motion(
+                NONLINEAR,
+                lm.CommandSignal(sines=[{"amplitude": 1, "frequency": 1}, {"amplitude": 1, "frequency": math.pi}]),
+            ),
+            "no common period",
+        ),
+    ],
+)
+def test_bad_questions_get_one_clear_answer(call, match: str):
+    with pytest.raises(ValueError, match=match):
+        call()
+
+
+def test_a_motion_that_does_not_settle_is_reported_and_not_made_up():
+    motion = "no periodic motion was found: not periodic after"
+    with pytest.raises(RuntimeError, match=motion):
+        # An undamped oscillator keeps its free swing for ever, and Newton has none to choose.
+        lm.periodic_motion(
+            oscillator(backlash=1e-3),
+            load_torque=lm.TorqueSignal(amplitude=0.5, frequency=3.183098861837907),
+            start=lm.Initial(twist=0.02),
+            max_periods=6,
+        )
