@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Iterator
@@ -159,6 +160,97 @@ def run(
         figure = overview(result)
         write_whole(plot, figure.savefig)
         print(f"Figure written to {plot}")
+
+
+@app.command()
+def response(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="Scenario file; only its drive counts.")],
+    amplitudes: Annotated[
+        str, typer.Option("--amplitudes", help="0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many).")
+    ] = "0.02..1:6",
+    frequencies: Annotated[str, typer.Option("--frequencies", help="[Hz], as the amplitudes.")] = "0.1..100:60",
+    source: Annotated[str, typer.Option("--input", help="command or load_torque: what is a sine.")] = "command",
+    variable: Annotated[str, typer.Option("--variable", help="Which variable's response to draw.")] = "load_speed",
+    refine: Annotated[
+        float | None, typer.Option("--refine", metavar="DB", help="Add frequencies where a curve bends by more.")
+    ] = None,
+    compare: Annotated[
+        list[Path] | None,
+        typer.Option("--compare", metavar="OTHER.toml", help="Overlay the drive of another scenario."),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in `run`.")
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
+        "response"
+    ),
+) -> None:
+    """Frequency response over amplitude: each point from a motion that truly repeats, on all cores.
+
+    Writes Bode figures (bode.png, .svg, .csv), maps of gain, phase, efficiency and distortion over amplitude and
+    frequency (maps.png, .svg), and all numbers (response.csv, response.nc, characteristics.csv).
+
+    \b
+    lostmotion response drive.toml --amplitudes 0.025,1 --frequencies 0.1..100:60
+    lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
+    """
+    from .errors import InputError
+    from .response_sheet import parse_grid
+    from .scenario import load
+    from .variables import CHANNELS
+
+    wanted, grid = parse_grid(amplitudes, "amplitudes"), parse_grid(frequencies, "frequencies")
+    if source not in ("command", "load_torque"):
+        raise InputError(f"--input {source}: must be command or load_torque")
+    names = [v.name for v in CHANNELS]
+    if variable not in names:
+        raise InputError(f"--variable {variable}: must be one of {', '.join(names)}")
+    if output.exists() and not output.is_dir():
+        raise InputError(f"{output}: is a file; -o names a directory")
+    loaded = {scenario.stem: load(scenario, overrides or ())}
+    for path in compare or ():
+        loaded[path.stem] = load(path)
+    from .harmonic_response import Source, frequency_response
+    from .response_sheet import write_response
+
+    responses = {}
+    with _progress(len(loaded) * len(wanted) * len(grid), "Response") as step:
+        for name, s in loaded.items():
+            kind: Source = "command" if source == "command" else "load_torque"
+            responses[name] = frequency_response(
+                s.drive(),
+                grid,
+                wanted,
+                source=kind,
+                mean_command=s.command.mean,
+                mean_load_torque=s.load.torque.mean,
+                refine=refine,
+                progress=step,
+            )
+    first = loaded[scenario.stem]
+    try:
+        figure, found = write_response(output, responses, first.drive(), variable)
+    except OSError as error:
+        raise InputError(f"{output}: cannot be written: {error.strerror}") from None
+    result = responses[scenario.stem]
+    print(first.title or scenario.stem)
+    for a in found["amplitude"].values:
+        band, cross = (float(found[k].sel(amplitude=a)) for k in ("bandwidth", "phase_crossover"))
+        text = [f"-3 dB at {band:.4g} Hz" if math.isfinite(band) else "-3 dB outside the frequencies, or no motion"]
+        text += [f"-180 degrees at {cross:.4g} Hz"] if math.isfinite(cross) else []
+        print(f"  amplitude {a:g}: {', '.join(text)}")
+    print(
+        f"  dead zone: from rest the load moves above a constant command of {found.attrs['dead_zone_forward']:.4g} and "
+        f"below {found.attrs['dead_zone_backward']:.4g}"
+    )
+    reasons = [r for r in result["reason"].values.ravel() if r]
+    print(
+        f"  {result['reason'].size - len(reasons)} of {result['reason'].size} motions found, repeating within "
+        f"{float(result['residual'].where(result['reason'] == '').max()):.1e} of their size"
+    )
+    for reason in dict.fromkeys(reasons):
+        print(f"  not found at {reasons.count(reason)} point(s): {reason}")
+    print(f"Figures and tables are in {figure.parent}")
 
 
 @app.command()

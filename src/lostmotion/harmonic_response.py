@@ -259,7 +259,7 @@ def frequency_response(
     refine: float | None = None,
     threads: int | None = None,
     max_periods: int = MAX_PERIODS,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[], None] | None = None,
 ) -> xarray.Dataset:
     """Response by harmonic linearisation (describing functions): harmonics of all outputs over one sinusoidal input.
 
@@ -283,7 +283,7 @@ def frequency_response(
     threads
         All cores, if left out.
     progress
-        Called with the number of points done.
+        Called after each point.
 
     Returns
     -------
@@ -303,12 +303,16 @@ def frequency_response(
         raise ValueError("amplitudes must be positive; give at least one")
     if source not in ("command", "load_torque"):
         raise ValueError(f"source {source!r} is not known; it must be command or load_torque")
-    finished = 0
 
     def compute(new: Sequence[float]) -> xarray.Dataset:
+        seen = 0
+
         def report(done: int) -> None:
-            if progress is not None:
-                progress(finished + done)
+            nonlocal seen
+            for _ in range(done - seen):
+                if progress is not None:
+                    progress()
+            seen = done
 
         points = [
             (*_signals(source, a, f, mean_command, mean_load_torque), 1.0 / f, Initial())
@@ -327,7 +331,6 @@ def frequency_response(
         return _labelled(r, amplitudes, new, source, harmonics)
 
     result = compute(frequencies)
-    finished = len(amplitudes) * len(frequencies)
     for _ in range(4 if refine is not None else 0):
         assert refine is not None
         new = _bends(result, refine)
@@ -336,7 +339,6 @@ def frequency_response(
         import xarray as xr
 
         more = compute(new)
-        finished += len(amplitudes) * len(new)
         result = xr.concat([result, more], dim="frequency", combine_attrs="override").sortby("frequency")
     return result
 

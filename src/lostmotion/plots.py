@@ -67,6 +67,11 @@ class Curve:
     x: Any
     y: Any
     style: Mapping[str, Any]
+    legend: str | None = None  # in the figure, if not the label; "_": none
+
+    @property
+    def shown(self) -> str:
+        return self.label if self.legend is None else self.legend
 
 
 @dataclass(frozen=True)
@@ -91,7 +96,7 @@ def draw(panels: Iterable[Panel], columns: int, size: tuple[float, float], note:
     for k, panel in enumerate(panels):
         axes = figure.add_subplot(rows, columns, k + 1)
         for curve in panel.curves:
-            axes.plot(curve.x, curve.y, label=curve.label, **curve.style)
+            axes.plot(curve.x, curve.y, label=curve.shown, **curve.style)
         if panel.log_x:
             axes.set_xscale("log")
         if panel.log_y:
@@ -104,7 +109,7 @@ def draw(panels: Iterable[Panel], columns: int, size: tuple[float, float], note:
             axes.set_ylim(*panel.y_range)
         elif panel.x_range is not None:
             axes.set_ylim(*_range_within(panel.curves, panel.x_range))
-    labels = [[c.label for c in panel.curves] for panel in panels]
+    labels = [[c.shown for c in panel.curves] for panel in panels]
     if len(labels[0]) > 1 and all(names == labels[0] for names in labels):
         figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=8.5)
     else:
@@ -192,4 +197,22 @@ def loss_map(speeds: Any, loads: Any, values: Any, note: str = "") -> Figure:
     curves.legend(fontsize=8, ncols=2)
     if note:
         figure.supxlabel(note, fontsize=8, color="0.35")
+    return figure
+
+
+def amplitude_maps(frequency: Any, amplitude: Any, maps: Mapping[str, tuple[str, Any]], amplitude_label: str) -> Figure:
+    """Contours over frequency [Hz] and amplitude: maps[title] = (label of the values, values[amplitude, frequency])."""
+    figure = Figure(figsize=(10.0, 3.4 * -(-len(maps) // 2)))
+    for k, (title, (label, values)) in enumerate(maps.items()):
+        axes = figure.add_subplot(-(-len(maps) // 2), 2, k + 1)
+        shown = np.ma.masked_invalid(values)
+        axes.set(xscale="log", yscale="log", title=title, xlabel="frequency [Hz]", ylabel=amplitude_label)
+        axes.title.set_fontsize(10)
+        axes.grid(visible=False)
+        if shown.count() == 0 or float(np.ptp(shown.compressed())) == 0.0:
+            axes.text(0.5, 0.5, "nothing to show", transform=axes.transAxes, ha="center", color="0.35")
+            continue
+        filled = axes.contourf(frequency, amplitude, shown, levels=14, cmap="cividis")
+        figure.colorbar(filled, ax=axes, label=label)
+        axes.contour(frequency, amplitude, shown, levels=14, colors="0.15", linewidths=0.4)
     return figure

@@ -100,15 +100,7 @@ def compute(progress: Callable[[], None] = lambda: None) -> Results:
             results.runs[model, amplitude] = simulate(paper_scenario(model, amplitude))
             progress()
     drive = paper_scenario("2-DOF-NL", "large").drive()
-    seen = 0
-
-    def report(done: int) -> None:
-        nonlocal seen
-        for _ in range(done - seen):
-            progress()
-        seen = done
-
-    results.response = frequency_response(drive, list(FREQUENCIES), list(AMPLITUDES.values()), progress=report)
+    results.response = frequency_response(drive, list(FREQUENCIES), list(AMPLITUDES.values()), progress=progress)
     if any(reasons := [r for r in results.response["reason"].values.ravel() if r]):
         raise RuntimeError(f"figures 17 and 18: {reasons[0]}")
     return results
