@@ -2,11 +2,17 @@
 
 import json
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import lostmotion as lm
+from conftest import ROOT
+from lostmotion.cli import app
 from lostmotion.harmonic_response import PERIODICITY
 from lostmotion.linear_analysis import rigid_constants
 from lostmotion.paper import paper_scenario
@@ -376,3 +382,64 @@ def test_a_motion_that_does_not_settle_is_reported_and_not_made_up():
             start=lm.Initial(twist=0.02),
             max_periods=6,
         )
+
+
+# --- the command ---
+
+
+def test_the_command_writes_figures_and_tables(tmp_path: Path):
+    linear = ROOT / "scenarios" / "paper-2dof-l-large.toml"
+    words = [
+        "--amplitudes",
+        "0.01,0.1,1",
+        "--frequencies",
+        "0.5..20:6",
+        "--compare",
+        str(linear),
+        "-o",
+        str(tmp_path / "out"),
+    ]
+    done = CliRunner().invoke(app, ["response", str(ROOT / "scenarios" / "paper-2dof-nl-large.toml"), *words])
+    assert done.exit_code == 0, done.output
+    assert "18 of 18 motions found" in done.output
+    assert "dead zone" in done.output
+    names = {p.name for p in (tmp_path / "out").iterdir()}
+    assert {
+        "bode.png",
+        "bode.svg",
+        "bode.csv",
+        "maps.png",
+        "maps.svg",
+        "response.csv",
+        "response.nc",
+        "characteristics.csv",
+    } == names
+    import xarray as xr
+
+    with xr.open_dataset(tmp_path / "out" / "response.nc") as opened:
+        stored = opened.load()
+    own = lm.frequency_response(NONLINEAR, np.geomspace(0.5, 20.0, 6), [0.01, 0.1, 1.0])
+    assert np.array_equal(stored["response_real"].values, own["response"].values.real)
+    table = np.genfromtxt(tmp_path / "out" / "response.csv", delimiter=",", skip_header=1, usecols=range(4))
+    values = own["response"].sel(output="load_speed").values.ravel()
+    assert np.allclose(table[:, 2], np.abs(values), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("words", "match"),
+    [
+        (["--amplitudes", "a"], "--amplitudes a: must be numbers"),
+        (["--amplitudes", "0,1"], "above 0"),
+        (["--frequencies", "1..x:3"], "--frequencies 1..x:3"),
+        (["--input", "reference"], "--input reference"),
+        (["--variable", "speed"], "--variable speed"),
+        (["--compare", "none.toml"], "no such file"),
+    ],
+)
+def test_the_command_refuses_bad_options_in_one_line(tmp_path: Path, words: list[str], match: str):
+    command = [sys.executable, "-m", "lostmotion", "response", str(ROOT / "scenarios" / "paper-1dof-l-large.toml")]
+    done = subprocess.run([*command, *words, "-o", str(tmp_path / "o")], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert match in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "o").exists()
