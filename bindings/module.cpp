@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 
+#include "lostmotion/batch.hpp"
 #include "lostmotion/explain.hpp"
 #include "lostmotion/response.hpp"
 #include "lostmotion/run.hpp"
@@ -173,25 +174,84 @@ nb::object column(const std::vector<ResponseResult>& results, std::vector<std::s
     return nb::cast(nb::ndarray<nb::numpy, double>(raw, shape.size(), shape.data(), owner));
 }
 
+// Polls for Ctrl-C and reports progress while other threads work.
+class Watch {
+ public:
+    explicit Watch(const nb::object& progress) : progress_(progress) {}
+    bool operator()(std::size_t done) {
+        nb::gil_scoped_acquire hold;
+        raised_ = raised_ || PyErr_CheckSignals() != 0;
+        if (raised_) return false;
+        if (!progress_.is_none()) progress_(done);
+        return true;
+    }
+    void check() const {
+        if (raised_) throw nb::python_error();
+    }
+
+ private:
+    const nb::object& progress_;
+    bool raised_ = false;
+};
+
+using Values = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+nb::tuple run_many(SharedDrive& drive, const Signals& signals, const std::array<double, n_states>& x, double capacity,
+                   const std::vector<int>& fields, const Values& values, double duration, double interval,
+                   std::size_t samples, bool energy, const std::vector<int>& channels, unsigned threads,
+                   const nb::object& progress) {
+    const std::size_t runs = values.shape(0);
+    RunOptions options;
+    options.duration = duration;
+    options.sample_interval = interval;
+    options.samples = samples;
+    options.energy = energy;
+    const BatchInput in{drive.drive, signals, {to_state(x), {capacity, 0.0}},
+                        options,     fields,  {values.data(), runs * fields.size()},
+                        runs,        channels};
+    auto data = std::make_unique_for_overwrite<double[]>(runs * channels.size() * samples);
+    std::vector<BatchRow> rows;
+    Watch watch(progress);
+    {
+        nb::gil_scoped_release release;
+        rows = run_batch(drive, in, data.get(), threads, std::ref(watch));
+    }
+    watch.check();
+    constexpr std::size_t width = 5 + n_flows + 4;
+    auto totals = std::make_unique<double[]>(runs * width);
+    for (std::size_t k = 0; k < runs; ++k) {
+        const BatchRow& r = rows[k];
+        double* to = &totals[k * width];
+        *to++ = static_cast<double>(r.status);
+        *to++ = r.contact;
+        *to++ = r.time;
+        *to++ = r.switchings;
+        *to++ = r.left_data_at;
+        to = std::copy(r.energy.flow.begin(), r.energy.flow.end(), to);
+        *to++ = r.energy.kinetic_end - r.energy.kinetic_begin;
+        *to++ = r.energy.elastic_end - r.energy.elastic_begin;
+        *to++ = r.energy.residual();
+        *to++ = r.energy.turned_over;
+    }
+    const std::size_t shape[3]{runs, channels.size(), samples};
+    double* raw = data.release();
+    nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+    return nb::make_tuple(nb::ndarray<nb::numpy, double>(raw, 3, shape, owner),
+                          as_array(std::move(totals), runs, width));
+}
+
 nb::dict respond_to(SharedDrive& drive, const std::vector<Point>& asked, const ResponseSpec& spec, unsigned threads,
                     const nb::object& progress) {
     std::vector<ResponsePoint> points;
     for (const auto& [command, load_torque, period, x, capacity] : asked)
         points.push_back({Signals{command, load_torque}, period, {to_state(x), {capacity, 0.0}}});
     std::vector<ResponseResult> results;
-    bool raised = false;
-    const auto waiting = [&](std::size_t done) {
-        nb::gil_scoped_acquire hold;
-        raised = raised || PyErr_CheckSignals() != 0;
-        if (raised) return false;
-        if (!progress.is_none()) progress(done);
-        return true;
-    };
+    Watch watch(progress);
     {
         nb::gil_scoped_release release;
-        results = respond_all(drive, points, spec, threads, waiting);
+        results = respond_all(drive, points, spec, threads, std::ref(watch));
     }
-    if (raised) throw nb::python_error();
+    watch.check();
     const auto harmonics = static_cast<std::size_t>(spec.harmonics) + 1;
     nb::dict out;
     const auto number = [&](const char* name, auto&& value) {
@@ -411,6 +471,31 @@ NB_MODULE(_core, m) {
                 "tolerance: float, keep_table: bool, threads: int, "
                 "progress: collections.abc.Callable[[int], None] | None = None) -> "
                 "dict[str, numpy.typing.NDArray[numpy.float64]]"));
+    m.def(
+        "batch_fields",
+        [] {
+            std::vector<std::string> keys;
+            for (const BatchField& f : batch_fields()) keys.emplace_back(f.key);
+            return keys;
+        },
+        nb::sig("def batch_fields() -> list[str]"));
+    m.def(
+        "run_batch",
+        [](SharedDrive& drive, const Signal& command, const Signal& load_torque, const std::array<double, n_states>& x,
+           double capacity, const std::vector<int>& fields, const Values& values, double duration, double interval,
+           std::size_t samples, bool energy, const std::vector<int>& channels, unsigned threads,
+           const nb::object& progress) {
+            return run_many(drive, Signals{command, load_torque}, x, capacity, fields, values, duration, interval,
+                            samples, energy, channels, threads, progress);
+        },
+        "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a, "fields"_a, "values"_a,
+        "duration"_a, "interval"_a, "samples"_a, "energy"_a, "channels"_a, "threads"_a, "progress"_a = nb::none(),
+        nb::sig("def run_batch(drive: Drive, command: Signal, load_torque: Signal, state: "
+                "collections.abc.Sequence[float], hysteresis_capacity: float, fields: collections.abc.Sequence[int], "
+                "values: numpy.typing.NDArray[numpy.float64], duration: float, interval: float, samples: int, "
+                "energy: bool, channels: collections.abc.Sequence[int], threads: int, "
+                "progress: collections.abc.Callable[[int], None] | None = None) -> "
+                "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]"));
     m.def(
         "linearization",
         [](SharedDrive& drive, const std::array<double, n_states>& x, double capacity,

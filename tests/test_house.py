@@ -16,7 +16,7 @@ PACKAGE = ROOT / "src" / "lostmotion"
 # analysis -> plots -> report -> command line.
 ROOMS = [
     {"_core", "errors", "variables", "units"},
-    {"quantities"},
+    {"quantities", "toml_files"},
     {"signals", "parts"},
     {"data_sheet"},
     {"loss_map_builder"},
@@ -34,6 +34,9 @@ ROOMS = [
     {"plots"},
     {"pages"},
     {"rig_sheet"},
+    {"study_file"},
+    {"study_engine"},
+    {"study_report"},
     {"listing"},
     {"response_sheet"},
     {"reproduce", "report"},

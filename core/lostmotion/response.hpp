@@ -105,36 +105,54 @@ struct WorkspacePool {
     virtual void give_back(std::unique_ptr<Workspace>) = 0;
 };
 
-// waiting(done) is called by the calling thread now and then; false stops the work, and what is missing stays
-// `interrupted`.
+// Shares `count` pieces of work among threads. worker(next, stop) runs once on each thread: it takes pieces from next()
+// until that is `count` or beyond. waiting(done) is called by the calling thread now and then; false stops the work.
+template <class Worker>
+void work_through(std::size_t count, unsigned threads, const std::function<bool(std::size_t)>& waiting,
+                  const Worker& worker) {
+    std::atomic<std::size_t> taken{0}, returned{0};
+    std::atomic<bool> stop{false};
+    std::atomic<unsigned> at_work{0};
+    const unsigned most =
+        static_cast<unsigned>(std::min<std::size_t>(std::max(1u, threads), std::max<std::size_t>(1, count)));
+    at_work = most;
+    std::vector<std::jthread> crew;
+    for (unsigned k = 0; k < most; ++k)
+        crew.emplace_back([&] {
+            bool busy = false;
+            worker(
+                [&] {
+                    if (busy) ++returned;
+                    busy = true;
+                    return taken++;
+                },
+                stop);
+            --at_work;
+        });
+    using namespace std::chrono_literals;
+    constexpr std::chrono::microseconds longest = 20ms;
+    for (std::chrono::microseconds pause = 200us; at_work > 0; pause = std::min(2 * pause, longest)) {
+        std::this_thread::sleep_for(pause);
+        if (!stop && !waiting(std::min<std::size_t>(returned, count))) stop = true;
+    }
+    crew.clear();
+    if (!stop) waiting(count);
+}
+
+// What the caller's `waiting` has stopped stays `interrupted`.
 inline std::vector<ResponseResult> respond_all(WorkspacePool& pool, const std::vector<ResponsePoint>& points,
                                                const ResponseSpec& spec, unsigned threads,
                                                const std::function<bool(std::size_t)>& waiting) {
     std::vector<ResponseResult> results(points.size());
     for (ResponseResult& r : results) r.motion.status = Status::interrupted;
-    std::atomic<std::size_t> next{0}, done{0};
-    std::atomic<bool> stop{false};
-    const auto stopped = [](void* flag) { return static_cast<std::atomic<bool>*>(flag)->load(); };
-    const auto work = [&] {
+    work_through(points.size(), threads, waiting, [&](auto next, std::atomic<bool>& stop) {
+        const auto stopped = [](void* flag) { return static_cast<std::atomic<bool>*>(flag)->load(); };
         std::unique_ptr<Workspace> workspace = pool.take();
         std::vector<double> table;
-        for (std::size_t k = next++; k < points.size() && !stop; k = next++) {
+        for (std::size_t k = next(); k < points.size() && !stop; k = next())
             results[k] = respond(*workspace, points[k], spec, table, stopped, &stop);
-            ++done;
-        }
         pool.give_back(std::move(workspace));
-    };
-    std::vector<std::jthread> crew;
-    const std::size_t most = std::min<std::size_t>(std::max(1u, threads), points.size());
-    for (std::size_t k = 0; k < most; ++k) crew.emplace_back(work);
-    using namespace std::chrono_literals;
-    for (auto pause = 200us; done < points.size() && !stop;
-         pause = std::min(pause * 2, std::chrono::microseconds(20ms))) {
-        std::this_thread::sleep_for(pause);
-        if (!waiting(done)) stop = true;
-    }
-    crew.clear();
-    waiting(done);
+    });
     return results;
 }
 

@@ -17,6 +17,13 @@ class TorsionCurve {
             offsets_[k + 1] = offsets_[k] + (slopes_[k] - slopes_[k + 1]) * breaks_[k];
     }
 
+    // The same breaks, all slopes times `factor`.
+    TorsionCurve scaled(double factor) const {
+        std::vector<double> slopes = slopes_;
+        for (double& k : slopes) k *= factor;
+        return TorsionCurve(breaks_, std::move(slopes));
+    }
+
     // Pieces are numbered -n..n; piece 0 contains d = 0.
     int outermost_piece() const { return static_cast<int>(breaks_.size()); }
     int locate(double d) const {

@@ -49,6 +49,9 @@ if TYPE_CHECKING:
     from .signals import CommandSignal as CommandSignal
     from .signals import TorqueSignal as TorqueSignal
     from .stepping import Simulation as Simulation
+    from .study_engine import study as study
+    from .study_file import Study as Study
+    from .study_file import load_study as load_study
     from .test_rig import TestRig as TestRig
     from .variables import VARIABLES as VARIABLES
 
@@ -86,6 +89,8 @@ _HOMES = {
     "signals": ("CommandSignal", "TorqueSignal"),
     "run": ("simulate",),
     "stepping": ("Simulation",),
+    "study_engine": ("study",),
+    "study_file": ("Study", "load_study"),
     "test_rig": ("TestRig",),
     "variables": ("VARIABLES",),
 }

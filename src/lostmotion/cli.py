@@ -8,12 +8,13 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from concurrent.futures import Executor
 
     import xarray
 
@@ -62,6 +63,31 @@ def _progress(total: int, what: str) -> Iterator[Callable[[], None]]:
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task(what, total=total)
         yield lambda: bar.advance(task)
+
+
+@contextmanager
+def _progress_of(total: int, what: str) -> Iterator[Callable[[int], None]]:
+    """A progress bar with rate and remaining time, told how much is done."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        ProgressColumn,
+        Task,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    class Rate(ProgressColumn):
+        def render(self, task: Task) -> str:
+            return f"{task.speed:.0f}/s" if task.speed else ""
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda done: bar.update(task, completed=done)
 
 
 @app.command()
@@ -337,6 +363,91 @@ def catalogue(
         print(record_text(name))
     else:
         print(list_records(kind, ratio, torque))
+
+
+@app.command()
+def study(
+    what: Annotated[str, typer.Argument(metavar="STUDY.toml | show", help="Study file; or `show` and a directory.")],
+    shown: Annotated[
+        Path | None, typer.Argument(metavar="[DIR]", help="With `show`: the directory of a study.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Directory; by default the file's name.")
+    ] = None,
+    threads: Annotated[int | None, typer.Option("--threads", help="In the core; all cores by default.")] = None,
+    processes: Annotated[int | None, typer.Option("--processes", help="Worker processes in place of threads.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler of a cluster.")
+    ] = None,
+    best: Annotated[
+        str | None, typer.Option("--best", metavar="COLUMN", help="With `show`: the ten least of it.")
+    ] = None,
+) -> None:
+    """Many runs: vary parameters, keep what matters, go on where an interruption left off.
+
+    Writes a directory of Parquet files, one row a run, that pandas, DuckDB and polars open directly.
+
+    \b
+    lostmotion study tolerance.toml -o tolerance
+    lostmotion study show tolerance --best peak_twist
+    """
+    from .errors import InputError
+
+    if what == "show":
+        if shown is None:
+            raise InputError("study show: name the directory of a study, as in `lostmotion study show DIR`")
+        from .study_report import best_runs, read_table, show
+
+        print("\n".join(show(shown)))
+        if best is not None:
+            rows = best_runs(read_table(shown), best).to_pylist()
+            print(f"Least {best}:")
+            for row in rows:
+                print("  " + ", ".join(f"{k} {v:.6g}" for k, v in row.items() if isinstance(v, int | float)))
+        return
+    if shown is not None:
+        raise InputError(f"study {what} {shown}: too many names; the directory is given by -o")
+    from contextlib import ExitStack
+
+    from .study_engine import study as work
+    from .study_file import load_study
+
+    loaded = load_study(what)
+    directory = output or Path(Path(what).stem)
+    with ExitStack() as stack:
+        executor = stack.enter_context(_executor(processes, scheduler)) if processes or scheduler else None
+        report = stack.enter_context(_progress_of(loaded.total, "Runs"))
+        try:
+            work(loaded, directory, threads=threads, executor=executor, progress=report)
+        except OSError as error:
+            raise InputError(f"{directory}: cannot be written: {error.strerror}; what is written stays") from None
+        except KeyboardInterrupt:
+            _fail(f"interrupted; what is in {directory} stays, and the same command goes on with it", 130)
+    print(f"{loaded.total} runs are in {directory}; `lostmotion study show {directory}` looks at them")
+
+
+@contextmanager
+def _executor(processes: int | None, scheduler: str | None) -> Iterator[Executor]:
+    """Worker processes of this machine, or the workers of a Dask cluster."""
+    if scheduler is None:
+        from concurrent.futures import ProcessPoolExecutor
+        from multiprocessing import get_context
+
+        with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+            yield pool
+        return
+    from .errors import InputError
+
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError("--scheduler needs Dask: pip install lostmotion[study]") from None
+    try:
+        client: Any = Client(scheduler, timeout="10s")  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise InputError(f"--scheduler {scheduler}: cannot be reached ({error})") from None
+    with client:
+        yield client.get_executor(pure=False)
 
 
 drive_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Check a drive against its task.")

@@ -17,6 +17,7 @@ from .errors import InputError
 from .loss_map_builder import BuiltMap, build_loss_map
 from .parts import Gearbox, Motor
 from .quantities import Angle, NotNegative, Number, Part, Positive, Temperature
+from .toml_files import read_toml
 
 KINDS: dict[str, type[GearboxSheet] | type[MotorSheet]] = {"gearbox": GearboxSheet, "motor": MotorSheet}
 # Keys of a sheet file that hold for all of its records.
@@ -55,15 +56,7 @@ def read_sheets(path: Path) -> list[GearboxSheet | MotorSheet]:
     InputError
         With one line that names the file, the record, the key, the value and the remedy.
     """
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file; check the name") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: is not valid TOML: {error}") from None
-    return parse_sheets(data, str(path))
+    return parse_sheets(read_toml(path, "a data sheet"), str(path))
 
 
 def parse_sheets(data: dict[str, Any], where: str) -> list[GearboxSheet | MotorSheet]:

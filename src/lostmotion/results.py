@@ -23,6 +23,22 @@ if TYPE_CHECKING:
 # What ended a regime, in the order of Guard::Kind (core/lostmotion/regime.hpp); last: an input jumped.
 CAUSES = ("came to rest", "broke away", "torsion piece", "loss cell", "loss cell", "voltage limit", "", "input changed")
 
+# Entries of the energy ledger, in the order of the core's (core/lostmotion/energy.hpp).
+ENERGY = (
+    "source",
+    "input_damper",
+    "motor_friction",
+    "gear_losses",
+    "hysteresis",
+    "load_damper",
+    "load_friction",
+    "load_work",
+    "kinetic_change",
+    "elastic_change",
+    "residual",
+    "turned_over",
+)
+
 FORMATS = {".nc": "NetCDF", ".csv": "CSV", ".parquet": "Parquet"}
 
 
@@ -85,13 +101,13 @@ def _contact_index() -> Any:
     return xr.indexes.PandasIndex(CONTACTS, "contact")
 
 
-def add_derived(data: dict[str, Any], ratio: float) -> None:
+def add_derived(data: dict[str, Any], ratio: Any) -> None:
     """Adds the variables that follow from those of the solver."""
     data["efficiency"] = gear_efficiency(data, ratio)
     data["motor_power"] = data["motor_torque"] * data["motor_speed"]
 
 
-def gear_efficiency(data: dict[str, Any], ratio: float) -> Any:
+def gear_efficiency(data: dict[str, Any], ratio: Any) -> Any:
     """Useful torque / torque fed in [-], by the direction of the load; NaN where the input shaft stands still.
 
     Driving (T_2 has the sign of w_M) it is T_2/(i T_1), overrunning i T_1/T_2; 0 where both sides feed the losses.

@@ -17,6 +17,7 @@ from .parts import Drive, Gearbox, Load, Motor, Rigid
 from .quantities import Angle, NotNegative, Part, Positive, Speed, Time, Torque
 from .records import Conditions, gearbox_table, motor
 from .signals import CommandSignal, TorqueSignal
+from .toml_files import read_toml
 
 MAX_SAMPLES = 100_000_000
 
@@ -163,22 +164,7 @@ def json_schema() -> dict[str, Any]:
 def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
     if path.resolve() in including:
         raise InputError(f"{path}: key base: leads back to this file; break the circle")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a directory; name a scenario file (.toml)") from None
-    except FileNotFoundError:
-        near = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.toml")], n=1)
-        hint = f"; did you mean {path.parent / near[0]}?" if near else "; check the name"
-        raise InputError(f"{path}: there is no such file{hint}") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); a scenario is a TOML file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: is not valid TOML: {error}") from None
+    data = read_toml(path, "a scenario")
     _read_series(data, path, ())
     for table in ("gearbox", "motor"):
         if isinstance(data.get(table), str):

@@ -52,6 +52,22 @@ def to_si(text: str, unit: str) -> float:
         ) from None
 
 
+def si_number(text: str) -> float:
+    """Value of a number with any unit, in SI base units (angles in radians).
+
+    Raises
+    ------
+    ValueError
+        The text is no number with a unit that is known.
+    """
+    import pint
+
+    try:
+        return float(registry().Quantity(text).to_base_units().magnitude)
+    except (pint.errors.PintError, AttributeError, TypeError, ValueError, AssertionError, SyntaxError):
+        raise ValueError(f"{text!r} is not a number with a unit that is known") from None
+
+
 @dataclass(frozen=True)
 class Unit:
     """Annotation of a field: the SI unit of its value. Accepts a number or a string with a unit."""

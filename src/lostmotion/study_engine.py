@@ -1,0 +1,408 @@
+"""Running studies: chunk by chunk, on all cores or any executor, safe against interruption at any instant."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from functools import lru_cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from . import _core
+from .errors import InputError
+from .parts import Rigid
+from .results import ENERGY, add_derived, installed_version, write_bytes
+from .run import simulate, start_state
+from .scenario import Scenario, describe
+from .study_file import (
+    CHANNEL_NAMES,
+    CHUNK,
+    FUNCTIONS,
+    Study,
+    base_value,
+    check_expression,
+    from_json,
+    to_json,
+    uses_energy,
+)
+from .variables import VARIABLES
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+SLOPES = "gearbox.stiffness.slopes"
+_STATUS = {
+    1: "interrupted",
+    2: "the friction jams: no combination of contact modes is consistent",
+    3: "the motion left the range of the loss map or of the arithmetic",
+    4: "switching instants accumulate",
+}
+
+
+# --- one chunk of runs ---
+
+
+def compute_chunk(text: str, first: int, last: int, threads: int = 1) -> bytes:
+    """The runs first .. last - 1 of a study (as JSON), as the bytes of a Parquet file. What executors are given."""
+    import pyarrow.parquet as pq
+
+    out = io.BytesIO()
+    pq.write_table(chunk_table(_parsed(text), text, first, last, threads), out)
+    return out.getvalue()
+
+
+@lru_cache(maxsize=8)
+def _parsed(text: str) -> Study:
+    return from_json(text)
+
+
+def chunk_table(study: Study, text: str, first: int, last: int, threads: int) -> pa.Table:
+    """One row a run: its number, its parameters, what is kept of it, its error if it has one."""
+    import pyarrow as pa
+
+    parameters = study.parameters(first, last)
+    needed = {name for e in study.keep.values() for name in check_expression("", e)}
+    needed |= set(study.trajectories.variables) if study.trajectories else set()
+    energy = any(uses_energy(e) for e in study.keep.values())
+    runs = (_in_the_core if _core_can(study) else _one_by_one)(
+        study, parameters, sorted(_sources(needed)), energy, threads
+    )
+    columns: dict[str, Any] = {"run": pa.array(np.arange(first, last))}
+    for k, v in enumerate(study.vary):
+        columns[v.title] = pa.array(parameters[:, k])
+    bad = np.array([e != "" for e in runs.errors])
+    data = _derived(study, runs, needed)
+    for name, expression in study.keep.items():
+        values = np.array(evaluate(expression, data, runs.energy, study), dtype=float)
+        values = np.broadcast_to(values, (last - first,)).copy()
+        values[bad] = np.nan
+        columns[name] = pa.array(values)
+    if study.trajectories is not None:
+        for name in study.trajectories.variables:
+            kept = data[name][:, :: study.trajectories.every]
+            columns[f"{name} over time"] = pa.array([None if b else row for b, row in zip(bad, kept, strict=True)])
+    columns["switchings"] = pa.array(runs.switchings.astype(np.int64))
+    columns["error"] = pa.array(runs.errors)
+    table = pa.table(columns)
+    return table.replace_schema_metadata({"lostmotion_study": text, "lostmotion_version": installed_version()})
+
+
+class Runs(SimpleNamespace):
+    """Of a chunk: samples (variable -> runs x samples), energy (entry -> runs), switchings, errors, ratio (runs)."""
+
+    samples: dict[str, np.ndarray]
+    energy: dict[str, np.ndarray]
+    switchings: np.ndarray
+    errors: list[str]
+    ratio: np.ndarray
+
+
+def _sources(needed: set[str]) -> set[str]:
+    """The channels of the core that the wanted variables are made of."""
+    derived = {
+        "efficiency": {"output_torque", "input_torque", "motor_speed"},
+        "motor_power": {"motor_torque", "motor_speed"},
+    }
+    return {channel for name in needed for channel in derived.get(name, {name})}
+
+
+def _derived(study: Study, runs: Runs, needed: set[str]) -> dict[str, np.ndarray]:
+    names = {v.name for v in VARIABLES if v.derived}
+    if not needed & names:
+        return runs.samples
+    whole = {
+        c: runs.samples.get(c, np.zeros((len(runs.errors), study.scenario.simulation.samples))) for c in CHANNEL_NAMES
+    }
+    add_derived(whole, runs.ratio[:, None])
+    return {name: whole[name] for name in needed | set(runs.samples)}
+
+
+def evaluate(expression: str, data: dict[str, np.ndarray], energy: dict[str, np.ndarray], study: Study) -> Any:
+    """An expression over all runs of a chunk at once."""
+    import xarray as xr
+
+    table = study.scenario.simulation
+    time = np.arange(table.samples) * table.sample_interval
+    names: dict[str, Any] = {
+        name: xr.DataArray(data[name], dims=("run", "time"), coords={"time": time})
+        for name in check_expression("", expression)
+    }
+    names["time"] = xr.DataArray(time, dims="time", coords={"time": time})
+    names["energy"] = SimpleNamespace(**{k: xr.DataArray(v, dims="run") for k, v in energy.items()})
+    with np.errstate(all="ignore"):
+        value = eval(compile(expression, expression, "eval"), {"__builtins__": {}}, names | FUNCTIONS)
+    dims = getattr(value, "dims", ())
+    if "time" in dims:
+        raise InputError(f"keep: {expression!r} leaves a value for each instant; reduce it, as in peak({expression})")
+    return value.values if hasattr(value, "values") else value
+
+
+def _changes(study: Study, row: np.ndarray) -> dict[str, Any]:
+    """Dotted keys and values of one run."""
+    out: dict[str, Any] = {}
+    for v, value in zip(study.vary, row, strict=True):
+        for key in v.all_keys:
+            base = base_value(study.scenario, key)
+            if not v.relative:
+                out[key] = float(value)
+            elif isinstance(base, tuple | list):
+                out[key] = [float(value) * x for x in base]
+            else:
+                out[key] = float(value) * float(base)
+    return out
+
+
+def scenario_of_run(study: Study, run: int) -> Scenario:
+    """The scenario of one run, by its number."""
+    return study.scenario.replace(**_changes(study, study.parameters(run, run + 1)[0]))
+
+
+def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energy: bool, threads: int) -> Runs:  # noqa: ARG001
+    """Any key may vary: each run is a scenario of its own."""
+    n, samples = len(parameters), study.scenario.simulation.samples
+    runs = Runs(
+        samples={c: np.full((n, samples), np.nan) for c in channels},
+        energy={e: np.full(n, np.nan) for e in ENERGY},
+        switchings=np.zeros(n),
+        errors=[""] * n,
+        ratio=np.full(n, study.scenario.gearbox.ratio),
+    )
+    for k, row in enumerate(parameters):
+        try:
+            scenario = study.scenario.replace(**_changes(study, row))
+            result = simulate(scenario, energy=energy)
+        except (ValidationError, RuntimeError, ValueError) as error:
+            runs.errors[k] = describe(error) if isinstance(error, ValidationError) else str(error)
+            continue
+        for c in channels:
+            runs.samples[c][k] = result[c].values
+        if energy:
+            for e, value in json.loads(result.attrs["energy"]).items():
+                runs.energy[e][k] = value
+        runs.switchings[k] = result.attrs["switching_count"]
+        runs.ratio[k] = scenario.gearbox.ratio
+    return runs
+
+
+@lru_cache(maxsize=1)
+def _fields() -> dict[str, int]:
+    return {key: k for k, key in enumerate(_core.batch_fields())}
+
+
+def _core_can(study: Study) -> bool:
+    """Whether all that varies is a plain number of the core."""
+    s = study.scenario
+    rigid = isinstance(s.gearbox.stiffness, Rigid)
+    for v in study.vary:
+        for key in v.all_keys:
+            if key not in _fields() or base_value(s, key) is None or rigid:
+                return False
+            if key == SLOPES and (not v.relative or s.gearbox.stiffness.preload > 0.0):  # type: ignore[union-attr]
+                return False
+            if key.startswith(("command.", "load.torque.")):
+                signal = s.command if key.startswith("command.") else s.load.torque
+                plain = not (signal.sines or signal.steps or signal.ramps or signal.chirp or signal.samples)
+                if not plain:
+                    return False
+    return True
+
+
+def _in_the_core(study: Study, parameters: np.ndarray, channels: list[str], energy: bool, threads: int) -> Runs:
+    """All runs in one call, the GIL released."""
+    s = study.scenario
+    keys = [(key, v, k) for k, v in enumerate(study.vary) for key in v.all_keys]
+    values = np.empty((len(parameters), len(keys)))
+    for j, (key, v, k) in enumerate(keys):
+        values[:, j] = parameters[:, k]
+        if v.relative and key != SLOPES:  # of the slopes the core takes the factor
+            values[:, j] *= float(base_value(s, key))
+    errors = _out_of_range(study, parameters)
+    good = np.array([e == "" for e in errors])
+    samples, totals = _core.run_batch(
+        s.drive().core(),
+        s.command.core(),
+        s.load.torque.core(),
+        start_state(s.initial),
+        s.initial.hysteresis_capacity,
+        [_fields()[key] for key, _, _ in keys],
+        np.ascontiguousarray(values[good]),
+        s.simulation.duration,
+        s.simulation.sample_interval,
+        s.simulation.samples,
+        energy,
+        [CHANNEL_NAMES.index(c) for c in channels],
+        threads,
+    )
+    n = len(parameters)
+    where = np.flatnonzero(good)
+    for row, status, time in zip(where.tolist(), totals[:, 0], totals[:, 2], strict=True):
+        if status != 0:
+            errors[row] = f"{_STATUS[int(status)]} at t = {time:.6g} s"
+
+    def spread(x: np.ndarray) -> np.ndarray:
+        if len(where) == n:
+            return x
+        out = np.full((n, *x.shape[1:]), np.nan)
+        out[where] = x
+        return out
+
+    ratio = next((values[:, j] for j, (key, _, _) in enumerate(keys) if key == "gearbox.ratio"), None)
+    return Runs(
+        samples={c: spread(samples[:, k]) for k, c in enumerate(channels)},
+        energy={e: spread(totals[:, 5 + k]) for k, e in enumerate(ENERGY)},
+        switchings=np.nan_to_num(spread(totals[:, 3])),
+        errors=errors,
+        ratio=np.full(n, s.gearbox.ratio) if ratio is None else ratio,
+    )
+
+
+def _out_of_range(study: Study, parameters: np.ndarray) -> list[str]:
+    """For each run, why it is no valid scenario; empty if it is.
+
+    The range of each number is an interval, so if the least and the largest value are valid, all are; a run is looked at by
+    itself only where that fails.
+    """
+    errors = [""] * len(parameters)
+    low, high = parameters.min(axis=0), parameters.max(axis=0)
+    try:
+        study.scenario.replace(**_changes(study, low))
+        study.scenario.replace(**_changes(study, high))
+    except ValidationError:
+        for k, row in enumerate(parameters):
+            try:
+                study.scenario.replace(**_changes(study, row))
+            except ValidationError as error:
+                errors[k] = describe(error)
+    return errors
+
+
+# --- the whole study ---
+
+
+def study(
+    what: Study,
+    directory: str | Path,
+    *,
+    threads: int | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Path:
+    """Run a study, or go on with it, into a directory of Parquet files.
+
+    Runs are computed and written in chunks; a chunk that is written is whole. Interrupted at any instant and called again, it
+    goes on with the chunks that are missing, so no run is lost and none is there twice. Rows depend on the study alone, not on
+    threads, workers or interruptions.
+
+    Parameters
+    ----------
+    what
+        From `load_study`, or made in Python.
+    directory
+        Made if missing. ``pandas.read_parquet(directory)``, DuckDB and polars open it directly.
+    threads
+        In the core, if there is no executor: all cores, if left out.
+    executor
+        Any `concurrent.futures.Executor`, such as a process pool or that of a Dask client.
+    progress
+        Called with the number of runs done.
+
+    Returns
+    -------
+    Path
+        The directory.
+
+    Raises
+    ------
+    InputError
+        The directory holds another study, or cannot be written; what is there stays.
+    """
+    directory = Path(directory)
+    text = to_json(what)
+    _prepare(directory, text)
+    done = sum(last - first for first, last in _chunks(what) if _part(directory, first).exists())
+    missing = [(first, last) for first, last in _chunks(what) if not _part(directory, first).exists()]
+    report = progress or _silent
+    report(done)
+    for first, last, content in _compute(text, missing, threads or os.cpu_count() or 1, executor):
+        write_bytes(_part(directory, first), content)
+        done += last - first
+        report(done)
+    return directory
+
+
+def _silent(done: int) -> None:
+    """No progress wanted."""
+
+
+def _chunks(study: Study) -> Iterator[tuple[int, int]]:
+    return ((first, min(first + CHUNK, study.total)) for first in range(0, study.total, CHUNK))
+
+
+def _part(directory: Path, first: int) -> Path:
+    return directory / f"part-{first // CHUNK:06d}.parquet"
+
+
+def _prepare(directory: Path, text: str) -> None:
+    """Makes the directory, or sees that it holds this study; what a killed run left half-written is removed."""
+    note = directory / "_study.json"  # a leading underscore: readers of Parquet directories pass it over
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{directory}: cannot be made: {error.strerror}") from None
+    for leftover in directory.glob(".part-*"):
+        leftover.unlink(missing_ok=True)
+    if note.exists():
+        if note.read_text(encoding="utf-8") != text:
+            raise InputError(f"{directory}: holds another study; name another directory, or remove it")
+        return
+    if any(directory.glob("*.parquet")):
+        raise InputError(f"{directory}: holds Parquet files that are of no study; name another directory")
+    write_bytes(note, text.encode())
+
+
+def _compute(
+    text: str, missing: list[tuple[int, int]], threads: int, executor: Executor | None
+) -> Iterator[tuple[int, int, bytes]]:
+    if executor is None:
+        for first, last in missing:
+            yield first, last, compute_chunk(text, first, last, threads)
+        return
+    # A few chunks more than there are workers, so that memory does not grow with the study.
+    waiting: dict[Future[bytes], tuple[int, int]] = {}
+    ahead = 2 * (getattr(executor, "_max_workers", None) or os.cpu_count() or 1) + 2
+    rest = iter(missing)
+    try:
+        while True:
+            for chunk in rest:
+                waiting[executor.submit(compute_chunk, text, *chunk)] = chunk
+                if len(waiting) >= ahead:
+                    break
+            if not waiting:
+                return
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                first, last = waiting.pop(future)
+                yield first, last, future.result()
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+def study_of(directory: str | Path) -> Study:
+    """The study that a directory holds.
+
+    Raises
+    ------
+    InputError
+        It holds none.
+    """
+    note = Path(directory) / "_study.json"
+    if not note.is_file():
+        raise InputError(f"{directory}: holds no study; run `lostmotion study STUDY.toml -o {directory}` first")
+    return from_json(note.read_text(encoding="utf-8"))

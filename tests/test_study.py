@@ -1,0 +1,419 @@
+"""Studies: designs, rows equal to single runs, interruption at any instant, executors, what they show."""
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from scipy import stats
+from typer.testing import CliRunner
+
+import lostmotion as lm
+from conftest import ROOT
+from lostmotion.cli import app
+from lostmotion.errors import InputError
+from lostmotion.paper import paper_scenario
+from lostmotion.study_engine import CHUNK, _core_can, scenario_of_run
+from lostmotion.study_file import FUNCTIONS, Study
+from lostmotion.study_report import best_runs, influence, read_table, sobol_indices
+
+SHORT = paper_scenario("2-DOF-NL", "large").replace(**{"simulation.duration": 0.2, "simulation.sample_interval": 2e-3})
+
+
+def make(**changes) -> Study:
+    values = {
+        "scenario": SHORT,
+        "design": "sobol",
+        "runs": 32,
+        "seed": 3,
+        "vary": [
+            {"key": "load.inertia", "uniform": [1.0, 3.0]},
+            {
+                "name": "stiffness",
+                "key": "gearbox.stiffness.slopes",
+                "relative": True,
+                "normal": {"mean": 1.0, "deviation": 0.1},
+            },
+            {"key": "command.amplitude", "log_uniform": [0.02, 1.0]},
+        ],
+        "keep": {
+            "peak_speed": "peak(load_speed)",
+            "rms_twist": "rms(twist)",
+            "end": "final(load_angle)",
+            "lost": "energy.gear_losses / energy.source",
+            "efficiency_driving": "efficiency.where(motor_power > 0).mean('time')",
+            "starts": "dead_time(load_angle)",
+        },
+    }
+    return Study(**(values | changes))
+
+
+def rows_of(directory: Path) -> dict[str, list]:
+    return read_table(directory).to_pydict()
+
+
+# --- rows ---
+
+
+@pytest.mark.parametrize("engine", ["core", "one by one"])
+def test_a_row_equals_the_single_run_bit_for_bit(tmp_path: Path, engine: str):
+    vary = list(make().vary)
+    if engine == "one by one":  # a key that the core does not know
+        vary.append({"key": "gearbox.stiffness.breaks", "relative": True, "values": [1.0, 1.1]})
+    study = make(vary=vary, trajectories={"variables": ["load_speed"], "every": 10})
+    assert _core_can(study) is (engine == "core")
+    rows = rows_of(lm.study(study, tmp_path / "s"))
+    assert rows["run"] == list(range(32))
+    for run in (0, 7, 31):
+        result = lm.simulate(scenario_of_run(study, run))
+        energy = lm.energy_of(result)
+        own = {
+            "peak_speed": FUNCTIONS["peak"](result["load_speed"]),
+            "rms_twist": FUNCTIONS["rms"](result["twist"]),
+            "end": result["load_angle"][-1],
+            "lost": energy["gear_losses"] / energy["source"],
+            "efficiency_driving": result["efficiency"].where(result["motor_power"] > 0).mean("time"),
+            "starts": FUNCTIONS["dead_time"](result["load_angle"]),
+        }
+        for name, value in own.items():
+            assert rows[name][run] == float(value), (run, name)
+        assert rows["load_speed over time"][run] == result["load_speed"].values[::10].tolist()
+        assert rows["switchings"][run] == result.attrs["switching_count"]
+
+
+def test_rows_do_not_depend_on_threads_or_executor(tmp_path: Path):
+    study = make(runs=2 * CHUNK + 24, design="random")
+    one = pq.ParquetDataset(lm.study(study, tmp_path / "1", threads=1)).read()
+    three = pq.ParquetDataset(lm.study(study, tmp_path / "3", threads=3)).read()
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        processes = pq.ParquetDataset(lm.study(study, tmp_path / "p", executor=pool)).read()
+    assert one.equals(three)
+    assert one.equals(processes)
+    assert [p.name for p in sorted((tmp_path / "1").glob("*.parquet"))] == [f"part-00000{k}.parquet" for k in range(3)]
+
+
+def test_one_bad_run_is_recorded_and_stops_no_other(tmp_path: Path):
+    vary = [{"key": "load.inertia", "values": [1.0, -1.0, 2.0, 0.0]}]
+    rows = rows_of(lm.study(make(design="list", runs=None, vary=vary), tmp_path / "s"))
+    assert [e == "" for e in rows["error"]] == [True, False, True, False]
+    assert "load.inertia: -1.0" in rows["error"][1]
+    assert math.isnan(rows["peak_speed"][1])
+    assert rows["load.inertia"] == [1.0, -1.0, 2.0, 0.0]
+    assert rows["peak_speed"][2] > 0.0
+
+
+def test_a_run_without_a_continuation_is_recorded_too(tmp_path: Path):
+    vary = [{"key": "command.amplitude", "values": [0.5, 1e9]}]
+    rows = rows_of(lm.study(make(design="list", runs=None, vary=vary), tmp_path / "s"))
+    assert rows["error"][0] == ""
+    assert "left the range" in rows["error"][1]
+
+
+def test_parquet_opens_directly_with_study_and_parameters(tmp_path: Path):
+    import pandas as pd
+
+    directory = lm.study(make(), tmp_path / "s")
+    frame = pd.read_parquet(directory)
+    assert list(frame.columns[:4]) == ["run", "load.inertia", "stiffness", "command.amplitude"]
+    meta = pq.read_schema(directory / "part-000000.parquet").metadata
+    stored = json.loads(meta[b"lostmotion_study"])
+    assert stored["scenario"]["gearbox"]["ratio"] == 90.0
+    assert stored["keep"]["peak_speed"] == "peak(load_speed)"
+
+
+# --- designs ---
+
+
+def test_designs_cover_what_they_say():
+    grid = make(
+        design="grid",
+        runs=None,
+        vary=[{"key": "load.inertia", "grid": [1, 2, 3]}, {"key": "command.phase", "values": [0, 1]}],
+    )
+    assert grid.total == 6
+    assert grid.parameters(0, 6).tolist() == [[1, 0], [1, 1], [1.5, 0], [1.5, 1], [2, 0], [2, 1]]
+    latin = make(design="latin_hypercube", runs=50, vary=[{"key": "load.inertia", "uniform": [0.5, 1.5]}])
+    strata = np.floor((latin.parameters(0, 50)[:, 0] - 0.5) * 50).astype(int)
+    assert sorted(strata.tolist()) == list(range(50))
+    # Any part of a design is what the whole has there.
+    for design in ("sobol", "latin_hypercube", "random"):
+        study = make(design=design, runs=1024 + 8)
+        assert np.array_equal(study.parameters(512, 700), study.parameters(0, 1032)[512:700])
+        assert not np.array_equal(study.parameters(0, 10), make(design=design, runs=1032, seed=4).parameters(0, 10))
+
+
+def test_distributions_have_their_tails():
+    vary = [
+        {"key": "load.inertia", "uniform": [1.0, 3.0]},
+        {"key": "motor.friction_torque", "normal": {"mean": 0.016, "deviation": 0.002}},
+        {"key": "command.amplitude", "log_uniform": [0.01, 1.0]},
+        {"key": "load.viscous_friction", "triangular": [1.0, 2.0, 5.0]},
+    ]
+    x = make(design="random", runs=5000, vary=vary, seed=1).parameters(0, 5000)
+    laws = [
+        stats.uniform(1.0, 2.0),
+        stats.norm(0.016, 0.002),
+        stats.loguniform(0.01, 1.0),
+        stats.triang(0.25, 1.0, 4.0),
+    ]
+    for k, law in enumerate(laws):
+        assert stats.kstest(x[:, k], law.cdf).pvalue > 0.01
+        for tail in (0.01, 0.99):
+            share = np.mean(x[:, k] < law.ppf(tail))
+            assert abs(share - tail) < 4.0 * math.sqrt(tail * (1 - tail) / 5000)  # four deviations of the count
+
+
+def test_coupled_keys_go_together(tmp_path: Path):
+    vary = [
+        {
+            "name": "friction",
+            "keys": ["motor.friction_torque", "load.viscous_friction"],
+            "relative": True,
+            "values": [0.5, 2.0],
+        }
+    ]
+    study = make(design="list", runs=None, vary=vary)
+    scenario = scenario_of_run(study, 1)
+    assert scenario.motor.friction_torque == 2.0 * SHORT.motor.friction_torque
+    assert scenario.load.viscous_friction == 2.0 * SHORT.load.viscous_friction
+    assert rows_of(lm.study(study, tmp_path / "s"))["friction"] == [0.5, 2.0]
+
+
+# --- safety ---
+
+LONG = """
+base = "{base}"
+set = {{ "simulation.duration" = 1.0 }}
+design = "random"
+runs = 6000
+[[vary]]
+key = "load.inertia"
+uniform = [1.0, 3.0]
+[keep]
+peak = "peak(load_speed)"
+"""
+
+
+@pytest.fixture
+def long_study(tmp_path: Path) -> Path:
+    path = tmp_path / "long.toml"
+    path.write_text(LONG.format(base=ROOT / "scenarios" / "paper-2dof-nl-large.toml"))
+    return path
+
+
+def started(study: Path, directory: Path, parts: int) -> subprocess.Popen:
+    """A study in a process of its own, once it has written some parts."""
+    command = [sys.executable, "-m", "lostmotion", "study", str(study), "-o", str(directory)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    limit = time.monotonic() + 60.0
+    while len(list(directory.glob("part-*.parquet"))) < parts:
+        assert process.poll() is None, process.stderr.read() if process.stderr else ""
+        assert time.monotonic() < limit
+        time.sleep(0.01)
+    return process
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_killed_and_started_again_it_goes_on_where_it_was(long_study: Path, tmp_path: Path, how: signal.Signals):
+    directory = tmp_path / "killed"
+    process = started(long_study, directory, 2)
+    os.kill(process.pid, how)
+    _, error = process.communicate(timeout=60)
+    if how == signal.SIGINT:
+        assert process.returncode == 130
+        assert "goes on with it" in error
+    kept = {p.name: p.stat().st_mtime_ns for p in directory.glob("part-*.parquet")}
+    assert 2 <= len(kept) < 12
+    (directory / ".part-000011.parquet.x.parquet").write_bytes(b"half")  # what a kill in mid-write leaves
+    done = CliRunner().invoke(app, ["study", str(long_study), "-o", str(directory)])
+    assert done.exit_code == 0, done.output
+    for name, stamp in kept.items():
+        assert (directory / name).stat().st_mtime_ns == stamp  # nothing twice
+    assert not list(directory.glob(".part*"))
+    whole = lm.study(lm.load_study(long_study), tmp_path / "whole")
+    assert read_table(directory).equals(read_table(whole))
+    assert read_table(directory)["run"].to_pylist() == list(range(6000))
+
+
+def test_a_full_disk_stops_it_with_one_line_and_loses_nothing(long_study: Path, tmp_path: Path):
+    directory = tmp_path / "full"
+    script = (
+        "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000));"  # room for the note, not for a part
+        "from lostmotion.cli import main; sys.argv = ['lostmotion', *sys.argv[1:]]; main()"
+    )
+    command = [sys.executable, "-c", script, "study", str(long_study), "-o", str(directory)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "cannot be written" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not list(directory.glob("*part*"))
+
+
+def test_a_directory_of_another_study_is_left_alone(tmp_path: Path):
+    lm.study(make(runs=4), tmp_path / "s")
+    with pytest.raises(InputError, match="holds another study"):
+        lm.study(make(runs=4, seed=9), tmp_path / "s")
+    (tmp_path / "p").mkdir()
+    (tmp_path / "p" / "mine.parquet").write_bytes(b"")
+    with pytest.raises(InputError, match="of no study"):
+        lm.study(make(runs=4), tmp_path / "p")
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_dask_worker_that_dies_takes_no_run_with_it(tmp_path: Path):
+    from distributed import Client, LocalCluster
+
+    study = make(design="random", runs=12 * CHUNK)
+    with (
+        LocalCluster(n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        Client(cluster) as client,
+    ):
+        pids = list(client.run(os.getpid).values())
+        seen: list[int] = []
+
+        def kill_one(done: int) -> None:
+            seen.append(done)
+            if len(seen) == 3:
+                os.kill(pids[0], signal.SIGKILL)
+
+        lm.study(study, tmp_path / "d", executor=client.get_executor(pure=False), progress=kill_one)
+        assert pids[0] not in client.run(os.getpid).values()
+    assert seen[-1] == study.total
+    assert read_table(tmp_path / "d").equals(read_table(lm.study(study, tmp_path / "t")))
+
+
+def test_progress_rises_to_the_total_and_starts_from_what_is_there(tmp_path: Path):
+    study = make(runs=2 * CHUNK + 1, design="random")
+    seen: list[int] = []
+    lm.study(study, tmp_path / "s", progress=seen.append)
+    assert seen == [0, CHUNK, 2 * CHUNK, 2 * CHUNK + 1]
+    (tmp_path / "s" / "part-000001.parquet").unlink()
+    seen.clear()
+    lm.study(study, tmp_path / "s", progress=seen.append)
+    assert seen == [CHUNK + 1, 2 * CHUNK + 1]
+
+
+# --- what it shows ---
+
+
+def test_sobol_indices_of_a_closed_form(tmp_path: Path):
+    """A free inertia: w(t) = (M - M_Z) t/J with fixed J is linear in both torques, so S = variance share, and no interaction."""
+    drive = lm.Scenario(
+        motor=lm.Motor(kind="torque_source", rotor_inertia=0.01),
+        gearbox=lm.Gearbox(
+            ratio=1.0,
+            rated_input_speed=100.0,
+            rated_output_torque=1.0,
+            stiffness=lm.LinearStiffness(stiffness=1e4),
+            losses=lm.ConstantEfficiency(efficiency=1.0),
+        ),
+        load={"inertia": 0.01},
+        simulation={"duration": 0.1, "sample_interval": 0.05},
+    )
+    study = Study(
+        scenario=drive,
+        design="saltelli",
+        runs=1024,
+        vary=[{"key": "command.mean", "uniform": [0.0, 3.0]}, {"key": "load.torque.mean", "uniform": [0.0, 1.0]}],
+        keep={"momentum": "final(motor_speed) + final(load_speed)"},
+    )
+    table = read_table(lm.study(study, tmp_path / "s"))
+    indices = sobol_indices(table, study)["momentum"]
+    assert indices["command.mean"] == pytest.approx((0.9, 0.9), abs=0.02)
+    assert indices["load.torque.mean"] == pytest.approx((0.1, 0.1), abs=0.02)
+    ranks = influence(table, study)["momentum"]
+    assert ranks["command.mean"] > 0.8
+    assert ranks["load.torque.mean"] < -0.2
+
+
+def test_show_and_best_from_the_command_line(tmp_path: Path):
+    out = tmp_path / "t"
+    done = CliRunner().invoke(app, ["study", str(ROOT / "examples" / "tolerance.toml"), "-o", str(out)])
+    assert done.exit_code == 0, done.output
+    shown = CliRunner().invoke(app, ["study", "show", str(out), "--best", "stuck_share"])
+    assert shown.exit_code == 0, shown.output
+    assert "256 of 256 runs, 0 failed" in shown.output
+    assert {p.name for p in (out / "show").iterdir()} >= {
+        "statistics.csv",
+        "distributions.png",
+        "tornado.png",
+        "scatter.png",
+    }
+    table = read_table(out)
+    best = best_runs(table, "stuck_share", 3)["stuck_share"].to_pylist()
+    assert best == sorted(table["stuck_share"].to_pylist())[:3]
+
+
+GOOD = """
+base = "{base}"
+design = "list"
+[[vary]]
+key = "load.inertia"
+values = [1, 2]
+[keep]
+peak = "peak(load_speed)"
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "match"),
+    [
+        ('base = "{base}"', "", "key base"),
+        ('base = "{base}"', 'base = "none.toml"', "no such file"),
+        ('"list"', '"lists"', "design"),
+        ("load.inertia", "load.inertai", "does not know"),
+        ("load.inertia", "simulation.duration", "same samples"),
+        ("values = [1, 2]", "", "needs one of values"),
+        ("values = [1, 2]", "values = []", "is empty"),
+        ("values = [1, 2]", 'values = ["1 kg*m"', "TOML"),
+        ("values = [1, 2]", "uniform = [1, 2]", "for which load.inertia needs values"),
+        ("values = [1, 2]", "values = [1]\nuniform = [1, 2]", "needs one of values"),
+        ('design = "list"', 'design = "sobol"', "lacks runs"),
+        ('design = "list"', 'design = "list"\nruns = 3', "leave it out"),
+        ('design = "list"', 'design = "saltelli"\nruns = 3', "power of two"),
+        ("peak(load_speed)", "peak(load_sped)", "neither a result variable"),
+        ("peak(load_speed)", "peak(load_speed", "cannot be read"),
+        ("peak(load_speed)", "energy.gear_loss", "energy.gear_loss is none"),
+        ("peak(load_speed)", "load_speed.__class__", "must not use"),
+        ('peak = "peak', 'run = "peak', "a name that is taken"),
+        ("[keep]", "[kept]", "kept"),
+        ("values = [1, 2]", "values = [1, 2]\nvalue = 3", "not known"),
+    ],
+)
+def test_a_bad_study_ends_in_one_clear_line(tmp_path: Path, old: str, new: str, match: str):
+    path = tmp_path / "s.toml"
+    assert old in GOOD
+    path.write_text(GOOD.replace(old, new).replace("{base}", str(ROOT / "scenarios" / "paper-2dof-nl-large.toml")))
+    with pytest.raises(InputError, match=match) as caught:
+        lm.load_study(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_expression_that_keeps_time_is_refused(tmp_path: Path):
+    with pytest.raises(InputError, match=r"reduce it, as in peak\(load_speed\)"):
+        lm.study(make(runs=2, keep={"x": "load_speed"}), tmp_path / "s")
+
+
+def test_memory_does_not_grow_with_the_length_of_a_study(tmp_path: Path):
+    import resource
+
+    def peak() -> int:
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # [kB]
+
+    lm.study(make(design="random", runs=2 * CHUNK), tmp_path / "short")
+    before = peak()
+    worker = threading.Thread(target=lambda: lm.study(make(design="random", runs=10 * CHUNK), tmp_path / "long"))
+    worker.start()
+    worker.join()
+    assert peak() - before < 60_000  # ten chunks of samples alone would be 100 MB
