@@ -5,19 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
 from .errors import InputError
 from .pages import save_figure, table_csv, write_text
+from .plots import STYLES  # with them come the settings of all figures
 from .study_engine import study_of
 from .study_file import Study
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-INK, ACCENT = "#0b3c5d", "#d9730d"
+INK, ACCENT = STYLES["2-DOF-NL"]["color"], STYLES["2-DOF-L"]["color"]
 
 
 def read_table(directory: Path) -> pa.Table:
@@ -166,15 +166,14 @@ def show(directory: Path) -> list[str]:
     view = directory / "show"
     view.mkdir(exist_ok=True)
     write_text(view / "statistics.csv", table_csv(["value", *header[1:]], rows))
-    with mpl.rc_context({"figure.constrained_layout.use": True}):
-        save_figure(distributions(table, study), view, "distributions")
-        save_figure(bars(influence(table, study), "rank correlation [-]"), view, "tornado")
-        save_figure(scatter(table, study), view, "scatter")
-        if study.design == "saltelli" and table.num_rows == study.total and not failed:
-            indices = sobol_indices(table, study)
-            save_figure(bars(indices, "Sobol index [-]"), view, "sobol")
-            for name, by_parameter in indices.items():
-                shares = ", ".join(f"{p} {s1:.3f} ({st:.3f})" for p, (s1, st) in by_parameter.items())
-                lines.append(f"  Sobol indices of {name}, first order (total): {shares}")
+    save_figure(distributions(table, study), view, "distributions")
+    save_figure(bars(influence(table, study), "rank correlation [-]"), view, "tornado")
+    save_figure(scatter(table, study), view, "scatter")
+    if study.design == "saltelli" and table.num_rows == study.total and not failed:
+        indices = sobol_indices(table, study)
+        save_figure(bars(indices, "Sobol index [-]"), view, "sobol")
+        for name, by_parameter in indices.items():
+            shares = ", ".join(f"{p} {s1:.3f} ({st:.3f})" for p, (s1, st) in by_parameter.items())
+            lines.append(f"  Sobol indices of {name}, first order (total): {shares}")
     lines.append(f"Figures and statistics are in {view}")
     return lines
