@@ -156,24 +156,8 @@ class AdaptiveSolver {
         return Status::done;
     }
 
-    // Right-hand side of one regime.
-    struct Equations {
-        Matrix rate;
-        State constant{};
-        std::array<State, n_inputs> input_column{};
-
-        Equations(const Regime& r, const Memory& m) : constant(constant_rate(r, m)) {
-            for (int row = 0; row < n_states; ++row) {
-                for (int c = 0; c < n_states; ++c) rate.column[c][row] = r.rate[row].c[c];
-                for (int i = 0; i < n_inputs; ++i) input_column[i][row] = r.rate[row].c[first_input + i];
-            }
-        }
-    };
-    State rates(const Equations& equations, double t, const State& x) {
-        State out = equations.rate * x;
-        const auto u = input_at(t);
-        for (int k = 0; k < lanes; ++k)
-            out[k] += equations.constant[k] + equations.input_column[0][k] * u[0] + equations.input_column[1][k] * u[1];
+    State rates(const LinearRates& linear, const State& constant, double t, const State& x) {
+        State out = linear(x, constant, input_at(t));
         remainder_(t, x, out);
         return out;
     }
@@ -182,7 +166,8 @@ class AdaptiveSolver {
     Status run_regime(double limit, const Guard*& fired, Observer& observer) {
         const auto& entry = cache_.entry(key_);
         const Regime& r = entry.regime;
-        const Equations equations(r, now_.memory);
+        const LinearRates linear(r);
+        const State fixed = constant_rate(r, now_.memory);
         const std::array<double, max_guards> constant = entry.guard_constants(now_.memory);
         using DP = DormandPrince;
         DenseStep dense;
@@ -195,7 +180,7 @@ class AdaptiveSolver {
         };
         double h = step_ > 0.0 ? step_ : 1e-6;
         off_zero_ = false;
-        dense.k[0] = rates(equations, time_, now_.x);
+        dense.k[0] = rates(linear, fixed, time_, now_.x);
         look(time_, now_.x, dense.k[0], value, slope);
         while (time_ < limit) {
             if (++steps_ % 256 == 0 && interrupted != nullptr && interrupted(interrupted_context))
@@ -212,7 +197,7 @@ class AdaptiveSolver {
             for (int stage = 1; stage < DP::stages; ++stage) {
                 x = now_.x;
                 for (int j = 0; j < stage; ++j) add_scaled(x, h * DP::a[stage][j], dense.k[j]);
-                dense.k[stage] = rates(equations, std::min(time_ + DP::c[stage] * h, latest), x);
+                dense.k[stage] = rates(linear, fixed, std::min(time_ + DP::c[stage] * h, latest), x);
             }
             double error = 0.0;
             for (int n = 0; n < n_states; ++n) {

@@ -54,11 +54,6 @@ class Flow {
         return 0;
     }
 
-    // First derivative of the state.
-    const State& rate() {
-        if (order_ < 1) extend();
-        return x_[1];
-    }
     // Value of the k-th derivative of a form and the sum of the magnitudes of its terms.
     std::pair<double, double> derivative(const LinearForm& f, int k) {
         if (k > order_) extend();
@@ -91,7 +86,7 @@ class Flow {
     const Instant& now_;
     double rounding_;
     int order_ = 0;
-    std::array<State, n_derivatives + 1> x_{}, size_{};
+    std::array<State, n_derivatives + 1> x_, size_;  // as far as they are known
 };
 
 enum class Found { yes, inconsistent, outside };
@@ -273,14 +268,12 @@ class SwitchedDrive {
         const Regime& r = entry.regime;
         Flow flow(r, now, coarseness);
         const std::array<double, max_guards> room = entry.guard_room(now.x, now.memory, now.input[0], now.input_size);
-        std::array<double, max_guards> rates;
-        entry.evaluate_guards(nullptr, flow.rate(), now.input[1], rates);
         bool overcome = false;
         for (int k = 0; k < r.n_guards; ++k) {
             const Guard& g = r.guards[k];
             if (g.kind == Guard::speed && !test_speed[g.contact]) continue;
-            // Only what is near zero needs a closer look.
-            if (room[k] > 16.0 * time_rounding * std::fabs(now.time * rates[k]) || flow.sign(g) >= 0) continue;
+            // Only what is near zero needs a closer look. (The rounding of the instant moves a guard by less than that.)
+            if (room[k] > 0.0 || flow.sign(g) >= 0) continue;
             if (g.kind != Guard::speed && g.kind != Guard::capacity) return {&g, overcome};
             overcome = true;
         }

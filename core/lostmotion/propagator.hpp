@@ -11,6 +11,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <vector>
 
@@ -19,31 +20,117 @@
 
 namespace lostmotion {
 
-// Column-major, with padded columns.
+// Pairs of numbers that are reckoned with at once. A state is three of them, and is always written as that: a pair that is
+// read in one piece after it was written in two halts the processor.
+typedef double Pair __attribute__((vector_size(16)));
+
+inline Pair load(const double* from) {
+    Pair p;
+    __builtin_memcpy(&p, from, sizeof p);
+    return p;
+}
+inline void store(Pair p, double* to) { __builtin_memcpy(to, &p, sizeof p); }
+
+// A linear map of the states. The first four are coupled; the load angle follows the load speed and nothing depends on
+// it, so its column is zero but for its own entry.
 struct Matrix {
-    std::array<State, n_states> column{};
+    static constexpr int coupled = 4;
+    using Column = std::array<double, coupled>;
+
+    std::array<Column, coupled> column{};
+    Column angle{};           // row of the load angle
+    double angle_own = 0.0;  // its own entry
+
+    static Matrix diagonal(double value) {
+        Matrix m;
+        for (int k = 0; k < coupled; ++k) m.column[k][k] = value;
+        m.angle_own = value;
+        return m;
+    }
 
     State operator*(const State& v) const {
-        State out{};
-        for (int c = 0; c < n_states; ++c)
-            for (int r = 0; r < lanes; ++r) out[r] += column[c][r] * v[c];
+        State out;
+        for (const int r : {0, 2}) store(rows(r, v.data()), &out[r]);
+        const double of_angle =
+            (((angle[0] * v[0] + angle[1] * v[1]) + angle[2] * v[2]) + angle[3] * v[3]) + angle_own * v[coupled];
+        store(Pair{of_angle, 0.0}, &out[coupled]);
         return out;
     }
-    friend Matrix operator+(Matrix a, const Matrix& b) {
-        for (int c = 0; c < n_states; ++c)
-            for (int r = 0; r < lanes; ++r) a.column[c][r] += b.column[c][r];
-        return a;
+    double operator()(int row, int col) const {
+        if (row < coupled) return col < coupled ? column[col][row] : 0.0;
+        return col < coupled ? angle[col] : angle_own;
+    }
+    // Rows r and r + 1 of the product with four numbers.
+    Pair rows(int r, const double* v) const {
+        return ((load(&column[0][r]) * v[0] + load(&column[1][r]) * v[1]) + load(&column[2][r]) * v[2]) +
+               load(&column[3][r]) * v[3];
+    }
+    // factor * other, entry by entry
+    void add(double factor, const Matrix& other) {
+        for (int c = 0; c < coupled; ++c) {
+            for (int r = 0; r < coupled; ++r) column[c][r] += factor * other.column[c][r];
+            angle[c] += factor * other.angle[c];
+        }
+        angle_own += factor * other.angle_own;
+    }
+    void scale(double factor) {
+        for (Column& c : column)
+            for (double& v : c) v *= factor;
+        for (double& v : angle) v *= factor;
+        angle_own *= factor;
+    }
+    // f(own entry, that of the other), entry by entry
+    template <class F>
+    void combine(const Matrix& other, F&& f) {
+        for (int c = 0; c < coupled; ++c) {
+            for (int r = 0; r < coupled; ++r) column[c][r] = f(column[c][r], other.column[c][r]);
+            angle[c] = f(angle[c], other.angle[c]);
+        }
+        angle_own = f(angle_own, other.angle_own);
     }
     friend Matrix operator*(const Matrix& a, const Matrix& b) {
         Matrix out;
-        for (int c = 0; c < n_states; ++c) out.column[c] = a * b.column[c];
+        for (int c = 0; c < coupled; ++c) {
+            const Column& v = b.column[c];
+            for (const int r : {0, 2}) store(a.rows(r, v.data()), &out.column[c][r]);
+            out.angle[c] = (((a.angle[0] * v[0] + a.angle[1] * v[1]) + a.angle[2] * v[2]) + a.angle[3] * v[3]) +
+                           a.angle_own * b.angle[c];
+        }
+        out.angle_own = a.angle_own * b.angle_own;
         return out;
     }
 };
 
 inline void add_scaled(State& y, double a, const State& x) {
-    for (int r = 0; r < lanes; ++r) y[r] += a * x[r];
+    for (const int r : {0, 2, 4}) store(load(&y[r]) + a * load(&x[r]), &y[r]);
 }
+
+// dx/dt = A x + constant + B u of one regime, as arrays. No rate may depend on the load angle.
+struct LinearRates {
+    Matrix rate;
+    std::array<State, n_inputs> input_column{};
+
+    LinearRates() = default;
+    explicit LinearRates(const Regime& regime) {
+        for (int r = 0; r < n_states; ++r) {
+            const LinearForm& f = regime.rate[r];
+            assert(f.c[load_angle] == 0.0);
+            for (int c = 0; c < Matrix::coupled; ++c) (r < Matrix::coupled ? rate.column[c][r] : rate.angle[c]) = f.c[c];
+            for (int i = 0; i < n_inputs; ++i) input_column[i][r] = f.c[first_input + i];
+        }
+    }
+    State operator()(const State& x, const State& constant, const std::array<double, n_inputs>& u) const {
+        State out = rate * x;
+        for (int r = 0; r < lanes; ++r) out[r] += constant[r] + input_column[0][r] * u[0] + input_column[1][r] * u[1];
+        return out;
+    }
+    // The next time derivative of the state from one that is at least the first.
+    State higher(const State& derivative, const std::array<double, n_inputs>& u) const {
+        State out = rate * derivative;
+        for (int r = 0; r < lanes; ++r) out[r] += input_column[0][r] * u[0] + input_column[1][r] * u[1];
+        return out;
+    }
+};
 
 // Everything needed to step by one length in one regime.
 struct Step {
@@ -64,14 +151,11 @@ class Propagator {
     void prepare(const Regime& regime, double unit, const State& scale, const std::vector<InputBasis>& basis) {
         n_basis_ = static_cast<int>(basis.size());
         basis_ = &basis;
-        for (int c = 0; c < n_states; ++c)
-            for (int r = 0; r < n_states; ++r) rate_.column[c][r] = regime.rate[r].c[c];
-        for (int i = 0; i < n_inputs; ++i)
-            for (int r = 0; r < n_states; ++r) input_column_[i][r] = regime.rate[r].c[first_input + i];
+        linear_ = LinearRates(regime);
         norm_ = 0.0;
         for (int r = 0; r < n_states; ++r) {
             double sum = 0.0;
-            for (int c = 0; c < n_states; ++c) sum += std::fabs(rate_.column[c][r]) * scale[c] / scale[r];
+            for (int c = 0; c < n_states; ++c) sum += std::fabs(regime.rate[r].c[c]) * scale[c] / scale[r];
             norm_ = std::fmax(norm_, sum);
         }
         fastest_input_ = 0.0;
@@ -90,18 +174,12 @@ class Propagator {
     bool ready() const { return !steps_.empty(); }
     void reset() { steps_.clear(); }
 
-    const State& input_column(int i) const { return input_column_[i]; }
-
+    const State& input_column(int i) const { return linear_.input_column[i]; }
     State rate(const State& x, const State& constant, const std::array<double, n_inputs>& u) const {
-        State out = rate_ * x;
-        for (int r = 0; r < lanes; ++r) out[r] += constant[r] + input_column_[0][r] * u[0] + input_column_[1][r] * u[1];
-        return out;
+        return linear_(x, constant, u);
     }
-    // The next time derivative of the state from one that is at least the first.
     State higher_rate(const State& derivative, const std::array<double, n_inputs>& u) const {
-        State out = rate_ * derivative;
-        for (int r = 0; r < lanes; ++r) out[r] += input_column_[0][r] * u[0] + input_column_[1][r] * u[1];
-        return out;
+        return linear_.higher(derivative, u);
     }
 
     const Step& level(int k) {
@@ -139,14 +217,15 @@ class Propagator {
     Matrix integral(double h) {
         Matrix sum;
         const auto append = [&sum](const Matrix& change, const Matrix& integral) {
-            sum = sum + change * sum + integral;  // G(s + h) = G(h) + exp(A h) G(s)
+            sum.add(1.0, change * sum);  // G(s + h) = G(h) + exp(A h) G(s)
+            sum.add(1.0, integral);
         };
         for (int k = level_below(h); k >= 0; --k)
             for (const double length = level(k).length; h >= length; h -= length)
                 append(steps_[k].change, steps_[k].integral);
         if (h > 0.0) {
             const Matrix rest = integral_series(h);
-            append(rate_ * rest, rest);
+            append(linear_.rate * rest, rest);
         }
         return sum;
     }
@@ -171,22 +250,20 @@ class Propagator {
         for (int k = 1;; ++k) {
             add_scaled(sum, power, term);
             if (k == terms) return sum;
-            term = rate_ * term;
+            term = linear_.rate * term;
             for (int i = 0; i < n_inputs; ++i)
-                if (u[k][i] != 0.0) add_scaled(term, u[k][i], input_column_[i]);
+                if (u[k][i] != 0.0) add_scaled(term, u[k][i], linear_.input_column[i]);
             power *= s / (k + 1);
         }
     }
 
     // G over at most one base interval.
     Matrix integral_series(double h) const {
-        Matrix term, sum;
-        for (int c = 0; c < n_states; ++c) term.column[c][c] = h;
+        Matrix term = Matrix::diagonal(h), sum;
         for (int k = 1; k <= series_terms; ++k) {
-            for (int c = 0; c < n_states; ++c) add_scaled(sum.column[c], 1.0, term.column[c]);
-            term = rate_ * term;
-            for (int c = 0; c < n_states; ++c)
-                for (double& v : term.column[c]) v *= h / (k + 1);
+            sum.add(1.0, term);
+            term = linear_.rate * term;
+            term.scale(h / (k + 1));
         }
         return sum;
     }
@@ -195,23 +272,19 @@ class Propagator {
         Step& s = steps_.emplace_back();
         s.length = h;
         s.integral = integral_series(h);
-        Matrix positive;
-        for (int c = 0; c < n_states; ++c) {
-            for (int r = 0; r < n_states; ++r) {
-                const double a = rate_.column[c][r];
-                positive.column[c][r] = h * (r == c ? std::fmax(a, 0.0) : std::fabs(a));
-            }
-            s.growth.column[c][c] = 1.0;
-        }
+        s.change = linear_.rate * s.integral;
+        // |exp(A s)| from the powers of a matrix without negative entries beside its diagonal.
+        Matrix positive = linear_.rate;
+        positive.combine(Matrix{}, [h](double a, double) { return h * std::fabs(a); });
+        for (int k = 0; k < Matrix::coupled; ++k)
+            positive.column[k][k] = h * std::fmax(linear_.rate.column[k][k], 0.0);
+        s.growth = Matrix::diagonal(1.0);
         Matrix bound = s.growth;
         for (int k = 1; k <= 8; ++k) {
             bound = positive * bound;
-            for (int c = 0; c < n_states; ++c) {
-                for (double& v : bound.column[c]) v /= k;
-                add_scaled(s.growth.column[c], 1.0, bound.column[c]);
-            }
+            bound.scale(1.0 / k);
+            s.growth.add(1.0, bound);
         }
-        s.change = rate_ * s.integral;
         for (int q = 0; q < n_basis_; ++q) {
             const InputBasis& b = (*basis_)[q];
             // y' = A y + b r(s), r = s, cos(omega s) - 1 or sin(omega s), by the series of r.
@@ -221,10 +294,10 @@ class Propagator {
             double power = h;
             for (int k = 0; k < series_terms; ++k) {
                 // coefficient: k-th derivative of y at 0; the next is A times it plus b times the derivative of r.
-                coefficient = rate_ * coefficient;
+                coefficient = linear_.rate * coefficient;
                 if (k == first || (b.kind != InputBasis::ramp && k > first && (k - first) % 2 == 0)) {
                     if (k > first) r *= -b.omega * b.omega;
-                    add_scaled(coefficient, r, input_column_[b.input]);
+                    add_scaled(coefficient, r, linear_.input_column[b.input]);
                 }
                 add_scaled(y, power, coefficient);
                 power *= h / (k + 2);
@@ -241,27 +314,21 @@ class Propagator {
         Step& b = steps_[k + 1];
         b.length = 2.0 * a.length;
         b.change = a.change * a.change;
+        b.change.add(2.0, a.change);
         b.integral = a.change * a.integral;
-        for (int c = 0; c < n_states; ++c) {
-            add_scaled(b.change.column[c], 2.0, a.change.column[c]);
-            add_scaled(b.integral.column[c], 2.0, a.integral.column[c]);
-        }
+        b.integral.add(2.0, a.integral);
         // |exp(A (h + s))| <= |exp(A s)| |exp(A h)|, of which the second is known.
-        Matrix size;
-        for (int c = 0; c < n_states; ++c)
-            for (int r = 0; r < n_states; ++r)
-                size.column[c][r] = std::fabs(a.change.column[c][r] + (r == c ? 1.0 : 0.0));
+        Matrix size = Matrix::diagonal(1.0);
+        size.combine(a.change, [](double one, double change) { return std::fabs(one + change); });
         b.growth = a.growth * size;
-        for (int c = 0; c < n_states; ++c)
-            for (int r = 0; r < n_states; ++r)
-                b.growth.column[c][r] = std::max(b.growth.column[c][r], a.growth.column[c][r]);
+        b.growth.combine(a.growth, [](double x, double y) { return std::max(x, y); });
         responses_.resize(responses_.size() + n_basis_);
         const State* from = responses(k);
         for (int q = 0; q < n_basis_; ++q) {
             const InputBasis& basis = (*basis_)[q];
             State y = a.change * from[q];
             add_scaled(y, 1.0, from[q]);
-            const State constant = a.integral * input_column_[basis.input];
+            const State constant = a.integral * linear_.input_column[basis.input];
             if (basis.kind == InputBasis::ramp) {
                 add_scaled(y, 1.0, from[q]);
                 add_scaled(y, a.length, constant);
@@ -289,8 +356,7 @@ class Propagator {
             rotations_.push_back(b.kind == InputBasis::sine ? std::sin(b.omega * h) : std::cos(b.omega * h));
     }
 
-    Matrix rate_;
-    std::array<State, n_inputs> input_column_{};
+    LinearRates linear_;
     double norm_ = 0.0;           // of A in scaled units, or the highest input frequency [1/s]
     double fastest_input_ = 0.0;  // [rad/s]
     int n_basis_ = 0;

@@ -30,7 +30,7 @@ class RegimeCache {
                          c[5][g] * u[0] + c[6][g] * u[1];
             }
         }
-        // How far the guards lie above a ten-thousandth of the sizes of their terms.
+        // How far the guards lie above a thousandth of the sizes of their terms.
         std::array<double, max_guards> guard_room(const State& x, const Memory& m,
                                                   const std::array<double, n_inputs>& u,
                                                   const std::array<double, n_inputs>& input_size) const {
@@ -42,7 +42,7 @@ class RegimeCache {
                 size[g] = std::fabs(constant[g]) + c[0][g] * std::fabs(x[0]) + c[1][g] * std::fabs(x[1]) +
                           c[2][g] * std::fabs(x[2]) + c[3][g] * std::fabs(x[3]) + c[4][g] * std::fabs(x[4]) +
                           c[5][g] * input_size[0] + c[6][g] * input_size[1];
-                value[g] -= 1e-4 * size[g];
+                value[g] -= 1e-3 * size[g];
             }
             return value;
         }

@@ -42,7 +42,7 @@ class Reader {
                                                      &r.input_friction};
         for (int k = 0; k < 4; ++k) {
             const LinearForm& f = *forms[k];
-            for (int c = 0; c < n_states; ++c) columns_.column[c][k] = f.c[c];
+            for (int c = 0; c < Matrix::coupled; ++c) columns_.column[c][k] = f.c[c];
             for (int i = 0; i < n_inputs; ++i) input_columns_[i][k] = f.c[first_input + i];
             constant_[k] = constant_part(f, m);
         }

@@ -110,7 +110,7 @@ TEST_SUITE("parts") {
                     for (int j = 0; j < n_states; ++j) {
                         const double e = static_cast<double>(expected[i][j]) - (i == j ? 1.0 : 0.0);
                         // In balanced units; doubling adds about one rounding a level.
-                        CHECK(std::fabs(step.change.column[j][i] - e) * scale[j] / scale[i] < 1e-10);
+                        CHECK(std::fabs(step.change(i, j) - e) * scale[j] / scale[i] < 1e-10);
                     }
             }
         }
@@ -131,8 +131,8 @@ TEST_SUITE("parts") {
                 for (int inner = 0; inner <= level; ++inner)
                     for (int j = 0; j < n_states; ++j)
                         for (int i = 0; i < n_states; ++i)
-                            CHECK(std::fabs(p.level(inner).change.column[j][i] + (i == j ? 1.0 : 0.0)) <=
-                                  p.level(level).growth.column[j][i] * (1.0 + 1e-9) + 1e-300);
+                            CHECK(std::fabs(p.level(inner).change(i, j) + (i == j ? 1.0 : 0.0)) <=
+                                  p.level(level).growth(i, j) * (1.0 + 1e-9) + 1e-300);
         }
     }
     TEST_CASE("Dormand-Prince tableau satisfies its conditions of order") {
