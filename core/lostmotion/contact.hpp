@@ -272,7 +272,8 @@ class SwitchedDrive {
         for (int k = 0; k < r.n_guards; ++k) {
             const Guard& g = r.guards[k];
             if (g.kind == Guard::speed && !test_speed[g.contact]) continue;
-            // Only what is near zero needs a closer look. (The rounding of the instant moves a guard by less than that.)
+            // Only what is near zero needs a closer look. (The rounding of the instant moves a guard by less than
+            // that.)
             if (room[k] > 0.0 || flow.sign(g) >= 0) continue;
             if (g.kind != Guard::speed && g.kind != Guard::capacity) return {&g, overcome};
             overcome = true;

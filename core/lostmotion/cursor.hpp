@@ -27,6 +27,15 @@ class Cursor {
         rate_known_ = false;
     }
 
+    // The same, with inputs that are there already.
+    void place(Propagator& propagator, const State& constant, const InputState& input, const State& x) {
+        propagator_ = &propagator;
+        constant_ = &constant;
+        input_ = input;
+        x_ = x;
+        rate_known_ = false;
+    }
+
     double time() const { return input_.time(); }
     const State& x() const { return x_; }
     const InputState& input() const { return input_; }
@@ -49,6 +58,12 @@ class Cursor {
     void step(int level) {
         x_ = propagator_->step(level, x_, rate(), input_.weights());
         input_.advance(propagator_->level(level).length, propagator_->rotations(level));
+        rate_known_ = false;
+    }
+    // By a small part of a base interval, forward or backward; the inputs turn on from where they are.
+    void nudge(double h) {
+        x_ = propagator_->series(h, x_, rate(), input_);
+        input_.turn(h);
         rate_known_ = false;
     }
     // By any length: whole levels from the longest down, then the Taylor series. Backward by a base interval at most.

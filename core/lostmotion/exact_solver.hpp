@@ -13,6 +13,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "contact.hpp"
 #include "cubic.hpp"
@@ -130,6 +131,7 @@ class ExactSolver {
     // Runs to t_end. The observer gets every segment and every switching as they come.
     template <class Observer>
     Status advance(double t_end, Observer& observer) {
+        input_.anchor(time_);
         if (jump_pending_) {
             jump_pending_ = false;
             const Status status = change_regime(nullptr, observer);
@@ -195,13 +197,13 @@ class ExactSolver {
             stopped_at_ = fired->contact;
             if (fired->kind == Guard::outside) return Status::outside;
         }
-        anchor_inputs();
+        const LinearForm& torque = cache_.regime(key_).output_torque;
         if (s.input_jump) {
             input_.anchor_left(time_);
-            s.torque_before = evaluate(cache_.regime(key_).output_torque, now_.x, now_.memory, input_.values());
-        } else {
-            s.torque_before = evaluate(cache_.regime(key_).output_torque, now_.x, now_.memory, now_.input[0]);
+            s.torque_before = evaluate(torque, now_.x, now_.memory, input_.values());
         }
+        anchor_inputs();
+        if (!s.input_jump) s.torque_before = evaluate(torque, now_.x, now_.memory, now_.input[0]);
         const Found found = system_.next(cache_, now_, fired, key_);
         if (found != Found::yes) return status_of(found);
         s.after = key_;
@@ -221,16 +223,27 @@ class ExactSolver {
     // Guards of one segment at the start of a look and at its end.
     struct Look {
         std::array<double, max_guards> value, slope, end_value, end_slope, fourth;
+        std::array<double, max_guards> least,
+            error;  // of the cubic: a lower bound, and how far the guard may lie from it
+
+        void enclose(double h, int lanes) {
+            const double third = h / 3.0, share = h * h * h * h / 384.0;
+            for (int g = 0; g < lanes; ++g) {
+                const double c1 = value[g] + third * slope[g], c2 = end_value[g] - third * end_slope[g];
+                const double outer = value[g] < end_value[g] ? value[g] : end_value[g], inner = c1 < c2 ? c1 : c2;
+                least[g] = outer < inner ? outer : inner;
+                error[g] = share * fourth[g];
+            }
+        }
     };
 
     // Advances within the regime until a guard reaches zero (fired) or `limit`.
     Status run_regime(const Segment<System>& segment, double limit, const Guard*& fired) {
         typename Cache::Entry& e = segment.entry;
-        const Regime& r = e.regime;
         Propagator& p = e.propagator;
         const std::array<double, max_guards> constant = e.guard_constants(segment.memory);
         Cursor &cursor = cursor_, &end = end_;
-        cursor.place(p, segment.constant, time_, now_.x);
+        cursor.place(p, segment.constant, input_, now_.x);
         Look look;
         off_zero_ = false;
         touch_size_ = 0.0;
@@ -243,7 +256,7 @@ class ExactSolver {
             if (looks_ % 1024 == 0 && interrupted != nullptr && interrupted(interrupted_context))
                 return Status::interrupted;
             if (count % 64 == 0) cursor.anchor(time_);
-            const InputJet u = cursor.input().jet();
+            const auto u = cursor.input().template jet<4>();
             const State& rate = cursor.rate();
             if (!(std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100)) return Status::outside;
             const State fourth = p.higher_rate(p.higher_rate(p.higher_rate(rate, u[1]), u[2]), u[3]);
@@ -260,15 +273,13 @@ class ExactSolver {
                 e.evaluate_guards(&constant, end.x(), v[0], look.end_value);
                 e.evaluate_guards(nullptr, end.rate(), v[1], look.end_slope);
                 bound_fourth(e, p.level(level).growth, fourth, h, look.fourth);
-                const Verdict verdict = judge(r, Instant{time_, cursor.x(), segment.memory, u, cursor.input().sizes()},
-                                              look, h, h < shortest);
+                const Verdict verdict = judge(e, segment.memory, cursor, look, h, h < shortest);
                 if (verdict == Verdict::uncertain) {  // below the shortest level, by plain halves
                     h = level > 0 ? std::min(p.level(--level).length, left) : 0.5 * h;
                     continue;
                 }
                 if (verdict == Verdict::crossing) {
-                    cursor.anchor(time_);  // so that the inputs at the event are those that the next regime sees
-                    first_crossing(r, e, segment.memory, cursor, look, h, end, fired);
+                    first_crossing(e, segment.memory, cursor, look, h, end, fired);
                     time_ = end.time();
                     now_.x = end.x();
                     last_level_ = level;
@@ -310,29 +321,39 @@ class ExactSolver {
                      c[5][g] * input_bound_[0] + c[6][g] * input_bound_[1];
     }
 
-    Verdict judge(const Regime& r, const Instant& now, const Look& look, double h, bool shortest) {
-        Flow flow(r, now);
+    Verdict judge(const typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, Look& look, double h,
+                  bool shortest) {
+        const Regime& r = e.regime;
+        look.enclose(h, e.guard_lanes);
         n_crossing_ = 0;
         room_ = std::numeric_limits<double>::infinity();
+        std::optional<Instant> instant;  // made when a guard needs it
+        std::optional<Flow> flow;
         for (int g = 0; g < r.n_guards; ++g) {
-            const Cubic c(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
-            const double bound = h * h * h * look.fourth[g], error = h / 384.0 * bound;
-            const double least = c.least();
             const bool by_touch = r.guards[g].by_touch;
-            if (least > error && !by_touch) {
+            const double least = look.least[g], error = look.error[g];
+            double apart = error;  // beyond this a guard is clear
+            if (by_touch) {
+                touch_size_ = std::max(touch_size_, e.speed_size(g, cursor.x()));
+                off_zero_ |= look.value[g] > rounding * touch_size_;
+                apart = std::max(error, rounding * touch_size_);
+            }
+            if (least > apart) {
                 room_ = std::min(room_, error > 0.0 ? least / error : room_);
                 continue;
             }
-            const double size = magnitude(r.guards[g].form, now.x, now.memory, now.input_size);
+            if (!instant) {
+                instant.emplace(Instant{time_, cursor.x(), memory, cursor.input().jet(), cursor.input().sizes()});
+                flow.emplace(r, *instant);
+            }
+            const Cubic c(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
+            const double bound = h * h * h * look.fourth[g];
+            const double size = magnitude(r.guards[g].form, instant->x, memory, instant->input_size);
             const double tolerance =
                 rounding * size +
                 time_rounding * std::fabs(time_) * std::max(std::fabs(look.slope[g]), std::fabs(look.end_slope[g]));
-            bool touches = false;
-            if (by_touch) {
-                touch_size_ = std::max(touch_size_, size);
-                off_zero_ |= c.c0 > rounding * touch_size_;
-                touches = off_zero_ && least - error <= rounding * touch_size_ && c.c3 > rounding * touch_size_;
-            }
+            const bool touches =
+                by_touch && off_zero_ && least - error <= rounding * touch_size_ && c.c3 > rounding * touch_size_;
             if (least > error && !touches) {
                 room_ = std::min(room_, error > 0.0 ? least / error : room_);
                 continue;
@@ -348,7 +369,7 @@ class ExactSolver {
                 crossing_[n_crossing_++] = {g, false};
                 continue;
             }
-            if (c.c0 <= tolerance && !touches && departs(r.guards[g].form, flow, h, look.fourth[g])) continue;
+            if (c.c0 <= tolerance && !touches && departs(r.guards[g].form, *flow, h, look.fourth[g])) continue;
             const double resolved = touches ? rounding * touch_size_ : tolerance;
             if (error > resolved && !shortest) return Verdict::uncertain;
             // The cubic is the guard to rounding; does it dip below zero?
@@ -381,8 +402,9 @@ class ExactSolver {
     }
 
     // Earliest of the certified crossings; `end` is left there.
-    void first_crossing(const Regime& r, typename Cache::Entry& e, const Memory& memory, const Cursor& cursor,
-                        const Look& look, double h, Cursor& end, const Guard*& fired) {
+    void first_crossing(typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, const Look& look,
+                        double h, Cursor& end, const Guard*& fired) {
+        const Regime& r = e.regime;
         double best = std::numeric_limits<double>::infinity();
         Cursor& at = trial_;
         const auto cubic = [&](int g) {
@@ -415,7 +437,7 @@ class ExactSolver {
                 const double moved = next - s;
                 if (value == 0.0 || at.time() + moved == at.time()) break;
                 if (std::fabs(moved) < e.propagator.level(0).length) {
-                    at.advance(moved);
+                    at.nudge(moved);
                 } else {
                     at = cursor;
                     at.advance(next);

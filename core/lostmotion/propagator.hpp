@@ -20,8 +20,8 @@
 
 namespace lostmotion {
 
-// Pairs of numbers that are reckoned with at once. A state is three of them, and is always written as that: a pair that is
-// read in one piece after it was written in two halts the processor.
+// Pairs of numbers that are reckoned with at once. A state is three of them, and is always written as that: a pair that
+// is read in one piece after it was written in two halts the processor.
 typedef double Pair __attribute__((vector_size(16)));
 
 inline Pair load(const double* from) {
@@ -38,7 +38,7 @@ struct Matrix {
     using Column = std::array<double, coupled>;
 
     std::array<Column, coupled> column{};
-    Column angle{};           // row of the load angle
+    Column angle{};          // row of the load angle
     double angle_own = 0.0;  // its own entry
 
     static Matrix diagonal(double value) {
@@ -115,7 +115,8 @@ struct LinearRates {
         for (int r = 0; r < n_states; ++r) {
             const LinearForm& f = regime.rate[r];
             assert(f.c[load_angle] == 0.0);
-            for (int c = 0; c < Matrix::coupled; ++c) (r < Matrix::coupled ? rate.column[c][r] : rate.angle[c]) = f.c[c];
+            for (int c = 0; c < Matrix::coupled; ++c)
+                (r < Matrix::coupled ? rate.column[c][r] : rate.angle[c]) = f.c[c];
             for (int i = 0; i < n_inputs; ++i) input_column[i][r] = f.c[first_input + i];
         }
     }
@@ -276,8 +277,7 @@ class Propagator {
         // |exp(A s)| from the powers of a matrix without negative entries beside its diagonal.
         Matrix positive = linear_.rate;
         positive.combine(Matrix{}, [h](double a, double) { return h * std::fabs(a); });
-        for (int k = 0; k < Matrix::coupled; ++k)
-            positive.column[k][k] = h * std::fmax(linear_.rate.column[k][k], 0.0);
+        for (int k = 0; k < Matrix::coupled; ++k) positive.column[k][k] = h * std::fmax(linear_.rate.column[k][k], 0.0);
         s.growth = Matrix::diagonal(1.0);
         Matrix bound = s.growth;
         for (int k = 1; k <= 8; ++k) {

@@ -46,6 +46,11 @@ class RegimeCache {
             }
             return value;
         }
+        // Sum of the magnitudes of the terms of a guard that is a speed, so without constant or inputs.
+        double speed_size(int g, const State& x) const {
+            const auto& c = guard_sizes;
+            return c[motor_speed][g] * std::fabs(x[motor_speed]) + c[load_speed][g] * std::fabs(x[load_speed]);
+        }
         // The part of the guards that depends on neither state nor inputs.
         std::array<double, max_guards> guard_constants(const Memory& m) const {
             std::array<double, max_guards> constant{};

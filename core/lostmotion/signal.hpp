@@ -174,6 +174,22 @@ class InputState {
         return bound;
     }
 
+    // Moves on by h, for once; sines and cosines of small angles from their series.
+    void turn(double h) {
+        time_ += h;
+        for (int i = 0; i < n_inputs; ++i) linear_[i] += slope_[i] * h;
+        for (std::size_t q = 0; q < basis_->size(); ++q) {
+            if ((*basis_)[q].kind != InputBasis::cosine) continue;
+            const double a = (*basis_)[q].omega * h, a2 = a * a;
+            const bool small = a2 < 1e-6;
+            const double cosine = small ? 1.0 - a2 / 2.0 * (1.0 - a2 / 12.0) : std::cos(a);
+            const double sine = small ? a * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0)) : std::sin(a);
+            const double s = weights_[q], c = weights_[q + 1];
+            weights_[q] = s * cosine + c * sine;
+            weights_[q + 1] = c * cosine - s * sine;
+        }
+    }
+
     // Moves on by h, with the rotations (cos, sin)(omega h) of the sines given in basis order.
     void advance(double h, const double* cos_sin) {
         time_ += h;
