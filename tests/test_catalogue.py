@@ -192,6 +192,29 @@ def test_no_load_torque_at_two_temperatures_is_used_between_and_refused_outside(
         build_loss_map(record, temperature=80.0)
 
 
+def test_figures_of_different_temperatures_are_each_taken_at_their_own():
+    # No-load torque at 20 and 60 °C; starting torque measured cold, efficiency warm. At each figure's temperature the map
+    # gives that figure back.
+    losses = {
+        "no_load_torque": [
+            {"input_speed": "2000 rpm", "torque": 0.105, "temperature": "20 degC"},
+            {"input_speed": "2000 rpm", "torque": 0.065, "temperature": "60 degC"},
+        ],
+        "efficiency": [{"input_speed": "2000 rpm", "efficiency": 0.8, "temperature": "60 degC"}],
+        "starting_torque": 0.037,
+        "starting_temperature": "20 degC",
+        "backdriving_torque": 3.0,
+        "backdriving_temperature": "60 degC",
+    }
+    record = sheet(losses=losses)
+    cold, warm = (build_loss_map(record, temperature=t).losses.core() for t in (20.0, 60.0))
+    assert cold(0.0, 0.0) == pytest.approx(100 * 0.037 / 52)
+    assert warm(0.0, 0.0) == pytest.approx(100 * 0.037 / 52 * 65 / 105)
+    assert warm(1.0, 1.0) == pytest.approx(1 / 0.8 - 1)
+    assert cold(1.0, 1.0) == pytest.approx(1 / 0.8 - 1 + 100 * (0.105 - 0.065) / 52)
+    assert warm(-3.0 / 52, 0.0) == pytest.approx(3.0 / 52)
+
+
 def test_wear_adds_backlash_and_multiplies_losses():
     new, worn = (
         lm.gearbox("bonfiglioli-tr080-3-90"),

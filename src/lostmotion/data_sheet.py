@@ -109,8 +109,10 @@ class LossFigures(Part):
     no_load_torque: tuple[NoLoadPoint, ...] = ()
     starting_torque: Annotated[Torque, Positive] | None = None
     """at the input, breaks the unloaded gearbox loose"""
+    starting_temperature: Temperature | None = None
     backdriving_torque: Annotated[Torque, Positive] | None = None
     """at the output, breaks the gearbox with a free input loose"""
+    backdriving_temperature: Temperature | None = None
     static_efficiency: Efficiency | None = None
     """when breaking loose under load, as printed for worm gears"""
     temperature: Temperature = 20.0

@@ -101,6 +101,21 @@ class _LoadPart:
 
 
 @dataclass
+class _Unloaded:
+    """m_0 at one temperature: over speed in motion, and at standstill."""
+
+    curve: dict[float, float]
+    start: float
+
+    def running(self, v: float) -> float:
+        """In motion: straight between the speeds, down to the lesser of starting and slowest running torque."""
+        x, y = [0.0, *self.curve], [min(self.start, next(iter(self.curve.values()))), *self.curve.values()]
+        if v <= x[-1]:
+            return float(np.interp(v, x, y))
+        return y[-1] + max(0.0, (y[-1] - y[-2]) / (x[-1] - x[-2])) * (v - x[-1])
+
+
+@dataclass
 class _Builder:
     sheet: GearboxSheet
     temperature: float | None
@@ -132,8 +147,7 @@ class _Builder:
         return speed / self.n_1R
 
     def _of_one_temperature(self, points: tuple[EfficiencyPoint, ...]) -> tuple[EfficiencyPoint, ...]:
-        reference = self.sheet.losses.temperature
-        temperatures = {reference if p.temperature is None else p.temperature for p in points}
+        temperatures = {self._at(p.temperature) for p in points}
         if len(temperatures) > 1:
             raise ValueError(
                 f"{self.sheet.name}: has efficiencies at several temperatures {sorted(temperatures)} °C; give those of "
@@ -144,43 +158,43 @@ class _Builder:
     # --- what is lost without load: areas 2 and 3 ---
 
     def _no_load_part(self, figures: LossFigures) -> None:
-        """Sets m_0 at standstill and in motion, at the temperature of the efficiencies and at the wanted one."""
-        sheet = self.sheet
-        per_torque = sheet.ratio / self.T_2R
-        reference = figures.temperature
-        wanted = reference if self.temperature is None else self.temperature
-        curves: dict[float, dict[float, float]] = {}
+        """Reads m_0 from the sheet, for `_unloaded` to give at any temperature."""
+        per_torque = self.sheet.ratio / self.T_2R
+        self.curves: dict[float, dict[float, float]] = {}
         for p in figures.no_load_torque:
-            t = reference if p.temperature is None else p.temperature
-            curves.setdefault(t, {})[self._relative(p.input_speed)] = per_torque * p.torque
-        start = None if figures.starting_torque is None else per_torque * figures.starting_torque
+            self.curves.setdefault(self._at(p.temperature), {})[self._relative(p.input_speed)] = per_torque * p.torque
+        self.standing = None if figures.starting_torque is None else per_torque * figures.starting_torque
+        self.standing_temperature = self._at(figures.starting_temperature)
         self.start_origin = "starting torque (area 3)"
         self.no_load_origin = "no-load torque (area 2)"
-        if not curves:
-            level = start
-            if level is None:
-                level = self._assumed_level(figures)
+        if not self.curves:
+            if self.standing is None:
+                self.standing = self._assumed_level(figures)
                 self.start_origin = self.no_load_origin = "filled in: assumed share of the loss under load"
             else:
                 self.no_load_origin = "filled in: as the starting torque"
-            curves = {reference: {1.0: level}}
-            start = level
-        elif start is None:
+            self.curves = {self.standing_temperature: {1.0: self.standing}}
+        elif self.standing is None:
             self.start_origin = "filled in: as the no-load torque at the lowest speed"
-        self.reference_curve = self._curve_at(curves, reference)
-        lowest = min(self.reference_curve)
-        self.start_reference = start if start is not None else self.reference_curve[lowest]
-        if len(curves) > 1:
-            self.curve = self._curve_at(curves, wanted)
-            factor = self.curve[lowest] / self.reference_curve[lowest]
-        else:
-            factor = self._viscosity_factor(figures, reference, wanted)
-            self.curve = {v: factor * m for v, m in self.reference_curve.items()}
-        self.start = factor * self.start_reference
-        if factor != 1.0:
+        wanted = self._at(self.temperature)
+        self.unloaded = self._unloaded(wanted)
+        if wanted != figures.temperature:
+            factor = self.unloaded.start / self._unloaded(figures.temperature).start
             self.notes.append(
-                f"At {wanted:g} °C the part that is lost without load is {factor:.3g} times that at {reference:g} °C."
+                f"At {wanted:g} °C the part that is lost without load is {factor:.3g} times that at {figures.temperature:g} °C."
             )
+
+    def _at(self, temperature: float | None) -> float:
+        return self.sheet.losses.temperature if temperature is None else temperature
+
+    def _unloaded(self, temperature: float) -> _Unloaded:
+        """m_0 at a temperature [°C], by the curves of the sheet, or by the viscosity from the only one."""
+        curve = self._curve_at(temperature)
+        if self.standing is None:
+            return _Unloaded(curve, next(iter(curve.values())))
+        # The starting torque changes as the slowest running torque does.
+        then = next(iter(self._curve_at(self.standing_temperature).values()))
+        return _Unloaded(curve, self.standing * (next(iter(curve.values())) / then if then > 0.0 else 1.0))
 
     def _assumed_level(self, figures: LossFigures) -> float:
         points = figures.all_efficiencies()
@@ -195,20 +209,20 @@ class _Builder:
         )
         return level
 
-    def _curve_at(self, curves: dict[float, dict[float, float]], temperature: float) -> dict[float, float]:
-        """m_0 over the speeds of all curves, straight between temperatures."""
-        known = sorted(curves)
-        if temperature in curves and len(known) == 1:
-            return dict(sorted(curves[temperature].items()))
+    def _curve_at(self, temperature: float) -> dict[float, float]:
+        """m_0 in motion over the speeds of all curves, straight between temperatures."""
+        known = sorted(self.curves)
+        if len(known) == 1:
+            factor = self._viscosity_factor(self.sheet.losses, known[0], temperature)
+            return {v: factor * m for v, m in sorted(self.curves[known[0]].items())}
         if not known[0] <= temperature <= known[-1]:
             raise ValueError(
                 f"{self.sheet.name}: has no_load_torque from {known[0]:g} to {known[-1]:g} °C, not at {temperature:g} °C; "
                 "choose a temperature between, or add figures"
             )
-        speeds = sorted({v for curve in curves.values() for v in curve})
         out = {}
-        for v in speeds:
-            at = [float(np.interp(v, sorted(curves[t]), [curves[t][x] for x in sorted(curves[t])])) for t in known]
+        for v in sorted({v for curve in self.curves.values() for v in curve}):
+            at = [float(np.interp(v, sorted(c), [c[x] for x in sorted(c)])) for c in (self.curves[t] for t in known)]
             out[v] = float(np.interp(temperature, known, at))
         return out
 
@@ -224,14 +238,6 @@ class _Builder:
             (figures.lubricant.viscosity(wanted) / figures.lubricant.viscosity(reference)) ** VISCOSITY_EXPONENT
         )
 
-    @staticmethod
-    def _running(curve: dict[float, float], start: float, v: float) -> float:
-        """m_0 in motion: straight between the speeds, down to the lesser of starting and slowest running torque."""
-        x, y = [0.0, *curve], [min(start, next(iter(curve.values()))), *curve.values()]
-        if v <= x[-1]:
-            return float(np.interp(v, x, y))
-        return y[-1] + max(0.0, (y[-1] - y[-2]) / (x[-1] - x[-2])) * (v - x[-1])
-
     # --- what the load adds: areas 1 and 4 ---
 
     def _load_parts(self, points: tuple[EfficiencyPoint, ...], loss: Any, name: str) -> dict[float, _LoadPart]:
@@ -240,7 +246,7 @@ class _Builder:
         for p in sorted(points, key=lambda p: (p.input_speed, p.load)):
             v = self._relative(p.input_speed)
             part = parts.setdefault(v, _LoadPart([], [], []))
-            total, without = loss(p), self._running(self.reference_curve, self.start_reference, v)
+            total, without = loss(p), self._unloaded(self._at(p.temperature)).running(v)
             origin = f"{name} (area 1)"
             if total < without:
                 self._contradiction(p, name, total, without)
@@ -268,10 +274,11 @@ class _Builder:
             slowest = driving[min(driving)]
             return slowest.scaled(figures.static_load_factor, "filled in: static load factor (area 4)")
         total = 1.0 / figures.static_efficiency - 1.0
-        rise = total - self.start_reference
+        start = self._unloaded(figures.temperature).start
+        rise = total - start
         if rise < 0.0:
             self.notes.append(
-                f"Contradiction at standstill: the starting torque alone is {self.start_reference:.3g} of rated torque, the "
+                f"Contradiction at standstill: the starting torque alone is {start:.3g} of rated torque, the "
                 f"static efficiency {figures.static_efficiency:g} leaves {total:.3g}. The starting torque is kept and the "
                 "static efficiency taken for what the load adds."
             )
@@ -283,13 +290,14 @@ class _Builder:
         if figures.backdriving_torque is None:
             return static.scaled(1.0, "filled in: as while the motor drives (area 4)")
         mu = figures.backdriving_torque / self.T_2R
-        if mu < self.start_reference:
+        start = self._unloaded(self._at(figures.backdriving_temperature)).start
+        if mu < start:
             self.notes.append(
                 f"Contradiction at standstill: a back-driving torque of {figures.backdriving_torque:g} N·m is less than the "
-                f"starting torque times the ratio, {self.start_reference * self.T_2R:.4g} N·m. Both are "
+                f"starting torque times the ratio, {start * self.T_2R:.4g} N·m. Both are "
                 "kept, so the loss falls a little between them."
             )
-        return _LoadPart([mu], [mu - self.start_reference], ["back-driving torque (area 4)"])
+        return _LoadPart([mu], [mu - start], ["back-driving torque (area 4)"])
 
     # --- the table ---
 
@@ -305,7 +313,7 @@ class _Builder:
         torques = (sheet.average_output_torque, sheet.peak_output_torque)
         most = max([1.5, *(t / self.T_2R for t in torques if t is not None)])
         fastest = max(1.2, self._relative(sheet.max_input_speed or 0.0))
-        measured = {*self.curve, *driving, *overrunning}
+        measured = {*self.unloaded.curve, *driving, *overrunning}
         slow = min([STATIC_TO_RUNNING, *(0.5 * v for v in measured)])
         speeds = sorted({0.0, slow, *measured, 1.0, fastest})
         speeds = [v for v in speeds if v <= max(fastest, *measured)]
@@ -330,10 +338,10 @@ class _Builder:
     def _node(self, mu: float, v: float, parts: dict[float, _LoadPart], standing: _LoadPart) -> tuple[float, str]:
         if v == 0.0:
             origin = standing.origin(mu) if mu > 0.0 else self.start_origin
-            return max(0.0, self.start + standing(mu)), origin
-        without = self._running(self.curve, self.start, v)
+            return max(0.0, self.unloaded.start + standing(mu)), origin
+        without = self.unloaded.running(v)
         if mu == 0.0:
-            return without, self.no_load_origin if v in self.curve else "filled in: along the speed"
+            return without, self.no_load_origin if v in self.unloaded.curve else "filled in: along the speed"
         known = sorted(parts)
         added = float(np.interp(v, known, [parts[x](mu) for x in known]))
         return without + added, parts[v].origin(mu) if v in parts else "filled in: along the speed"

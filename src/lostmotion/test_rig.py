@@ -321,19 +321,23 @@ def _compare(rig: TestRig, sheet: GearboxSheet, notes: tuple[str, ...]) -> Itera
     contradiction = "contradicts the no-load torque; see note" if any("Contradiction" in n for n in notes) else ""
     figures = sheet.losses
     rpm = 30.0 / np.pi
-    for p in figures.all_efficiencies():
+
+    def here(temperature: float | None) -> bool:
+        """Whether a figure is of the temperature that the gearbox was made for."""
+        return temperature in (None, figures.temperature)
+
+    for p in filter(lambda p: here(p.temperature), figures.all_efficiencies()):
         what = f"efficiency at {rpm * p.input_speed:.0f} rpm, load {p.load:g}"
         yield Comparison(what, "1", p.efficiency, rig.efficiency(p.input_speed, p.load), contradiction)
-    for p in figures.backdrive_efficiency:
+    for p in filter(lambda p: here(p.temperature), figures.backdrive_efficiency):
         what = f"back-drive efficiency at {rpm * p.input_speed:.0f} rpm, load {p.load:g}"
         yield Comparison(what, "1", p.efficiency, rig.efficiency(p.input_speed, -p.load), contradiction)
-    for q in figures.no_load_torque:
-        if q.temperature in (None, figures.temperature):
-            what = f"no-load torque at {rpm * q.input_speed:.0f} rpm"
-            yield Comparison(what, "N·m", q.torque, rig.no_load_torque(q.input_speed))
-    if figures.starting_torque is not None:
+    for q in filter(lambda q: here(q.temperature), figures.no_load_torque):
+        what = f"no-load torque at {rpm * q.input_speed:.0f} rpm"
+        yield Comparison(what, "N·m", q.torque, rig.no_load_torque(q.input_speed))
+    if figures.starting_torque is not None and here(figures.starting_temperature):
         yield Comparison("starting torque", "N·m", figures.starting_torque, rig.starting_torque())
-    if figures.backdriving_torque is not None:
+    if figures.backdriving_torque is not None and here(figures.backdriving_temperature):
         yield Comparison("back-driving torque", "N·m", figures.backdriving_torque, rig.backdriving_torque() or np.inf)
     if figures.static_efficiency is not None:
         eta = rig.gearbox.rated_output_torque / (rig.gearbox.ratio * rig.starting_torque(1.0))
