@@ -21,9 +21,10 @@ test-core: $(VENV)/tools
 	$(BIN)/ctest --test-dir build/core --output-on-failure
 
 bench: $(VENV)/built
+	echo '#include <cvode/cvode.h>' | c++ -E -x c++ - >/dev/null 2>&1 || { apt-get update -q && apt-get install -qy libsundials-dev; } || echo 'without SUNDIALS'
 	$(BIN)/cmake -S . -B build/bench -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_BENCHMARKS=ON >build/bench.log
 	$(BIN)/cmake --build build/bench
-	$(BIN)/python benchmarks/bench.py build/bench/bench_core
+	$(BIN)/python benchmarks/bench.py build/bench
 
 docs: $(VENV)/built
 	$(BIN)/pip install -q --group docs
@@ -34,7 +35,7 @@ lint: $(VENV)/built
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/clang-format --dry-run --Werror core/lostmotion/*.hpp core/tests/*.cpp core/tests/*.hpp bindings/*.cpp benchmarks/*.cpp
+	$(BIN)/clang-format --dry-run --Werror core/lostmotion/*.hpp core/tests/*.cpp core/tests/*.hpp bindings/*.cpp benchmarks/*.cpp benchmarks/*.hpp
 
 .PHONY: stub
 stub: $(VENV)/built
@@ -43,7 +44,7 @@ stub: $(VENV)/built
 format: $(VENV)/tools
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
-	$(BIN)/clang-format -i core/lostmotion/*.hpp core/tests/*.cpp core/tests/*.hpp bindings/*.cpp benchmarks/*.cpp
+	$(BIN)/clang-format -i core/lostmotion/*.hpp core/tests/*.cpp core/tests/*.hpp bindings/*.cpp benchmarks/*.cpp benchmarks/*.hpp
 
 # Tools and libraries, then the package itself; only what changed is compiled again.
 $(VENV)/tools: pyproject.toml

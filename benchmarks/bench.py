@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -31,12 +34,18 @@ def start_up(*command: str) -> float:
     return best(5, lambda: subprocess.run(command, check=True, stdout=subprocess.DEVNULL))
 
 
+def output_of(program: Path) -> str:
+    return subprocess.run([program], check=True, capture_output=True, text=True).stdout
+
+
 def main() -> None:
     scenario = lm.load(ROOT / "scenarios" / "paper-2dof-nl-large.toml")
     exact = lm.simulate(scenario)
     rows: list[tuple[str, float, str]] = []
     responses: list[tuple[str, float]] = []
-    for line in subprocess.run([sys.argv[1]], check=True, capture_output=True, text=True).stdout.splitlines():
+    programs = [Path(sys.argv[1]) / name for name in ("bench_core", "peer_cvode")]
+    lines = [line for p in programs if p.exists() for line in output_of(p).splitlines()]
+    for line in lines:
         name, milliseconds, error = line.split("|")
         if name.startswith("response, "):
             responses.append((name.removeprefix("response, "), float(milliseconds)))
@@ -62,29 +71,100 @@ def main() -> None:
             ]
             rows.append((f"scipy {method}, rtol {rtol:g}, events in Python", spent, f"{max(errors):.3g}"))
 
-    reference = next(ms for name, ms, _ in rows if "same drive again" in name)
-    print(
-        f"\n{platform.platform()}, Python {platform.python_version()}, lostmotion {exact.attrs['lostmotion_version']}"
+    report = Report()
+    model = next(
+        (x.split(":")[1].strip() for x in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in x), "?"
     )
-    print("2-DOF-NL, E_CA = 1.0275, 1 Hz, 2 s from rest, sampled at 1 kHz, stand-in loss table\n")
-    print(f"{'':52}{'time [ms]':>12}{'ratio':>10}{'largest error':>16}")
-    for name, ms, error in rows:
-        print(f"{name:52}{ms:12.4f}{ms / reference:10.1f}{error:>16}")
-    print("\nFrequency response of the same drive: 60 frequencies from 0.1 to 100 Hz, 8 amplitudes\n")
-    print(f"{'':64}{'time [ms]':>12}{'ratio':>10}")
-    for name, ms in responses:
-        print(f"{name:64}{ms:12.0f}{ms / responses[0][1]:10.1f}")
+    report.add("# Benchmark", "", "Made by `make bench`, all in one run; times are the best of several.", "")
+    report.add(
+        f"{model}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}, Python {platform.python_version()}"
+    )
+    report.add(
+        f"lostmotion {exact.attrs['lostmotion_version']}, {', '.join(f'{m} {version(m)}' for m in ('numpy', 'scipy', 'xarray'))}"
+    )
+    report.add("", "## One run", "")
+    report.add(
+        "2-DOF-NL, E_CA = 1.0275, 1 Hz, 2 s from rest, sampled at 1 kHz, stand-in loss table. CVODE has the same regimes and"
+    )
+    report.add(
+        "contact logic as the exact solver and differs in the integrator alone; scipy has them written in Python.", ""
+    )
+    reference = next(ms for name, ms, _ in rows if "same drive again" in name)
+    cells = [(name, f"{ms:.4f}", f"{ms / reference:.1f}", error) for name, ms, error in rows]
+    report.table(("", "time [ms]", "ratio", "largest error"), cells)
+    report.add(
+        "", "## Frequency response", "", "The same drive, 60 frequencies from 0.1 to 100 Hz at 8 amplitudes.", ""
+    )
+    report.table(("", "time [ms]", "ratio"), [(n, f"{ms:.0f}", f"{ms / responses[0][1]:.1f}") for n, ms in responses])
+    report.add("", "## Studies", "", "Runs of 1 s of the same drive, two values kept of each, Parquet written.", "")
+    report.table(("what varies", "threads", "runs/s", "simulated s per s and core"), studies(scenario))
+    report.add("", "## Start-up", "")
     python, command = sys.executable, str(Path(sys.executable).with_name("lostmotion"))
     bare = start_up(python, "-c", "pass")
-    print(
-        f"\nimport lostmotion            {start_up(python, '-c', 'import lostmotion') - bare:8.1f} ms beyond the interpreter's own {bare:.1f} ms"
-    )
-    print(f"lostmotion --help            {start_up(command, '--help'):8.1f} ms")
     begin = time.perf_counter()
     subprocess.run(
         [command, "reproduce", "-o", str(ROOT / "build" / "bench-report")], check=True, stdout=subprocess.DEVNULL
     )
-    print(f"lostmotion reproduce         {1e3 * (time.perf_counter() - begin):8.0f} ms")
+    reproduced = 1e3 * (time.perf_counter() - begin)
+    report.table(
+        ("", "time [ms]"),
+        [
+            (
+                f"import lostmotion, beyond the interpreter's own {bare:.1f} ms",
+                f"{start_up(python, '-c', 'import lostmotion') - bare:.1f}",
+            ),
+            ("lostmotion --help", f"{start_up(command, '--help'):.0f}"),
+            ("lostmotion reproduce", f"{reproduced:.0f}"),
+        ],
+    )
+    print(report.text())
+    (ROOT / "benchmarks" / "RESULTS.md").write_text(report.text())
+
+
+class Report:
+    """Text that reads well in the terminal and as Markdown."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def add(self, *lines: str) -> None:
+        self.lines += lines
+
+    def table(self, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        widths = [max(len(str(r[k])) for r in [header, *rows]) for k in range(len(header))]
+
+        def line(cells: Sequence[str]) -> str:
+            first, *rest = (str(c) for c in cells)
+            return (
+                "| "
+                + " | ".join([first.ljust(widths[0]), *(c.rjust(w) for c, w in zip(rest, widths[1:], strict=True))])
+                + " |"
+            )
+
+        self.add(
+            line(header),
+            "|" + "|".join(("-" * (w + 1) + ":") if k else "-" * (w + 2) for k, w in enumerate(widths)) + "|",
+        )
+        self.add(*(line(r) for r in rows))
+
+    def text(self) -> str:
+        return "\n".join(self.lines) + "\n"
+
+
+def studies(scenario: lm.Scenario) -> list[tuple[str, ...]]:
+    base = scenario.replace(**{"simulation.duration": 1.0})
+    keep = {"peak": "peak(load_speed)", "rms": "rms(twist)"}
+    command = [{"key": "command.amplitude", "uniform": [0.1, 1.0]}]
+    drive = [{"key": "load.inertia", "uniform": [1.0, 3.0]}, {"key": "motor.friction_torque", "uniform": [0.01, 0.02]}]
+    rows = []
+    for name, vary in (("the command", command), ("the command and the drive", command + drive)):
+        for threads in sorted({1, os.cpu_count() or 1}):
+            study = lm.Study(scenario=base, design="random", runs=4000, vary=vary, keep=keep)
+            with tempfile.TemporaryDirectory() as directory:
+                spent = best(1, lambda: lm.study(study, Path(directory) / "s", threads=threads))  # noqa: B023
+            rate = 4000 / (1e-3 * spent)
+            rows.append((name, str(threads), f"{rate:.0f}", f"{rate / threads:.0f}"))
+    return rows
 
 
 if __name__ == "__main__":
