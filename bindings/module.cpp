@@ -60,23 +60,28 @@ struct SolverError : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-// Turns a status into an exception; the signal's own exception is already set when a run was interrupted.
-void check(Status status, double time, Contact contact) {
+// Why a run has no continuation.
+std::string status_text(Status status, double time, Contact contact) {
     const std::string at = "at t = " + std::to_string(time) + " s";
     switch (status) {
-        case Status::done: return;
-        case Status::interrupted: throw nb::python_error();
         case Status::jammed:
-            throw SolverError("no combination of sticking and slipping contacts is consistent " + at +
-                              ": the friction jams. Give the gearbox a compliance, or lower its losses.");
+            return "no combination of sticking and slipping contacts is consistent " + at +
+                   ": the friction jams. Give the gearbox a compliance, or lower its losses.";
         case Status::outside:
-            throw SolverError(
-                "the state left the range that the loss map can be extended to " + at +
-                " (1000 times its data). The drive is unstable, or its data or inputs have a wrong unit.");
+            return "the state left the range that the loss map can be extended to " + at +
+                   " (1000 times its data). The drive is unstable, or its data or inputs have a wrong unit.";
         case Status::zeno:
-            throw SolverError("switching instants of the contact '" + std::string(contact_name(contact)) +
-                              "' accumulate " + at + ": infinitely many in finite time. The model ends here.");
+            return "switching instants of the contact '" + std::string(contact_name(contact)) + "' accumulate " + at +
+                   ": infinitely many in finite time. The model ends here.";
+        default: return "interrupted";
     }
+}
+
+// Turns a status into an exception; the signal's own exception is already set when a run was interrupted.
+void check(Status status, double time, Contact contact) {
+    if (status == Status::done) return;
+    if (status == Status::interrupted) throw nb::python_error();
+    throw SolverError(status_text(status, time, contact));
 }
 
 nb::ndarray<nb::numpy, double, nb::ndim<2>> as_array(std::unique_ptr<double[]> data, std::size_t rows,
@@ -260,6 +265,7 @@ nb::dict respond_to(SharedDrive& drive, const std::vector<Point>& asked, const R
     };
     number("status", [](const ResponseResult& r) { return static_cast<int>(r.motion.status); });
     number("time", [](const ResponseResult& r) { return r.motion.time; });
+    number("contact", [](const ResponseResult& r) { return static_cast<int>(r.motion.contact); });
     number("converged", [](const ResponseResult& r) { return r.motion.converged; });
     number("smooth", [](const ResponseResult& r) { return r.motion.smooth; });
     number("periods", [](const ResponseResult& r) { return r.motion.periods; });
@@ -471,6 +477,12 @@ NB_MODULE(_core, m) {
                 "tolerance: float, keep_table: bool, threads: int, "
                 "progress: collections.abc.Callable[[int], None] | None = None) -> "
                 "dict[str, numpy.typing.NDArray[numpy.float64]]"));
+    m.def(
+        "status_text",
+        [](int status, double time, int contact) {
+            return status_text(static_cast<Status>(status), time, static_cast<Contact>(contact));
+        },
+        "status"_a, "time"_a, "contact"_a);
     m.def(
         "batch_fields",
         [] {

@@ -99,7 +99,7 @@ class AdaptiveSolver {
         time_ = time;
         now_.x = x;
         now_.memory = memory;
-        set_inputs();
+        see_inputs(input_, time_, now_);
         step_ = 0.0;
         return status_of(system_.start(cache_, now_, key_));
     }
@@ -125,35 +125,14 @@ class AdaptiveSolver {
     }
 
  private:
-    void set_inputs() {
-        input_.anchor(time_);
-        now_.time = time_;
-        now_.input = input_.jet();
-        now_.input_size = input_.sizes();
-    }
-
     template <class Observer>
     Status change_regime(const Guard* fired, Observer& observer) {
         Switching s;
-        s.time = time_;
-        s.before = key_;
-        s.input_jump = fired == nullptr;
-        if (fired != nullptr) {
-            s.kind = fired->kind;
-            s.contact = stopped_at_ = fired->contact;
-            if (fired->kind == Guard::outside) return Status::outside;
-        }
-        set_inputs();
-        const double before = last_event_;
-        last_event_ = time_;
-        repeats_ = time_ - before < 1e-14 * std::fmax(1.0, time_) ? repeats_ + 1 : 0;
-        if (repeats_ > 100) return Status::zeno;
-        const Found found = system_.next(cache_, now_, fired, key_);
-        if (found != Found::yes) return status_of(found);
-        s.after = key_;
-        s.x = now_.x;
+        const Status status = switch_regime(system_, cache_, input_, time_, fired, now_, key_, s);
+        if (fired != nullptr) stopped_at_ = fired->contact;
+        if (status != Status::done) return status;
         observer.switching(s);
-        return Status::done;
+        return accumulation_.add(time_, 1.0) ? Status::zeno : Status::done;
     }
 
     State rates(const LinearRates& linear, const State& constant, double t, const State& x) {
@@ -304,9 +283,8 @@ class AdaptiveSolver {
     Instant now_;
     RegimeKey key_;
     long steps_ = 0;
-    int repeats_ = 0;
+    Accumulation accumulation_;
     bool off_zero_ = false;  // whether the guard that may touch has been off zero in this regime
-    double last_event_ = -1.0;
     Contact stopped_at_ = input_contact;
 };
 

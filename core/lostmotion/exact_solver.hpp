@@ -15,38 +15,12 @@
 #include <memory>
 #include <optional>
 
-#include "contact.hpp"
 #include "cubic.hpp"
 #include "cursor.hpp"
 #include "regime_cache.hpp"
+#include "switching.hpp"
 
 namespace lostmotion {
-
-enum class Status {
-    done,
-    interrupted,
-    jammed,   // no combination of contact modes is consistent
-    outside,  // left the extended loss map, or the range of the arithmetic
-    zeno,     // switching instants accumulate
-};
-
-inline Status status_of(Found found) {
-    if (found == Found::yes) return Status::done;
-    return found == Found::outside ? Status::outside : Status::jammed;
-}
-
-// What ended a regime.
-struct Switching {
-    double time = 0.0;
-    Guard::Kind kind = Guard::speed;
-    Contact contact = input_contact;
-    bool input_jump = false;  // an input changed its value or slope; kind and contact mean nothing
-    int guard = -1;           // its number among those of the regime before; -1: an input jumped
-    RegimeKey before, after;
-    State x{};
-    Memory memory;                                   // after it, as x
-    double torque_before = 0.0, torque_after = 0.0;  // T_2 [N m], left and right limit
-};
 
 // A stretch of time spent in one regime, from which an observer can evaluate the exact state at any instant.
 template <class System>
@@ -161,11 +135,8 @@ class ExactSolver {
     }
 
  private:
-    // Accumulation of switching instants: this many of them within a few thousand roundings of the time.
     static constexpr double settled = 1e-8;
     static constexpr int first_level = 6;  // of the first look
-    static constexpr int zeno_count = 100;
-    static constexpr double zeno_span = 1e4 * std::numeric_limits<double>::epsilon();
 
     static double elementary(double unit) {
         while (unit > 1e-2) unit *= 0.5;
@@ -173,49 +144,20 @@ class ExactSolver {
     }
     void set_time(double time) {
         time_ = time;
-        recent_ = 0;
+        accumulation_ = {};
         jump_pending_ = false;
         last_level_ = first_level;  // so that what follows depends on the state alone
     }
-    void anchor_inputs() {
-        input_.anchor(time_);
-        now_.time = time_;
-        now_.input = input_.jet();
-        now_.input_size = input_.sizes();
-    }
+    void anchor_inputs() { see_inputs(input_, time_, now_); }
 
     template <class Observer>
     Status change_regime(const Guard* fired, Observer& observer) {
         Switching s;
-        s.time = time_;
-        s.before = key_;
-        s.input_jump = fired == nullptr;
-        if (fired != nullptr) {
-            s.kind = fired->kind;
-            s.contact = fired->contact;
-            s.guard = static_cast<int>(fired - cache_.regime(key_).guards.data());
-            stopped_at_ = fired->contact;
-            if (fired->kind == Guard::outside) return Status::outside;
-        }
-        const LinearForm& torque = cache_.regime(key_).output_torque;
-        if (s.input_jump) {
-            input_.anchor_left(time_);
-            s.torque_before = evaluate(torque, now_.x, now_.memory, input_.values());
-        }
-        anchor_inputs();
-        if (!s.input_jump) s.torque_before = evaluate(torque, now_.x, now_.memory, now_.input[0]);
-        const Found found = system_.next(cache_, now_, fired, key_);
-        if (found != Found::yes) return status_of(found);
-        s.after = key_;
-        s.x = now_.x;
-        s.memory = now_.memory;
-        s.torque_after = evaluate(cache_.regime(key_).output_torque, now_.x, now_.memory, now_.input[0]);
+        const Status status = switch_regime(system_, cache_, input_, time_, fired, now_, key_, s);
+        if (fired != nullptr) stopped_at_ = fired->contact;
+        if (status != Status::done) return status;
         observer.switching(s);
-        if (recent_ == 0 || time_ - recent_since_ > zeno_span * std::fmax(std::fabs(time_), unit_)) {
-            recent_ = 0;
-            recent_since_ = time_;
-        }
-        return ++recent_ > zeno_count ? Status::zeno : Status::done;
+        return accumulation_.add(time_, unit_) ? Status::zeno : Status::done;
     }
 
     enum class Verdict { clear, crossing, uncertain };
@@ -480,8 +422,7 @@ class ExactSolver {
     // rounding leaves of a zero is relative to the latter. (A regime has at most one such guard.)
     bool off_zero_ = false;
     double touch_size_ = 0.0;
-    int recent_ = 0;
-    double recent_since_ = 0.0;
+    Accumulation accumulation_;
     bool jump_pending_ = false;
     Contact stopped_at_ = input_contact;
 };

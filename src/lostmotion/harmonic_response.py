@@ -33,19 +33,13 @@ COMPONENTS = (*STATES, "hysteresis_capacity", "held_torque")
 _ACTIVE = [k for k, name in enumerate(COMPONENTS) if name != "load_angle"]
 
 Source = Literal["command", "load_torque"]
-_STATUS = {
-    1: "interrupted",
-    2: "the friction jams: no combination of contact modes is consistent",
-    3: "the motion left the range of the loss map or of the arithmetic",
-    4: "switching instants accumulate",
-}
 
 
 def _reason(result: dict[str, Any], k: int) -> str:
     """Why a point has no periodic motion; empty if it has one."""
     status = int(result["status"][k])
     if status != 0:
-        return f"{_STATUS[status]} at t = {result['time'][k]:.6g} s"
+        return _core.status_text(status, result["time"][k], int(result["contact"][k]))
     if not result["converged"][k]:
         return f"not periodic after {int(result['periods'][k])} periods: the states still change by {result['residual'][k]:.1e}"
     return ""

@@ -38,12 +38,6 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 SLOPES = "gearbox.stiffness.slopes"
-_STATUS = {
-    1: "interrupted",
-    2: "the friction jams: no combination of contact modes is consistent",
-    3: "the motion left the range of the loss map or of the arithmetic",
-    4: "switching instants accumulate",
-}
 
 
 # --- one chunk of runs ---
@@ -242,9 +236,9 @@ def _in_the_core(study: Study, parameters: np.ndarray, channels: list[str], ener
     )
     n = len(parameters)
     where = np.flatnonzero(good)
-    for row, status, time in zip(where.tolist(), totals[:, 0], totals[:, 2], strict=True):
+    for row, (status, contact, time) in zip(where.tolist(), totals[:, :3].tolist(), strict=True):
         if status != 0:
-            errors[row] = f"{_STATUS[int(status)]} at t = {time:.6g} s"
+            errors[row] = _core.status_text(int(status), time, int(contact))
 
     def spread(x: np.ndarray) -> np.ndarray:
         if len(where) == n:
