@@ -519,5 +519,16 @@ def test_the_drive_check_finds_what_is_wrong():
     assert {"output torque, largest"} <= {f.what for f in plain}
 
 
+def test_a_load_that_drives_is_no_dead_zone():
+    findings = {f.what: f for f in check_drive(lm.load(ROOT / "scenarios" / "backlash-reversing-load.toml"))}
+    assert findings["dead zone"].verdict == "ok"  # the command is 0 throughout
+
+
+def test_a_name_that_is_none_is_answered_with_near_ones():
+    done = CliRunner().invoke(app, ["catalogue", "maxon-re-65-35329"])
+    assert isinstance(done.exception, InputError)
+    assert "did you mean maxon-re-65-35329" in str(done.exception)
+
+
 def test_difference_is_relative():
     assert Comparison("x", "1", 2.0, 2.1).difference == pytest.approx(0.05)

@@ -425,6 +425,14 @@ def test_the_command_writes_figures_and_tables(tmp_path: Path):
     assert np.allclose(table[:, 2], np.abs(values), rtol=1e-12)
 
 
+def test_a_drive_that_never_moves_still_gets_its_figures(tmp_path: Path):
+    scenario = str(ROOT / "scenarios" / "paper-2dof-nl-large.toml")
+    words = ["--amplitudes", "0.001,0.002", "--frequencies", "1,5", "-o", str(tmp_path / "o")]
+    done = CliRunner().invoke(app, ["response", scenario, *words])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "o" / "bode.png").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "match"),
     [

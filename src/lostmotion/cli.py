@@ -270,12 +270,15 @@ def response(
         f"below {found.attrs['dead_zone_backward']:.4g}"
     )
     reasons = [r for r in result["reason"].values.ravel() if r]
-    print(
-        f"  {result['reason'].size - len(reasons)} of {result['reason'].size} motions found, repeating within "
-        f"{float(result['residual'].where(result['reason'] == '').max()):.1e} of their size"
-    )
-    for reason in dict.fromkeys(reasons):
+    found_points = result["reason"].size - len(reasons)
+    worst = float(result["residual"].where(result["reason"] == "").max())
+    within = f", repeating within {worst:.1e} of their size" if found_points else ""
+    print(f"  {found_points} of {result['reason'].size} motions found{within}")
+    different = list(dict.fromkeys(reasons))
+    for reason in different[:3]:
         print(f"  not found at {reasons.count(reason)} point(s): {reason}")
+    if len(different) > 3:
+        print(f"  {len(different) - 3} more reasons are in response.csv")
     print(f"Figures and tables are in {figure.parent}")
 
 

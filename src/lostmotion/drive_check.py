@@ -151,7 +151,10 @@ def _dead_zone(scenario: Scenario, result: xarray.Dataset) -> Finding:
     forward, backward = (scenario.drive().core().smallest_command(0.0, against, s) for s in (+1, -1))
     largest = float(abs(result["command"]).max())
     value = f"the load moves above a command of {forward:.4g} and below {backward:.4g}"
-    if largest <= min(forward, -backward):
+    moves = bool((result["motor_speed"] != 0.0).any())
+    if largest == 0.0:  # the load drives
+        return Finding("dead zone", value, "ok")
+    if largest <= min(forward, -backward) and not moves:
         return Finding(
             "dead zone", value, "warning", f"the command never exceeds {largest:.4g}: the load does not move"
         )
@@ -190,7 +193,7 @@ def _heat(scenario: Scenario, result: xarray.Dataset) -> Finding:
         or limits.thermal_resistance is None
         or limits.max_winding_temperature is None
     ):
-        limit = m.rated_torque if limits is None else limits.continuous_torque
+        limit = limits.continuous_torque if limits is not None else m.rated_torque if m.kind == "dc" else None
         return _within("motor torque, rms", torque, limit, "N·m", "continuous torque")
     cold = limits.thermal_resistance * limits.resistance * (torque / limits.torque_constant) ** 2
     if cold * COPPER >= 1.0:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import difflib
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 
 from .data_sheet import GearboxSheet, MotorSheet
 from .errors import InputError
-from .records import catalogue, find
+from .records import catalogue, find, read_sheets
 from .rig_sheet import rows_of
 
 
@@ -69,11 +71,12 @@ def record_text(name: str) -> str:
     InputError
         There is no such record.
     """
-    table = (
-        "gearbox"
-        if name.endswith(".toml") or any(r.name == name and isinstance(r, GearboxSheet) for r in catalogue())
-        else "motor"
-    )
+    kinds = {r.name: "gearbox" if isinstance(r, GearboxSheet) else "motor" for r in catalogue()}
+    if not name.endswith(".toml") and name not in kinds:
+        near = difflib.get_close_matches(name, kinds, n=3, cutoff=0.5)
+        hint = f"did you mean {' or '.join(near)}?" if near else "`lostmotion catalogue` lists them"
+        raise InputError(f"{name!r} is not in the catalogue; {hint}")
+    table = kinds.get(name) or ("gearbox" if isinstance(read_sheets(Path(name))[0], GearboxSheet) else "motor")
     record = find(name, table)
     rows = rows_of(record)
     lines = [f"{record.name}: {record.maker} {record.title}".strip(), ""]

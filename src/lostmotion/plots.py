@@ -99,7 +99,7 @@ def draw(panels: Iterable[Panel], columns: int, size: tuple[float, float], note:
             axes.plot(curve.x, curve.y, label=curve.shown, **curve.style)
         if panel.log_x:
             axes.set_xscale("log")
-        if panel.log_y:
+        if panel.log_y and any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves):
             axes.set_yscale("log")
         axes.set(title=panel.title, xlabel=panel.x_label, ylabel=panel.y_label)
         axes.title.set_fontsize(10)

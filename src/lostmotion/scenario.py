@@ -263,7 +263,7 @@ def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[
     try:
         part = Gearbox(**_merge(values, own))
     except ValidationError as error:
-        raise InputError(f"gearbox {reference}: {describe(error)}") from None
+        raise InputError(f"gearbox {reference}: {describe(error).removeprefix('the scenario ')}") from None
     return part, built.notes if built else ()
 
 
