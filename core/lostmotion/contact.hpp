@@ -131,6 +131,14 @@ class SwitchedDrive {
         return find(cache, now, at_rest, T_2, ended, key);
     }
 
+    // Sets the speeds of contacts at rest to what they are, to the last bit. Two at rest imply the third.
+    void stop(State& x, std::array<bool, n_contacts>& at_rest) const {
+        if (at_rest[0] + at_rest[1] + at_rest[2] >= 2) at_rest = {true, true, true};
+        if (at_rest[input_contact]) x[motor_speed] = 0.0;
+        if (at_rest[load_contact]) x[load_speed] = 0.0;
+        if (at_rest[twist_contact]) x[load_speed] = x[motor_speed] * (1.0 / drive_.gearbox.ratio);
+    }
+
  private:
     // A regime that the solver has seen to its end. Where the motion has all but come to rest, the derivatives at the
     // instant alone may be too small to tell that it ends.
@@ -154,13 +162,6 @@ class SwitchedDrive {
     std::array<bool, n_contacts> at_exact_rest(const State& x) const {
         const double w_M = x[motor_speed], w = x[load_speed];
         return {w_M == 0.0, w_M * (1.0 / drive_.gearbox.ratio) == w, w == 0.0};
-    }
-
-    void stop(State& x, std::array<bool, n_contacts>& at_rest) const {
-        if (at_rest[0] + at_rest[1] + at_rest[2] >= 2) at_rest = {true, true, true};
-        if (at_rest[input_contact]) x[motor_speed] = 0.0;
-        if (at_rest[load_contact]) x[load_speed] = 0.0;
-        if (at_rest[twist_contact]) x[load_speed] = x[motor_speed] * (1.0 / drive_.gearbox.ratio);
     }
 
     using Choices = std::array<std::array<std::int8_t, 3>, n_contacts>;  // the modes that each contact may take

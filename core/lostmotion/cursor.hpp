@@ -20,20 +20,13 @@ class Cursor {
 
     // On a regime, at an instant of it.
     void place(Propagator& propagator, const State& constant, double time, const State& x) {
-        propagator_ = &propagator;
-        constant_ = &constant;
         input_.anchor(time);
-        x_ = x;
-        rate_known_ = false;
+        stand(propagator, constant, x);
     }
-
     // The same, with inputs that are there already.
     void place(Propagator& propagator, const State& constant, const InputState& input, const State& x) {
-        propagator_ = &propagator;
-        constant_ = &constant;
         input_ = input;
-        x_ = x;
-        rate_known_ = false;
+        stand(propagator, constant, x);
     }
 
     double time() const { return input_.time(); }
@@ -81,6 +74,13 @@ class Cursor {
     }
 
  private:
+    void stand(Propagator& propagator, const State& constant, const State& x) {
+        propagator_ = &propagator;
+        constant_ = &constant;
+        x_ = x;
+        rate_known_ = false;
+    }
+
     Propagator* propagator_ = nullptr;
     const State* constant_ = nullptr;
     InputState input_;

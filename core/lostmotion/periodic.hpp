@@ -42,7 +42,8 @@ class Shooting {
  public:
     // The inputs must repeat with the period. unit: as of ExactSolver.
     Shooting(Workspace& workspace, const Signals& signals, double unit, const ShootingOptions& options)
-        : drive_(workspace.drive),
+        : workspace_(workspace),
+          drive_(workspace.drive),
           options_(options),
           solver_(workspace.system, signals, unit, workspace.drive.balanced_scale(), &workspace.cache) {
         solver_.interrupted = options.interrupted;
@@ -56,7 +57,7 @@ class Shooting {
         Station here{solver_.state(), solver_.memory(), solver_.key()};
         for (int follow = first_follow; motion.periods < options_.max_periods; follow *= 2) {
             for (int k = 0; k < follow; ++k, ++motion.periods) {
-                Image image(drive_);
+                Image image(workspace_);
                 if (!advance(here, image, motion)) return motion;
                 motion.residual = residual(here, image);
                 // A motion that repeats to the last bit needs no more.
@@ -84,7 +85,7 @@ class Shooting {
 
     // A station after one period, and how it depends on the one before.
     struct Image {
-        explicit Image(const Drive& drive) : sensitivity(drive) {}
+        explicit Image(Workspace& workspace) : sensitivity(workspace.drive, workspace.cache) {}
         Station end;
         Sensitivity sensitivity;
     };
@@ -130,7 +131,7 @@ class Shooting {
     bool newton(Station y, PeriodicMotion& motion) {
         double best = std::numeric_limits<double>::infinity();
         for (int step = 0; step <= max_newton; ++step) {
-            Image image(drive_);
+            Image image(workspace_);
             if (!advance(y, image, motion)) return false;
             const double now = residual(y, image), before = best;
             if (now < best) {
@@ -145,7 +146,7 @@ class Shooting {
     }
 
     // y + (1 - J)^-1 (image - y), leaving out the directions in which the motion is neutral.
-    bool step_from(Station& y, const Image& image) const {
+    bool step_from(Station& y, const Image& image) {
         constexpr std::array<int, n_components - 1> active{motor_torque, motor_speed,          load_speed,
                                                            twist,        hysteresis_component, held_component};
         constexpr int n = active.size();
@@ -205,16 +206,14 @@ class Shooting {
         }
         // What stands at the end of the period stands at its beginning, to the last bit.
         y.key = image.end.key;
-        const Modes& modes = y.key.modes;
-        const int stuck = (modes[0] == 0) + (modes[1] == 0) + (modes[2] == 0);
-        if (modes[input_contact] == 0 || stuck >= 2) y.x[motor_speed] = 0.0;
-        if (modes[load_contact] == 0 || stuck >= 2) y.x[load_speed] = 0.0;
-        if (modes[twist_contact] == 0) y.x[load_speed] = y.x[motor_speed] * (1.0 / drive_.gearbox.ratio);
+        std::array<bool, n_contacts> at_rest = workspace_.cache.regime(y.key).at_rest;
+        workspace_.system.stop(y.x, at_rest);
         return true;
     }
 
     static constexpr double neutral = 1e-9;  // of a pivot, in units of the sizes
 
+    Workspace& workspace_;
     const Drive& drive_;
     ShootingOptions options_;
     ExactSolver<SwitchedDrive> solver_;

@@ -37,14 +37,22 @@ struct ResponseResult {
     std::vector<double> table;  // n_channels x samples, if it is kept
 };
 
-// Coefficients c_n = 2/N sum x_k exp(-2 pi i n k / N) (n = 0: the mean) of one period of samples.
-inline void add_harmonics(std::span<const double> table, std::size_t samples, int harmonics, ResponseResult& result) {
-    std::vector<double> cosine(samples), sine(samples);
-    for (std::size_t k = 0; k < samples; ++k) {
-        const double angle = 2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(samples);
-        cosine[k] = std::cos(angle);
-        sine[k] = std::sin(angle);
+// Samples of one turn, made once for all points.
+struct Circle {
+    std::vector<double> cosine, sine;
+
+    explicit Circle(std::size_t samples) : cosine(samples), sine(samples) {
+        for (std::size_t k = 0; k < samples; ++k) {
+            const double angle = 2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(samples);
+            cosine[k] = std::cos(angle);
+            sine[k] = std::sin(angle);
+        }
     }
+};
+
+// Coefficients c_n = 2/N sum x_k exp(-2 pi i n k / N) (n = 0: the mean) of one period of samples.
+inline void add_harmonics(std::span<const double> table, const Circle& circle, int harmonics, ResponseResult& result) {
+    const std::size_t samples = circle.cosine.size();
     result.harmonic.assign(static_cast<std::size_t>(n_channels * (harmonics + 1) * 2), 0.0);
     for (int c = 0; c < n_channels; ++c) {
         const double* x = table.data() + static_cast<std::size_t>(c) * samples;
@@ -55,8 +63,8 @@ inline void add_harmonics(std::span<const double> table, std::size_t samples, in
             double re = 0.0, im = 0.0;
             std::size_t at = 0;
             for (std::size_t k = 0; k < samples; ++k) {
-                re += x[k] * cosine[at];
-                im -= x[k] * sine[at];
+                re += x[k] * circle.cosine[at];
+                im -= x[k] * circle.sine[at];
                 at += static_cast<std::size_t>(n);
                 if (at >= samples) at -= samples;
             }
@@ -69,7 +77,8 @@ inline void add_harmonics(std::span<const double> table, std::size_t samples, in
 }
 
 inline ResponseResult respond(Workspace& workspace, const ResponsePoint& point, const ResponseSpec& spec,
-                              std::vector<double>& table, bool (*interrupted)(void*), void* context) {
+                              const Circle& circle, std::vector<double>& table, bool (*interrupted)(void*),
+                              void* context) {
     ResponseResult result;
     ShootingOptions options;
     options.period = point.period;
@@ -83,7 +92,7 @@ inline ResponseResult respond(Workspace& workspace, const ResponsePoint& point, 
     table.resize(n_channels * spec.samples);
     result.motion.status = shooting.sample(result.motion.start, spec.samples, table.data());
     if (result.motion.status != Status::done) return result;
-    add_harmonics(table, spec.samples, spec.harmonics, result);
+    add_harmonics(table, circle, spec.harmonics, result);
     const auto channel = [&](Channel c) { return table.data() + static_cast<std::size_t>(c) * spec.samples; };
     for (std::size_t k = 0; k < spec.samples; ++k) {
         const double in = channel(ch_input_torque)[k] * channel(ch_motor_speed)[k];
@@ -145,12 +154,13 @@ inline std::vector<ResponseResult> respond_all(WorkspacePool& pool, const std::v
                                                const std::function<bool(std::size_t)>& waiting) {
     std::vector<ResponseResult> results(points.size());
     for (ResponseResult& r : results) r.motion.status = Status::interrupted;
+    const Circle circle(spec.samples);
     work_through(points.size(), threads, waiting, [&](auto next, std::atomic<bool>& stop) {
         const auto stopped = [](void* flag) { return static_cast<std::atomic<bool>*>(flag)->load(); };
         std::unique_ptr<Workspace> workspace = pool.take();
         std::vector<double> table;
         for (std::size_t k = next(); k < points.size() && !stop; k = next())
-            results[k] = respond(*workspace, points[k], spec, table, stopped, &stop);
+            results[k] = respond(*workspace, points[k], spec, circle, table, stopped, &stop);
         pool.give_back(std::move(workspace));
     });
     return results;

@@ -45,7 +45,7 @@ inline Components gradient(const LinearForm& f) {
 //     (dR + (f_after - dR f_before - R_t) grad g / g') times itself.
 class Sensitivity {
  public:
-    explicit Sensitivity(const Drive& drive) : drive_(drive) {}
+    Sensitivity(const Drive& drive, RegimeCache<SwitchedDrive>& cache) : drive_(drive), cache_(cache) {}
 
     Jacobian jacobian = Jacobian::identity();
     State size{};        // largest magnitude of each state at the ends of the segments
@@ -75,7 +75,7 @@ class Sensitivity {
     }
 
     void switching(const Switching& w) {
-        const Regime &old = *regime_, next = drive_.build(w.after);
+        const Regime &old = *regime_, &next = cache_.regime(w.after);
         input_->anchor_left(w.time);
         const auto u = input_->jet<2>();
         Jacobian jump = Jacobian::identity();
@@ -167,6 +167,7 @@ class Sensitivity {
     }
 
     const Drive& drive_;
+    RegimeCache<SwitchedDrive>& cache_;
     std::optional<InputState> input_;
     // Where the last segment ended.
     const Regime* regime_ = nullptr;

@@ -184,9 +184,7 @@ class InputState {
             const bool small = a2 < 1e-6;
             const double cosine = small ? 1.0 - a2 / 2.0 * (1.0 - a2 / 12.0) : std::cos(a);
             const double sine = small ? a * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0)) : std::sin(a);
-            const double s = weights_[q], c = weights_[q + 1];
-            weights_[q] = s * cosine + c * sine;
-            weights_[q + 1] = c * cosine - s * sine;
+            rotate(q, cosine, sine);
         }
     }
 
@@ -196,13 +194,17 @@ class InputState {
         for (int i = 0; i < n_inputs; ++i) linear_[i] += slope_[i] * h;
         for (std::size_t q = 0; q < basis_->size(); ++q) {
             if ((*basis_)[q].kind != InputBasis::cosine) continue;
-            const double s = weights_[q], c = weights_[q + 1];
-            weights_[q] = s * cos_sin[q] + c * cos_sin[q + 1];
-            weights_[q + 1] = c * cos_sin[q] - s * cos_sin[q + 1];
+            rotate(q, cos_sin[q], cos_sin[q + 1]);
         }
     }
 
  private:
+    void rotate(std::size_t q, double cosine, double sine) {
+        const double s = weights_[q], c = weights_[q + 1];
+        weights_[q] = s * cosine + c * sine;
+        weights_[q + 1] = c * cosine - s * sine;
+    }
+
     const Signals* signals_;
     const std::vector<InputBasis>* basis_;
     double time_ = 0.0;
