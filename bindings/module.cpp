@@ -84,11 +84,13 @@ void check(Status status, double time, Contact contact) {
     throw SolverError(status_text(status, time, contact));
 }
 
-nb::ndarray<nb::numpy, double, nb::ndim<2>> as_array(std::unique_ptr<double[]> data, std::size_t rows,
-                                                     std::size_t columns) {
+using Array = nb::ndarray<nb::numpy, double>;
+
+// Hands data over to Python without a copy.
+Array as_array(std::unique_ptr<double[]> data, const std::vector<std::size_t>& shape) {
     double* raw = data.release();
     nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
-    return {raw, {rows, columns}, owner};
+    return Array(raw, shape.size(), shape.data(), owner);
 }
 
 State to_state(const std::array<double, n_states>& v) {
@@ -104,7 +106,7 @@ std::array<double, n_states> from_state(const State& x) {
 
 // Switching as numbers: time, kind, contact, contact modes before and after, T_2 before and after.
 constexpr std::size_t switching_columns = 11;
-nb::ndarray<nb::numpy, double, nb::ndim<2>> switching_table(const RunReport& report) {
+Array switching_table(const RunReport& report) {
     const std::size_t n = report.switchings.size();
     auto data = std::make_unique<double[]>(n * switching_columns);
     for (std::size_t k = 0; k < n; ++k) {
@@ -120,19 +122,19 @@ nb::ndarray<nb::numpy, double, nb::ndim<2>> switching_table(const RunReport& rep
         row[9] = s.torque_before;
         row[10] = s.torque_after;
     }
-    return as_array(std::move(data), n, switching_columns);
+    return as_array(std::move(data), {n, switching_columns});
 }
 
-nb::dict ledger_dict(const EnergyLedger& e) {
-    nb::dict d;
-    const char* names[n_flows] = {"source",     "input_damper", "motor_friction", "gear_losses",
-                                  "hysteresis", "load_damper",  "load_friction",  "load_work"};
-    for (int k = 0; k < n_flows; ++k) d[names[k]] = e.flow[k];
-    d["kinetic_change"] = e.kinetic_end - e.kinetic_begin;
-    d["elastic_change"] = e.elastic_end - e.elastic_begin;
-    d["residual"] = e.residual();
-    d["turned_over"] = e.turned_over;
-    return d;
+// Flows, changes of the stored energies, residual, turned over; named by ENERGY in results.py.
+constexpr std::size_t ledger_size = n_flows + 4;
+std::array<double, ledger_size> ledger_values(const EnergyLedger& e) {
+    std::array<double, ledger_size> values;
+    auto to = std::copy(e.flow.begin(), e.flow.end(), values.begin());
+    *to++ = e.kinetic_end - e.kinetic_begin;
+    *to++ = e.elastic_end - e.elastic_begin;
+    *to++ = e.residual();
+    *to++ = e.turned_over;
+    return values;
 }
 
 nb::tuple run(SharedDrive& shared, const Signals& signals, const std::array<double, n_states>& x, double capacity,
@@ -159,8 +161,8 @@ nb::tuple run(SharedDrive& shared, const Signals& signals, const std::array<doub
         }
     }
     check(report.status, report.time, report.contact);
-    return nb::make_tuple(as_array(std::move(data), n_channels, samples), switching_table(report),
-                          report.switching_count, ledger_dict(report.energy), from_state(report.x),
+    return nb::make_tuple(as_array(std::move(data), {n_channels, samples}), switching_table(report),
+                          report.switching_count, ledger_values(report.energy), from_state(report.x),
                           report.memory.hysteresis_capacity, report.left_data_at, report.steps);
 }
 
@@ -174,9 +176,7 @@ nb::object column(const std::vector<ResponseResult>& results, std::vector<std::s
     shape.insert(shape.begin(), results.size());
     auto data = std::make_unique<double[]>(results.size() * width);
     for (std::size_t k = 0; k < results.size(); ++k) values(results[k], &data[k * width]);
-    double* raw = data.release();
-    nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
-    return nb::cast(nb::ndarray<nb::numpy, double>(raw, shape.size(), shape.data(), owner));
+    return nb::cast(as_array(std::move(data), shape));
 }
 
 // Polls for Ctrl-C and reports progress while other threads work.
@@ -222,27 +222,17 @@ nb::tuple run_many(SharedDrive& drive, const Signals& signals, const std::array<
         rows = run_batch(drive, in, data.get(), threads, std::ref(watch));
     }
     watch.check();
-    constexpr std::size_t width = 5 + n_flows + 4;
+    constexpr std::size_t width = 5 + ledger_size;
     auto totals = std::make_unique<double[]>(runs * width);
     for (std::size_t k = 0; k < runs; ++k) {
         const BatchRow& r = rows[k];
-        double* to = &totals[k * width];
-        *to++ = static_cast<double>(r.status);
-        *to++ = r.contact;
-        *to++ = r.time;
-        *to++ = r.switchings;
-        *to++ = r.left_data_at;
-        to = std::copy(r.energy.flow.begin(), r.energy.flow.end(), to);
-        *to++ = r.energy.kinetic_end - r.energy.kinetic_begin;
-        *to++ = r.energy.elastic_end - r.energy.elastic_begin;
-        *to++ = r.energy.residual();
-        *to++ = r.energy.turned_over;
+        const std::array<double, 5> head{static_cast<double>(r.status), static_cast<double>(r.contact), r.time,
+                                         r.switchings, r.left_data_at};
+        const auto energies = ledger_values(r.energy);
+        std::copy(energies.begin(), energies.end(), std::copy(head.begin(), head.end(), &totals[k * width]));
     }
-    const std::size_t shape[3]{runs, channels.size(), samples};
-    double* raw = data.release();
-    nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
-    return nb::make_tuple(nb::ndarray<nb::numpy, double>(raw, 3, shape, owner),
-                          as_array(std::move(totals), runs, width));
+    return nb::make_tuple(as_array(std::move(data), {runs, channels.size(), samples}),
+                          as_array(std::move(totals), {runs, width}));
 }
 
 nb::dict respond_to(SharedDrive& drive, const std::vector<Point>& asked, const ResponseSpec& spec, unsigned threads,
@@ -313,7 +303,7 @@ nb::tuple linearization(const Drive& drive, const std::array<double, n_states>& 
             for (int i = 0; i < n_inputs; ++i) data[k * width + n_states + i] = forms[k]->c[first_input + i];
             data[k * width + width - 1] = constant_part(*forms[k], solver.memory());
         }
-        return as_array(std::move(data), forms.size(), width);
+        return as_array(std::move(data), {forms.size(), width});
     };
     std::vector<const LinearForm*> rates;
     for (const LinearForm& f : r.rate) rates.push_back(&f);
@@ -462,7 +452,7 @@ NB_MODULE(_core, m) {
                 "hysteresis_capacity: float, duration: float, interval: float, samples: int, energy: bool, "
                 "tolerance: float, max_switchings: int) -> tuple[numpy.typing.NDArray[numpy.float64], "
                 "numpy.typing.NDArray[numpy.float64], "
-                "int, dict[str, float], list[float], float, float, int]"));
+                "int, list[float], list[float], float, float, int]"));
     m.def(
         "respond",
         [](SharedDrive& drive, const std::vector<Point>& points, std::size_t samples, int harmonics, int max_periods,

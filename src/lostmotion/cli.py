@@ -8,12 +8,11 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from concurrent.futures import Executor
 
     import xarray
@@ -52,22 +51,15 @@ def _fail(text: str, code: int = 1) -> None:
     sys.exit(code)
 
 
-@contextmanager
-def _progress(total: int, what: str) -> Iterator[Callable[[], None]]:
-    """A progress bar on stderr where that is a terminal."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+class Step(Protocol):
+    """Tells a progress bar of one more piece of work, or of how many are done."""
 
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
-        task = bar.add_task(what, total=total)
-        yield lambda: bar.advance(task)
+    def __call__(self, done: int | None = None) -> None: ...
 
 
 @contextmanager
-def _progress_of(total: int, what: str) -> Iterator[Callable[[int], None]]:
-    """A progress bar with rate and remaining time, told how much is done."""
+def _progress(total: int, what: str) -> Iterator[Step]:
+    """A progress bar with rate and remaining time on stderr, where that is a terminal."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -87,7 +79,25 @@ def _progress_of(total: int, what: str) -> Iterator[Callable[[int], None]]:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task(what, total=total)
-        yield lambda done: bar.update(task, completed=done)
+
+        def step(done: int | None = None) -> None:
+            if done is None:
+                bar.advance(task)
+            else:
+                bar.update(task, completed=done)
+
+        yield step
+
+
+@contextmanager
+def _writing(directory: Path, then: str = "") -> Iterator[None]:
+    """What goes wrong with a directory that is written to, as one line."""
+    from .errors import InputError
+
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{directory}: cannot be written: {error.strerror}{then}") from None
 
 
 @app.command()
@@ -107,13 +117,8 @@ def reproduce(
     from .reproduce import WORK
     from .reproduce import reproduce as work
 
-    try:
-        with _progress(WORK, "Reproducing") as step:
-            report = work(output, step)
-    except OSError as error:
-        from .errors import InputError
-
-        raise InputError(f"{output}: cannot be written: {error.strerror}") from None
+    with _writing(output), _progress(WORK, "Reproducing") as step:
+        report = work(output, step)
     print(f"The report is at {report}")
 
 
@@ -223,14 +228,13 @@ def response(
     from .errors import InputError
     from .response_sheet import parse_grid
     from .scenario import load
-    from .variables import CHANNELS
+    from .variables import CHANNEL_NAMES
 
     wanted, grid = parse_grid(amplitudes, "amplitudes"), parse_grid(frequencies, "frequencies")
     if source not in ("command", "load_torque"):
         raise InputError(f"--input {source}: must be command or load_torque")
-    names = [v.name for v in CHANNELS]
-    if variable not in names:
-        raise InputError(f"--variable {variable}: must be one of {', '.join(names)}")
+    if variable not in CHANNEL_NAMES:
+        raise InputError(f"--variable {variable}: must be one of {', '.join(CHANNEL_NAMES)}")
     if output.exists() and not output.is_dir():
         raise InputError(f"{output}: is a file; -o names a directory")
     loaded = {scenario.stem: load(scenario, overrides or ())}
@@ -254,10 +258,8 @@ def response(
                 progress=step,
             )
     first = loaded[scenario.stem]
-    try:
+    with _writing(output):
         figure, found = write_response(output, responses, first.drive(), variable)
-    except OSError as error:
-        raise InputError(f"{output}: cannot be written: {error.strerror}") from None
     result = responses[scenario.stem]
     print(first.title or scenario.stem)
     for a in found["amplitude"].values:
@@ -304,7 +306,6 @@ def rig(
     lostmotion rig my-gearbox.toml -o sheet --set loss_factor=1.3
     """
     from .data_sheet import GearboxSheet
-    from .errors import InputError
     from .records import find
     from .scenario import gearbox_from_record
 
@@ -315,10 +316,8 @@ def rig(
     from .test_rig import measure
 
     report = measure(part, sheet, notes)
-    try:
+    with _writing(output):
         page = write_sheet(output, sheet.name, report, sheet, notes)
-    except OSError as error:
-        raise InputError(f"{output}: cannot be written: {error.strerror}") from None
     print(sheet.title or sheet.name)
     for c in report.comparisons:
         unit = "" if c.unit == "1" else f" {c.unit}"
@@ -419,11 +418,10 @@ def study(
     directory = output or Path(Path(what).stem)
     with ExitStack() as stack:
         executor = stack.enter_context(_executor(processes, scheduler)) if processes or scheduler else None
-        report = stack.enter_context(_progress_of(loaded.total, "Runs"))
+        report = stack.enter_context(_progress(loaded.total, "Runs"))
         try:
-            work(loaded, directory, threads=threads, executor=executor, progress=report)
-        except OSError as error:
-            raise InputError(f"{directory}: cannot be written: {error.strerror}; what is written stays") from None
+            with _writing(directory, "; what is written stays"):
+                work(loaded, directory, threads=threads, executor=executor, progress=report)
         except KeyboardInterrupt:
             _fail(f"interrupted; what is in {directory} stays, and the same command goes on with it", 130)
     print(f"{loaded.total} runs are in {directory}; `lostmotion study show {directory}` looks at them")

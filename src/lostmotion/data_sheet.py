@@ -33,6 +33,8 @@ from .quantities import (
 )
 
 Efficiency = Annotated[Number, Limit(gt=0.0, le=1.0)]
+# Figures of a gearbox that `[gearbox]` has too, under the same names.
+SCALARS = ("ratio", "inertia", "viscous_friction", "rated_input_speed", "rated_output_torque")
 
 
 class Source(Part):
@@ -325,8 +327,7 @@ class GearboxSheet(Record):
 
     def scalars(self) -> dict[str, Any]:
         """Those keys of `[gearbox]` that are figures of the sheet."""
-        names = ("ratio", "inertia", "viscous_friction", "rated_input_speed", "rated_output_torque")
-        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        return {name: getattr(self, name) for name in SCALARS if getattr(self, name) is not None}
 
 
 class MotorSheet(Record):

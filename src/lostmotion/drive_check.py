@@ -119,13 +119,6 @@ def _inertia(scenario: Scenario) -> Finding:
     return Finding("inertia of the load / of the motor side", f"{ratio:.3g}", "warning" if far else "ok", remark)
 
 
-def _pieces(g: Gearbox) -> list[float]:
-    if isinstance(g.stiffness, Rigid):
-        return []
-    slopes = [g.stiffness.stiffness] if g.stiffness.kind == "linear" else g.stiffness.pieces()[1]
-    return [k for k in slopes if k > 0.0]
-
-
 def _resonance(scenario: Scenario) -> list[Finding]:
     g = scenario.gearbox
     J_1 = g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia)
@@ -133,7 +126,7 @@ def _resonance(scenario: Scenario) -> list[Finding]:
     if scenario.command.frequency is not None:
         excited.add(scenario.command.frequency)
     out = []
-    slopes = _pieces(g)
+    slopes = [] if isinstance(g.stiffness, Rigid) else [k for k in g.stiffness.pieces()[1] if k > 0.0]
     for name, k in (("softest", min(slopes, default=0.0)), ("stiffest", max(slopes, default=0.0))):
         if k == 0.0 or (name == "stiffest" and len(slopes) == 1):
             continue

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from . import _core
 from .parts import Drive
-from .run import start_state
+from .run import core_inputs
 from .scenario import Scenario
 from .stepping import Simulation
-from .variables import CHANNELS
+from .variables import CHANNEL_NAMES
 
 NAMES = ("input shaft", "twist of the gear", "load bearing")
 
@@ -103,19 +103,12 @@ def explain(what: Scenario | Simulation, time: float | None = None) -> Explanati
         return _explanation(what.drive, what.time, values, contacts)
     if time is None or not 0.0 <= time <= what.simulation.duration:
         raise ValueError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
-    values, contacts = _core.explain_at(
-        what.drive().core(),
-        what.command.core(),
-        what.load.torque.core(),
-        start_state(what.initial),
-        what.initial.hysteresis_capacity,
-        time,
-    )
+    values, contacts = _core.explain_at(*core_inputs(what), time)
     return _explanation(what.drive(), time, values, contacts)
 
 
 def _explanation(drive: Drive, time: float, values: list[float], contacts: list[tuple[float, ...]]) -> Explanation:
-    named = dict(zip((v.name for v in CHANNELS), values, strict=True))
+    named = dict(zip(CHANNEL_NAMES, values, strict=True))
     forward, backward = (
         drive.core().smallest_command(named["output_torque"], named["load_torque"], s) for s in (+1, -1)
     )

@@ -16,7 +16,7 @@ from .results import add_derived
 from .run import start_state
 from .scenario import Initial
 from .signals import CommandSignal, TorqueSignal
-from .variables import CHANNELS, STATES, VARIABLES
+from .variables import CHANNEL_NAMES, STATES, VARIABLES
 
 if TYPE_CHECKING:
     import control
@@ -154,7 +154,7 @@ def periodic_motion(
     )
     if reason := _reason(r, 0):
         raise RuntimeError(f"no periodic motion was found: {reason}")
-    data = dict(zip((v.name for v in CHANNELS), r["table"][0], strict=True))
+    data = dict(zip(CHANNEL_NAMES, r["table"][0], strict=True))
     add_derived(data, drive.gearbox.ratio)
     multipliers = _multipliers(r["jacobian"][0])
     time = np.arange(SAMPLES_PER_PERIOD) * (period / SAMPLES_PER_PERIOD)
@@ -371,7 +371,7 @@ def _labelled(
     import xarray as xr
 
     shape = (len(amplitudes), len(frequencies))
-    names = [v.name for v in CHANNELS]
+    names = list(CHANNEL_NAMES)
     reasons = np.array([_reason(r, k) for k in range(shape[0] * shape[1])], dtype=object).reshape(shape)
     found = reasons == ""
     c = (r["harmonics"][..., 0] + 1j * r["harmonics"][..., 1]).reshape(*shape, len(names), harmonics + 1)

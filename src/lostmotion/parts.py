@@ -141,8 +141,12 @@ class LinearStiffness(Part):
     kind: Literal["linear"] = "linear"
     stiffness: Annotated[Stiffness, Positive]
 
+    def pieces(self) -> tuple[list[float], list[float]]:
+        """(breaks [rad], slopes [N·m/rad]): no break, one slope."""
+        return [], [self.stiffness]
+
     def core(self) -> _core.TorsionCurve:
-        return _core.TorsionCurve([], [self.stiffness])
+        return _core.TorsionCurve(*self.pieces())
 
 
 class Rigid(Part):

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from pydantic import ValidationError
 
-from .data_sheet import GearboxSheet, MotorSheet
+from .data_sheet import SCALARS, GearboxSheet, MotorSheet
 from .errors import InputError
 from .loss_map_builder import BuiltMap, build_loss_map
 from .parts import Gearbox, Motor
@@ -22,8 +22,6 @@ from .toml_files import read_toml
 KINDS: dict[str, type[GearboxSheet] | type[MotorSheet]] = {"gearbox": GearboxSheet, "motor": MotorSheet}
 # Keys of a sheet file that hold for all of its records.
 COMMON = ("kind", "maker", "note")
-# Figures of the record that `[gearbox]` may replace before the loss map is made.
-SCALARS = ("ratio", "inertia", "viscous_friction", "rated_input_speed", "rated_output_torque")
 
 
 class Conditions(Part):

@@ -15,7 +15,7 @@ import numpy as np
 
 from .errors import InputError
 from .scenario import Scenario
-from .variables import CHANNELS, CONTACTS, STATES, VARIABLES
+from .variables import CHANNEL_NAMES, CONTACTS, STATES, VARIABLES
 
 if TYPE_CHECKING:
     import xarray
@@ -51,7 +51,7 @@ def installed_version() -> str:
 def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) -> xarray.Dataset:
     """Label what the solver returned."""
     table, switchings, count, energy, state, capacity, left_data_at, steps = result
-    data = dict(zip((v.name for v in CHANNELS), table, strict=True))
+    data = dict(zip(CHANNEL_NAMES, table, strict=True))
     add_derived(data, scenario.gearbox.ratio)
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     attributes = {
@@ -64,7 +64,7 @@ def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) 
         "steps": int(steps),
     }
     if ledger:
-        attributes["energy"] = json.dumps(energy)
+        attributes["energy"] = json.dumps(dict(zip(ENERGY, energy, strict=True)))
     if np.isfinite(left_data_at):
         attributes["warning"] = (
             f"from t = {left_data_at:.6g} s on the loss map is used outside its data; there it continues with the slope "

@@ -81,11 +81,7 @@ def simulate(
     table = scenario.simulation
     exact = solver == "exact"
     result = _core.run(
-        scenario.drive().core(),
-        scenario.command.core(),
-        scenario.load.torque.core(),
-        start_state(scenario.initial),
-        scenario.initial.hysteresis_capacity,
+        *core_inputs(scenario),
         table.duration,
         table.sample_interval,
         table.samples,
@@ -132,6 +128,18 @@ def as_scenario(
     if initial is not None:
         changes["initial"] = initial
     return Scenario(**changes)
+
+
+def core_inputs(scenario: Scenario) -> tuple[_core.Drive, _core.Signal, _core.Signal, list[float], float]:
+    """What every run of the core begins with: drive, command, load torque, state, hysteresis capacity."""
+    start = scenario.initial
+    return (
+        scenario.drive().core(),
+        scenario.command.core(),
+        scenario.load.torque.core(),
+        start_state(start),
+        start.hysteresis_capacity,
+    )
 
 
 def start_state(initial: Initial) -> list[float]:

@@ -10,7 +10,7 @@ from .parts import Drive
 from .results import add_derived
 from .run import start_state
 from .scenario import Initial
-from .variables import CHANNELS
+from .variables import CHANNEL_NAMES
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class Simulation:
 
     def read(self) -> dict[str, float]:
         """All result variables, by name."""
-        values = dict(zip((v.name for v in CHANNELS), self._core.read(), strict=True))
+        values = dict(zip(CHANNEL_NAMES, self._core.read(), strict=True))
         add_derived(values, self._drive.gearbox.ratio)
         return {name: float(value) for name, value in values.items()}
 

@@ -19,10 +19,9 @@ from . import _core
 from .errors import InputError
 from .parts import Rigid
 from .results import ENERGY, add_derived, installed_version, write_bytes
-from .run import simulate, start_state
+from .run import core_inputs, simulate
 from .scenario import Scenario, describe
 from .study_file import (
-    CHANNEL_NAMES,
     CHUNK,
     FUNCTIONS,
     Study,
@@ -32,7 +31,7 @@ from .study_file import (
     to_json,
     uses_energy,
 )
-from .variables import VARIABLES
+from .variables import CHANNEL_NAMES, VARIABLES
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -220,11 +219,7 @@ def _in_the_core(study: Study, parameters: np.ndarray, channels: list[str], ener
     errors = _out_of_range(study, parameters)
     good = np.array([e == "" for e in errors])
     samples, totals = _core.run_batch(
-        s.drive().core(),
-        s.command.core(),
-        s.load.torque.core(),
-        start_state(s.initial),
-        s.initial.hysteresis_capacity,
+        *core_inputs(s),
         [_fields()[key] for key, _, _ in keys],
         np.ascontiguousarray(values[good]),
         s.simulation.duration,
@@ -320,8 +315,8 @@ def study(
     directory = Path(directory)
     text = to_json(what)
     _prepare(directory, text)
-    done = sum(last - first for first, last in _chunks(what) if _part(directory, first).exists())
     missing = [(first, last) for first, last in _chunks(what) if not _part(directory, first).exists()]
+    done = what.total - sum(last - first for first, last in missing)
     report = progress or _silent
     report(done)
     for first, last, content in _compute(text, missing, threads or os.cpu_count() or 1, executor):

@@ -7,6 +7,7 @@ import json
 import math
 import warnings
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -19,7 +20,7 @@ from .results import ENERGY
 from .scenario import Scenario, load
 from .toml_files import read_toml
 from .units import si_number
-from .variables import CHANNELS, VARIABLES
+from .variables import VARIABLES
 
 CHUNK = 500  # runs that are computed, and written, as one
 MAX_RUNS = 100_000_000
@@ -234,13 +235,17 @@ class Study(Part):
             rows = np.concatenate([np.random.default_rng([self.seed, c]).random((CHUNK, p)) for c in chunks])
             begin = first - chunks[0] * CHUNK
             return _open(rows[begin : begin + last - first])
-        rng = np.random.default_rng(self.seed)
-        n = self.total
-        out = np.empty((last - first, p))
-        for k in range(p):
-            strata, inside = rng.permutation(n), rng.random(n)
-            out[:, k] = (strata[first:last] + inside[first:last]) / n
-        return _open(out)
+        return _open(_latin_hypercube(p, self.total, self.seed)[first:last])
+
+
+@lru_cache(maxsize=2)  # one part after the other is asked for
+def _latin_hypercube(p: int, n: int, seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    out = np.empty((n, p))
+    for k in range(p):
+        strata, inside = rng.permutation(n), rng.random(n)
+        out[:, k] = (strata + inside) / n
+    return out
 
 
 def _open(u: np.ndarray) -> np.ndarray:
@@ -248,6 +253,7 @@ def _open(u: np.ndarray) -> np.ndarray:
     return np.asarray(np.clip(u, 1e-12, 1.0 - 1e-12))
 
 
+@lru_cache(maxsize=2)
 def _saltelli(p: int, base: int, seed: int) -> np.ndarray:
     try:
         from SALib.sample import sobol
@@ -388,6 +394,3 @@ def from_json(text: str) -> Study:
 def to_json(study: Study) -> str:
     """All of a study, the base scenario included."""
     return study.model_dump_json(exclude_none=True)
-
-
-CHANNEL_NAMES = tuple(v.name for v in CHANNELS)

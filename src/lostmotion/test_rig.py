@@ -92,17 +92,10 @@ class TestRig:
         if isinstance(gearbox.stiffness, Rigid):
             raise ValueError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
         self.gearbox = gearbox
-        breaks, slopes = self._pieces()
-        k = max(slopes)
+        self.breaks, self.slopes = gearbox.stiffness.pieces()
+        k = max(self.slopes)
         omega = 2.0 * np.pi * RIG_FREQUENCY
         self.load = Load(inertia=k / omega**2, viscous_friction=2.0 * k / omega)
-        self.breaks, self.slopes = breaks, slopes
-
-    def _pieces(self) -> tuple[list[float], list[float]]:
-        stiffness = self.gearbox.stiffness
-        if stiffness.kind == "curve":
-            return stiffness.pieces()
-        return [], [stiffness.stiffness]  # type: ignore[union-attr]
 
     def _twist_at(self, torque: float) -> float:
         """Where the torsion curve has this torque: a start without transient."""

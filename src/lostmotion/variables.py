@@ -43,6 +43,7 @@ VARIABLES = (
 )
 
 CHANNELS = tuple(v for v in VARIABLES if not v.derived)
+CHANNEL_NAMES = tuple(v.name for v in CHANNELS)
 CONTACTS = ("input_contact", "twist_contact", "load_contact")
 
 # Names of the five states, in the order of the solver's state vector (core/lostmotion/linear_form.hpp).
