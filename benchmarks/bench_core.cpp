@@ -12,14 +12,12 @@ namespace {
 
 struct SamplesOnly {
     Sampler sampler;
-    bool segment(const Segment<SwitchedDrive>& s, const std::vector<InputBasis>& basis) {
-        return sampler.segment(s, basis);
-    }
+    bool segment(const Segment<SwitchedDrive>& s) { return sampler.segment(s); }
     void switching(const Switching&) {}
 };
 
 struct Nothing {
-    bool segment(const Segment<SwitchedDrive>&, const std::vector<InputBasis>&) { return true; }
+    bool segment(const Segment<SwitchedDrive>&) { return true; }
     void switching(const Switching&) {}
     void step(const Regime&, const Memory&, const DenseStep&, bool) {}
 };

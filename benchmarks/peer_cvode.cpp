@@ -129,7 +129,7 @@ class Cvode {
         user_.regime = &r;
         user_.memory = now.memory;
         user_.linear = LinearRates(r);
-        user_.constant = constant_rate(r, now.memory);
+        user_.constant = user_.linear.constant(now.memory);
         std::copy_n(now.x.begin(), n_states, N_VGetArrayPointer(y_));
         CVodeReInit(memory_, now.time, y_);
     }

@@ -145,17 +145,18 @@ class AdaptiveSolver {
     Status run_regime(double limit, const Guard*& fired, Observer& observer) {
         const auto& entry = cache_.entry(key_);
         const Regime& r = entry.regime;
-        const LinearRates linear(r);
-        const State fixed = constant_rate(r, now_.memory);
-        const std::array<double, max_guards> constant = entry.guard_constants(now_.memory);
+        const LinearRates& linear = entry.rates;
+        const State fixed = linear.constant(now_.memory);
+        GuardTable::Values constant;
+        entry.guards.constants(now_.memory, constant);
         using DP = DormandPrince;
         DenseStep dense;
         std::array<double, max_guards> value, slope, end_value, end_slope;
         const auto look = [&](double t, const State& x, const State& rate, auto& g, auto& g_rate) {
             input_.anchor(t);
             const auto u = input_.template jet<2>();
-            entry.evaluate_guards(&constant, x, u[0], g);
-            entry.evaluate_guards(nullptr, rate, u[1], g_rate);
+            entry.guards.evaluate(constant, x, u[0], g);
+            entry.guards.rates(rate, u[1], g_rate);
         };
         double h = step_ > 0.0 ? step_ : 1e-6;
         off_zero_ = false;

@@ -7,21 +7,12 @@
 
 #include <algorithm>
 #include <limits>
-#include <tuple>
 #include <utility>
 
 #include "drive.hpp"
-#include "regime.hpp"
+#include "linear_rates.hpp"
 
 namespace lostmotion {
-
-struct Instant {
-    double time = 0.0;  // [s]
-    State x{};
-    Memory memory;
-    InputJet input{};
-    std::array<double, n_inputs> input_size{};  // sums of the magnitudes of the inputs' parts
-};
 
 // A form counts as zero within this multiple of the sum of the magnitudes of its terms. Its coefficients come from an
 // elimination and carry more than one rounding.
@@ -32,12 +23,9 @@ inline constexpr double time_rounding = 4.0 * std::numeric_limits<double>::epsil
 // Time derivatives of the state along the flow of one regime, computed as far as they are asked for.
 class Flow {
  public:
-    // coarseness: how many times `rounding` counts as zero.
-    Flow(const Regime& regime, const Instant& now, double coarseness = 1.0)
-        : regime_(regime), now_(now), rounding_(coarseness * rounding) {
-        x_[0] = now.x;
-        for (int k = 0; k < n_states; ++k) size_[0][k] = std::fabs(now.x[k]);
-    }
+    // sizes: the rates with the magnitudes of their coefficients. coarseness: how many times `rounding` counts as zero.
+    Flow(const LinearRates& rates, const LinearRates& sizes, const Instant& now, double coarseness = 1.0)
+        : rates_(rates), sizes_(sizes), now_(now), rounding_(coarseness * rounding) {}
 
     // Sign of the guard just after now; 0 if it stays at zero.
     int sign(const Guard& guard) {
@@ -54,35 +42,30 @@ class Flow {
         return 0;
     }
 
-    // Value of the k-th derivative of a form and the sum of the magnitudes of its terms.
+    // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
     std::pair<double, double> derivative(const LinearForm& f, int k) {
         if (k > order_) extend();
-        return rate_of(f, x_[k], size_[k], now_.input[k]);
+        const State &x = x_[k], &size = size_[k];
+        const auto& u = now_.input[k];
+        double sum = std::fabs(f.c[command] * u[0]) + std::fabs(f.c[load_torque] * u[1]);
+        for (int j = 0; j < n_states; ++j) sum += std::fabs(f.c[j]) * size[j];
+        return {evaluate_rate(f, x, u), sum};
     }
 
  private:
-    static std::pair<double, double> rate_of(const LinearForm& f, const State& x, const State& x_size,
-                                             const std::array<double, n_inputs>& u) {
-        double size = std::fabs(f.c[command] * u[0]) + std::fabs(f.c[load_torque] * u[1]);
-        for (int j = 0; j < n_states; ++j) size += std::fabs(f.c[j]) * x_size[j];
-        return {evaluate_rate(f, x, u), size};
-    }
-
     void extend() {
         const int k = order_++;
-        for (int row = 0; row < n_states; ++row) {
-            const LinearForm& f = regime_.rate[row];
+        if (k == 0) {
+            x_[1] = rates_(now_.x, rates_.constant(now_.memory), now_.input[0]);
+            size_[1] = sizes_(magnitudes(now_.x), sizes_.constant(magnitudes(now_.memory)), now_.input_size);
+        } else {
             const auto& u = now_.input[k];
-            if (k == 0) {
-                x_[1][row] = evaluate(f, now_.x, now_.memory, u);
-                size_[1][row] = magnitude(f, now_.x, now_.memory, now_.input_size);
-                continue;
-            }
-            std::tie(x_[k + 1][row], size_[k + 1][row]) = rate_of(f, x_[k], size_[k], u);
+            x_[k + 1] = rates_.higher(x_[k], u);
+            size_[k + 1] = sizes_.higher(size_[k], {std::fabs(u[0]), std::fabs(u[1])});
         }
     }
 
-    const Regime& regime_;
+    const LinearRates &rates_, &sizes_;
     const Instant& now_;
     double rounding_;
     int order_ = 0;
@@ -267,8 +250,8 @@ class SwitchedDrive {
                                                   const std::array<bool, n_contacts>& test_speed,
                                                   double coarseness = 1.0) {
         const Regime& r = entry.regime;
-        Flow flow(r, now, coarseness);
-        const std::array<double, max_guards> room = entry.guard_room(now.x, now.memory, now.input[0], now.input_size);
+        Flow flow(entry.rates, entry.rate_sizes, now, coarseness);
+        const auto room = entry.guard_room(now);
         bool overcome = false;
         for (int k = 0; k < r.n_guards; ++k) {
             const Guard& g = r.guards[k];

@@ -41,17 +41,17 @@ class EnergyMeter {
     explicit EnergyMeter(const Drive& drive) : drive_(drive) {}
     EnergyLedger ledger;
 
-    void begin(const State& x) { store(x, ledger.kinetic_begin, ledger.elastic_begin); }
-    void end(const State& x) { store(x, ledger.kinetic_end, ledger.elastic_end); }
+    void begin(const State& x) { measure(x, ledger.kinetic_begin, ledger.elastic_begin); }
+    void end(const State& x) { measure(x, ledger.kinetic_end, ledger.elastic_end); }
 
-    bool segment(const Segment<SwitchedDrive>& s, const std::vector<InputBasis>& basis) {
+    bool segment(const Segment<SwitchedDrive>& s) {
         if (!(s.end > s.begin)) return true;
         const Regime& r = s.entry.regime;
         if (r.at_rest[input_contact] && r.at_rest[load_contact]) return true;
         Propagator& p = s.entry.propagator;
-        if (!cursor_) end_ = cursor_.emplace(s.signals, basis);
+        if (!cursor_) end_ = cursor_.emplace(s.input);
         Cursor &cursor = *cursor_, &end = *end_;
-        cursor.place(p, s.constant, s.begin, s.x);
+        cursor.place(p, s.constant, s.input, s.x);
         const Factors factors(drive_, r, s.memory);
         Powers here, there;
         factors.powers(p, cursor, here);
@@ -62,11 +62,12 @@ class EnergyMeter {
             double length = p.level(level).length;
             const bool whole = length <= s.end - t;
             if (!whole) length = s.end - t;
-            end = cursor;
-            if (whole)
-                end.step(level);
-            else
+            if (whole) {
+                end.step_from(cursor, level);
+            } else {
+                end = cursor;
                 end.move_to(s.end, s.x_end);
+            }
             factors.powers(p, end, there);
             const double error = add_panel(here, there, length, level == 0);
             if (error > 1.0) {
@@ -90,24 +91,30 @@ class EnergyMeter {
 
     // Every power is a product of two linear forms; all are evaluated at once, as columns.
     struct Factors {
-        std::array<std::array<double, n_flows>, n_terms> left{}, right{};
-        std::array<double, n_flows> left_constant{}, right_constant{};
+        FormTable<n_flows> left, right;
+        std::array<double, n_flows> left_constant, right_constant;
 
         Factors(const Drive& drive, const Regime& r, const Memory& m) {
             const LinearForm w_M = LinearForm::unit(motor_speed), w = LinearForm::unit(load_speed);
+            const auto set = [this](EnergyFlow flow, const LinearForm& a, const LinearForm& b) {
+                left.set(flow, a);
+                right.set(flow, b);
+            };
             const auto friction = [&](Contact c, double torque) {
                 const int mode = r.key.modes[c];
                 return LinearForm::unit(one, mode == absent ? 0.0 : mode * torque);
             };
-            set(from_source, r.source_torque, w_M, m);
-            set(in_input_damper, drive.gearbox.viscous_friction * w_M, w_M, m);
-            set(in_motor_friction, friction(input_contact, drive.motor.friction_torque), w_M, m);
-            set(in_gear, r.input_torque - r.output_torque / drive.gearbox.ratio, w_M, m);
-            if (!r.at_rest[twist_contact])
-                set(in_hysteresis, r.hysteresis_torque, drive.contact_speed(twist_contact), m);
-            set(in_load_damper, drive.load.viscous_friction * w, w, m);
-            set(in_load_friction, friction(load_contact, drive.load.friction_torque), w, m);
-            set(to_load, LinearForm::unit(load_torque), w, m);
+            set(from_source, r.source_torque, w_M);
+            set(in_input_damper, drive.gearbox.viscous_friction * w_M, w_M);
+            set(in_motor_friction, friction(input_contact, drive.motor.friction_torque), w_M);
+            set(in_gear, r.input_torque - r.output_torque / drive.gearbox.ratio, w_M);
+            set(in_hysteresis, r.at_rest[twist_contact] ? LinearForm{} : r.hysteresis_torque,
+                drive.contact_speed(twist_contact));
+            set(in_load_damper, drive.load.viscous_friction * w, w);
+            set(in_load_friction, friction(load_contact, drive.load.friction_torque), w);
+            set(to_load, LinearForm::unit(load_torque), w);
+            left.constants(m, left_constant);
+            right.constants(m, right_constant);
         }
 
         void powers(const Propagator& p, Cursor& c, Powers& out) const {
@@ -116,9 +123,14 @@ class EnergyMeter {
             State x = c.x();
             for (int k = 0; k < orders; ++k) {
                 if (k == 1) x = c.rate();
-                if (k > 1) x = p.higher_rate(x, u[k - 1]);
-                evaluate(left, k == 0 ? left_constant : none, x, u[k], a[k]);
-                evaluate(right, k == 0 ? right_constant : none, x, u[k], b[k]);
+                if (k > 1) x = p.rates().higher(x, u[k - 1]);
+                if (k == 0) {
+                    left.evaluate(left_constant, x, u[0], a[0]);
+                    right.evaluate(right_constant, x, u[0], b[0]);
+                } else {
+                    left.rates(x, u[k], a[k]);
+                    right.rates(x, u[k], b[k]);
+                }
             }
             for (int f = 0; f < n_flows; ++f) {
                 out[0][f] = a[0][f] * b[0][f];
@@ -129,28 +141,9 @@ class EnergyMeter {
                             6.0 * a[2][f] * b[2][f] + a[0][f] * b[4][f];
             }
         }
-
-     private:
-        static constexpr std::array<double, n_flows> none{};
-
-        void set(EnergyFlow flow, const LinearForm& a, const LinearForm& b, const Memory& m) {
-            for (int k = 0; k < n_terms; ++k) {
-                left[k][flow] = a.c[k];
-                right[k][flow] = b.c[k];
-            }
-            left_constant[flow] = constant_part(a, m);
-            right_constant[flow] = constant_part(b, m);
-        }
-        static void evaluate(const std::array<std::array<double, n_flows>, n_terms>& c,
-                             const std::array<double, n_flows>& constant, const State& x,
-                             const std::array<double, n_inputs>& u, std::array<double, n_flows>& out) {
-            for (int f = 0; f < n_flows; ++f)
-                out[f] = constant[f] + c[0][f] * x[0] + c[1][f] * x[1] + c[2][f] * x[2] + c[3][f] * x[3] +
-                         c[4][f] * x[4] + c[command][f] * u[0] + c[load_torque][f] * u[1];
-        }
     };
 
-    void store(const State& x, double& kinetic, double& elastic) const {
+    void measure(const State& x, double& kinetic, double& elastic) const {
         kinetic = 0.5 * drive_.input_inertia() * x[motor_speed] * x[motor_speed] +
                   0.5 * drive_.load.inertia * x[load_speed] * x[load_speed];
         elastic = drive_.rigid() ? 0.0 : drive_.gearbox.curve.energy(x[twist]);

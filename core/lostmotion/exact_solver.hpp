@@ -15,8 +15,8 @@
 #include <memory>
 #include <optional>
 
-#include "cubic.hpp"
 #include "cursor.hpp"
+#include "polynomial.hpp"
 #include "regime_cache.hpp"
 #include "switching.hpp"
 
@@ -26,21 +26,14 @@ namespace lostmotion {
 template <class System>
 struct Segment {
     typename RegimeCache<System>::Entry& entry;
-    const Signals& signals;
-    double begin, end;  // [s]
-    bool last;          // no further segment follows in this call: `end` belongs to it
-    State x;            // at begin
+    const InputState& input;  // at begin
+    double begin, end;        // [s]
+    bool last;                // no further segment follows in this call: `end` belongs to it
+    State x;                  // at begin
     Memory memory;
     State constant;  // the part of dx/dt that depends on neither state nor inputs
     State x_end{};   // at end, before any stop there
 };
-
-// Constant part of a regime's rates.
-inline State constant_rate(const Regime& r, const Memory& m) {
-    State c{};
-    for (int k = 0; k < n_states; ++k) c[k] = constant_part(r.rate[k], m);
-    return c;
-}
 
 template <class System>
 class ExactSolver {
@@ -113,9 +106,9 @@ class ExactSolver {
         }
         while (true) {
             typename Cache::Entry& entry = cache_.entry(key_);
-            if (!entry.propagator.ready()) entry.propagator.prepare(entry.regime, unit_, scale_, basis_);
-            Segment<System> segment{entry, signals_, time_,       t_end,
-                                    true,  now_.x,   now_.memory, constant_rate(entry.regime, now_.memory)};
+            if (!entry.propagator.ready()) entry.propagator.prepare(entry.rates, unit_, scale_, basis_);
+            Segment<System> segment{entry, input_, time_,       t_end,
+                                    true,  now_.x, now_.memory, entry.rates.constant(now_.memory)};
             const double knot = next_knot(signals_, time_);
             const double limit = std::fmin(t_end, knot);
             const Guard* fired = nullptr;
@@ -124,7 +117,7 @@ class ExactSolver {
             segment.end = time_;
             segment.x_end = now_.x;
             segment.last = fired == nullptr && time_ >= t_end;
-            if (!observer.segment(segment, basis_)) return Status::interrupted;
+            if (!observer.segment(segment)) return Status::interrupted;
             if (segment.last) {
                 jump_pending_ = knot == t_end;  // it belongs to what comes after
                 return Status::done;
@@ -135,8 +128,8 @@ class ExactSolver {
     }
 
  private:
-    static constexpr double settled = 1e-8;
-    static constexpr int first_level = 6;  // of the first look
+    static constexpr double converging = 1e-9;  // Newton's next correction is the square of the last
+    static constexpr int first_level = 6;       // of the first look
 
     static double elementary(double unit) {
         while (unit > 1e-2) unit *= 0.5;
@@ -162,161 +155,148 @@ class ExactSolver {
 
     enum class Verdict { clear, crossing, uncertain };
 
-    // Guards of one segment at the start of a look and at its end.
-    struct Look {
-        std::array<double, max_guards> value, slope, end_value, end_slope, fourth;
-        std::array<double, max_guards> least,
-            error;  // of the cubic: a lower bound, and how far the guard may lie from it
-
-        void enclose(double h, int lanes) {
-            const double third = h / 3.0, share = h * h * h * h / 384.0;
-            for (int g = 0; g < lanes; ++g) {
-                const double c1 = value[g] + third * slope[g], c2 = end_value[g] - third * end_slope[g];
-                const double outer = value[g] < end_value[g] ? value[g] : end_value[g], inner = c1 < c2 ? c1 : c2;
-                least[g] = outer < inner ? outer : inner;
-                error[g] = share * fourth[g];
-            }
-        }
+    // Guards at one end of a look.
+    struct Ends {
+        GuardTable::Values value, slope;
+    };
+    // Guards all through it: a lower bound of their cubics, and how far they may lie from these.
+    struct Bounds {
+        GuardTable::Values least, error, fourth;
     };
 
     // Advances within the regime until a guard reaches zero (fired) or `limit`.
     Status run_regime(const Segment<System>& segment, double limit, const Guard*& fired) {
         typename Cache::Entry& e = segment.entry;
         Propagator& p = e.propagator;
-        const std::array<double, max_guards> constant = e.guard_constants(segment.memory);
-        Cursor &cursor = cursor_, &end = end_;
-        cursor.place(p, segment.constant, input_, now_.x);
-        Look look;
+        GuardTable::Values constant;
+        e.guards.constants(segment.memory, constant);
+        Cursor *cursor = &cursor_, *end = &end_;
+        Ends *here = &ends_[0], *there = &ends_[1];
+        cursor->place(p, segment.constant, input_, now_.x);
         off_zero_ = false;
         touch_size_ = 0.0;
-        e.evaluate_guards(&constant, cursor.x(), cursor.input().values(), look.value);
-        e.evaluate_guards(nullptr, cursor.rate(), cursor.input().jet<2>()[1], look.slope);
+        evaluate(e.guards, constant, *cursor, *here);
+        State forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
+        for (int i = 0; i < n_inputs; ++i) add_scaled(forced, input_bound_[i], e.rate_sizes.input_column[i]);
         int level = std::min(last_level_, p.level_below(limit - time_));
         const double shortest = 1e-7 * p.level(0).length;
         for (long count = 1; time_ < limit; ++count) {
             ++looks_;
             if (looks_ % 1024 == 0 && interrupted != nullptr && interrupted(interrupted_context))
                 return Status::interrupted;
-            if (count % 64 == 0) cursor.anchor(time_);
-            const auto u = cursor.input().template jet<4>();
-            const State& rate = cursor.rate();
+            if (count % 64 == 0) cursor->anchor(time_);
+            const State& rate = cursor->rate();
             if (!(std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100)) return Status::outside;
-            const State fourth = p.higher_rate(p.higher_rate(p.higher_rate(rate, u[1]), u[2]), u[3]);
+            const State fourth = magnitudes(cursor->fourth_derivative());
             const double left = limit - time_;
             double h = std::min(p.level(level).length, left);
             while (true) {
-                const bool whole = h == p.level(level).length;
-                end = cursor;
-                if (whole)
-                    end.step(level);
-                else
-                    end.advance(h);
-                const auto v = end.input().jet<2>();
-                e.evaluate_guards(&constant, end.x(), v[0], look.end_value);
-                e.evaluate_guards(nullptr, end.rate(), v[1], look.end_slope);
-                bound_fourth(e, p.level(level).growth, fourth, h, look.fourth);
-                const Verdict verdict = judge(e, segment.memory, cursor, look, h, h < shortest);
+                if (h == p.level(level).length) {
+                    end->step_from(*cursor, level);
+                } else {
+                    *end = *cursor;
+                    end->advance(h);
+                }
+                evaluate(e.guards, constant, *end, *there);
+                State size = fourth;
+                add_scaled(size, h, forced);
+                bound_fourth(e.guard_sizes, p.level(level).growth, size);
+                const Verdict verdict = judge(e, segment.memory, *cursor, *here, *there, h, h < shortest);
                 if (verdict == Verdict::uncertain) {  // below the shortest level, by plain halves
                     h = level > 0 ? std::min(p.level(--level).length, left) : 0.5 * h;
                     continue;
                 }
                 if (verdict == Verdict::crossing) {
-                    first_crossing(e, segment.memory, cursor, look, h, end, fired);
-                    time_ = end.time();
-                    now_.x = end.x();
+                    first_crossing(e, segment.memory, *cursor, *here, *there, h, *end, fired);
+                    time_ = end->time();
+                    now_.x = end->x();
                     last_level_ = level;
                     return Status::done;
                 }
                 time_ = h == left ? limit : time_ + h;
                 break;
             }
-            cursor = end;
-            std::swap(look.value, look.end_value);
-            std::swap(look.slope, look.end_slope);
+            std::swap(cursor, end);
+            std::swap(here, there);
             // Twice the length has at least sixteen times the error; try it where there is room for more than that.
-            if (room_ > 64.0 && p.can_double(level, limit - time_)) ++level;
+            if (roomy_ && p.can_double(level, limit - time_)) ++level;
         }
-        now_.x = cursor.x();
+        now_.x = cursor->x();
         last_level_ = level;
         return Status::done;
     }
 
-    // |g''''| over the look.
-    void bound_fourth(const typename Cache::Entry& e, const Matrix& growth, const State& fourth, double h,
-                      std::array<double, max_guards>& out) const {
-        State size{};
-        double any = input_bound_[0] + input_bound_[1];
-        for (int k = 0; k < n_states; ++k) {
-            size[k] = std::fabs(fourth[k]);
-            for (int i = 0; i < n_inputs; ++i)
-                size[k] += h * std::fabs(e.propagator.input_column(i)[k]) * input_bound_[i];
-            any += size[k];
-        }
-        if (any == 0.0) {  // at rest; growth may have overflowed
-            out.fill(0.0);
-            return;
-        }
-        size = growth * size;
-        const auto& c = e.guard_sizes;
-        for (int g = 0; g < e.guard_lanes; ++g)
-            out[g] = c[0][g] * size[0] + c[1][g] * size[1] + c[2][g] * size[2] + c[3][g] * size[3] + c[4][g] * size[4] +
-                     c[5][g] * input_bound_[0] + c[6][g] * input_bound_[1];
+    static void evaluate(const GuardTable& guards, const GuardTable::Values& constant, Cursor& at, Ends& out) {
+        guards.evaluate(constant, at.x(), at.input(), out.value);
+        guards.rates(at.rate(), at.input(), out.slope);
     }
 
-    Verdict judge(const typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, Look& look, double h,
-                  bool shortest) {
-        const Regime& r = e.regime;
-        look.enclose(h, e.guard_lanes);
+    // |g''''| over the look, from a bound on the fourth derivative of the state that the flow carries on.
+    void bound_fourth(const GuardTable& guard_sizes, const Matrix& growth, const State& size) {
+        if (size[0] + size[1] + size[2] + size[3] == 0.0)  // at rest; growth may have overflowed
+            guard_sizes.rates(size, input_bound_, bounds_.fourth);
+        else
+            guard_sizes.rates(growth * size, input_bound_, bounds_.fourth);
+    }
+
+    // Encloses all guards over a look of length h. Whether they are positive all through it.
+    bool enclose(int rows, const Ends& here, const Ends& there, double h) {
+        const double third = h / 3.0, share = h * h * h * h / 384.0;
+        Mask clear = Vec{} == Vec{}, roomy = clear;
+        for (int g = 0; g < rows; g += vec_width) {
+            const Vec begin = load(&here.value[g]), end = load(&there.value[g]);
+            const Vec c1 = begin + third * load(&here.slope[g]), c2 = end - third * load(&there.slope[g]);
+            const Vec low = least(least(begin, end), least(c1, c2)), error = share * load(&bounds_.fourth[g]);
+            store(low, &bounds_.least[g]);
+            store(error, &bounds_.error[g]);
+            const Mask above = low > error;
+            clear &= above;
+            roomy &= (low > 64.0 * error) | ~above;
+        }
+        roomy_ = all(roomy);
+        return all(clear);
+    }
+
+    Verdict judge(const typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here,
+                  const Ends& there, double h, bool shortest) {
+        bool clear = enclose(e.guards.rows(), here, there, h);
         n_crossing_ = 0;
-        room_ = std::numeric_limits<double>::infinity();
-        std::optional<Instant> instant;  // made when a guard needs it
-        std::optional<Flow> flow;
+        if (e.touch_guard >= 0) {
+            touch_size_ = std::max(touch_size_, e.touch_size(cursor.x()));
+            off_zero_ |= here.value[e.touch_guard] > rounding * touch_size_;
+            clear &= bounds_.least[e.touch_guard] > rounding * touch_size_;
+        }
+        if (clear) return Verdict::clear;
+        const Regime& r = e.regime;
+        const std::array<double, n_inputs> input_size = cursor.input().sizes();
         for (int g = 0; g < r.n_guards; ++g) {
-            const bool by_touch = r.guards[g].by_touch;
-            const double least = look.least[g], error = look.error[g];
-            double apart = error;  // beyond this a guard is clear
-            if (by_touch) {
-                touch_size_ = std::max(touch_size_, e.speed_size(g, cursor.x()));
-                off_zero_ |= look.value[g] > rounding * touch_size_;
-                apart = std::max(error, rounding * touch_size_);
-            }
-            if (least > apart) {
-                room_ = std::min(room_, error > 0.0 ? least / error : room_);
-                continue;
-            }
-            if (!instant) {
-                instant.emplace(Instant{time_, cursor.x(), memory, cursor.input().jet(), cursor.input().sizes()});
-                flow.emplace(r, *instant);
-            }
-            const Cubic c(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
-            const double bound = h * h * h * look.fourth[g];
-            const double size = magnitude(r.guards[g].form, instant->x, memory, instant->input_size);
+            const double low = bounds_.least[g], error = bounds_.error[g];
+            if (low > error && g != e.touch_guard) continue;
+            const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
+            const bool touches = g == e.touch_guard && off_zero_ && low - error <= rounding * touch_size_ &&
+                                 c.c3 > rounding * touch_size_;
+            if (low > error && !touches) continue;
+            const double size = magnitude(r.guards[g].form, cursor.x(), memory, input_size);
             const double tolerance =
                 rounding * size +
-                time_rounding * std::fabs(time_) * std::max(std::fabs(look.slope[g]), std::fabs(look.end_slope[g]));
-            const bool touches =
-                by_touch && off_zero_ && least - error <= rounding * touch_size_ && c.c3 > rounding * touch_size_;
-            if (least > error && !touches) {
-                room_ = std::min(room_, error > 0.0 ? least / error : room_);
-                continue;
-            }
-            if (least - error >= -tolerance && !touches) continue;
-            const double slope_error = 0.00802 * bound;
+                time_rounding * std::fabs(time_) * std::max(std::fabs(here.slope[g]), std::fabs(there.slope[g]));
+            if (low - error >= -tolerance && !touches) continue;
+            const double slope_error = 0.00802 * h * h * h * bounds_.fourth[g];
             const double d0 = 3.0 / h * (c.c1 - c.c0), d1 = 3.0 / h * (c.c2 - c.c1), d2 = 3.0 / h * (c.c3 - c.c2);
-            const bool rises = std::fmin(d0, std::fmin(d1, d2)) > slope_error;
-            const bool falls = std::fmax(d0, std::fmax(d1, d2)) < -slope_error;
+            const bool rises = std::min(d0, std::min(d1, d2)) > slope_error;
+            const bool falls = std::max(d0, std::max(d1, d2)) < -slope_error;
             if (rises && c.c0 >= -tolerance && !(touches && c.c0 <= rounding * touch_size_)) continue;
             if (falls && c.c3 >= -tolerance) continue;
             if (falls) {
                 crossing_[n_crossing_++] = {g, false};
                 continue;
             }
-            if (c.c0 <= tolerance && !touches && departs(r.guards[g].form, *flow, h, look.fourth[g])) continue;
+            if (c.c0 <= tolerance && !touches && departs(e, memory, cursor, g, h)) continue;
             const double resolved = touches ? rounding * touch_size_ : tolerance;
             if (error > resolved && !shortest) return Verdict::uncertain;
-            // The cubic is the guard to rounding; does it dip below zero?
+            // The cubic is the guard to rounding, or as near as the shortest look comes; does it dip below zero?
             const double lowest = c(c.lowest_at());
-            if (lowest < -tolerance)
+            if (lowest < -std::max(tolerance, error))
                 crossing_[n_crossing_++] = {g, false};
             else if (touches && lowest <= resolved)
                 crossing_[n_crossing_++] = {g, true};
@@ -325,11 +305,13 @@ class ExactSolver {
     }
 
     // A guard that starts on zero: does its first derivative that is not zero carry it away, all through the look?
-    static bool departs(const LinearForm& form, Flow& flow, double h, double fourth) {
+    bool departs(const typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, int g, double h) const {
+        const Instant now{time_, cursor.x(), memory, cursor.input().jet(), cursor.input().sizes()};
+        Flow flow(e.rates, e.rate_sizes, now);
         std::array<double, 4> derivative{};
         int first = 0;
         for (int k = 1; k < 4; ++k) {
-            const auto [value, size] = flow.derivative(form, k);
+            const auto [value, size] = flow.derivative(e.regime.guards[g].form, k);
             derivative[k] = value;
             if (first == 0 && value < -rounding * size) return false;
             if (first == 0 && value > rounding * size) first = k;
@@ -337,62 +319,85 @@ class ExactSolver {
         if (first == 0) return false;
         // value = h^k (derivative_k / k! + what follows), bounded at the far end.
         constexpr std::array<double, 4> factorial{1.0, 1.0, 2.0, 6.0};
-        double least = derivative[first] / factorial[first] - fourth * std::pow(h, 4 - first) / 24.0;
+        double least = derivative[first] / factorial[first] - bounds_.fourth[g] * std::pow(h, 4 - first) / 24.0;
         for (int k = first + 1; k < 4; ++k)
             least += std::min(0.0, derivative[k]) * std::pow(h, k - first) / factorial[k];
         return least > 0.0;
     }
 
     // Earliest of the certified crossings; `end` is left there.
-    void first_crossing(typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, const Look& look,
-                        double h, Cursor& end, const Guard*& fired) {
-        const Regime& r = e.regime;
+    void first_crossing(typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here,
+                        const Ends& there, double h, Cursor& end, const Guard*& fired) {
         double best = std::numeric_limits<double>::infinity();
-        Cursor& at = trial_;
         const auto cubic = [&](int g) {
-            return Cubic(look.value[g], look.slope[g], look.end_value[g], look.end_slope[g], h);
+            return Cubic(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
         };
         std::array<double, max_guards> estimate{};
         for (int k = 0; k < n_crossing_; ++k) {
             const auto [g, touch] = crossing_[k];
             const Cubic c = cubic(g);
-            estimate[g] = touch ? c.lowest_at() : c.root(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
+            estimate[g] = touch ? c.lowest_at() : c.zero(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
         }
-        std::sort(crossing_.begin(), crossing_.begin() + n_crossing_,
-                  [&](const Crossing& a, const Crossing& b) { return estimate[a.guard] < estimate[b.guard]; });
+        if (n_crossing_ > 1)
+            std::sort(crossing_.begin(), crossing_.begin() + n_crossing_,
+                      [&](const Crossing& a, const Crossing& b) { return estimate[a.guard] < estimate[b.guard]; });
         for (int k = 0; k < n_crossing_; ++k) {
             const auto [g, touch] = crossing_[k];
-            const double z = estimate[g];
             // Still positive where another has crossed: later.
-            if (k > 0 && cubic(g)(best / h) > h * h * h * h / 384.0 * look.fourth[g]) continue;
-            // Newton on the guard itself, kept within its bracket by bisection.
-            double low = 0.0, high = h, s = z * h;
-            at = cursor;
-            at.advance(s);
-            for (int m = 0; m < 100 && !touch; ++m) {
-                const Guard& guard = r.guards[g];
-                const InputJet u = at.input().jet();
-                const double value = evaluate(guard.form, at.x(), memory, u[0]);
-                (value > 0.0 ? low : high) = s;
-                double next = s - value / evaluate_rate(guard.form, at.rate(), u[1]);
-                if (!(next >= low && next <= high)) next = 0.5 * (low + high);
-                const double moved = next - s;
-                if (value == 0.0 || at.time() + moved == at.time()) break;
-                if (std::fabs(moved) < e.propagator.level(0).length) {
-                    at.nudge(moved);
-                } else {
-                    at = cursor;
-                    at.advance(next);
-                }
-                s = next;
-                if (std::fabs(moved) < settled * s) break;  // Newton has converged: the next correction is its square
-            }
+            if (k > 0 && cubic(g)(best / h) > bounds_.error[g]) continue;
+            double s = estimate[g] * h;
+            trial_ = cursor;
+            if (touch)
+                trial_.advance(s);
+            else
+                s = find_zero(e.regime.guards[g].form, e.propagator, memory, cursor, s, h);
             if (s < best) {
                 best = s;
-                end = at;
-                fired = &r.guards[g];
+                std::swap(end, trial_);
+                fired = &e.regime.guards[g];
             }
         }
+    }
+
+    // Where a guard falls through zero between `cursor` and h later, near an estimate. Leaves trial_ there, returns
+    // when. About the nearest instant that whole levels lead to, the guard is a polynomial to rounding; Newton finds
+    // its zero.
+    double find_zero(const LinearForm& form, Propagator& p, const Memory& memory, const Cursor& cursor, double estimate,
+                     double h) {
+        const double base = p.level(0).length;
+        double low = 0.0, high = h, s = estimate;
+        Expansion about;
+        for (int m = 0; m < 100; ++m) {
+            trial_ = cursor;
+            const double rest = trial_.advance_by_levels(s), from = s - rest;
+            trial_.expand(rest + 0.25 * base, about);
+            const double value = lostmotion::evaluate(form, trial_.x(), memory, about.u[0]);
+            Polynomial guard(value);
+            double power = 1.0;
+            for (int k = 1; k <= about.terms; ++k) {
+                power *= base * Propagator::reciprocal[k];
+                guard.set(k, power * evaluate_rate(form, about.x[k - 1], about.u[k]));
+            }
+            const double reach = rest / base + 0.25, at = trial_.time();
+            double z = rest / base;
+            bool found = false;
+            for (int n = 0; n < 60 && !found && std::fabs(z) <= reach; ++n) {
+                const double moved = -guard.value(z) / guard.slope(z);
+                z += moved;
+                found = std::fabs(moved) <= converging * std::fabs(z) || at + base * moved == at;
+            }
+            if (found && std::fabs(z) <= reach) {
+                s = std::clamp(from + z * base, 0.0, h);
+                trial_.nudge(s - from, about);
+                return s;
+            }
+            // The zero lies elsewhere: there Newton leads, or half of what is left.
+            (value > 0.0 ? low : high) = from;
+            s = from + z * base;
+            if (!(s > low && s < high)) s = 0.5 * (low + high);
+        }
+        trial_.nudge(s - trial_.time() + cursor.time(), about);
+        return s;
     }
 
     const System& system_;
@@ -410,8 +415,10 @@ class ExactSolver {
     long looks_ = 0;
     const std::vector<InputBasis>& basis_;
     InputState input_{signals_, basis_};
-    Cursor cursor_{signals_, basis_}, end_ = cursor_, trial_ = cursor_;
-    double room_ = 0.0;  // least value of a guard / error of its cubic, in the last look
+    Cursor cursor_{input_}, end_ = cursor_, trial_ = cursor_;
+    Ends ends_[2];
+    Bounds bounds_;
+    bool roomy_ = false;  // in the last look the guards that were clear were so by far
     struct Crossing {
         int guard;
         bool touch;

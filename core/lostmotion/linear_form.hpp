@@ -1,8 +1,12 @@
 // The variables of the drive and linear expressions in them.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
+
+#include "vec.hpp"
 
 namespace lostmotion {
 
@@ -56,9 +60,13 @@ struct Form {
 
 using LinearForm = Form<n_terms>;
 
-// State vector with one lane of padding, so that a column of a matrix is three pairs of doubles.
-inline constexpr int lanes = 6;
+// State vector, with padding so that it is a whole number of vectors.
+inline constexpr int lanes = 8;
 using State = std::array<double, lanes>;
+
+inline void add_scaled(State& y, double a, const State& x) {
+    for (int r = 0; r < n_states; r += vec_width) store(load(&y[r]) + a * load(&x[r]), &y[r]);
+}
 
 // What the solver must remember beside the state: the two piecewise-constant torques of the twist contact.
 struct Memory {
@@ -66,9 +74,25 @@ struct Memory {
     double held_torque = 0.0;          // T_2 [N m], used while all three contacts are stuck
 };
 
+inline State magnitudes(const State& x) {
+    State size;
+    for (int r = 0; r < n_states; r += vec_width) store(absolute(load(&x[r])), &size[r]);
+    return size;
+}
+inline Memory magnitudes(const Memory& m) { return {std::fabs(m.hysteresis_capacity), std::fabs(m.held_torque)}; }
+
 // Value and time derivatives of the two inputs at one instant: u[k][input] is the k-th derivative.
 inline constexpr int n_derivatives = 6;
 using InputJet = std::array<std::array<double, n_inputs>, n_derivatives>;
+
+// All that a regime's equations depend on at one instant.
+struct Instant {
+    double time = 0.0;  // [s]
+    State x{};
+    Memory memory;
+    InputJet input{};
+    std::array<double, n_inputs> input_size{};  // sums of the magnitudes of the inputs' parts
+};
 
 // The part of a form that depends on neither state nor inputs: constant within a regime.
 inline double constant_part(const LinearForm& f, const Memory& m) {
@@ -97,5 +121,67 @@ inline double evaluate_rate(const LinearForm& f, const State& rate, const std::a
     for (int k = 0; k < n_states; ++k) sum += f.c[k] * rate[k];
     return sum;
 }
+
+// Up to N forms as columns, so that all are evaluated at once. None may depend on the load angle.
+template <int N>
+class FormTable {
+ public:
+    static_assert(N % 4 == 0);
+    using Values = std::array<double, N>;
+
+    FormTable() { column_[one].fill(1.0); }  // forms that are not there are 1
+
+    void set(int row, const LinearForm& f) {
+        assert(f.c[load_angle] == 0.0);
+        for (int k = 0; k < n_terms; ++k) column_[k][row] = f.c[k];
+        rows_ = std::max(rows_, (row + 4) / 4 * 4);
+        driven_ = driven_ || f.c[command] != 0.0 || f.c[load_torque] != 0.0;
+    }
+    // The forms with the magnitudes of their coefficients.
+    FormTable magnitudes() const {
+        FormTable out = *this;
+        for (auto& column : out.column_)
+            for (double& c : column) c = std::fabs(c);
+        return out;
+    }
+
+    int rows() const { return rows_; }       // rounded up to whole vectors
+    bool driven() const { return driven_; }  // whether any form depends on the inputs
+    double coefficient(int row, int term) const { return column_[term][row]; }
+
+    // The parts that depend on neither state nor inputs.
+    void constants(const Memory& m, Values& out) const {
+        for (int g = 0; g < rows_; g += vec_width)
+            store(at(one, g) + m.hysteresis_capacity * at(hysteresis_capacity, g) + m.held_torque * at(held_torque, g),
+                  &out[g]);
+    }
+    void evaluate(const Values& constant, const State& x, const std::array<double, n_inputs>& u, Values& out) const {
+        for (int g = 0; g < rows_; g += vec_width) store(load(&constant[g]) + terms(g, x, u), &out[g]);
+    }
+    // The same with inputs that are asked for their values or rates where the forms depend on them.
+    template <class Input>
+    void evaluate(const Values& constant, const State& x, const Input& input, Values& out) const {
+        evaluate(constant, x, driven_ ? input.values() : std::array<double, n_inputs>{}, out);
+    }
+    template <class Input>
+    void rates(const State& rate, const Input& input, Values& out) const {
+        rates(rate, driven_ ? input.rates() : std::array<double, n_inputs>{}, out);
+    }
+    // Time derivatives, from those of state and inputs.
+    void rates(const State& rate, const std::array<double, n_inputs>& input_rate, Values& out) const {
+        for (int g = 0; g < rows_; g += vec_width) store(terms(g, rate, input_rate), &out[g]);
+    }
+
+ private:
+    Vec at(int term, int g) const { return load(&column_[term][g]); }
+    Vec terms(int g, const State& x, const std::array<double, n_inputs>& u) const {
+        const Vec sum = ((at(0, g) * x[0] + at(1, g) * x[1]) + at(2, g) * x[2]) + at(3, g) * x[3];
+        return driven_ ? sum + (at(command, g) * u[0] + at(load_torque, g) * u[1]) : sum;
+    }
+
+    alignas(32) std::array<std::array<double, N>, n_terms> column_{};
+    int rows_ = 0;
+    bool driven_ = false;
+};
 
 }  // namespace lostmotion

@@ -11,127 +11,15 @@
 #pragma once
 
 #include <algorithm>
-#include <cassert>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
-#include "regime.hpp"
+#include "linear_rates.hpp"
 #include "signal.hpp"
 
 namespace lostmotion {
-
-// Pairs of numbers that are reckoned with at once. A state is three of them, and is always written as that: a pair that
-// is read in one piece after it was written in two halts the processor.
-typedef double Pair __attribute__((vector_size(16)));
-
-inline Pair load(const double* from) {
-    Pair p;
-    __builtin_memcpy(&p, from, sizeof p);
-    return p;
-}
-inline void store(Pair p, double* to) { __builtin_memcpy(to, &p, sizeof p); }
-
-// A linear map of the states. The first four are coupled; the load angle follows the load speed and nothing depends on
-// it, so its column is zero but for its own entry.
-struct Matrix {
-    static constexpr int coupled = 4;
-    using Column = std::array<double, coupled>;
-
-    std::array<Column, coupled> column{};
-    Column angle{};          // row of the load angle
-    double angle_own = 0.0;  // its own entry
-
-    static Matrix diagonal(double value) {
-        Matrix m;
-        for (int k = 0; k < coupled; ++k) m.column[k][k] = value;
-        m.angle_own = value;
-        return m;
-    }
-
-    State operator*(const State& v) const {
-        State out;
-        for (const int r : {0, 2}) store(rows(r, v.data()), &out[r]);
-        const double of_angle =
-            (((angle[0] * v[0] + angle[1] * v[1]) + angle[2] * v[2]) + angle[3] * v[3]) + angle_own * v[coupled];
-        store(Pair{of_angle, 0.0}, &out[coupled]);
-        return out;
-    }
-    double operator()(int row, int col) const {
-        if (row < coupled) return col < coupled ? column[col][row] : 0.0;
-        return col < coupled ? angle[col] : angle_own;
-    }
-    // Rows r and r + 1 of the product with four numbers.
-    Pair rows(int r, const double* v) const {
-        return ((load(&column[0][r]) * v[0] + load(&column[1][r]) * v[1]) + load(&column[2][r]) * v[2]) +
-               load(&column[3][r]) * v[3];
-    }
-    // factor * other, entry by entry
-    void add(double factor, const Matrix& other) {
-        for (int c = 0; c < coupled; ++c) {
-            for (int r = 0; r < coupled; ++r) column[c][r] += factor * other.column[c][r];
-            angle[c] += factor * other.angle[c];
-        }
-        angle_own += factor * other.angle_own;
-    }
-    void scale(double factor) {
-        for (Column& c : column)
-            for (double& v : c) v *= factor;
-        for (double& v : angle) v *= factor;
-        angle_own *= factor;
-    }
-    // f(own entry, that of the other), entry by entry
-    template <class F>
-    void combine(const Matrix& other, F&& f) {
-        for (int c = 0; c < coupled; ++c) {
-            for (int r = 0; r < coupled; ++r) column[c][r] = f(column[c][r], other.column[c][r]);
-            angle[c] = f(angle[c], other.angle[c]);
-        }
-        angle_own = f(angle_own, other.angle_own);
-    }
-    friend Matrix operator*(const Matrix& a, const Matrix& b) {
-        Matrix out;
-        for (int c = 0; c < coupled; ++c) {
-            const Column& v = b.column[c];
-            for (const int r : {0, 2}) store(a.rows(r, v.data()), &out.column[c][r]);
-            out.angle[c] = (((a.angle[0] * v[0] + a.angle[1] * v[1]) + a.angle[2] * v[2]) + a.angle[3] * v[3]) +
-                           a.angle_own * b.angle[c];
-        }
-        out.angle_own = a.angle_own * b.angle_own;
-        return out;
-    }
-};
-
-inline void add_scaled(State& y, double a, const State& x) {
-    for (const int r : {0, 2, 4}) store(load(&y[r]) + a * load(&x[r]), &y[r]);
-}
-
-// dx/dt = A x + constant + B u of one regime, as arrays. No rate may depend on the load angle.
-struct LinearRates {
-    Matrix rate;
-    std::array<State, n_inputs> input_column{};
-
-    LinearRates() = default;
-    explicit LinearRates(const Regime& regime) {
-        for (int r = 0; r < n_states; ++r) {
-            const LinearForm& f = regime.rate[r];
-            assert(f.c[load_angle] == 0.0);
-            for (int c = 0; c < Matrix::coupled; ++c)
-                (r < Matrix::coupled ? rate.column[c][r] : rate.angle[c]) = f.c[c];
-            for (int i = 0; i < n_inputs; ++i) input_column[i][r] = f.c[first_input + i];
-        }
-    }
-    State operator()(const State& x, const State& constant, const std::array<double, n_inputs>& u) const {
-        State out = rate * x;
-        for (int r = 0; r < lanes; ++r) out[r] += constant[r] + input_column[0][r] * u[0] + input_column[1][r] * u[1];
-        return out;
-    }
-    // The next time derivative of the state from one that is at least the first.
-    State higher(const State& derivative, const std::array<double, n_inputs>& u) const {
-        State out = rate * derivative;
-        for (int r = 0; r < lanes; ++r) out[r] += input_column[0][r] * u[0] + input_column[1][r] * u[1];
-        return out;
-    }
-};
 
 // Everything needed to step by one length in one regime.
 struct Step {
@@ -141,22 +29,38 @@ struct Step {
     Matrix growth;        // bound on |exp(A s)|, element by element, for 0 <= s <= h
 };
 
+// The response from rest to one function of an input, at the end of a step.
+struct Response {
+    State x{}, rate{};
+};
+
+// Time derivatives of state and inputs at one instant.
+struct Expansion {
+    static constexpr int most = 12;  // good for two base intervals: 0.25^13/13! < 1e-17
+
+    int terms = 0;
+    std::array<State, most> x;                             // from the first derivative on
+    std::array<std::array<double, n_inputs>, most + 1> u;  // from the value on
+};
+
 class Propagator {
  public:
     static constexpr int max_levels = 40;
     static constexpr int usual_levels = 12;
     static constexpr double base_norm = 0.125;  // |A| h of the base interval, in scaled units
+    static constexpr int series_terms = Expansion::most;
 
     // unit: a length [s] of which some power-of-two multiple or fraction is the base interval.
     // scale: natural sizes of the states; only for choosing the base interval.
-    void prepare(const Regime& regime, double unit, const State& scale, const std::vector<InputBasis>& basis) {
+    // rates and basis must outlive this.
+    void prepare(const LinearRates& rates, double unit, const State& scale, const std::vector<InputBasis>& basis) {
         n_basis_ = static_cast<int>(basis.size());
         basis_ = &basis;
-        linear_ = LinearRates(regime);
+        linear_ = &rates;
         norm_ = 0.0;
         for (int r = 0; r < n_states; ++r) {
             double sum = 0.0;
-            for (int c = 0; c < n_states; ++c) sum += std::fabs(regime.rate[r].c[c]) * scale[c] / scale[r];
+            for (int c = 0; c < Matrix::coupled; ++c) sum += std::fabs(rates.rate(r, c)) * scale[c] / scale[r];
             norm_ = std::fmax(norm_, sum);
         }
         fastest_input_ = 0.0;
@@ -164,54 +68,80 @@ class Propagator {
         norm_ = std::fmax(norm_, fastest_input_);
         double h = unit;
         while (norm_ * h > base_norm) h *= 0.5;
+        levels_ = 0;
         steps_.clear();
         responses_.clear();
         rotations_.clear();
         steps_.reserve(usual_levels);
         responses_.reserve(usual_levels * basis.size());
+        prepare_derivatives();
+        base_ = h;
+        longest_ = 0;
+        while (longest_ + 1 < max_levels && fastest_input_ * length(longest_ + 1) <= 1.0) ++longest_;
+        turning_ = rates.rate.angle[load_speed];
         add_base(h);
     }
 
-    bool ready() const { return !steps_.empty(); }
-    void reset() { steps_.clear(); }
+    bool ready() const { return levels_ > 0; }
+    void reset() { levels_ = 0; }
 
-    const State& input_column(int i) const { return linear_.input_column[i]; }
-    State rate(const State& x, const State& constant, const std::array<double, n_inputs>& u) const {
-        return linear_(x, constant, u);
-    }
-    State higher_rate(const State& derivative, const std::array<double, n_inputs>& u) const {
-        return linear_.higher(derivative, u);
+    const LinearRates& rates() const { return *linear_; }
+    // The fourth time derivative of the state, from the first and the input state.
+    State fourth_derivative(const State& rate, const double* weights) const {
+        State out = cubed_ * rate;
+        for (int q = 0; q < n_basis_; ++q) add_scaled(out, weights[q], fourth_[q]);
+        return out;
     }
 
     const Step& level(int k) {
-        while (static_cast<int>(steps_.size()) <= k) add_doubled();
+        while (levels_ <= k) add_doubled();
         return steps_[k];
     }
-    const State* responses(int k) const { return responses_.data() + static_cast<std::size_t>(k) * n_basis_; }
+    const Response* responses(int k) const { return responses_.data() + static_cast<std::size_t>(k) * n_basis_; }
     const double* rotations(int k) const { return rotations_.data() + static_cast<std::size_t>(k) * n_basis_; }
 
+    double length(int k) const { return base_ * static_cast<double>(1ull << k); }
+    // How many base intervals fit into s.
+    std::uint64_t intervals(double s) const {
+        auto n = static_cast<std::uint64_t>(s / base_);
+        while (n > 0 && base_ * static_cast<double>(n) > s) --n;  // the quotient may have been rounded up
+        return n;
+    }
+    // Steps stay below a sixth of the fastest input period: the doubling formula of a sine loses accuracy beyond it.
+    int longest_level() const { return longest_; }
     // The highest level not longer than s (level 0 even if it is longer). Computes no level.
     int level_below(double s) const {
-        const double base = steps_[0].length, longest = fastest_input_ > 0.0 ? std::min(s, 1.0 / fastest_input_) : s;
-        int k = longest > base ? std::min(std::ilogb(longest / base), max_levels - 1) : 0;
-        while (k > 0 && std::ldexp(base, k) > longest) --k;  // the quotient may have been rounded up
-        return k;
+        const double most = length(longest_);
+        return s >= most ? longest_ : std::max(0, static_cast<int>(std::bit_width(intervals(s))) - 1);
     }
-    // Whether twice the level is a step within s. Steps stay below a sixth of the fastest input period: the doubling
-    // formula of a sine loses accuracy beyond it.
-    bool can_double(int k, double s) const {
-        const double next = 2.0 * steps_[k].length;
-        return k + 1 < max_levels && next <= s && next * fastest_input_ <= 1.0;
-    }
+    // Whether twice the level is a step within s.
+    bool can_double(int k, double s) const { return k < longest_ && length(k + 1) <= s; }
 
     // x after the step of level k; `rate` is x' at the anchor, `weights` the input state there.
-    State step(int k, const State& x, const State& rate, const std::vector<double>& weights) {
-        const Step& s = level(k);
-        State y = s.integral * rate;
-        const State* response = responses(k);
-        for (int q = 0; q < n_basis_; ++q) add_scaled(y, weights[q], response[q]);
-        for (int r = 0; r < lanes; ++r) y[r] += x[r];
+    State step(int k, const State& x, const State& rate, const double* weights) {
+        Quad sum = level(k).integral * Quad::load(rate.data());
+        const Response* response = responses(k);
+        for (int q = 0; q < n_basis_; ++q) sum = sum + weights[q] * Quad::load(response[q].x.data());
+        State y;
+        (Quad::load(x.data()) + sum).store(y.data());
+        store_single(x[load_angle] + angle_step(k, rate.data(), rate[load_angle], weights), &y[load_angle]);
         return y;
+    }
+    // The same for x and x' at once, without a look at the rates of the regime in between. The angle's own rate is
+    // that of the load speed.
+    void step(int k, Quad& x, Quad& rate, double& angle, const double* weights) {
+        const Step& s = level(k);
+        const Response* response = responses(k);
+        alignas(32) double from[Matrix::coupled];
+        rate.store(from);
+        angle += angle_step(k, from, turning_ * x.part[load_speed / vec_width][load_speed % vec_width], weights);
+        Quad sum = s.integral * rate, rate_sum = s.change * rate;
+        for (int q = 0; q < n_basis_; ++q) {
+            sum = sum + weights[q] * Quad::load(response[q].x.data());
+            rate_sum = rate_sum + weights[q] * Quad::load(response[q].rate.data());
+        }
+        x = x + sum;
+        rate = rate + rate_sum;
     }
 
     // G(h) for any length: whole levels from the longest down, then the Taylor series.
@@ -222,39 +152,80 @@ class Propagator {
             sum.add(1.0, integral);
         };
         for (int k = level_below(h); k >= 0; --k)
-            for (const double length = level(k).length; h >= length; h -= length)
-                append(steps_[k].change, steps_[k].integral);
+            for (; h >= length(k); h -= length(k)) append(level(k).change, level(k).integral);
         if (h > 0.0) {
             const Matrix rest = integral_series(h);
-            append(linear_.rate * rest, rest);
+            append(linear_->rate * rest, rest);
         }
         return sum;
     }
 
-    // Taylor series over at most one base interval, forward or backward.
-    State series(double s, const State& x, const State& rate, const InputState& input) const {
-        double left = norm_ * std::fabs(s);  // bound on the relative size of what follows
-        int terms = 1;
-        while (left >= 1e-19 && terms < series_terms) left *= norm_ * std::fabs(s) / ++terms;
-        return terms < n_derivatives ? series<n_derivatives>(terms, s, x, rate, input)
-                                     : series<series_terms + 1>(terms, s, x, rate, input);
+    // How many terms of the Taylor series count over s: at most two base intervals, forward or backward. From rest the
+    // first derivatives are zero and a later one, up to the fifth (an input, then each state in turn), comes first.
+    int terms(double s) const {
+        double left = 1.0;  // bound on the relative size of what follows
+        int n = 0;
+        while ((n <= n_states || left >= 1e-19) && n < series_terms) {
+            ++n;
+            left *= norm_ * std::fabs(s) * reciprocal[n];
+        }
+        return n;
     }
+    // Fills in the derivatives of the state after the first, which is given; terms and inputs are there. By A^2, so
+    // that those of even and of odd order are reckoned side by side.
+    void expand(const State& rate, Expansion& about) const {
+        about.x[0] = rate;
+        about.x[1] = linear_->higher(rate, about.u[1]);
+        for (int k = 2; k < about.terms; ++k) {
+            const State& before = about.x[k - 2];
+            store_single(turning_ * about.x[k - 1][load_speed], &about.x[k][load_angle]);
+            Quad x = squared_ * Quad::load(before.data());
+            for (int i = 0; i < n_inputs; ++i)
+                x = x + (about.u[k - 1][i] * Quad::load(rate_column_[i].data()) +
+                         about.u[k][i] * Quad::load(linear_->input_column[i].data()));
+            x.store(about.x[k].data());
+        }
+    }
+    static State series(const Expansion& about, double s, const State& x) {
+        State sum = x;
+        double power = 1.0;
+        for (int k = 1; k <= about.terms; ++k) {
+            power *= s * reciprocal[k];
+            add_scaled(sum, power, about.x[k - 1]);
+        }
+        return sum;
+    }
+    static constexpr std::array<double, series_terms + 1> reciprocal = [] {
+        std::array<double, series_terms + 1> r{};
+        for (int k = 1; k <= series_terms; ++k) r[k] = 1.0 / k;
+        return r;
+    }();
 
  private:
-    static constexpr int series_terms = 12;  // 0.125^13/13! < 1e-21
+    double angle_step(int k, const double* rate, double turning, const double* weights) const {
+        double sum = steps_[k].integral.angle_row(rate) + steps_[k].integral.angle_own * turning;
+        const Response* response = responses(k);
+        for (int q = 0; q < n_basis_; ++q) sum += weights[q] * response[q].x[load_angle];
+        return sum;
+    }
 
-    template <int N>
-    State series(int terms, double s, const State& x, const State& rate, const InputState& input) const {
-        const auto u = input.jet<N>();
-        State term = rate, sum = x;
-        double power = s;
-        for (int k = 1;; ++k) {
-            add_scaled(sum, power, term);
-            if (k == terms) return sum;
-            term = linear_.rate * term;
-            for (int i = 0; i < n_inputs; ++i)
-                if (u[k][i] != 0.0) add_scaled(term, u[k][i], linear_.input_column[i]);
-            power *= s / (k + 1);
+    // x'''' = A^3 x' + A^2 B u' + A B u'' + B u''', the derivatives of the inputs written by the input state.
+    void prepare_derivatives() {
+        squared_ = linear_->rate * linear_->rate;
+        cubed_ = linear_->rate * squared_;
+        for (int i = 0; i < n_inputs; ++i) rate_column_[i] = linear_->rate * linear_->input_column[i];
+        fourth_.assign(n_basis_, State{});
+        for (int q = 0; q < n_basis_; ++q) {
+            const InputBasis& b = (*basis_)[q];
+            const State &B = linear_->input_column[b.input], A2B = squared_ * B;
+            if (b.kind == InputBasis::cosine) {  // its weight is that of the sine: u'' = -omega^2
+                add_scaled(fourth_[q], -b.omega * b.omega, rate_column_[b.input]);
+            } else if (b.kind == InputBasis::sine) {  // and this one's of the cosine: u' = omega, u''' = -omega^3
+                add_scaled(fourth_[q], b.omega, A2B);
+                add_scaled(fourth_[q], -b.omega * b.omega * b.omega, B);
+            } else {
+                fourth_[q] = A2B;
+            }
         }
     }
 
@@ -263,7 +234,7 @@ class Propagator {
         Matrix term = Matrix::diagonal(h), sum;
         for (int k = 1; k <= series_terms; ++k) {
             sum.add(1.0, term);
-            term = linear_.rate * term;
+            term = linear_->rate * term;
             term.scale(h / (k + 1));
         }
         return sum;
@@ -273,11 +244,12 @@ class Propagator {
         Step& s = steps_.emplace_back();
         s.length = h;
         s.integral = integral_series(h);
-        s.change = linear_.rate * s.integral;
+        s.change = linear_->rate * s.integral;
         // |exp(A s)| from the powers of a matrix without negative entries beside its diagonal.
-        Matrix positive = linear_.rate;
+        Matrix positive = linear_->rate;
         positive.combine(Matrix{}, [h](double a, double) { return h * std::fabs(a); });
-        for (int k = 0; k < Matrix::coupled; ++k) positive.column[k][k] = h * std::fmax(linear_.rate.column[k][k], 0.0);
+        for (int k = 0; k < Matrix::coupled; ++k)
+            positive.column[k][k] = h * std::fmax(linear_->rate.column[k][k], 0.0);
         s.growth = Matrix::diagonal(1.0);
         Matrix bound = s.growth;
         for (int k = 1; k <= 8; ++k) {
@@ -294,21 +266,21 @@ class Propagator {
             double power = h;
             for (int k = 0; k < series_terms; ++k) {
                 // coefficient: k-th derivative of y at 0; the next is A times it plus b times the derivative of r.
-                coefficient = linear_.rate * coefficient;
+                coefficient = linear_->rate * coefficient;
                 if (k == first || (b.kind != InputBasis::ramp && k > first && (k - first) % 2 == 0)) {
                     if (k > first) r *= -b.omega * b.omega;
-                    add_scaled(coefficient, r, linear_.input_column[b.input]);
+                    add_scaled(coefficient, r, linear_->input_column[b.input]);
                 }
                 add_scaled(y, power, coefficient);
                 power *= h / (k + 2);
             }
-            responses_.push_back(y);
+            responses_.push_back({y, {}});
         }
-        add_rotations(h);
+        finish_level();
     }
 
     void add_doubled() {
-        const int k = static_cast<int>(steps_.size()) - 1;
+        const int k = levels_ - 1;
         steps_.emplace_back();
         const Step& a = steps_[k];
         Step& b = steps_[k + 1];
@@ -323,47 +295,66 @@ class Propagator {
         b.growth = a.growth * size;
         b.growth.combine(a.growth, [](double x, double y) { return std::max(x, y); });
         responses_.resize(responses_.size() + n_basis_);
-        const State* from = responses(k);
+        const Response* from = responses(k);
         for (int q = 0; q < n_basis_; ++q) {
             const InputBasis& basis = (*basis_)[q];
-            State y = a.change * from[q];
-            add_scaled(y, 1.0, from[q]);
-            const State constant = a.integral * linear_.input_column[basis.input];
+            State y = a.change * from[q].x;
+            add_scaled(y, 1.0, from[q].x);
+            const State constant = a.integral * linear_->input_column[basis.input];
             if (basis.kind == InputBasis::ramp) {
-                add_scaled(y, 1.0, from[q]);
+                add_scaled(y, 1.0, from[q].x);
                 add_scaled(y, a.length, constant);
             } else {
                 const int cosine = basis.kind == InputBasis::cosine ? q : q - 1, sine = cosine + 1;
                 const double c = rotations(k)[cosine], s = rotations(k)[sine];
                 const double half = std::sin(0.5 * basis.omega * a.length);
                 if (basis.kind == InputBasis::cosine) {
-                    add_scaled(y, c, from[cosine]);
-                    add_scaled(y, -s, from[sine]);
+                    add_scaled(y, c, from[cosine].x);
+                    add_scaled(y, -s, from[sine].x);
                     add_scaled(y, -2.0 * half * half, constant);
                 } else {
-                    add_scaled(y, s, from[cosine]);
-                    add_scaled(y, c, from[sine]);
+                    add_scaled(y, s, from[cosine].x);
+                    add_scaled(y, c, from[sine].x);
                     add_scaled(y, s, constant);
                 }
             }
-            responses_[static_cast<std::size_t>(k + 1) * n_basis_ + q] = y;
+            responses_[static_cast<std::size_t>(k + 1) * n_basis_ + q].x = y;
         }
-        add_rotations(b.length);
+        finish_level();
     }
 
-    void add_rotations(double h) {
-        for (const InputBasis& b : *basis_)
-            rotations_.push_back(b.kind == InputBasis::sine ? std::sin(b.omega * h) : std::cos(b.omega * h));
+    // What follows from length and responses: the rotations of the inputs, and the rates.
+    void finish_level() {
+        const int k = levels_++;
+        const double h = steps_[k].length;
+        for (int q = 0; q < n_basis_; ++q) {
+            const InputBasis& b = (*basis_)[q];
+            const double sine = std::sin(b.omega * h), half = std::sin(0.5 * b.omega * h);
+            rotations_.push_back(b.kind == InputBasis::sine ? sine : std::cos(b.omega * h));
+            Response& r = responses_[static_cast<std::size_t>(k) * n_basis_ + q];
+            r.rate = linear_->rate * r.x;
+            const double input = b.kind == InputBasis::ramp   ? h
+                                 : b.kind == InputBasis::sine ? sine
+                                                              : -2.0 * half * half;
+            add_scaled(r.rate, input, linear_->input_column[b.input]);
+        }
     }
 
-    LinearRates linear_;
-    double norm_ = 0.0;           // of A in scaled units, or the highest input frequency [1/s]
-    double fastest_input_ = 0.0;  // [rad/s]
+    const LinearRates* linear_ = nullptr;
+    Matrix squared_, cubed_;                     // A^2, A^3
+    std::array<State, n_inputs> rate_column_{};  // A B
+    std::vector<State> fourth_;                  // n_basis: what each contributes to the fourth derivative
+    double norm_ = 0.0;                          // of A in scaled units, or the highest input frequency [1/s]
+    double fastest_input_ = 0.0;                 // [rad/s]
+    double base_ = 0.0;                          // length of level 0 [s]
+    int longest_ = 0;                            // level
+    double turning_ = 0.0;                       // 1 where the load may turn
     int n_basis_ = 0;
     const std::vector<InputBasis>* basis_ = nullptr;
-    std::vector<Step> steps_;        // one a level
-    std::vector<State> responses_;   // levels x n_basis
-    std::vector<double> rotations_;  // levels x n_basis: cos and sin of omega * length
+    int levels_ = 0;
+    std::vector<Step> steps_;          // one a level
+    std::vector<Response> responses_;  // levels x n_basis
+    std::vector<double> rotations_;    // levels x n_basis: cos and sin of omega * length
 };
 
 }  // namespace lostmotion

@@ -25,7 +25,7 @@ struct RegimeKey {
     std::int32_t cell = 0;       // slipping: triangle; stuck: load interval for starting forward ...
     std::int32_t cell_back = 0;  // ... and backward
 
-    friend bool operator==(const RegimeKey&, const RegimeKey&) = default;
+    friend bool operator==(const RegimeKey& a, const RegimeKey& b) { return a.packed() == b.packed(); }
 
     std::uint64_t packed() const {
         const auto bits = [](auto v, int n) { return static_cast<std::uint64_t>(v) & ((1ull << n) - 1); };

@@ -10,55 +10,43 @@
 
 namespace lostmotion {
 
+using GuardTable = FormTable<max_guards>;
+
 template <class System>
 class RegimeCache {
  public:
     struct Entry {
-        Regime regime;
-        Propagator propagator;
-        // Guards as columns, so that all are evaluated at once: value = constant + sum columns * (x, u).
-        std::array<std::array<double, max_guards>, n_states + n_inputs> guard_columns{}, guard_sizes{};
-        int guard_lanes = 0;  // number of guards, rounded up to whole vectors
-
-        // The guards' values, or with constant = nullptr and the derivatives of state and inputs, their rates.
-        void evaluate_guards(const std::array<double, max_guards>* constant, const State& x,
-                             const std::array<double, n_inputs>& u, std::array<double, max_guards>& out) const {
-            const auto& c = guard_columns;
-            for (int g = 0; g < guard_lanes; ++g) {
-                const double fixed = constant != nullptr ? (*constant)[g] : 0.0;
-                out[g] = fixed + c[0][g] * x[0] + c[1][g] * x[1] + c[2][g] * x[2] + c[3][g] * x[3] + c[4][g] * x[4] +
-                         c[5][g] * u[0] + c[6][g] * u[1];
+        explicit Entry(const Regime& r) : regime(r), rates(r), rate_sizes(rates.magnitudes()) {
+            for (int g = 0; g < r.n_guards; ++g) {
+                guards.set(g, r.guards[g].form);
+                if (r.guards[g].by_touch) touch_guard = g;
             }
+            guard_sizes = guards.magnitudes();
         }
+        Entry(const Entry&) = delete;
+        Entry& operator=(const Entry&) = delete;
+
+        const Regime regime;
+        const LinearRates rates, rate_sizes;  // and with the magnitudes of all coefficients
+        GuardTable guards, guard_sizes;
+        int touch_guard = -1;  // the one that also ends the regime by touching zero
+        Propagator propagator;
+
         // How far the guards lie above a thousandth of the sizes of their terms.
-        std::array<double, max_guards> guard_room(const State& x, const Memory& m,
-                                                  const std::array<double, n_inputs>& u,
-                                                  const std::array<double, n_inputs>& input_size) const {
-            const std::array<double, max_guards> constant = guard_constants(m);
-            std::array<double, max_guards> value, size;
-            evaluate_guards(&constant, x, u, value);
-            const auto& c = guard_sizes;
-            for (int g = 0; g < guard_lanes; ++g) {
-                size[g] = std::fabs(constant[g]) + c[0][g] * std::fabs(x[0]) + c[1][g] * std::fabs(x[1]) +
-                          c[2][g] * std::fabs(x[2]) + c[3][g] * std::fabs(x[3]) + c[4][g] * std::fabs(x[4]) +
-                          c[5][g] * input_size[0] + c[6][g] * input_size[1];
-                value[g] -= 1e-3 * size[g];
-            }
+        GuardTable::Values guard_room(const Instant& now) const {
+            GuardTable::Values constant, value, size;
+            guards.constants(now.memory, constant);
+            guards.evaluate(constant, now.x, now.input[0], value);
+            guard_sizes.constants(magnitudes(now.memory), constant);
+            guard_sizes.evaluate(constant, magnitudes(now.x), now.input_size, size);
+            for (int g = 0; g < guards.rows(); g += vec_width)
+                store(load(&value[g]) - 1e-3 * load(&size[g]), &value[g]);
             return value;
         }
-        // Sum of the magnitudes of the terms of a guard that is a speed, so without constant or inputs.
-        double speed_size(int g, const State& x) const {
-            const auto& c = guard_sizes;
-            return c[motor_speed][g] * std::fabs(x[motor_speed]) + c[load_speed][g] * std::fabs(x[load_speed]);
-        }
-        // The part of the guards that depends on neither state nor inputs.
-        std::array<double, max_guards> guard_constants(const Memory& m) const {
-            std::array<double, max_guards> constant{};
-            for (int g = 0; g < regime.n_guards; ++g) {
-                const LinearForm& f = regime.guards[g].form;
-                constant[g] = constant_part(f, m);
-            }
-            return constant;
+        // Sum of the magnitudes of the terms of the guard that ends by touching, a speed.
+        double touch_size(const State& x) const {
+            return guard_sizes.coefficient(touch_guard, motor_speed) * std::fabs(x[motor_speed]) +
+                   guard_sizes.coefficient(touch_guard, load_speed) * std::fabs(x[load_speed]);
         }
     };
 
@@ -67,23 +55,12 @@ class RegimeCache {
     const Regime& regime(const RegimeKey& key) { return entry(key).regime; }
 
     Entry& entry(const RegimeKey& key) {
-        if (last_ != nullptr && last_->regime.key == key) return *last_;
         const std::uint64_t packed = key.packed();
+        if (last_ != nullptr && packed == last_packed_) return *last_;
         std::unique_ptr<Entry>& found = entries_[packed];
-        if (!found) {
-            found = std::make_unique<Entry>();
-            found->regime = system_.build(key);
-            const Regime& r = found->regime;
-            found->guard_lanes = (r.n_guards + 3) / 4 * 4;
-            for (int g = 0; g < r.n_guards; ++g) {
-                for (int k = 0; k < n_states; ++k) found->guard_columns[k][g] = r.guards[g].form.c[k];
-                for (int i = 0; i < n_inputs; ++i)
-                    found->guard_columns[n_states + i][g] = r.guards[g].form.c[first_input + i];
-            }
-            for (int k = 0; k < n_states + n_inputs; ++k)
-                for (int g = 0; g < r.n_guards; ++g) found->guard_sizes[k][g] = std::fabs(found->guard_columns[k][g]);
-        }
+        if (!found) found = std::make_unique<Entry>(system_.build(key));
         last_ = found.get();
+        last_packed_ = packed;
         return *found;
     }
 
@@ -107,6 +84,7 @@ class RegimeCache {
     double unit_ = 0.0;
     std::vector<InputBasis> basis_;
     Entry* last_ = nullptr;  // the one asked for last
+    std::uint64_t last_packed_ = 0;
     std::unordered_map<std::uint64_t, std::unique_ptr<Entry>> entries_;
 };
 

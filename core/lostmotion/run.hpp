@@ -49,8 +49,8 @@ class Recorder {
         sampler_.interrupted_context = options.interrupted_context;
     }
     void begin(const State& x) { meter_.begin(x); }
-    bool segment(const Segment<SwitchedDrive>& s, const std::vector<InputBasis>& basis) {
-        return sampler_.segment(s, basis) && (!options_.energy || meter_.segment(s, basis));
+    bool segment(const Segment<SwitchedDrive>& s) {
+        return sampler_.segment(s) && (!options_.energy || meter_.segment(s));
     }
     void switching(const Switching& s) {
         if (report_.switching_count++ < options_.max_switchings) report_.switchings.push_back(s);

@@ -40,23 +40,24 @@ class Reader {
     Reader(const Drive& drive, const Regime& r, const Memory& m) : drive_(drive), regime_(r) {
         const std::array<const LinearForm*, 4> forms{&r.source_torque, &r.output_torque, &r.input_torque,
                                                      &r.input_friction};
-        for (int k = 0; k < 4; ++k) {
-            const LinearForm& f = *forms[k];
-            for (int c = 0; c < Matrix::coupled; ++c) columns_.column[c][k] = f.c[c];
-            for (int i = 0; i < n_inputs; ++i) input_columns_[i][k] = f.c[first_input + i];
-            constant_[k] = constant_part(f, m);
+        for (int k = 0; k < 4; ++k) forms_.set(k, *forms[k]);
+        forms_.constants(m, constant_);
+        has_map_ = drive.gearbox.losses == Gearbox::loss_map;
+        for (int c = 0; c < n_contacts; ++c) {
+            const int mode = r.key.modes[c];
+            shows_speed_[c] = mode == absent && !r.at_rest[c];
+            mode_[c] = r.at_rest[c] ? 0.0 : mode;
         }
     }
 
     Reading operator()(const State& x, const std::array<double, n_inputs>& u) const {
-        State out = columns_ * x;
-        for (int k = 0; k < lanes; ++k)
-            out[k] += constant_[k] + input_columns_[0][k] * u[0] + input_columns_[1][k] * u[1];
-        const auto [M_D, T_2, T_1_moving, F, unused_0, unused_1] = out;
+        std::array<double, 4> out;
+        forms_.evaluate(constant_, x, u, out);
+        const auto [M_D, T_2, T_1_moving, F] = out;
         const Gearbox& gearbox = drive_.gearbox;
         double T_1 = T_1_moving, loss;
         const int mode = regime_.key.modes[input_contact];
-        if (gearbox.losses == Gearbox::loss_map && mode == 0) {
+        if (has_map_ && mode == 0) {
             // The torque F that the standing contact holds is shared by bearing and gear as their capacities are.
             const double s = F >= 0.0 ? 1.0 : -1.0;
             const double M_2B = gearbox.loss_torque(s * T_2 / gearbox.rated_output_torque, 0.0);
@@ -64,7 +65,7 @@ class Reader {
             if (capacity > 0.0) T_1 += F * (M_2B / gearbox.ratio) / capacity;
             loss = M_2B / gearbox.rated_output_torque;
         } else {
-            const double s = gearbox.losses == Gearbox::loss_map ? mode : sign_of(x[motor_speed]);
+            const double s = has_map_ ? mode : sign_of(x[motor_speed]);
             loss = (gearbox.ratio * T_1 - T_2) * s / gearbox.rated_output_torque;
         }
         return {{u[0], u[1], M_D, x[motor_speed], x[load_speed], x[load_angle], x[twist], T_2, T_1, loss,
@@ -74,16 +75,19 @@ class Reader {
  private:
     // Mode of a contact: +-1 slipping, 0 stuck. One that the drive does not have shows the sign of its speed.
     double shown_mode(Contact c, const State& x) const {
-        if (regime_.at_rest[c]) return 0.0;
-        const int mode = regime_.key.modes[c];
-        return mode != absent ? mode : sign_of(evaluate(drive_.contact_speed(c), x, {}, {}));
+        if (!shows_speed_[c]) return mode_[c];
+        return sign_of(c == input_contact  ? x[motor_speed]
+                       : c == load_contact ? x[load_speed]
+                                           : x[motor_speed] / drive_.gearbox.ratio - x[load_speed]);
     }
 
     const Drive& drive_;
     const Regime& regime_;
-    Matrix columns_;  // M_D, T_2, T_1, F, over the states
-    std::array<State, n_inputs> input_columns_{};
-    State constant_{};
+    FormTable<4> forms_;  // M_D, T_2, T_1, F
+    FormTable<4>::Values constant_;
+    bool has_map_;
+    std::array<bool, n_contacts> shows_speed_;
+    std::array<double, n_contacts> mode_;
 };
 
 // Writes `count` samples at begin + k * interval, channel by channel: out[channel * count + k].
@@ -99,14 +103,14 @@ class Sampler {
     std::size_t written() const { return next_; }
     double left_data_at = std::numeric_limits<double>::infinity();  // first instant outside the loss map's data [s]
 
-    bool segment(const Segment<SwitchedDrive>& s, const std::vector<InputBasis>& basis) {
+    bool segment(const Segment<SwitchedDrive>& s) {
         const Regime& r = s.entry.regime;
         if (!r.in_data) left_data_at = std::fmin(left_data_at, s.begin);
         if (next_ >= count_ || !due(s)) return true;
         Propagator& p = s.entry.propagator;
-        if (!cursor_) cursor_.emplace(s.signals, basis);
+        if (!cursor_) cursor_.emplace(s.input);
         Cursor& cursor = *cursor_;
-        cursor.place(p, s.constant, s.begin, s.x);
+        cursor.place(p, s.constant, s.input, s.x);
         const int level = level_of_interval(p);
         cursor.advance(instant(next_) - s.begin);
         const Reader reader(drive_, r, s.memory);

@@ -51,8 +51,8 @@ class Sensitivity {
     State size{};        // largest magnitude of each state at the ends of the segments
     bool smooth = true;  // false: a switching by a touch, or with a rate that is lost in rounding
 
-    bool segment(const Segment<SwitchedDrive>& s, const std::vector<InputBasis>& basis) {
-        if (!input_) input_.emplace(s.signals, basis);
+    bool segment(const Segment<SwitchedDrive>& s) {
+        if (!input_) input_.emplace(s.input);
         for (int k = 0; k < n_states; ++k)
             size[k] = std::fmax(size[k], std::fmax(std::fabs(s.x[k]), std::fabs(s.x_end[k])));
         const Regime& r = s.entry.regime;

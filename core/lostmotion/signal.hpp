@@ -86,7 +86,8 @@ inline std::vector<InputBasis> input_basis(const Signals& signals) {
 class InputState {
  public:
     InputState(const Signals& signals, const std::vector<InputBasis>& basis)
-        : signals_(&signals), basis_(&basis), weights_(basis.size()) {
+        : signals_(&signals), basis_(basis.data()), size_(static_cast<int>(basis.size())), weights_(basis.size()) {
+        while (first_sine_ < size_ && basis_[first_sine_].kind == InputBasis::ramp) ++first_sine_;
         anchor(0.0);
     }
 
@@ -108,14 +109,13 @@ class InputState {
     // The same, on the stretches between knots that were last anchored to, also at their far end.
     void follow(double t) {
         time_ = t;
-        std::size_t q = 0;
         for (int i = 0; i < n_inputs; ++i) {
             const Knot& k = *knot_[i];
             linear_[i] = k.value + k.slope * (t - k.time);
             slope_[i] = k.slope;
-            if (q < basis_->size() && (*basis_)[q].kind == InputBasis::ramp && (*basis_)[q].input == i)
-                weights_[q++] = k.slope;
         }
+        int q = 0;
+        for (; q < first_sine_; ++q) weights_[q] = slope_[basis_[q].input];
         for (int i = 0; i < n_inputs; ++i)
             for (const Sine& s : (*signals_)[i].sines) {
                 const double turns = s.frequency * t;
@@ -126,21 +126,26 @@ class InputState {
     }
 
     double time() const { return time_; }
-    const std::vector<InputBasis>& basis() const { return *basis_; }
-    const std::vector<double>& weights() const { return weights_; }
+    int size() const { return size_; }
+    const InputBasis& basis(int q) const { return basis_[q]; }
+    const double* weights() const { return weights_.data(); }
 
     std::array<double, n_inputs> values() const {
         std::array<double, n_inputs> u = linear_;
-        for (std::size_t q = 0; q < basis_->size(); ++q)
-            if ((*basis_)[q].kind == InputBasis::cosine) u[(*basis_)[q].input] += weights_[q];
+        for (int q = first_sine_; q < size_; q += 2) u[basis_[q].input] += weights_[q];
+        return u;
+    }
+    std::array<double, n_inputs> rates() const {
+        std::array<double, n_inputs> u = slope_;
+        for (int q = first_sine_; q < size_; q += 2) u[basis_[q].input] += basis_[q].omega * weights_[q + 1];
         return u;
     }
 
     // Sums of the magnitudes of the parts: what the rounding of the values is relative to.
     std::array<double, n_inputs> sizes() const {
         std::array<double, n_inputs> size{std::fabs(linear_[0]), std::fabs(linear_[1])};
-        for (std::size_t q = 0; q < basis_->size(); ++q)
-            if ((*basis_)[q].kind != InputBasis::ramp) size[(*basis_)[q].input] += std::fabs(weights_[q]);
+        for (int q = first_sine_; q < size_; q += 2)
+            size[basis_[q].input] += std::fabs(weights_[q]) + std::fabs(weights_[q + 1]);
         return size;
     }
     const std::array<double, n_inputs>& slope() const { return slope_; }
@@ -150,17 +155,25 @@ class InputState {
     // Value and derivatives up to order N - 1.
     template <int N = n_derivatives>
     std::array<std::array<double, n_inputs>, N> jet() const {
-        std::array<std::array<double, n_inputs>, N> u{};
-        u[0] = linear_;
-        u[1] = slope_;
-        for (std::size_t q = 0; q < basis_->size(); ++q) {
-            if ((*basis_)[q].kind != InputBasis::cosine) continue;
-            const int i = (*basis_)[q].input;
-            const double omega = (*basis_)[q].omega, s = weights_[q], c = weights_[q + 1];
-            double power = 1.0;
-            for (int k = 0; k < N; ++k, power *= k % 2 == 0 ? -omega : omega) u[k][i] += power * (k % 2 == 0 ? s : c);
-        }
+        std::array<std::array<double, n_inputs>, N> u;
+        jet(N, u.data());
         return u;
+    }
+    void jet(int n, std::array<double, n_inputs>* u) const {
+        u[0] = linear_;
+        if (n > 1) u[1] = slope_;
+        for (int k = 2; k < n; ++k) u[k] = {};
+        for (int q = first_sine_; q < size_; q += 2) {
+            const int i = basis_[q].input;
+            const double omega = basis_[q].omega;
+            double s = weights_[q], c = weights_[q + 1];
+            for (int k = 0; k < n; ++k) {
+                u[k][i] += s;
+                const double next = omega * c;
+                c = -omega * s;
+                s = next;
+            }
+        }
     }
 
     // Bound on the fourth derivative of each input for all time.
@@ -178,35 +191,37 @@ class InputState {
     void turn(double h) {
         time_ += h;
         for (int i = 0; i < n_inputs; ++i) linear_[i] += slope_[i] * h;
-        for (std::size_t q = 0; q < basis_->size(); ++q) {
-            if ((*basis_)[q].kind != InputBasis::cosine) continue;
-            const double a = (*basis_)[q].omega * h, a2 = a * a;
+        for (int q = first_sine_; q < size_; q += 2) {
+            const double a = basis_[q].omega * h, a2 = a * a;
             const bool small = a2 < 1e-6;
             const double cosine = small ? 1.0 - a2 / 2.0 * (1.0 - a2 / 12.0) : std::cos(a);
             const double sine = small ? a * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0)) : std::sin(a);
-            rotate(q, cosine, sine);
+            rotate(q, weights_[q], weights_[q + 1], cosine, sine);
         }
     }
 
     // Moves on by h, with the rotations (cos, sin)(omega h) of the sines given in basis order.
-    void advance(double h, const double* cos_sin) {
-        time_ += h;
-        for (int i = 0; i < n_inputs; ++i) linear_[i] += slope_[i] * h;
-        for (std::size_t q = 0; q < basis_->size(); ++q) {
-            if ((*basis_)[q].kind != InputBasis::cosine) continue;
-            rotate(q, cos_sin[q], cos_sin[q + 1]);
-        }
+    void advance(double h, const double* cos_sin) { advance_from(*this, h, cos_sin); }
+    // To h beyond where another stands on the same stretch.
+    void advance_from(const InputState& from, double h, const double* cos_sin) {
+        time_ = from.time_ + h;
+        knot_ = from.knot_;
+        slope_ = from.slope_;
+        for (int i = 0; i < n_inputs; ++i) linear_[i] = from.linear_[i] + slope_[i] * h;
+        const double* w = from.weights();
+        for (int q = 0; q < first_sine_; ++q) weights_[q] = w[q];
+        for (int q = first_sine_; q < size_; q += 2) rotate(q, w[q], w[q + 1], cos_sin[q], cos_sin[q + 1]);
     }
 
  private:
-    void rotate(std::size_t q, double cosine, double sine) {
-        const double s = weights_[q], c = weights_[q + 1];
+    void rotate(int q, double s, double c, double cosine, double sine) {
         weights_[q] = s * cosine + c * sine;
         weights_[q + 1] = c * cosine - s * sine;
     }
 
     const Signals* signals_;
-    const std::vector<InputBasis>* basis_;
+    const InputBasis* basis_;  // ramps first, then a cosine and a sine for each sine of the signals
+    int size_, first_sine_ = 0;
     double time_ = 0.0;
     std::array<const Knot*, n_inputs> knot_{};
     std::array<double, n_inputs> linear_{}, slope_{};

@@ -59,7 +59,7 @@ class Simulation {
 
  private:
     struct Nothing {
-        bool segment(const Segment<SwitchedDrive>&, const std::vector<InputBasis>&) { return true; }
+        bool segment(const Segment<SwitchedDrive>&) { return true; }
         void switching(const Switching&) {}
     };
     void advance_nowhere() {

@@ -122,7 +122,7 @@ TEST_SUITE("contacts") {
         const Signals signals{sine(0.025, 1.0), Signal{}};
         ExactSolver<SwitchedDrive> solver(system, signals, 1e-3, drive.balanced_scale());
         struct {
-            bool segment(const Segment<SwitchedDrive>&, const std::vector<InputBasis>&) { return true; }
+            bool segment(const Segment<SwitchedDrive>&) { return true; }
             void switching(const Switching&) {}
         } nothing;
         REQUIRE(solver.begin(0.0, {}, {}) == Status::done);

@@ -101,7 +101,8 @@ TEST_SUITE("parts") {
             const Regime r = drive.build(key);
             Propagator p;
             const std::vector<InputBasis> none;
-            p.prepare(r, 1e-3, drive.balanced_scale(), none);
+            const LinearRates rates(r);
+            p.prepare(rates, 1e-3, drive.balanced_scale(), none);
             const State scale = drive.balanced_scale();
             for (int level = 0; p.level(level).length < 1.0; level += 2) {
                 const Step& step = p.level(level);
@@ -126,7 +127,8 @@ TEST_SUITE("parts") {
             REQUIRE(system.start(cache, now, key) == Found::yes);
             Propagator p;
             const std::vector<InputBasis> none;
-            p.prepare(drive.build(key), 1e-3, drive.balanced_scale(), none);
+            const LinearRates rates(drive.build(key));
+            p.prepare(rates, 1e-3, drive.balanced_scale(), none);
             for (int level = 3; level < 9; ++level)
                 for (int inner = 0; inner <= level; ++inner)
                     for (int j = 0; j < n_states; ++j)

@@ -1,8 +1,11 @@
-// Cubic Hermite interpolant of a guard over one look, enclosed by its Bernstein coefficients.
+// Polynomials that stand for a guard: over one look the cubic Hermite interpolant, enclosed by its Bernstein
+// coefficients; near its zero the Taylor series.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+
+#include "vec.hpp"
 
 namespace lostmotion {
 
@@ -34,19 +37,47 @@ struct Cubic {
             if (s > 0.0 && s < 1.0 && (*this)(s) < (*this)(best)) best = s;
         return best;
     }
-    // Zero between 0, where it is positive, and `b`, where it is negative: Newton, kept in its bracket by bisection.
-    double root(double b) const {
+    // Zero between 0, where it is positive, and `b`, where it is negative, to a few digits: Newton, kept in its bracket
+    // by bisection.
+    double zero(double b) const {
+        // By powers, for the sake of speed: c0 + z (a1 + z (a2 + z a3)).
+        const double a1 = 3.0 * (c1 - c0), a2 = 3.0 * (c0 - 2.0 * c1 + c2), a3 = c3 - c0 + 3.0 * (c1 - c2);
         double a = 0.0, z = 0.5 * b;
-        for (int k = 0; k < 60 && b - a > 1e-9; ++k) {
-            const double value = (*this)(z);
+        for (int k = 0; k < 60; ++k) {
+            const double value = c0 + z * (a1 + z * (a2 + z * a3)), slope = a1 + z * (2.0 * a2 + z * (3.0 * a3));
             (value > 0.0 ? a : b) = z;
-            const double next = z - value / slope(z), moved = std::fabs(next - z);
+            const double next = z - value / slope, moved = std::fabs(next - z);
             const bool inside = next > a && next < b;
             z = inside ? next : 0.5 * (a + b);
-            if (inside && moved < 1e-9) break;
+            if ((inside && moved < 1e-3 * z) || b - a < 1e-9) break;
         }
         return z;
     }
+};
+
+// Polynomial of degree up to 12, four coefficients at once.
+class Polynomial {
+ public:
+    explicit Polynomial(double constant) { value_[0] = constant; }
+    void set(int k, double coefficient) {
+        value_[k] = coefficient;
+        slope_[k - 1] = k * coefficient;
+    }
+    double value(double z) const { return sum<16>(value_, z); }
+    double slope(double z) const { return sum<12>(slope_, z); }
+
+ private:
+    template <int n>
+    static double sum(const double* c, double z) {
+        const double z2 = z * z, z4 = z2 * z2;
+        Quad total = Quad::load(c + n - 4);
+        for (int k = n - 8; k >= 0; k -= 4) total = Quad::load(c + k) + z4 * total;
+        alignas(32) double t[4];
+        total.store(t);
+        return (t[0] + t[1] * z) + (t[2] + t[3] * z) * z2;
+    }
+
+    alignas(32) double value_[16] = {}, slope_[12] = {};
 };
 
 }  // namespace lostmotion
