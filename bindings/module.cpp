@@ -211,9 +211,10 @@ nb::tuple run_many(SharedDrive& drive, const Signals& signals, const std::array<
     options.sample_interval = interval;
     options.samples = samples;
     options.energy = energy;
+    options.channels = channels;
     const BatchInput in{drive.drive, signals, {to_state(x), {capacity, 0.0}},
                         options,     fields,  {values.data(), runs * fields.size()},
-                        runs,        channels};
+                        runs};
     auto data = std::make_unique_for_overwrite<double[]>(runs * channels.size() * samples);
     std::vector<BatchRow> rows;
     Watch watch(progress);

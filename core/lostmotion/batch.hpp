@@ -72,7 +72,6 @@ struct BatchInput {
     std::span<const int> fields;     // numbers in batch_fields()
     std::span<const double> values;  // runs x fields
     std::size_t runs = 0;
-    std::span<const int> channels;  // that are wanted
 };
 
 struct BatchRow {
@@ -92,7 +91,6 @@ inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in
     for (const int f : in.fields) drive_varies = drive_varies || batch_fields()[static_cast<std::size_t>(f)].drive;
     work_through(in.runs, threads, waiting, [&](auto next, std::atomic<bool>& stop) {
         std::unique_ptr<Workspace> shared = drive_varies ? nullptr : pool.take();
-        std::vector<double> table(n_channels * in.options.samples);
         RunOptions options = in.options;
         options.max_switchings = 0;
         options.interrupted = [](void* flag) { return static_cast<std::atomic<bool>*>(flag)->load(); };
@@ -104,19 +102,16 @@ inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in
             for (std::size_t f = 0; f < in.fields.size(); ++f)
                 batch_fields()[static_cast<std::size_t>(in.fields[f])].set(drive, signals, start,
                                                                            in.values[k * in.fields.size() + f]);
+            double* out = samples + k * options.channels.size() * options.samples;
             RunReport report;
             if (drive_varies) {
                 Workspace own(drive);
-                report = run_exact(own, signals, start, options, table.data());
+                report = run_exact(own, signals, start, options, out);
             } else {
-                report = run_exact(*shared, signals, start, options, table.data());
+                report = run_exact(*shared, signals, start, options, out);
             }
             rows[k] = {report.status,       report.contact, report.time, static_cast<double>(report.switching_count),
                        report.left_data_at, report.energy};
-            double* out = samples + k * in.channels.size() * options.samples;
-            for (std::size_t c = 0; c < in.channels.size(); ++c)
-                std::copy_n(table.data() + static_cast<std::size_t>(in.channels[c]) * options.samples, options.samples,
-                            out + c * options.samples);
         }
         if (shared) pool.give_back(std::move(shared));
     });

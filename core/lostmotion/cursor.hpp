@@ -141,7 +141,7 @@ class Stride {
     const InputState& input() const { return input_; }
     void anchor(double time) { input_.follow(time); }
 
-    void advance(State& x) {
+    [[gnu::always_inline]] void advance(State& x) {
         const State change = step_->change * x;
         for (int r = 0; r < n_states; r += vec_width)
             store(load(&x[r]) + (load(&change[r]) + load(&forced_[r])), &x[r]);

@@ -50,8 +50,8 @@ class ExactSolver {
           cache_(shared == nullptr ? *own_ : *shared),
           scale_(scale),
           unit_(elementary(unit)),
-          basis_(cache_.serve(unit_, input_basis(signals))) {
-        const auto bound = InputState(signals_, basis_).fourth_derivative_bound();
+          turns_(cache_.serve(unit_, input_basis(signals))) {
+        const auto bound = input_.fourth_derivative_bound();
         for (int i = 0; i < n_inputs; ++i) input_bound_[i] = bound[i];
     }
     ExactSolver(const ExactSolver&) = delete;
@@ -67,7 +67,7 @@ class ExactSolver {
     const RegimeKey& key() const { return key_; }
     const Regime& regime() { return cache_.regime(key_); }
     const Signals& signals() const { return signals_; }
-    const std::vector<InputBasis>& basis() const { return basis_; }
+    const std::vector<InputBasis>& basis() const { return turns_.basis(); }
     double unit() const { return unit_; }
     Contact stopped_at() const { return stopped_at_; }
     long looks() const { return looks_; }
@@ -106,7 +106,7 @@ class ExactSolver {
         }
         while (true) {
             typename Cache::Entry& entry = cache_.entry(key_);
-            if (!entry.propagator.ready()) entry.propagator.prepare(entry.rates, unit_, scale_, basis_);
+            if (!entry.propagator.ready()) entry.propagator.prepare(entry.rates, turns_, scale_);
             Segment<System> segment{entry, input_, time_,       t_end,
                                     true,  now_.x, now_.memory, entry.rates.constant(now_.memory)};
             const double knot = next_knot(signals_, time_);
@@ -413,8 +413,8 @@ class ExactSolver {
     RegimeKey key_;
     int last_level_ = first_level;
     long looks_ = 0;
-    const std::vector<InputBasis>& basis_;
-    InputState input_{signals_, basis_};
+    InputTurns& turns_;
+    InputState input_{signals_, turns_.basis()};
     Cursor cursor_{input_}, end_ = cursor_, trial_ = cursor_;
     Ends ends_[2];
     Bounds bounds_;

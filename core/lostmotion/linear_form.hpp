@@ -174,7 +174,7 @@ class FormTable {
 
  private:
     Vec at(int term, int g) const { return load(&column_[term][g]); }
-    Vec terms(int g, const State& x, const std::array<double, n_inputs>& u) const {
+    [[gnu::always_inline]] Vec terms(int g, const State& x, const std::array<double, n_inputs>& u) const {
         const Vec sum = ((at(0, g) * x[0] + at(1, g) * x[1]) + at(2, g) * x[2]) + at(3, g) * x[3];
         return driven_ ? sum + (at(command, g) * u[0] + at(load_torque, g) * u[1]) : sum;
     }

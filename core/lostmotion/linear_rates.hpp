@@ -17,6 +17,7 @@ struct Matrix {
     alignas(32) std::array<Column, coupled> column{};
     Column angle{};          // row of the load angle
     double angle_own = 0.0;  // its own entry
+    double unused[3] = {};
 
     static Matrix diagonal(double value) {
         Matrix m;
@@ -25,14 +26,14 @@ struct Matrix {
         return m;
     }
 
-    State operator*(const State& v) const {
+    [[gnu::always_inline]] State operator*(const State& v) const {
         State out;
         (*this * Quad::load(v.data())).store(out.data());
         store_single(angle_row(v.data()) + angle_own * v[coupled], &out[coupled]);
         return out;
     }
     // The coupled states alone.
-    Quad operator*(const Quad& v) const {
+    [[gnu::always_inline]] Quad operator*(const Quad& v) const {
         const Vec v0 = v.spread<0>(), v1 = v.spread<1>(), v2 = v.spread<2>(), v3 = v.spread<3>();
         Quad out;
         for (int p = 0; p < Quad::parts; ++p) {
@@ -46,31 +47,22 @@ struct Matrix {
         if (row < coupled) return col < coupled ? column[col][row] : 0.0;
         return col < coupled ? angle[col] : angle_own;
     }
-    double angle_row(const double* v) const {
+    [[gnu::always_inline]] double angle_row(const double* v) const {
         return ((angle[0] * v[0] + angle[1] * v[1]) + angle[2] * v[2]) + angle[3] * v[3];
     }
     // factor * other, entry by entry
     void add(double factor, const Matrix& other) {
-        for (int c = 0; c < coupled; ++c) {
-            for (int r = 0; r < coupled; ++r) column[c][r] += factor * other.column[c][r];
-            angle[c] += factor * other.angle[c];
-        }
-        angle_own += factor * other.angle_own;
+        combine(other, [factor](double own, double others) { return own + factor * others; });
     }
     void scale(double factor) {
-        for (Column& c : column)
-            for (double& v : c) v *= factor;
-        for (double& v : angle) v *= factor;
-        angle_own *= factor;
+        combine(*this, [factor](double own, double) { return own * factor; });
     }
     // f(own entry, that of the other), entry by entry
     template <class F>
     void combine(const Matrix& other, F&& f) {
-        for (int c = 0; c < coupled; ++c) {
-            for (int r = 0; r < coupled; ++r) column[c][r] = f(column[c][r], other.column[c][r]);
-            angle[c] = f(angle[c], other.angle[c]);
-        }
-        angle_own = f(angle_own, other.angle_own);
+        double* own = column[0].data();
+        const double* others = other.column[0].data();
+        for (int k = 0; k < entries; ++k) own[k] = f(own[k], others[k]);
     }
     friend Matrix operator*(const Matrix& a, const Matrix& b) {
         Matrix out;
@@ -82,7 +74,11 @@ struct Matrix {
         out.angle_own = a.angle_own * b.angle_own;
         return out;
     }
+
+ private:
+    static constexpr int entries = 24;  // one behind the other, so that the compiler can take several at once
 };
+static_assert(sizeof(Matrix) == 24 * sizeof(double));
 
 // dx/dt = A x + constant + B u of one regime. No rate depends on the load angle, and its own rate on the load speed
 // alone.
@@ -127,13 +123,13 @@ struct LinearRates {
         return out;
     }
     // The next time derivative of the state from one that is at least the first.
-    State higher(const State& derivative, const std::array<double, n_inputs>& u) const {
+    [[gnu::always_inline]] State higher(const State& derivative, const std::array<double, n_inputs>& u) const {
         State out;
         higher(Quad::load(derivative.data()), u).store(out.data());
         store_single(rate.angle[load_speed] * derivative[load_speed], &out[load_angle]);
         return out;
     }
-    Quad higher(const Quad& derivative, const std::array<double, n_inputs>& u) const {
+    [[gnu::always_inline]] Quad higher(const Quad& derivative, const std::array<double, n_inputs>& u) const {
         return rate * derivative +
                (u[0] * Quad::load(input_column[0].data()) + u[1] * Quad::load(input_column[1].data()));
     }

@@ -50,36 +50,35 @@ class Propagator {
     static constexpr double base_norm = 0.125;  // |A| h of the base interval, in scaled units
     static constexpr int series_terms = Expansion::most;
 
-    // unit: a length [s] of which some power-of-two multiple or fraction is the base interval.
+    // turns: its unit is a length of which some power-of-two multiple or fraction is the base interval.
     // scale: natural sizes of the states; only for choosing the base interval.
-    // rates and basis must outlive this.
-    void prepare(const LinearRates& rates, double unit, const State& scale, const std::vector<InputBasis>& basis) {
-        n_basis_ = static_cast<int>(basis.size());
-        basis_ = &basis;
+    // rates and turns must outlive this.
+    void prepare(const LinearRates& rates, InputTurns& turns, const State& scale) {
         linear_ = &rates;
-        norm_ = 0.0;
+        turns_ = &turns;
+        basis_ = turns.basis().data();
+        n_basis_ = static_cast<int>(turns.basis().size());
+        const double fastest = turns.fastest();
+        norm_ = fastest;
         for (int r = 0; r < n_states; ++r) {
             double sum = 0.0;
             for (int c = 0; c < Matrix::coupled; ++c) sum += std::fabs(rates.rate(r, c)) * scale[c] / scale[r];
             norm_ = std::fmax(norm_, sum);
         }
-        fastest_input_ = 0.0;
-        for (const InputBasis& b : basis) fastest_input_ = std::fmax(fastest_input_, b.omega);
-        norm_ = std::fmax(norm_, fastest_input_);
-        double h = unit;
-        while (norm_ * h > base_norm) h *= 0.5;
+        base_ = turns.unit();
+        exponent_ = 0;
+        for (; norm_ * base_ > base_norm; base_ *= 0.5) --exponent_;
+        longest_ = 0;
+        while (longest_ + 1 < max_levels && fastest * length(longest_ + 1) <= 1.0) ++longest_;
+        turning_ = rates.rate.angle[load_speed];
         levels_ = 0;
         steps_.clear();
         responses_.clear();
         rotations_.clear();
         steps_.reserve(usual_levels);
-        responses_.reserve(usual_levels * basis.size());
+        responses_.reserve(static_cast<std::size_t>(usual_levels * n_basis_));
         prepare_derivatives();
-        base_ = h;
-        longest_ = 0;
-        while (longest_ + 1 < max_levels && fastest_input_ * length(longest_ + 1) <= 1.0) ++longest_;
-        turning_ = rates.rate.angle[load_speed];
-        add_base(h);
+        add_base();
     }
 
     bool ready() const { return levels_ > 0; }
@@ -98,7 +97,7 @@ class Propagator {
         return steps_[k];
     }
     const Response* responses(int k) const { return responses_.data() + static_cast<std::size_t>(k) * n_basis_; }
-    const double* rotations(int k) const { return rotations_.data() + static_cast<std::size_t>(k) * n_basis_; }
+    const double* rotations(int k) const { return rotations_[static_cast<std::size_t>(k)]; }
 
     double length(int k) const { return base_ * static_cast<double>(1ull << k); }
     // How many base intervals fit into s.
@@ -118,7 +117,7 @@ class Propagator {
     bool can_double(int k, double s) const { return k < longest_ && length(k + 1) <= s; }
 
     // x after the step of level k; `rate` is x' at the anchor, `weights` the input state there.
-    State step(int k, const State& x, const State& rate, const double* weights) {
+    [[gnu::always_inline]] State step(int k, const State& x, const State& rate, const double* weights) {
         Quad sum = level(k).integral * Quad::load(rate.data());
         const Response* response = responses(k);
         for (int q = 0; q < n_basis_; ++q) sum = sum + weights[q] * Quad::load(response[q].x.data());
@@ -129,7 +128,7 @@ class Propagator {
     }
     // The same for x and x' at once, without a look at the rates of the regime in between. The angle's own rate is
     // that of the load speed.
-    void step(int k, Quad& x, Quad& rate, double& angle, const double* weights) {
+    [[gnu::always_inline]] void step(int k, Quad& x, Quad& rate, double& angle, const double* weights) {
         const Step& s = level(k);
         const Response* response = responses(k);
         alignas(32) double from[Matrix::coupled];
@@ -202,7 +201,7 @@ class Propagator {
     }();
 
  private:
-    double angle_step(int k, const double* rate, double turning, const double* weights) const {
+    [[gnu::always_inline]] double angle_step(int k, const double* rate, double turning, const double* weights) const {
         double sum = steps_[k].integral.angle_row(rate) + steps_[k].integral.angle_own * turning;
         const Response* response = responses(k);
         for (int q = 0; q < n_basis_; ++q) sum += weights[q] * response[q].x[load_angle];
@@ -216,7 +215,7 @@ class Propagator {
         for (int i = 0; i < n_inputs; ++i) rate_column_[i] = linear_->rate * linear_->input_column[i];
         fourth_.assign(n_basis_, State{});
         for (int q = 0; q < n_basis_; ++q) {
-            const InputBasis& b = (*basis_)[q];
+            const InputBasis& b = basis_[q];
             const State &B = linear_->input_column[b.input], A2B = squared_ * B;
             if (b.kind == InputBasis::cosine) {  // its weight is that of the sine: u'' = -omega^2
                 add_scaled(fourth_[q], -b.omega * b.omega, rate_column_[b.input]);
@@ -240,8 +239,9 @@ class Propagator {
         return sum;
     }
 
-    void add_base(double h) {
+    void add_base() {
         Step& s = steps_.emplace_back();
+        const double h = base_;
         s.length = h;
         s.integral = integral_series(h);
         s.change = linear_->rate * s.integral;
@@ -258,7 +258,7 @@ class Propagator {
             s.growth.add(1.0, bound);
         }
         for (int q = 0; q < n_basis_; ++q) {
-            const InputBasis& b = (*basis_)[q];
+            const InputBasis& b = basis_[q];
             // y' = A y + b r(s), r = s, cos(omega s) - 1 or sin(omega s), by the series of r.
             State y{}, coefficient{};
             double r = b.kind == InputBasis::cosine ? -b.omega * b.omega : b.kind == InputBasis::sine ? b.omega : 1.0;
@@ -297,7 +297,7 @@ class Propagator {
         responses_.resize(responses_.size() + n_basis_);
         const Response* from = responses(k);
         for (int q = 0; q < n_basis_; ++q) {
-            const InputBasis& basis = (*basis_)[q];
+            const InputBasis& basis = basis_[q];
             State y = a.change * from[q].x;
             add_scaled(y, 1.0, from[q].x);
             const State constant = a.integral * linear_->input_column[basis.input];
@@ -307,7 +307,7 @@ class Propagator {
             } else {
                 const int cosine = basis.kind == InputBasis::cosine ? q : q - 1, sine = cosine + 1;
                 const double c = rotations(k)[cosine], s = rotations(k)[sine];
-                const double half = std::sin(0.5 * basis.omega * a.length);
+                const double half = turns_->over(exponent_ + k - 1)[sine];
                 if (basis.kind == InputBasis::cosine) {
                     add_scaled(y, c, from[cosine].x);
                     add_scaled(y, -s, from[sine].x);
@@ -326,16 +326,15 @@ class Propagator {
     // What follows from length and responses: the rotations of the inputs, and the rates.
     void finish_level() {
         const int k = levels_++;
-        const double h = steps_[k].length;
+        const double *turn = turns_->over(exponent_ + k), *half = turns_->over(exponent_ + k - 1);
+        rotations_.push_back(turn);
         for (int q = 0; q < n_basis_; ++q) {
-            const InputBasis& b = (*basis_)[q];
-            const double sine = std::sin(b.omega * h), half = std::sin(0.5 * b.omega * h);
-            rotations_.push_back(b.kind == InputBasis::sine ? sine : std::cos(b.omega * h));
+            const InputBasis& b = basis_[q];
+            const double input = b.kind == InputBasis::ramp     ? steps_[k].length
+                                 : b.kind == InputBasis::cosine ? -2.0 * half[q + 1] * half[q + 1]
+                                                                : turn[q];
             Response& r = responses_[static_cast<std::size_t>(k) * n_basis_ + q];
             r.rate = linear_->rate * r.x;
-            const double input = b.kind == InputBasis::ramp   ? h
-                                 : b.kind == InputBasis::sine ? sine
-                                                              : -2.0 * half * half;
             add_scaled(r.rate, input, linear_->input_column[b.input]);
         }
     }
@@ -345,16 +344,17 @@ class Propagator {
     std::array<State, n_inputs> rate_column_{};  // A B
     std::vector<State> fourth_;                  // n_basis: what each contributes to the fourth derivative
     double norm_ = 0.0;                          // of A in scaled units, or the highest input frequency [1/s]
-    double fastest_input_ = 0.0;                 // [rad/s]
     double base_ = 0.0;                          // length of level 0 [s]
+    int exponent_ = 0;                           // of two: base / unit
     int longest_ = 0;                            // level
     double turning_ = 0.0;                       // 1 where the load may turn
     int n_basis_ = 0;
-    const std::vector<InputBasis>* basis_ = nullptr;
+    InputTurns* turns_ = nullptr;
+    const InputBasis* basis_ = nullptr;
     int levels_ = 0;
-    std::vector<Step> steps_;          // one a level
-    std::vector<Response> responses_;  // levels x n_basis
-    std::vector<double> rotations_;    // levels x n_basis: cos and sin of omega * length
+    std::vector<Step> steps_;               // one a level
+    std::vector<Response> responses_;       // levels x n_basis
+    std::vector<const double*> rotations_;  // one a level: cos and sin of omega * length
 };
 
 }  // namespace lostmotion

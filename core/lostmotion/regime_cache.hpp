@@ -65,24 +65,23 @@ class RegimeCache {
     }
 
     // Makes ready for runs with this unit of length and these inputs; propagators for others are forgotten.
-    const std::vector<InputBasis>& serve(double unit, const std::vector<InputBasis>& basis) {
+    InputTurns& serve(double unit, std::vector<InputBasis> basis) {
         if (entries_.size() > most_kept) {
             entries_.clear();
             last_ = nullptr;
         }
-        if (unit != unit_ || basis != basis_)
+        if (!turns_ || unit != turns_->unit() || basis != turns_->basis()) {
             for (auto& [key, entry] : entries_) entry->propagator.reset();
-        unit_ = unit;
-        basis_ = basis;
-        return basis_;
+            turns_ = std::make_unique<InputTurns>(unit, std::move(basis));
+        }
+        return *turns_;
     }
 
  private:
     static constexpr std::size_t most_kept = 1000;  // from run to run; each takes some tens of kilobytes
 
     const System& system_;
-    double unit_ = 0.0;
-    std::vector<InputBasis> basis_;
+    std::unique_ptr<InputTurns> turns_;
     Entry* last_ = nullptr;  // the one asked for last
     std::uint64_t last_packed_ = 0;
     std::unordered_map<std::uint64_t, std::unique_ptr<Entry>> entries_;

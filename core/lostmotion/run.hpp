@@ -18,6 +18,7 @@ struct RunOptions {
     double duration = 1.0;          // [s]
     double sample_interval = 1e-3;  // [s]
     std::size_t samples = 0;        // instants k * sample_interval to record, from k = 0
+    std::span<const int> channels = all_channels;
     bool energy = true;
     std::size_t max_switchings = 100000;  // kept; all are counted
     bool (*interrupted)(void*) = nullptr;
@@ -41,7 +42,7 @@ struct RunReport {
 class Recorder {
  public:
     Recorder(const Drive& drive, const RunOptions& options, double* out, RunReport& report)
-        : sampler_(drive, 0.0, options.sample_interval, options.samples, out),
+        : sampler_(drive, 0.0, options.sample_interval, options.samples, out, options.channels),
           meter_(drive),
           options_(options),
           report_(report) {
@@ -79,7 +80,7 @@ struct Workspace {
     RegimeCache<SwitchedDrive> cache{system};
 };
 
-// out: n_channels x samples, channel by channel.
+// out: channels x samples, channel by channel.
 inline RunReport run_exact(Workspace& workspace, const Signals& signals, const Start& start, const RunOptions& options,
                            double* out) {
     RunReport report;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include "exact_solver.hpp"
 
@@ -26,6 +27,12 @@ enum Channel : int {
     ch_load_contact,
     n_channels
 };
+
+inline constexpr auto all_channels = [] {
+    std::array<int, n_channels> all{};
+    for (int c = 0; c < n_channels; ++c) all[static_cast<std::size_t>(c)] = c;
+    return all;
+}();
 
 // Quantities of one instant that follow from state, inputs and regime.
 struct Reading {
@@ -50,7 +57,7 @@ class Reader {
         }
     }
 
-    Reading operator()(const State& x, const std::array<double, n_inputs>& u) const {
+    [[gnu::always_inline]] Reading operator()(const State& x, const std::array<double, n_inputs>& u) const {
         std::array<double, 4> out;
         forms_.evaluate(constant_, x, u, out);
         const auto [M_D, T_2, T_1_moving, F] = out;
@@ -90,11 +97,12 @@ class Reader {
     std::array<double, n_contacts> mode_;
 };
 
-// Writes `count` samples at begin + k * interval, channel by channel: out[channel * count + k].
+// Writes `count` samples at begin + k * interval, channel by channel: out[c * count + k] is that of channels[c].
 class Sampler {
  public:
-    Sampler(const Drive& drive, double begin, double interval, std::size_t count, double* out)
-        : drive_(drive), begin_(begin), interval_(interval), count_(count), out_(out) {}
+    Sampler(const Drive& drive, double begin, double interval, std::size_t count, double* out,
+            std::span<const int> channels = all_channels)
+        : drive_(drive), begin_(begin), interval_(interval), count_(count), out_(out), channels_(channels) {}
 
     // Polled now and then; true ends the run.
     bool (*interrupted)(void*) = nullptr;
@@ -148,8 +156,11 @@ class Sampler {
         return p.level(k).length == interval_ ? k : -1;
     }
     void write(const Reading& reading) {
-        for (int c = 0; c < n_channels; ++c) out_[c * count_ + next_] = reading.value[c];
-        ++next_;
+        double* to = out_ + next_++;
+        for (const int c : channels_) {
+            *to = reading.value[c];
+            to += count_;
+        }
     }
     bool stop() const { return next_ % 4096 == 0 && interrupted != nullptr && interrupted(interrupted_context); }
 
@@ -157,6 +168,7 @@ class Sampler {
     double begin_, interval_;
     std::size_t count_, next_ = 0;
     double* out_;
+    std::span<const int> channels_;
     std::optional<Cursor> cursor_;  // kept from segment to segment for their memory
     std::optional<Stride> stride_;
 };

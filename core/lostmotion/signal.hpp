@@ -2,9 +2,12 @@
 #pragma once
 
 #include <array>
+#include <cassert>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "linear_form.hpp"
@@ -81,6 +84,39 @@ inline std::vector<InputBasis> input_basis(const Signals& signals) {
         }
     return basis;
 }
+
+// By how much the functions of a basis turn over lengths of time that are a unit times a power of two. What several
+// regimes ask for is reckoned once.
+class InputTurns {
+ public:
+    InputTurns(double unit, std::vector<InputBasis> basis) : unit_(unit), basis_(std::move(basis)) {}
+
+    double unit() const { return unit_; }  // [s]
+    const std::vector<InputBasis>& basis() const { return basis_; }
+    double fastest() const {  // [rad/s]
+        double omega = 0.0;
+        for (const InputBasis& b : basis_) omega = std::fmax(omega, b.omega);
+        return omega;
+    }
+    // For each function, cos(omega h) of a cosine (and of a ramp, 1) and sin(omega h) of a sine; h = unit * 2^exponent.
+    const double* over(int exponent) {
+        assert(std::abs(exponent) <= reach);
+        std::vector<double>& turn = turns_[static_cast<std::size_t>(exponent + reach)];
+        if (turn.size() < basis_.size()) {
+            const double h = std::ldexp(unit_, exponent);
+            for (const InputBasis& b : basis_)
+                turn.push_back(b.kind == InputBasis::sine ? std::sin(b.omega * h) : std::cos(b.omega * h));
+        }
+        return turn.data();
+    }
+
+ private:
+    static constexpr int reach = 200;
+
+    double unit_;
+    std::vector<InputBasis> basis_;
+    std::array<std::vector<double>, 2 * reach + 1> turns_;
+};
 
 // The two inputs at one instant, as the state of the linear system that generates them.
 class InputState {

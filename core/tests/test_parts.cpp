@@ -100,9 +100,9 @@ TEST_SUITE("parts") {
                 if (key.modes[c] == 0 && !(c == twist_contact && drive.rigid())) key.modes[c] = 1;
             const Regime r = drive.build(key);
             Propagator p;
-            const std::vector<InputBasis> none;
+            InputTurns turns(1e-3, {});
             const LinearRates rates(r);
-            p.prepare(rates, 1e-3, drive.balanced_scale(), none);
+            p.prepare(rates, turns, drive.balanced_scale());
             const State scale = drive.balanced_scale();
             for (int level = 0; p.level(level).length < 1.0; level += 2) {
                 const Step& step = p.level(level);
@@ -126,9 +126,9 @@ TEST_SUITE("parts") {
             RegimeKey key;
             REQUIRE(system.start(cache, now, key) == Found::yes);
             Propagator p;
-            const std::vector<InputBasis> none;
+            InputTurns turns(1e-3, {});
             const LinearRates rates(drive.build(key));
-            p.prepare(rates, 1e-3, drive.balanced_scale(), none);
+            p.prepare(rates, turns, drive.balanced_scale());
             for (int level = 3; level < 9; ++level)
                 for (int inner = 0; inner <= level; ++inner)
                     for (int j = 0; j < n_states; ++j)
