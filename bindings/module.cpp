@@ -361,7 +361,7 @@ void advance(Simulation& s, double interval, double c0, double c1, double m0, do
 
 }  // namespace
 
-NB_MODULE(_core, m) {
+NB_MODULE(CORE_MODULE, m) {
     nb::exception<SolverError>(m, "SolverError", PyExc_RuntimeError).attr("__doc__") =
         "The motion has no continuation; the message names time and contact.";
 

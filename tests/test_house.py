@@ -1,6 +1,7 @@
 """The rules of the house: one-way imports, quick start-up, stub and docs in step with the code."""
 
 import ast
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ PACKAGE = ROOT / "src" / "lostmotion"
 # Each module may import only from rooms before its own. The way of the data: parts -> scenario -> run -> dataset ->
 # analysis -> plots -> report -> command line.
 ROOMS = [
+    {"_instruction_set"},
     {"_core", "errors", "variables", "units"},
     {"quantities", "toml_files"},
     {"signals", "parts"},
@@ -54,7 +56,7 @@ def imports_of(path: Path) -> set[str]:
 
 
 def test_every_module_has_its_room() -> None:
-    assert {p.stem for p in PACKAGE.glob("*.py")} | {"_core"} == set.union(*ROOMS)
+    assert {p.stem for p in PACKAGE.glob("*.py")} | {"_instruction_set"} == set.union(*ROOMS)
 
 
 @pytest.mark.parametrize("path", sorted(PACKAGE.glob("*.py")), ids=lambda p: p.stem)
@@ -91,6 +93,29 @@ def test_the_extension_s_stub_is_current(tmp_path: Path) -> None:
     ]
     subprocess.run(command, check=True)
     assert (tmp_path / "_core.pyi").read_text() == (PACKAGE / "_core.pyi").read_text(), "run: make stub"
+
+
+def test_both_builds_of_the_core_give_the_same_bits() -> None:
+    script = (
+        "import hashlib, sys, lostmotion as lm; from lostmotion import _core;"
+        "results = [lm.simulate(lm.load(p)) for p in sys.argv[1:]];"
+        "bits = b''.join(v.values.tobytes() for r in results for v in r.data_vars.values() if v.dtype.kind == 'f');"
+        "print(_core.__name__, hashlib.sha256(bits).hexdigest(), len(bits))"
+    )
+    scenarios = [str(p) for p in sorted((ROOT / "scenarios").glob("*.toml"))]
+    prints = []
+    for build in ("any", ""):
+        done = subprocess.run(
+            [sys.executable, "-c", script, *scenarios],
+            env=os.environ | {"LOSTMOTION_CORE": build},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        prints.append(done.stdout.split())
+    assert prints[0][0] == "lostmotion._core_any"
+    assert prints[0][1:] == prints[1][1:]
+    assert int(prints[0][2]) > 1_000_000
 
 
 def test_typing_marker_is_shipped() -> None:

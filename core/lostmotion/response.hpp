@@ -4,7 +4,9 @@
 
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <functional>
+#include <mutex>
 #include <numbers>
 #include <span>
 #include <thread>
@@ -121,12 +123,12 @@ void work_through(std::size_t count, unsigned threads, const std::function<bool(
                   const Worker& worker) {
     std::atomic<std::size_t> taken{0}, returned{0};
     std::atomic<bool> stop{false};
-    std::atomic<unsigned> at_work{0};
-    const unsigned most =
+    unsigned at_work =
         static_cast<unsigned>(std::min<std::size_t>(std::max(1u, threads), std::max<std::size_t>(1, count)));
-    at_work = most;
+    std::mutex door;
+    std::condition_variable somebody_left;
     std::vector<std::jthread> crew;
-    for (unsigned k = 0; k < most; ++k)
+    for (unsigned k = at_work; k > 0; --k)
         crew.emplace_back([&] {
             bool busy = false;
             worker(
@@ -136,14 +138,18 @@ void work_through(std::size_t count, unsigned threads, const std::function<bool(
                     return taken++;
                 },
                 stop);
+            const std::lock_guard lock(door);
             --at_work;
+            somebody_left.notify_one();
         });
     using namespace std::chrono_literals;
-    constexpr std::chrono::microseconds longest = 20ms;
-    for (std::chrono::microseconds pause = 200us; at_work > 0; pause = std::min(2 * pause, longest)) {
-        std::this_thread::sleep_for(pause);
+    std::unique_lock lock(door);
+    while (!somebody_left.wait_for(lock, 20ms, [&] { return at_work == 0; })) {
+        lock.unlock();
         if (!stop && !waiting(std::min<std::size_t>(returned, count))) stop = true;
+        lock.lock();
     }
+    lock.unlock();
     crew.clear();
     if (!stop) waiting(count);
 }

@@ -6,11 +6,11 @@ import io
 import json
 import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -33,9 +33,6 @@ from .study_file import (
 )
 from .variables import CHANNEL_NAMES, VARIABLES
 
-if TYPE_CHECKING:
-    import pyarrow as pa
-
 SLOPES = "gearbox.stiffness.slopes"
 
 
@@ -44,11 +41,8 @@ SLOPES = "gearbox.stiffness.slopes"
 
 def compute_chunk(text: str, first: int, last: int, threads: int = 1) -> bytes:
     """The runs first .. last - 1 of a study (as JSON), as the bytes of a Parquet file. What executors are given."""
-    import pyarrow.parquet as pq
-
-    out = io.BytesIO()
-    pq.write_table(chunk_table(_parsed(text), text, first, last, threads), out)
-    return out.getvalue()
+    study = _parsed(text)
+    return tabulate(study, text, first, last, run_chunk(study, first, last, threads))
 
 
 @lru_cache(maxsize=8)
@@ -56,22 +50,30 @@ def _parsed(text: str) -> Study:
     return from_json(text)
 
 
-def chunk_table(study: Study, text: str, first: int, last: int, threads: int) -> pa.Table:
+def _needed(study: Study) -> frozenset[str]:
+    """The result variables that the study looks at."""
+    needed = {name for e in study.keep.values() for name in check_expression("", e)}
+    return frozenset(needed | set(study.trajectories.variables if study.trajectories else ()))
+
+
+def run_chunk(study: Study, first: int, last: int, threads: int) -> Runs:
+    """Simulates the runs; nearly all the time goes here, most of it with the GIL released."""
+    energy = any(uses_energy(e) for e in study.keep.values())
+    simulate_all = _in_the_core if _core_can(study) else _one_by_one
+    return simulate_all(study, study.parameters(first, last), sorted(_sources(_needed(study))), energy, threads)
+
+
+def tabulate(study: Study, text: str, first: int, last: int, runs: Runs) -> bytes:
     """One row a run: its number, its parameters, what is kept of it, its error if it has one."""
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
     parameters = study.parameters(first, last)
-    needed = {name for e in study.keep.values() for name in check_expression("", e)}
-    needed |= set(study.trajectories.variables) if study.trajectories else set()
-    energy = any(uses_energy(e) for e in study.keep.values())
-    runs = (_in_the_core if _core_can(study) else _one_by_one)(
-        study, parameters, sorted(_sources(needed)), energy, threads
-    )
     columns: dict[str, Any] = {"run": pa.array(np.arange(first, last))}
     for k, v in enumerate(study.vary):
         columns[v.title] = pa.array(parameters[:, k])
     bad = np.array([e != "" for e in runs.errors])
-    data = _derived(study, runs, needed)
+    data = _derived(study, runs, _needed(study))
     for name, expression in study.keep.items():
         values = np.array(evaluate(expression, data, runs.energy, study), dtype=float)
         values = np.broadcast_to(values, (last - first,)).copy()
@@ -84,7 +86,11 @@ def chunk_table(study: Study, text: str, first: int, last: int, threads: int) ->
     columns["switchings"] = pa.array(runs.switchings.astype(np.int64))
     columns["error"] = pa.array(runs.errors)
     table = pa.table(columns)
-    return table.replace_schema_metadata({"lostmotion_study": text, "lostmotion_version": installed_version()})
+    out = io.BytesIO()
+    pq.write_table(
+        table.replace_schema_metadata({"lostmotion_study": text, "lostmotion_version": installed_version()}), out
+    )
+    return out.getvalue()
 
 
 class Runs(SimpleNamespace):
@@ -97,7 +103,7 @@ class Runs(SimpleNamespace):
     ratio: np.ndarray
 
 
-def _sources(needed: set[str]) -> set[str]:
+def _sources(needed: frozenset[str]) -> set[str]:
     """The channels of the core that the wanted variables are made of."""
     derived = {
         "efficiency": {"output_torque", "input_torque", "motor_speed"},
@@ -106,7 +112,7 @@ def _sources(needed: set[str]) -> set[str]:
     return {channel for name in needed for channel in derived.get(name, {name})}
 
 
-def _derived(study: Study, runs: Runs, needed: set[str]) -> dict[str, np.ndarray]:
+def _derived(study: Study, runs: Runs, needed: frozenset[str]) -> dict[str, np.ndarray]:
     names = {v.name for v in VARIABLES if v.derived}
     if not needed & names:
         return runs.samples
@@ -360,8 +366,7 @@ def _compute(
     text: str, missing: list[tuple[int, int]], threads: int, executor: Executor | None
 ) -> Iterator[tuple[int, int, bytes]]:
     if executor is None:
-        for first, last in missing:
-            yield first, last, compute_chunk(text, first, last, threads)
+        yield from _compute_here(text, missing, threads)
         return
     # A few chunks more than there are workers, so that memory does not grow with the study.
     waiting: dict[Future[bytes], tuple[int, int]] = {}
@@ -381,6 +386,25 @@ def _compute(
     finally:
         for future in waiting:
             future.cancel()
+
+
+def _compute_here(text: str, missing: list[tuple[int, int]], threads: int) -> Iterator[tuple[int, int, bytes]]:
+    """While a chunk is simulated, the one before it is made into a table beside it."""
+    study = _parsed(text)
+    before: tuple[int, int, Future[bytes]] | None = None
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        for first, last in missing:
+            try:
+                runs = run_chunk(study, first, last, threads)
+            except BaseException:  # interrupted; what is simulated is not lost
+                if before is not None:
+                    yield before[0], before[1], before[2].result()
+                raise
+            if before is not None:
+                yield before[0], before[1], before[2].result()
+            before = first, last, beside.submit(tabulate, study, text, first, last, runs)
+        if before is not None:
+            yield before[0], before[1], before[2].result()
 
 
 def study_of(directory: str | Path) -> Study:
