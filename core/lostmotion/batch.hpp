@@ -90,7 +90,7 @@ inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in
     bool drive_varies = false;
     for (const int f : in.fields) drive_varies = drive_varies || batch_fields()[static_cast<std::size_t>(f)].drive;
     work_through(in.runs, threads, waiting, [&](auto next, std::atomic<bool>& stop) {
-        std::unique_ptr<Workspace> shared = drive_varies ? nullptr : pool.take();
+        std::unique_ptr<Workspace> workspace = drive_varies ? std::make_unique<Workspace>(in.drive) : pool.take();
         RunOptions options = in.options;
         options.max_switchings = 0;
         options.interrupted = [](void* flag) { return static_cast<std::atomic<bool>*>(flag)->load(); };
@@ -103,17 +103,12 @@ inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in
                 batch_fields()[static_cast<std::size_t>(in.fields[f])].set(drive, signals, start,
                                                                            in.values[k * in.fields.size() + f]);
             double* out = samples + k * options.channels.size() * options.samples;
-            RunReport report;
-            if (drive_varies) {
-                Workspace own(drive);
-                report = run_exact(own, signals, start, options, out);
-            } else {
-                report = run_exact(*shared, signals, start, options, out);
-            }
+            if (drive_varies) workspace->set(drive);
+            const RunReport report = run_exact(*workspace, signals, start, options, out);
             rows[k] = {report.status,       report.contact, report.time, static_cast<double>(report.switching_count),
                        report.left_data_at, report.energy};
         }
-        if (shared) pool.give_back(std::move(shared));
+        if (!drive_varies) pool.give_back(std::move(workspace));
     });
     return rows;
 }

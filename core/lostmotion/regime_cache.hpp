@@ -16,21 +16,29 @@ template <class System>
 class RegimeCache {
  public:
     struct Entry {
-        explicit Entry(const Regime& r) : regime(r), rates(r), rate_sizes(rates.magnitudes()) {
+        Entry() = default;
+        Entry(const Entry&) = delete;
+        Entry& operator=(const Entry&) = delete;
+
+        Regime regime;
+        LinearRates rates, rate_sizes;  // and with the magnitudes of all coefficients
+        GuardTable guards, guard_sizes;
+        int touch_guard = -1;  // the one that also ends the regime by touching zero
+        Propagator propagator;
+
+        void set(const Regime& r) {
+            regime = r;
+            rates = LinearRates(r);
+            rate_sizes = rates.magnitudes();
+            guards = {};
+            touch_guard = -1;
             for (int g = 0; g < r.n_guards; ++g) {
                 guards.set(g, r.guards[g].form);
                 if (r.guards[g].by_touch) touch_guard = g;
             }
             guard_sizes = guards.magnitudes();
+            propagator.reset();
         }
-        Entry(const Entry&) = delete;
-        Entry& operator=(const Entry&) = delete;
-
-        const Regime regime;
-        const LinearRates rates, rate_sizes;  // and with the magnitudes of all coefficients
-        GuardTable guards, guard_sizes;
-        int touch_guard = -1;  // the one that also ends the regime by touching zero
-        Propagator propagator;
 
         // How far the guards lie above a thousandth of the sizes of their terms.
         GuardTable::Values guard_room(const Instant& now) const {
@@ -58,18 +66,31 @@ class RegimeCache {
         const std::uint64_t packed = key.packed();
         if (last_ != nullptr && packed == last_packed_) return *last_;
         std::unique_ptr<Entry>& found = entries_[packed];
-        if (!found) found = std::make_unique<Entry>(system_.build(key));
+        if (!found) {
+            if (spare_.empty()) {
+                found = std::make_unique<Entry>();
+            } else {
+                found = std::move(spare_.back());
+                spare_.pop_back();
+            }
+            found->set(system_.build(key));
+        }
         last_ = found.get();
         last_packed_ = packed;
         return *found;
     }
 
+    // Forgets all regimes, since the system has changed. Their memory is kept for others.
+    void forget() {
+        for (auto& [key, entry] : entries_)
+            if (spare_.size() < most_kept) spare_.push_back(std::move(entry));
+        entries_.clear();
+        last_ = nullptr;
+    }
+
     // Makes ready for runs with this unit of length and these inputs; propagators for others are forgotten.
     InputTurns& serve(double unit, std::vector<InputBasis> basis) {
-        if (entries_.size() > most_kept) {
-            entries_.clear();
-            last_ = nullptr;
-        }
+        if (entries_.size() > most_kept) forget();
         if (!turns_ || unit != turns_->unit() || basis != turns_->basis()) {
             for (auto& [key, entry] : entries_) entry->propagator.reset();
             turns_ = std::make_unique<InputTurns>(unit, std::move(basis));
@@ -85,6 +106,7 @@ class RegimeCache {
     Entry* last_ = nullptr;  // the one asked for last
     std::uint64_t last_packed_ = 0;
     std::unordered_map<std::uint64_t, std::unique_ptr<Entry>> entries_;
+    std::vector<std::unique_ptr<Entry>> spare_;
 };
 
 }  // namespace lostmotion

@@ -75,7 +75,13 @@ struct Workspace {
     Workspace(const Workspace&) = delete;
     Workspace& operator=(const Workspace&) = delete;
 
-    const Drive drive;
+    // Another drive; the memory stays.
+    void set(const Drive& d) {
+        drive = d;
+        cache.forget();
+    }
+
+    Drive drive;
     const SwitchedDrive system{drive};
     RegimeCache<SwitchedDrive> cache{system};
 };
