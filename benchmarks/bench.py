@@ -157,6 +157,8 @@ def studies(scenario: lm.Scenario) -> list[tuple[str, ...]]:
     command = [{"key": "command.amplitude", "uniform": [0.1, 1.0]}]
     drive = [{"key": "load.inertia", "uniform": [1.0, 3.0]}, {"key": "motor.friction_torque", "uniform": [0.01, 0.02]}]
     rows = []
+    with tempfile.TemporaryDirectory() as directory:  # the first study of a process loads the libraries
+        lm.study(lm.Study(scenario=base, design="random", runs=1, vary=command, keep=keep), Path(directory) / "s")
     for name, vary in (("the command", command), ("the command and the drive", command + drive)):
         for threads in sorted({1, os.cpu_count() or 1}):
             study = lm.Study(scenario=base, design="random", runs=4000, vary=vary, keep=keep)
