@@ -23,7 +23,7 @@ from conftest import ROOT
 from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
-from lostmotion.study_engine import CHUNK, _core_can, scenario_of_run
+from lostmotion.study_engine import CHUNK, _core_can, run_chunk, scenario_of_run
 from lostmotion.study_file import FUNCTIONS, Study
 from lostmotion.study_report import best_runs, influence, read_table, sobol_indices
 
@@ -114,9 +114,13 @@ def test_one_bad_run_is_recorded_and_stops_no_other(tmp_path: Path):
 
 def test_a_run_without_a_continuation_is_recorded_too(tmp_path: Path):
     vary = [{"key": "command.amplitude", "values": [0.5, 1e9]}]
-    rows = rows_of(lm.study(make(design="list", runs=None, vary=vary), tmp_path / "s"))
+    what = make(design="list", runs=None, vary=vary)
+    rows = rows_of(lm.study(what, tmp_path / "s"))
     assert rows["error"][0] == ""
     assert "left the range" in rows["error"][1]
+    runs = run_chunk(what, 0, 2, 1)
+    assert np.isfinite(runs.samples["load_speed"][0]).all()
+    assert np.isnan(runs.samples["load_speed"][1]).all()  # none is left as the memory happened to be
 
 
 def test_parquet_opens_directly_with_study_and_parameters(tmp_path: Path):

@@ -2,7 +2,9 @@
 // know of the others, so a row is the single run to the last bit, for any number of threads.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <limits>
 #include <span>
 
 #include "response.hpp"
@@ -83,10 +85,11 @@ struct BatchRow {
     EnergyLedger energy;
 };
 
-// samples: runs x channels x samples.
+// samples: runs x channels x samples; NaN all through a run that did not end well.
 inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in, double* samples, unsigned threads,
                                        const std::function<bool(std::size_t)>& waiting) {
     std::vector<BatchRow> rows(in.runs);
+    const std::size_t width = in.options.channels.size() * in.options.samples;
     bool drive_varies = false;
     for (const int f : in.fields) drive_varies = drive_varies || batch_fields()[static_cast<std::size_t>(f)].drive;
     work_through(in.runs, threads, waiting, [&](auto next, std::atomic<bool>& stop) {
@@ -102,9 +105,10 @@ inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in
             for (std::size_t f = 0; f < in.fields.size(); ++f)
                 batch_fields()[static_cast<std::size_t>(in.fields[f])].set(drive, signals, start,
                                                                            in.values[k * in.fields.size() + f]);
-            double* out = samples + k * options.channels.size() * options.samples;
+            const std::span<double> out(samples + k * width, width);
             if (drive_varies) workspace->set(drive);
-            const RunReport report = run_exact(*workspace, signals, start, options, out);
+            const RunReport report = run_exact(*workspace, signals, start, options, out.data());
+            if (report.status != Status::done) std::ranges::fill(out, std::numeric_limits<double>::quiet_NaN());
             rows[k] = {report.status,       report.contact, report.time, static_cast<double>(report.switching_count),
                        report.left_data_at, report.energy};
         }

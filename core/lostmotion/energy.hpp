@@ -59,7 +59,7 @@ class EnergyMeter {
         double t = s.begin;
         for (long count = 1; t < s.end; ++count) {
             if (count % 64 == 0) cursor.anchor(t);
-            double length = p.level(level).length;
+            double length = p.length(level);
             const bool whole = length <= s.end - t;
             if (!whole) length = s.end - t;
             if (whole) {

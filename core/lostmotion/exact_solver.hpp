@@ -13,7 +13,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <optional>
 
 #include "cursor.hpp"
 #include "polynomial.hpp"
@@ -66,7 +65,6 @@ class ExactSolver {
     const Memory& memory() const { return now_.memory; }
     const RegimeKey& key() const { return key_; }
     const Regime& regime() { return cache_.regime(key_); }
-    const Signals& signals() const { return signals_; }
     const std::vector<InputBasis>& basis() const { return turns_.basis(); }
     double unit() const { return unit_; }
     Contact stopped_at() const { return stopped_at_; }
@@ -179,7 +177,7 @@ class ExactSolver {
         State forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
         for (int i = 0; i < n_inputs; ++i) add_scaled(forced, input_bound_[i], e.rate_sizes.input_column[i]);
         int level = std::min(last_level_, p.level_below(limit - time_));
-        const double shortest = 1e-7 * p.level(0).length;
+        const double shortest = 1e-7 * p.length(0);
         for (long count = 1; time_ < limit; ++count) {
             ++looks_;
             if (looks_ % 1024 == 0 && interrupted != nullptr && interrupted(interrupted_context))
@@ -189,9 +187,9 @@ class ExactSolver {
             if (!(std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100)) return Status::outside;
             const State fourth = magnitudes(cursor->fourth_derivative());
             const double left = limit - time_;
-            double h = std::min(p.level(level).length, left);
+            double h = std::min(p.length(level), left);
             while (true) {
-                if (h == p.level(level).length) {
+                if (h == p.length(level)) {
                     end->step_from(*cursor, level);
                 } else {
                     *end = *cursor;
@@ -203,7 +201,7 @@ class ExactSolver {
                 bound_fourth(e.guard_sizes, p.level(level).growth, size);
                 const Verdict verdict = judge(e, segment.memory, *cursor, *here, *there, h, h < shortest);
                 if (verdict == Verdict::uncertain) {  // below the shortest level, by plain halves
-                    h = level > 0 ? std::min(p.level(--level).length, left) : 0.5 * h;
+                    h = level > 0 ? std::min(p.length(--level), left) : 0.5 * h;
                     continue;
                 }
                 if (verdict == Verdict::crossing) {
@@ -346,11 +344,12 @@ class ExactSolver {
             // Still positive where another has crossed: later.
             if (k > 0 && cubic(g)(best / h) > bounds_.error[g]) continue;
             double s = estimate[g] * h;
-            trial_ = cursor;
-            if (touch)
+            if (touch) {
+                trial_ = cursor;
                 trial_.advance(s);
-            else
+            } else {
                 s = find_zero(e.regime.guards[g].form, e.propagator, memory, cursor, s, h);
+            }
             if (s < best) {
                 best = s;
                 std::swap(end, trial_);
@@ -364,13 +363,13 @@ class ExactSolver {
     // its zero.
     double find_zero(const LinearForm& form, Propagator& p, const Memory& memory, const Cursor& cursor, double estimate,
                      double h) {
-        const double base = p.level(0).length;
+        const double base = p.length(0);
         double low = 0.0, high = h, s = estimate;
         Expansion about;
         for (int m = 0; m < 100; ++m) {
             trial_ = cursor;
             const double rest = trial_.advance_by_levels(s), from = s - rest;
-            trial_.expand(rest + 0.25 * base, about);
+            trial_.expand(std::fabs(rest) + 0.25 * base, about);
             const double value = lostmotion::evaluate(form, trial_.x(), memory, about.u[0]);
             Polynomial guard(value);
             double power = 1.0;
@@ -378,7 +377,7 @@ class ExactSolver {
                 power *= base * Propagator::reciprocal[k];
                 guard.set(k, power * evaluate_rate(form, about.x[k - 1], about.u[k]));
             }
-            const double reach = rest / base + 0.25, at = trial_.time();
+            const double reach = std::fabs(rest) / base + 0.25, at = trial_.time();
             double z = rest / base;
             bool found = false;
             for (int n = 0; n < 60 && !found && std::fabs(z) <= reach; ++n) {

@@ -145,8 +145,7 @@ class FormTable {
         return out;
     }
 
-    int rows() const { return rows_; }       // rounded up to whole vectors
-    bool driven() const { return driven_; }  // whether any form depends on the inputs
+    int rows() const { return rows_; }  // rounded up to whole vectors
     double coefficient(int row, int term) const { return column_[term][row]; }
 
     // The parts that depend on neither state nor inputs.
@@ -175,7 +174,7 @@ class FormTable {
  private:
     Vec at(int term, int g) const { return load(&column_[term][g]); }
     [[gnu::always_inline]] Vec terms(int g, const State& x, const std::array<double, n_inputs>& u) const {
-        const Vec sum = ((at(0, g) * x[0] + at(1, g) * x[1]) + at(2, g) * x[2]) + at(3, g) * x[3];
+        const Vec sum = (at(0, g) * x[0] + at(1, g) * x[1]) + (at(2, g) * x[2] + at(3, g) * x[3]);
         return driven_ ? sum + (at(command, g) * u[0] + at(load_torque, g) * u[1]) : sum;
     }
 

@@ -38,8 +38,9 @@ struct Matrix {
         Quad out;
         for (int p = 0; p < Quad::parts; ++p) {
             const int r = p * vec_width;
-            out.part[p] = ((load(&column[0][r]) * v0 + load(&column[1][r]) * v1) + load(&column[2][r]) * v2) +
-                          load(&column[3][r]) * v3;
+            // In pairs, which the processor adds side by side.
+            out.part[p] = (load(&column[0][r]) * v0 + load(&column[1][r]) * v1) +
+                          (load(&column[2][r]) * v2 + load(&column[3][r]) * v3);
         }
         return out;
     }
@@ -48,7 +49,7 @@ struct Matrix {
         return col < coupled ? angle[col] : angle_own;
     }
     [[gnu::always_inline]] double angle_row(const double* v) const {
-        return ((angle[0] * v[0] + angle[1] * v[1]) + angle[2] * v[2]) + angle[3] * v[3];
+        return (angle[0] * v[0] + angle[1] * v[1]) + (angle[2] * v[2] + angle[3] * v[3]);
     }
     // factor * other, entry by entry
     void add(double factor, const Matrix& other) {

@@ -23,10 +23,9 @@ namespace lostmotion {
 
 // Everything needed to step by one length in one regime.
 struct Step {
-    double length = 0.0;  // [s]
-    Matrix change;        // E(h) = exp(A h) - 1
-    Matrix integral;      // G(h)
-    Matrix growth;        // bound on |exp(A s)|, element by element, for 0 <= s <= h
+    Matrix change;    // E(h) = exp(A h) - 1
+    Matrix integral;  // G(h)
+    Matrix growth;    // bound on |exp(A s)|, element by element, for 0 <= s <= h
 };
 
 // The response from rest to one function of an input, at the end of a step.
@@ -48,7 +47,6 @@ class Propagator {
     static constexpr int max_levels = 40;
     static constexpr int usual_levels = 12;
     static constexpr double base_norm = 0.125;  // |A| h of the base interval, in scaled units
-    static constexpr int series_terms = Expansion::most;
 
     // turns: its unit is a length of which some power-of-two multiple or fraction is the base interval.
     // scale: natural sizes of the states; only for choosing the base interval.
@@ -85,6 +83,7 @@ class Propagator {
     void reset() { levels_ = 0; }
 
     const LinearRates& rates() const { return *linear_; }
+    double turning() const { return turning_; }  // rate of the load angle per load speed: 1 where the load may turn
     // The fourth time derivative of the state, from the first and the input state.
     State fourth_derivative(const State& rate, const double* weights) const {
         State out = cubed_ * rate;
@@ -161,13 +160,13 @@ class Propagator {
 
     // How many terms of the Taylor series count over s: at most two base intervals, forward or backward. From rest the
     // first derivatives are zero and a later one, up to the fifth (an input, then each state in turn), comes first.
+    // An even number.
     int terms(double s) const {
+        const double turned = norm_ * s;
         double left = 1.0;  // bound on the relative size of what follows
         int n = 0;
-        while ((n <= n_states || left >= 1e-19) && n < series_terms) {
-            ++n;
-            left *= norm_ * std::fabs(s) * reciprocal[n];
-        }
+        for (; (n <= n_states || left >= 1e-19) && n < Expansion::most; n += 2)
+            left *= turned * turned * (reciprocal[n + 1] * reciprocal[n + 2]);
         return n;
     }
     // Fills in the derivatives of the state after the first, which is given; terms and inputs are there. By A^2, so
@@ -186,17 +185,20 @@ class Propagator {
         }
     }
     static State series(const Expansion& about, double s, const State& x) {
-        State sum = x;
+        // Terms of odd and of even order, side by side.
+        State sum = x, odd{};
         double power = 1.0;
-        for (int k = 1; k <= about.terms; ++k) {
-            power *= s * reciprocal[k];
+        for (int k = 2; k <= about.terms; k += 2) {
+            add_scaled(odd, power * s * reciprocal[k - 1], about.x[k - 2]);
+            power *= s * s * (reciprocal[k - 1] * reciprocal[k]);
             add_scaled(sum, power, about.x[k - 1]);
         }
+        add_scaled(sum, 1.0, odd);
         return sum;
     }
-    static constexpr std::array<double, series_terms + 1> reciprocal = [] {
-        std::array<double, series_terms + 1> r{};
-        for (int k = 1; k <= series_terms; ++k) r[k] = 1.0 / k;
+    static constexpr std::array<double, Expansion::most + 1> reciprocal = [] {
+        std::array<double, Expansion::most + 1> r{};
+        for (int k = 1; k <= Expansion::most; ++k) r[k] = 1.0 / k;
         return r;
     }();
 
@@ -231,7 +233,7 @@ class Propagator {
     // G over at most one base interval.
     Matrix integral_series(double h) const {
         Matrix term = Matrix::diagonal(h), sum;
-        for (int k = 1; k <= series_terms; ++k) {
+        for (int k = 1; k <= Expansion::most; ++k) {
             sum.add(1.0, term);
             term = linear_->rate * term;
             term.scale(h / (k + 1));
@@ -242,7 +244,6 @@ class Propagator {
     void add_base() {
         Step& s = steps_.emplace_back();
         const double h = base_;
-        s.length = h;
         s.integral = integral_series(h);
         s.change = linear_->rate * s.integral;
         // |exp(A s)| from the powers of a matrix without negative entries beside its diagonal.
@@ -264,7 +265,7 @@ class Propagator {
             double r = b.kind == InputBasis::cosine ? -b.omega * b.omega : b.kind == InputBasis::sine ? b.omega : 1.0;
             const int first = b.kind == InputBasis::cosine ? 2 : 1;
             double power = h;
-            for (int k = 0; k < series_terms; ++k) {
+            for (int k = 0; k < Expansion::most; ++k) {
                 // coefficient: k-th derivative of y at 0; the next is A times it plus b times the derivative of r.
                 coefficient = linear_->rate * coefficient;
                 if (k == first || (b.kind != InputBasis::ramp && k > first && (k - first) % 2 == 0)) {
@@ -279,12 +280,17 @@ class Propagator {
         finish_level();
     }
 
+    // cos(omega length) - 1 of the function q, without cancellation.
+    double cosine_change(int k, int q) {
+        const double half = turns_->over(exponent_ + k - 1)[q + 1];
+        return -2.0 * half * half;
+    }
+
     void add_doubled() {
         const int k = levels_ - 1;
         steps_.emplace_back();
         const Step& a = steps_[k];
         Step& b = steps_[k + 1];
-        b.length = 2.0 * a.length;
         b.change = a.change * a.change;
         b.change.add(2.0, a.change);
         b.integral = a.change * a.integral;
@@ -303,15 +309,14 @@ class Propagator {
             const State constant = a.integral * linear_->input_column[basis.input];
             if (basis.kind == InputBasis::ramp) {
                 add_scaled(y, 1.0, from[q].x);
-                add_scaled(y, a.length, constant);
+                add_scaled(y, length(k), constant);
             } else {
                 const int cosine = basis.kind == InputBasis::cosine ? q : q - 1, sine = cosine + 1;
                 const double c = rotations(k)[cosine], s = rotations(k)[sine];
-                const double half = turns_->over(exponent_ + k - 1)[sine];
                 if (basis.kind == InputBasis::cosine) {
                     add_scaled(y, c, from[cosine].x);
                     add_scaled(y, -s, from[sine].x);
-                    add_scaled(y, -2.0 * half * half, constant);
+                    add_scaled(y, cosine_change(k, q), constant);
                 } else {
                     add_scaled(y, s, from[cosine].x);
                     add_scaled(y, c, from[sine].x);
@@ -326,12 +331,12 @@ class Propagator {
     // What follows from length and responses: the rotations of the inputs, and the rates.
     void finish_level() {
         const int k = levels_++;
-        const double *turn = turns_->over(exponent_ + k), *half = turns_->over(exponent_ + k - 1);
+        const double* turn = turns_->over(exponent_ + k);
         rotations_.push_back(turn);
         for (int q = 0; q < n_basis_; ++q) {
             const InputBasis& b = basis_[q];
-            const double input = b.kind == InputBasis::ramp     ? steps_[k].length
-                                 : b.kind == InputBasis::cosine ? -2.0 * half[q + 1] * half[q + 1]
+            const double input = b.kind == InputBasis::ramp     ? length(k)
+                                 : b.kind == InputBasis::cosine ? cosine_change(k, q)
                                                                 : turn[q];
             Response& r = responses_[static_cast<std::size_t>(k) * n_basis_ + q];
             r.rate = linear_->rate * r.x;
@@ -347,7 +352,7 @@ class Propagator {
     double base_ = 0.0;                          // length of level 0 [s]
     int exponent_ = 0;                           // of two: base / unit
     int longest_ = 0;                            // level
-    double turning_ = 0.0;                       // 1 where the load may turn
+    double turning_ = 0.0;
     int n_basis_ = 0;
     InputTurns* turns_ = nullptr;
     const InputBasis* basis_ = nullptr;

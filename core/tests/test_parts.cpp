@@ -104,9 +104,9 @@ TEST_SUITE("parts") {
             const LinearRates rates(r);
             p.prepare(rates, turns, drive.balanced_scale());
             const State scale = drive.balanced_scale();
-            for (int level = 0; p.level(level).length < 1.0; level += 2) {
+            for (int level = 0; p.length(level) < 1.0; level += 2) {
                 const Step& step = p.level(level);
-                const LongMatrix expected = reference_exponential(r, step.length);
+                const LongMatrix expected = reference_exponential(r, p.length(level));
                 for (int i = 0; i < n_states; ++i)
                     for (int j = 0; j < n_states; ++j) {
                         const double e = static_cast<double>(expected[i][j]) - (i == j ? 1.0 : 0.0);

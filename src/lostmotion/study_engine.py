@@ -68,10 +68,9 @@ def tabulate(study: Study, text: str, first: int, last: int, runs: Runs) -> byte
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    parameters = study.parameters(first, last)
     columns: dict[str, Any] = {"run": pa.array(np.arange(first, last))}
     for k, v in enumerate(study.vary):
-        columns[v.title] = pa.array(parameters[:, k])
+        columns[v.title] = pa.array(runs.parameters[:, k])
     bad = np.array([e != "" for e in runs.errors])
     data = _derived(study, runs, _needed(study))
     for name, expression in study.keep.items():
@@ -94,8 +93,10 @@ def tabulate(study: Study, text: str, first: int, last: int, runs: Runs) -> byte
 
 
 class Runs(SimpleNamespace):
-    """Of a chunk: samples (variable -> runs x samples), energy (entry -> runs), switchings, errors, ratio (runs)."""
+    """Of a chunk: parameters (runs x parameters), samples (variable -> runs x samples), energy (entry -> runs),
+    switchings, errors, ratio (runs)."""
 
+    parameters: np.ndarray
     samples: dict[str, np.ndarray]
     energy: dict[str, np.ndarray]
     switchings: np.ndarray
@@ -167,6 +168,7 @@ def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energ
     """Any key may vary: each run is a scenario of its own."""
     n, samples = len(parameters), study.scenario.simulation.samples
     runs = Runs(
+        parameters=parameters,
         samples={c: np.full((n, samples), np.nan) for c in channels},
         energy={e: np.full(n, np.nan) for e in ENERGY},
         switchings=np.zeros(n),
@@ -250,6 +252,7 @@ def _in_the_core(study: Study, parameters: np.ndarray, channels: list[str], ener
 
     ratio = next((values[:, j] for j, (key, _, _) in enumerate(keys) if key == "gearbox.ratio"), None)
     return Runs(
+        parameters=parameters,
         samples={c: spread(samples[:, k]) for k, c in enumerate(channels)},
         energy={e: spread(totals[:, 5 + k]) for k, e in enumerate(ENERGY)},
         switchings=np.nan_to_num(spread(totals[:, 3])),
