@@ -31,6 +31,7 @@ ROOMS = [
     {"stepping"},
     {"explanation"},
     {"linear_analysis"},
+    {"shooting"},
     {"harmonic_response"},
     {"paper"},
     {"plots"},

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
-from lostmotion.harmonic_response import PERIODICITY
 from lostmotion.linear_analysis import rigid_constants
 from lostmotion.paper import paper_scenario
+from lostmotion.shooting import PERIODICITY
 from lostmotion.variables import STATES
 
 NONLINEAR = paper_scenario("2-DOF-NL", "large").drive()
@@ -335,6 +335,23 @@ def test_frequencies_are_added_where_the_curve_bends():
     assert len(near) > 0.6 * len(added)
     exact = lm.linearize(drive).response(response["frequency"].values)
     assert np.max(np.abs(load_response(response, 0.1) / exact - 1.0)) < 1e-9
+
+
+def test_bandwidth_is_where_the_gain_has_fallen_by_three_decibels():
+    linear = frictionless("2-DOF-L")
+    found = lm.bandwidth(linear, 0.5)
+    gain = np.abs(lm.linearize(linear).response(np.array([0.1, found])))
+    assert gain[1] / gain[0] == pytest.approx(math.sqrt(0.5), rel=1e-7)
+    # Of the drive with friction it depends on the amplitude, and agrees with the curve it is read from otherwise.
+    near = np.geomspace(0.1, 20.0, 60)
+    for amplitude in (0.1, 1.0):
+        curve = lm.characteristics(lm.frequency_response(NONLINEAR, near, amplitude), NONLINEAR)
+        assert lm.bandwidth(NONLINEAR, amplitude) == pytest.approx(float(curve["bandwidth"][0]), rel=2e-3)
+    assert math.isnan(lm.bandwidth(linear, 0.5, highest=1.0))
+    with pytest.raises(RuntimeError, match="does not move"):
+        lm.bandwidth(NONLINEAR, 1e-3)
+    with pytest.raises(ValueError, match="must be positive"):
+        lm.bandwidth(linear, 0.0)
 
 
 def test_control_gets_the_response_as_data():

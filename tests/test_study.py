@@ -91,6 +91,39 @@ def test_a_row_equals_the_single_run_bit_for_bit(tmp_path: Path, engine: str):
         assert rows["switchings"][run] == result.attrs["switching_count"]
 
 
+def test_bandwidth_and_tracking_error_of_each_run(tmp_path: Path):
+    study = make(
+        design="list",
+        runs=None,
+        vary=[
+            {"key": "gearbox.ratio", "values": [90.0, 60.0, 90.0]},
+            {"key": "command.amplitude", "values": [1.0, 0.5, 1e-3]},
+        ],
+        keep={
+            "own": "bandwidth()",
+            "small": "bandwidth(0.1)",
+            "lag": "tracking_error(load_speed, ideal_speed)",
+        },
+    )
+    rows = rows_of(lm.study(study, tmp_path / "s"))
+    for run in (0, 1):
+        scenario = scenario_of_run(study, run)
+        assert rows["own"][run] == lm.bandwidth(scenario.drive(), scenario.command.amplitude)
+        assert rows["small"][run] == lm.bandwidth(scenario.drive(), 0.1)
+        result = lm.simulate(scenario)
+        # Without load the speed of a DC motor is u / k_E, here by its rated point: w_R M_stall / (M_stall - M_R).
+        ideal = result["command"] * scenario.motor.rated_speed * 3.1169 / 2.1169 / scenario.gearbox.ratio
+        assert rows["lag"][run] == pytest.approx(float(((result["load_speed"] - ideal) ** 2).mean() ** 0.5), rel=1e-12)
+    assert "does not move" in rows["error"][2]  # the run itself can be, but has no bandwidth
+    assert math.isnan(rows["own"][2])
+
+
+def test_a_torque_source_has_no_ideal_speed():
+    scenario = SHORT.replace(**{"motor.kind": "torque_source"})
+    with pytest.raises(ValueError, match="ideal_speed needs a motor of kind dc"):
+        make(scenario=scenario, keep={"x": "peak(ideal_speed)"})
+
+
 def test_rows_do_not_depend_on_threads_or_executor(tmp_path: Path):
     study = make(runs=2 * CHUNK + 24, design="random")
     one = pq.ParquetDataset(lm.study(study, tmp_path / "1", threads=1)).read()

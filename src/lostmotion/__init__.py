@@ -17,10 +17,9 @@ if TYPE_CHECKING:
     from .drive_check import check_drive as check_drive
     from .errors import InputError as InputError
     from .explanation import explain as explain
+    from .harmonic_response import bandwidth as bandwidth
     from .harmonic_response import characteristics as characteristics
     from .harmonic_response import frequency_response as frequency_response
-    from .harmonic_response import periodic_motion as periodic_motion
-    from .harmonic_response import periodic_motions as periodic_motions
     from .harmonic_response import to_control as to_control
     from .linear_analysis import LinearModel as LinearModel
     from .linear_analysis import linearize as linearize
@@ -46,6 +45,8 @@ if TYPE_CHECKING:
     from .scenario import Initial as Initial
     from .scenario import Scenario as Scenario
     from .scenario import load as load
+    from .shooting import periodic_motion as periodic_motion
+    from .shooting import periodic_motions as periodic_motions
     from .signals import CommandSignal as CommandSignal
     from .signals import TorqueSignal as TorqueSignal
     from .stepping import Simulation as Simulation
@@ -62,13 +63,7 @@ _HOMES = {
     "errors": ("InputError",),
     "explanation": ("explain",),
     "data_sheet": ("GearboxSheet", "MotorSheet"),
-    "harmonic_response": (
-        "characteristics",
-        "frequency_response",
-        "periodic_motion",
-        "periodic_motions",
-        "to_control",
-    ),
+    "harmonic_response": ("bandwidth", "characteristics", "frequency_response", "to_control"),
     "linear_analysis": ("LinearModel", "linearize"),
     "loss_map_builder": ("build_loss_map",),
     "parts": (
@@ -83,6 +78,7 @@ _HOMES = {
         "Rigid",
         "TorsionCurve",
     ),
+    "shooting": ("periodic_motion", "periodic_motions"),
     "records": ("catalogue", "gearbox", "motor"),
     "results": ("energy_of", "open_result", "save", "scenario_of"),
     "scenario": ("Initial", "Scenario", "load"),

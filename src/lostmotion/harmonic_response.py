@@ -1,244 +1,27 @@
-"""Periodic motions by shooting, and the frequency response that they give: harmonics, distortion, efficiency, stability."""
+"""Frequency response from motions that repeat: harmonics, distortion, efficiency, stability, bandwidth."""
 
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from . import _core
 from .linear_analysis import _control
 from .parts import Drive
-from .results import add_derived
-from .run import start_state
 from .scenario import Initial
+from .shooting import MAX_PERIODS, SAMPLES_PER_PERIOD, floquet_multipliers, is_stable, reason_of, respond
 from .signals import CommandSignal, TorqueSignal
-from .variables import CHANNEL_NAMES, STATES, VARIABLES
+from .variables import CHANNEL_NAMES
 
 if TYPE_CHECKING:
     import control
     import xarray
 
-SAMPLES_PER_PERIOD = 2048
-MAX_PERIODS = 20_000
-PERIODICITY = 1e-10  # largest change of a state over one period / its magnitude, for a motion to count as periodic
-NEUTRAL = 1e-6  # a Floquet multiplier this near 1 belongs to a direction in which a sticking drive may rest anywhere
-SAME = 1e-5  # solutions that differ by less, in parts of their size, are one
-
-# Of the components that the core's Jacobian goes over: all but the load angle, which is neutral.
-COMPONENTS = (*STATES, "hysteresis_capacity", "held_torque")
-_ACTIVE = [k for k, name in enumerate(COMPONENTS) if name != "load_angle"]
+THREE_DECIBELS = math.sqrt(2.0)  # the bandwidth ends where the gain has fallen by this factor
 
 Source = Literal["command", "load_torque"]
-
-
-def _reason(result: dict[str, Any], k: int) -> str:
-    """Why a point has no periodic motion; empty if it has one."""
-    status = int(result["status"][k])
-    if status != 0:
-        return _core.status_text(status, result["time"][k], int(result["contact"][k]))
-    if not result["converged"][k]:
-        return f"not periodic after {int(result['periods'][k])} periods: the states still change by {result['residual'][k]:.1e}"
-    return ""
-
-
-def _multipliers(jacobian: np.ndarray) -> np.ndarray:
-    """Floquet multipliers, largest first."""
-    values = np.linalg.eigvals(jacobian[np.ix_(_ACTIVE, _ACTIVE)])
-    return values[np.argsort(-np.abs(values))]
-
-
-def _respond(
-    drive: Drive,
-    points: Sequence[tuple[CommandSignal, TorqueSignal, float, Initial]],
-    *,
-    harmonics: int,
-    keep_table: bool,
-    max_periods: int,
-    threads: int | None,
-    progress: Callable[[int], None] | None,
-) -> dict[str, Any]:
-    core = [(c.core(), t.core(), period, start_state(s), s.hysteresis_capacity) for c, t, period, s in points]
-    return _core.respond(
-        drive.core(),
-        core,
-        SAMPLES_PER_PERIOD,
-        harmonics,
-        max_periods,
-        PERIODICITY,
-        keep_table,
-        threads or os.cpu_count() or 1,
-        progress,
-    )
-
-
-def _period(*signals: CommandSignal | TorqueSignal) -> float:
-    """The common period [s] of signals that are sums of sines and constants.
-
-    Raises
-    ------
-    ValueError
-        They have none.
-    """
-    frequencies = []
-    for s in signals:
-        if s.steps or s.ramps or s.chirp is not None or s.samples is not None:
-            raise ValueError(
-                "a periodic motion needs signals of mean and sines only; leave out steps, ramps, chirp, samples"
-            )
-        frequencies += [f for _, f, _ in s.sine_list()]
-    if not frequencies:
-        raise ValueError("a periodic motion needs at least one sine in command or load torque, or a period")
-    base = min(frequencies)
-    for parts in range(1, 101):
-        shares = [parts * f / base for f in frequencies]
-        if all(abs(q - round(q)) <= 1e-9 * q for q in shares):
-            return parts / base
-    raise ValueError(f"the frequencies {sorted(set(frequencies))} Hz have no common period within 100 of the slowest")
-
-
-def periodic_motion(
-    drive: Drive,
-    command: CommandSignal | float = 0.0,
-    load_torque: TorqueSignal | float = 0.0,
-    *,
-    multiple: int = 1,
-    start: Initial | None = None,
-    max_periods: int = MAX_PERIODS,
-) -> xarray.Dataset:
-    """A motion that repeats with the inputs, by shooting.
-
-    Newton's method on the map over one period, with its exact Jacobian; it is entered after a few periods from `start`,
-    and where it does not converge, the transient is followed further. The load angle is neutral: it may drift.
-
-    Parameters
-    ----------
-    command, load_torque
-        Constants, or signals of mean and sines with a common period.
-    multiple
-        The motion may repeat after this many periods of the inputs (sub-harmonics).
-    start
-        From where; at rest if left out. Coexisting motions are reached from different ones.
-
-    Returns
-    -------
-    xarray.Dataset
-        The result variables over one period, and the ``jacobian`` of the map over it. Attributes: ``residual`` (largest change of a state over the period / its
-        largest magnitude), ``drift`` of the load angle [rad], ``multipliers_real`` and ``multipliers_imag`` (Floquet),
-        ``stable``, ``smooth`` (the multipliers are exact: no switching grazes), ``periods`` followed, ``newton_steps``,
-        ``start_<state>``, ``period`` [s].
-
-    Raises
-    ------
-    RuntimeError
-        None was found; the message says why.
-    """
-    import xarray as xr
-
-    command = command if isinstance(command, CommandSignal) else CommandSignal(mean=command)
-    load_torque = load_torque if isinstance(load_torque, TorqueSignal) else TorqueSignal(mean=load_torque)
-    if multiple < 1:
-        raise ValueError(f"multiple {multiple} must be 1 or more")
-    period = multiple * _period(command, load_torque)
-    r = _respond(
-        drive,
-        [(command, load_torque, period, start or Initial())],
-        harmonics=1,
-        keep_table=True,
-        max_periods=max_periods,
-        threads=1,
-        progress=None,
-    )
-    if reason := _reason(r, 0):
-        raise RuntimeError(f"no periodic motion was found: {reason}")
-    data = dict(zip(CHANNEL_NAMES, r["table"][0], strict=True))
-    add_derived(data, drive.gearbox.ratio)
-    multipliers = _multipliers(r["jacobian"][0])
-    time = np.arange(SAMPLES_PER_PERIOD) * (period / SAMPLES_PER_PERIOD)
-    variables: dict[str, Any] = {
-        v.name: ("time", data[v.name], {"units": v.unit, "long_name": v.meaning, "symbol": v.symbol}) for v in VARIABLES
-    }
-    meaning = "derivative of each component after the period by each at its start (SI)"
-    return xr.Dataset(
-        variables | {"jacobian": (("to", "by"), r["jacobian"][0], {"long_name": meaning})},
-        coords={
-            "time": ("time", time, {"units": "s", "long_name": "time within the period"}),
-            "to": ("to", list(COMPONENTS)),
-            "by": ("by", list(COMPONENTS)),
-        },
-        attrs={
-            "period": period,
-            "residual": float(r["residual"][0]),
-            "drift": float(r["drift"][0]),
-            "multipliers_real": multipliers.real.tolist(),
-            "multipliers_imag": multipliers.imag.tolist(),
-            "stable": int(_stable(multipliers)),
-            "smooth": int(r["smooth"][0]),
-            "periods": int(r["periods"][0]),
-            "newton_steps": int(r["newton_steps"][0]),
-            "start_hysteresis_capacity": float(r["hysteresis_capacity"][0]),
-            **{f"start_{name}": float(v) for name, v in zip(STATES, r["start"][0], strict=True)},
-        },
-    )
-
-
-def _stable(multipliers: np.ndarray) -> bool:
-    return bool(np.all(np.abs(multipliers) < 1.0 + NEUTRAL))
-
-
-def periodic_motions(
-    drive: Drive,
-    command: CommandSignal | float = 0.0,
-    load_torque: TorqueSignal | float = 0.0,
-    *,
-    starts: Iterable[Initial],
-    multiples: Iterable[int] = (1,),
-) -> list[xarray.Dataset]:
-    """The different periodic motions that several starts lead to, each once.
-
-    Motions that differ by a whole period of the inputs only, or by the load angle, count as one.
-    """
-    found: list[xarray.Dataset] = []
-    starts = list(starts)
-    for multiple in multiples:
-        for start in starts:
-            try:
-                motion = periodic_motion(drive, command, load_torque, multiple=multiple, start=start)
-            except RuntimeError:
-                continue
-            if not any(_same(drive, motion, other) for other in found):
-                found.append(motion)
-    return found
-
-
-def _same(drive: Drive, a: xarray.Dataset, b: xarray.Dataset) -> bool:
-    """Whether two motions are one; that of the longer period is compared at each shift by the shorter one."""
-    if a.attrs["period"] < b.attrs["period"]:
-        a, b = b, a
-    g = drive.gearbox
-    # What is smaller than this does not tell motions apart.
-    least = {
-        "motor_speed": SAME * g.rated_input_speed,
-        "load_speed": SAME * g.rated_input_speed / g.ratio,
-        "output_torque": SAME * g.rated_output_torque,
-        "twist": 0.0,
-    }
-    times = round(a.attrs["period"] / b.attrs["period"])
-    t = a["time"].values
-    allowed = SAME if times == 1 else 1e-3  # between samples there is a straight line
-    for shift in range(times):
-        at = (t + shift * b.attrs["period"]) % b.attrs["period"]
-        gaps = []
-        for name, floor in least.items():
-            x, y = a[name].values, b[name].values
-            other = y if times == 1 else np.interp(at, b["time"].values, y, period=b.attrs["period"])
-            gaps.append(np.max(np.abs(x - other)) / max(np.max(np.abs(x)), np.max(np.abs(y)), floor, 1e-300))
-        if max(gaps) < allowed:
-            return True
-    return False
 
 
 def frequency_response(
@@ -313,7 +96,7 @@ def frequency_response(
             for a in amplitudes
             for f in new
         ]
-        r = _respond(
+        r = respond(
             drive,
             points,
             harmonics=harmonics,
@@ -372,7 +155,7 @@ def _labelled(
 
     shape = (len(amplitudes), len(frequencies))
     names = list(CHANNEL_NAMES)
-    reasons = np.array([_reason(r, k) for k in range(shape[0] * shape[1])], dtype=object).reshape(shape)
+    reasons = np.array([reason_of(r, k) for k in range(shape[0] * shape[1])], dtype=object).reshape(shape)
     found = reasons == ""
     c = (r["harmonics"][..., 0] + 1j * r["harmonics"][..., 1]).reshape(*shape, len(names), harmonics + 1)
     c = np.where(found[..., None, None], c, np.nan)
@@ -384,9 +167,9 @@ def _labelled(
         response = first / drive_in[..., None]
         distortion = np.sqrt(np.maximum(above, 0.0)) / (np.abs(first) / math.sqrt(2.0))
         efficiency = np.where(power["motor_power"] > 0.0, power["load_power"] / power["motor_power"], np.nan)
-    multipliers = [_multipliers(j) for j in r["jacobian"]]
+    multipliers = [floquet_multipliers(j) for j in r["jacobian"]]
     largest = np.array([abs(m[0]) for m in multipliers]).reshape(shape)
-    stable = np.array([_stable(m) for m in multipliers]).reshape(shape)
+    stable = np.array([is_stable(m) for m in multipliers]).reshape(shape)
     grid, each = ("amplitude", "frequency"), ("output", "amplitude", "frequency")
 
     def plain(name: str) -> np.ndarray:
@@ -466,7 +249,7 @@ def characteristics(response: xarray.Dataset, drive: Drive, output: str = "load_
         with np.errstate(divide="ignore", invalid="ignore"):
             gain = 20.0 * np.log10(size / size[0])
             phase = np.degrees(np.unwrap(np.angle(curve)))
-        bandwidth.append(_falls_through(x, gain, -20.0 * math.log10(math.sqrt(2.0))))
+        bandwidth.append(_falls_through(x, gain, -20.0 * math.log10(THREE_DECIBELS)))
         crossover.append(_falls_through(x, phase, -180.0))
     forward, backward = (drive.core().smallest_command(0.0, 0.0, s) for s in (+1, -1))
     return xr.Dataset(
@@ -485,6 +268,61 @@ def _falls_through(x: np.ndarray, y: np.ndarray, level: float) -> float:
         return math.nan
     k = below[0]
     return float(np.exp(x[k] + (level - y[k]) / (y[k + 1] - y[k]) * (x[k + 1] - x[k])))
+
+
+def bandwidth(
+    drive: Drive,
+    amplitude: float,
+    *,
+    output: str = "load_speed",
+    mean_command: float = 0.0,
+    mean_load_torque: float = 0.0,
+    lowest: float = 0.1,
+    highest: float = 1000.0,
+) -> float:
+    """Frequency [Hz] at which the gain from the command first falls 3 dB below that at the lowest frequency.
+
+    Gains come from motions that repeat, as in `frequency_response`; they are looked at half an octave apart, and the
+    fall is then located between two of them.
+
+    Parameters
+    ----------
+    amplitude
+        Of the command, E_CA [-].
+    lowest, highest
+        [Hz]. Where the gain has not fallen at the highest, the bandwidth is NaN.
+
+    Raises
+    ------
+    ValueError
+        The amplitude is not positive.
+    RuntimeError
+        A motion that repeats was not found, or the output does not move at the lowest frequency.
+    """
+    from scipy.optimize import brentq
+
+    if not amplitude > 0.0:
+        raise ValueError(f"no bandwidth: the amplitude {amplitude:g} of the command must be positive")
+    channel = CHANNEL_NAMES.index(output)
+
+    def gain(frequency: float) -> float:
+        point = (*_signals("command", amplitude, frequency, mean_command, mean_load_torque), 1.0 / frequency, Initial())
+        r = respond(drive, [point], harmonics=1, keep_table=False, max_periods=MAX_PERIODS, threads=1, progress=None)
+        if reason := reason_of(r, 0):
+            raise RuntimeError(f"no bandwidth: at {frequency:.4g} Hz {reason}")
+        return math.hypot(*r["harmonics"][0, channel, 1]) / amplitude
+
+    level = gain(lowest) / THREE_DECIBELS
+    if level == 0.0:
+        raise RuntimeError(f"no bandwidth: {output} does not move at an amplitude of {amplitude:g}")
+    below = lowest
+    while below < highest:
+        above = min(below * math.sqrt(2.0), highest)
+        if gain(above) < level:
+            found = brentq(lambda x: gain(math.exp(x)) - level, math.log(below), math.log(above), xtol=1e-9)
+            return math.exp(found)
+        below = above
+    return math.nan
 
 
 def to_control(response: xarray.Dataset, amplitude: float, output: str = "load_speed") -> control.FrequencyResponseData:

@@ -82,6 +82,13 @@ class Motor(Part):
                 raise ValueError("has a voltage_limit, which also needs rated_voltage")
         return self
 
+    @property
+    def no_load_speed(self) -> float:
+        """Speed [rad/s] at command 1 without any load or friction, by (2)."""
+        if self.rated_speed is None or self.armature_voltage_constant is None:
+            raise ValueError("a torque source has no speed of its own")
+        return self.rated_speed * self.armature_voltage_constant / (self.armature_voltage_constant - 1.0)
+
 
 class TorsionCurve(Part):
     """Torque against twist (eq. 14): odd, continuous, piecewise linear.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
@@ -17,6 +18,7 @@ from pydantic import ValidationError
 
 from . import _core
 from .errors import InputError
+from .harmonic_response import bandwidth
 from .parts import Rigid
 from .results import ENERGY, add_derived, installed_version, write_bytes
 from .run import core_inputs, simulate
@@ -29,7 +31,7 @@ from .study_file import (
     check_expression,
     from_json,
     to_json,
-    uses_energy,
+    uses,
 )
 from .variables import CHANNEL_NAMES, VARIABLES
 
@@ -42,7 +44,7 @@ SLOPES = "gearbox.stiffness.slopes"
 def compute_chunk(text: str, first: int, last: int, threads: int = 1) -> bytes:
     """The runs first .. last - 1 of a study (as JSON), as the bytes of a Parquet file. What executors are given."""
     study = _parsed(text)
-    return tabulate(study, text, first, last, run_chunk(study, first, last, threads))
+    return tabulate(study, text, first, last, run_chunk(study, first, last, threads), threads)
 
 
 @lru_cache(maxsize=8)
@@ -58,12 +60,12 @@ def _needed(study: Study) -> frozenset[str]:
 
 def run_chunk(study: Study, first: int, last: int, threads: int) -> Runs:
     """Simulates the runs; nearly all the time goes here, most of it with the GIL released."""
-    energy = any(uses_energy(e) for e in study.keep.values())
+    energy = any(uses(e, "energy") for e in study.keep.values())
     simulate_all = _in_the_core if _core_can(study) else _one_by_one
     return simulate_all(study, study.parameters(first, last), sorted(_sources(_needed(study))), energy, threads)
 
 
-def tabulate(study: Study, text: str, first: int, last: int, runs: Runs) -> bytes:
+def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads: int) -> bytes:
     """One row a run: its number, its parameters, what is kept of it, its error if it has one."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -71,13 +73,11 @@ def tabulate(study: Study, text: str, first: int, last: int, runs: Runs) -> byte
     columns: dict[str, Any] = {"run": pa.array(np.arange(first, last))}
     for k, v in enumerate(study.vary):
         columns[v.title] = pa.array(runs.parameters[:, k])
-    bad = np.array([e != "" for e in runs.errors])
     data = _derived(study, runs, _needed(study))
-    for name, expression in study.keep.items():
-        values = np.array(evaluate(expression, data, runs.energy, study), dtype=float)
-        values = np.broadcast_to(values, (last - first,)).copy()
-        values[bad] = np.nan
-        columns[name] = pa.array(values)
+    kept_values = {name: evaluate(e, data, runs, study, threads) for name, e in study.keep.items()}
+    bad = np.array([e != "" for e in runs.errors])
+    for name, values in kept_values.items():
+        columns[name] = pa.array(np.where(bad, np.nan, values))
     if study.trajectories is not None:
         for name in study.trajectories.variables:
             kept = data[name][:, :: study.trajectories.every]
@@ -124,9 +124,12 @@ def _derived(study: Study, runs: Runs, needed: frozenset[str]) -> dict[str, np.n
     return {name: whole[name] for name in needed | set(runs.samples)}
 
 
-def evaluate(expression: str, data: dict[str, np.ndarray], energy: dict[str, np.ndarray], study: Study) -> Any:
-    """An expression over all runs of a chunk at once."""
+def evaluate(expression: str, data: dict[str, np.ndarray], runs: Runs, study: Study, threads: int) -> np.ndarray:
+    """An expression over all runs of a chunk at once; shape (runs,). What cannot be found of a run is noted in its error."""
     import xarray as xr
+
+    def each_run(values: np.ndarray) -> xr.DataArray:
+        return xr.DataArray(values, dims="run")
 
     table = study.scenario.simulation
     time = np.arange(table.samples) * table.sample_interval
@@ -135,13 +138,52 @@ def evaluate(expression: str, data: dict[str, np.ndarray], energy: dict[str, np.
         for name in check_expression("", expression)
     }
     names["time"] = xr.DataArray(time, dims="time", coords={"time": time})
-    names["energy"] = SimpleNamespace(**{k: xr.DataArray(v, dims="run") for k, v in energy.items()})
+    names["energy"] = SimpleNamespace(**{k: each_run(v) for k, v in runs.energy.items()})
+    if uses(expression, "ideal_speed"):
+        names["ideal_speed"] = names["command"] * each_run(_ideal_speeds(study, runs))
+    names["bandwidth"] = lambda amplitude=None: each_run(_bandwidths(study, runs, amplitude, threads))
     with np.errstate(all="ignore"):
         value = eval(compile(expression, expression, "eval"), {"__builtins__": {}}, names | FUNCTIONS)
     dims = getattr(value, "dims", ())
     if "time" in dims:
         raise InputError(f"keep: {expression!r} leaves a value for each instant; reduce it, as in peak({expression})")
-    return value.values if hasattr(value, "values") else value
+    return np.broadcast_to(np.asarray(value, dtype=float), (len(runs.errors),))
+
+
+def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
+    """Load speed [rad/s] at command 1 of a rigid drive without inertia, friction and load, for each run."""
+
+    def of(scenario: Scenario) -> float:
+        return scenario.motor.no_load_speed / scenario.gearbox.ratio
+
+    keys = {key for v in study.vary for key in v.all_keys}
+    if not any(key.startswith("motor.") or key == "gearbox.ratio" for key in keys):
+        return np.full(len(runs.errors), of(study.scenario))
+    rows = zip(runs.parameters, runs.errors, strict=True)
+    return np.array([math.nan if error else of(_changed(study, row)) for row, error in rows])
+
+
+def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.ndarray:
+    """Bandwidth [Hz] of the load speed for each run, at the amplitude of its command or at the given one."""
+    amplitudes = np.broadcast_to(np.nan if amplitude is None else np.asarray(amplitude, dtype=float), len(runs.errors))
+
+    def find(k: int) -> float:
+        if runs.errors[k]:
+            return math.nan
+        scenario = _changed(study, runs.parameters[k])
+        try:
+            return bandwidth(
+                scenario.drive(),
+                float(amplitudes[k]) if amplitude is not None else scenario.command.amplitude or 0.0,
+                mean_command=scenario.command.mean,
+                mean_load_torque=scenario.load.torque.mean,
+            )
+        except (RuntimeError, ValueError) as error:
+            runs.errors[k] = str(error)
+            return math.nan
+
+    with ThreadPoolExecutor(max_workers=threads) as pool:
+        return np.array(list(pool.map(find, range(len(runs.errors)))))
 
 
 def _changes(study: Study, row: np.ndarray) -> dict[str, Any]:
@@ -159,9 +201,13 @@ def _changes(study: Study, row: np.ndarray) -> dict[str, Any]:
     return out
 
 
+def _changed(study: Study, row: np.ndarray) -> Scenario:
+    return study.scenario.replace(**_changes(study, row))
+
+
 def scenario_of_run(study: Study, run: int) -> Scenario:
     """The scenario of one run, by its number."""
-    return study.scenario.replace(**_changes(study, study.parameters(run, run + 1)[0]))
+    return _changed(study, study.parameters(run, run + 1)[0])
 
 
 def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energy: bool, threads: int) -> Runs:  # noqa: ARG001
@@ -177,7 +223,7 @@ def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energ
     )
     for k, row in enumerate(parameters):
         try:
-            scenario = study.scenario.replace(**_changes(study, row))
+            scenario = _changed(study, row)
             result = simulate(scenario, energy=energy)
         except (ValidationError, RuntimeError, ValueError) as error:
             runs.errors[k] = describe(error) if isinstance(error, ValidationError) else str(error)
@@ -270,12 +316,12 @@ def _out_of_range(study: Study, parameters: np.ndarray) -> list[str]:
     errors = [""] * len(parameters)
     low, high = parameters.min(axis=0), parameters.max(axis=0)
     try:
-        study.scenario.replace(**_changes(study, low))
-        study.scenario.replace(**_changes(study, high))
+        _changed(study, low)
+        _changed(study, high)
     except ValidationError:
         for k, row in enumerate(parameters):
             try:
-                study.scenario.replace(**_changes(study, row))
+                _changed(study, row)
             except ValidationError as error:
                 errors[k] = describe(error)
     return errors
@@ -405,7 +451,7 @@ def _compute_here(text: str, missing: list[tuple[int, int]], threads: int) -> It
                 raise
             if before is not None:
                 yield before[0], before[1], before[2].result()
-            before = first, last, beside.submit(tabulate, study, text, first, last, runs)
+            before = first, last, beside.submit(tabulate, study, text, first, last, runs, threads)
         if before is not None:
             yield before[0], before[1], before[2].result()
 

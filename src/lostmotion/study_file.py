@@ -183,6 +183,10 @@ class Study(Part):
             if name in {*titles, "run", "error", "switchings"}:
                 raise ValueError(f"keeps {name!r}, a name that is taken; choose another")
             check_expression(name, text)
+            if uses(text, "ideal_speed") and self.scenario.motor.kind != "dc":
+                raise ValueError(
+                    f"keep.{name}: ideal_speed needs a motor of kind dc; a torque source has no speed of its own"
+                )
         if self.total > MAX_RUNS:
             raise ValueError(f"has {self.total} runs, more than {MAX_RUNS}")
         return self
@@ -282,6 +286,8 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "dead_time": lambda x, share=0.01: (
         x["time"].where(abs(x - x.isel(time=0)) > share * abs(x).max("time")).min("time")
     ),
+    # Root mean square of the distance from a reference.
+    "tracking_error": lambda x, reference: ((x - reference) ** 2).mean("time") ** 0.5,
     "abs": abs,
     "sqrt": np.sqrt,
     "exp": np.exp,
@@ -289,6 +295,10 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "sign": np.sign,
 }
 """what an expression may use, beside the methods of xarray"""
+
+OF_THE_RUN = ("energy", "time", "ideal_speed", "bandwidth")
+"""further names: the ledger; the instants; the load speed of a rigid drive without inertia, friction and load under the same
+command; the bandwidth [Hz] of the load speed, a function of the command's amplitude (left out: the run's own)"""
 
 
 def check_expression(name: str, text: str) -> set[str]:
@@ -307,11 +317,13 @@ def check_expression(name: str, text: str) -> set[str]:
     used = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Name):
-            if node.id in FUNCTIONS or node.id in ("energy", "time"):
+            if node.id == "ideal_speed":
+                used.add("command")
+            if node.id in FUNCTIONS or node.id in OF_THE_RUN:
                 continue
             if node.id not in known:
                 raise ValueError(
-                    f"keep.{name}: {node.id!r} in {text!r} is neither a result variable nor one of {', '.join(FUNCTIONS)}"
+                    f"keep.{name}: {node.id!r} in {text!r} is neither a result variable nor one of {', '.join((*FUNCTIONS, *OF_THE_RUN))}"
                 )
             used.add(node.id)
         if isinstance(node, ast.Attribute):
@@ -322,9 +334,9 @@ def check_expression(name: str, text: str) -> set[str]:
     return used
 
 
-def uses_energy(text: str) -> bool:
-    """Whether an expression needs the energy ledger."""
-    return any(isinstance(n, ast.Name) and n.id == "energy" for n in ast.walk(ast.parse(text, mode="eval")))
+def uses(text: str, name: str) -> bool:
+    """Whether a name stands in an expression."""
+    return any(isinstance(n, ast.Name) and n.id == name for n in ast.walk(ast.parse(text, mode="eval")))
 
 
 # --- reading ---

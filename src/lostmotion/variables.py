@@ -16,7 +16,7 @@ class Variable:
     derived: bool = False  # computed from the others, not read from the solver
 
 
-# Those that are read from the solver stand in the order of its channels (core/lostmotion/sampler.hpp).
+# Those that are read from the solver stand in the order of its channels (core/lostmotion/reader.hpp).
 VARIABLES = (
     Variable("command", "E_C", "1", "control signal, relative armature voltage"),
     Variable("load_torque", "M_Z", "N*m", "disturbance torque on the load"),
