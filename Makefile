@@ -21,6 +21,8 @@ test-core: $(VENV)/tools
 	$(BIN)/ctest --test-dir build/core --output-on-failure
 
 bench: $(VENV)/built
+	$(BIN)/pip install -q --group bench
+	command -v valgrind >/dev/null || { apt-get update -q && apt-get install -qy valgrind; } || echo 'without valgrind'
 	echo '#include <cvode/cvode.h>' | c++ -E -x c++ - >/dev/null 2>&1 || { apt-get update -q && apt-get install -qy libsundials-dev; } || echo 'without SUNDIALS'
 	$(BIN)/cmake -S . -B build/bench -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_BENCHMARKS=ON >build/bench.log
 	$(BIN)/cmake --build build/bench

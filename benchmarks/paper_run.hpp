@@ -1,4 +1,4 @@
-// The run that all solvers are timed on: 2-DOF-NL, E_CA = 1.0275, 1 Hz, 2 s from rest, 1 kHz, stand-in loss table.
+// The run that all solvers are timed on: 2-DOF-NL, E_CA = 1.0275, 1 Hz, 2 s from rest, 1 kHz.
 #pragma once
 
 #include <algorithm>
@@ -10,9 +10,17 @@
 
 namespace lostmotion {
 
-inline LossMap stand_in_map() {
-    const std::vector<double> speeds{0.0, 0.01, 0.1, 0.3, 0.6, 1.0, 1.5};
-    const std::vector<double> loads{-1.5, -1.0, -0.6, -0.3, -0.1, 0.0, 0.1, 0.3, 0.6, 1.0, 1.5};
+// fine: into how many each interval of speed and of load is divided.
+inline LossMap stand_in_map(int fine = 1) {
+    const auto divided = [fine](const std::vector<double>& edges) {
+        std::vector<double> out;
+        for (std::size_t k = 0; k + 1 < edges.size(); ++k)
+            for (int part = 0; part < fine; ++part) out.push_back(edges[k] + (edges[k + 1] - edges[k]) * part / fine);
+        out.push_back(edges.back());
+        return out;
+    };
+    const std::vector<double> speeds = divided({0.0, 0.01, 0.1, 0.3, 0.6, 1.0, 1.5});
+    const std::vector<double> loads = divided({-1.5, -1.0, -0.6, -0.3, -0.1, 0.0, 0.1, 0.3, 0.6, 1.0, 1.5});
     std::vector<double> values;
     for (const double mu : loads)
         for (const double v : speeds) {
@@ -52,7 +60,9 @@ inline double error(const Table& a, const Table& exact, std::size_t samples) {
 }
 
 struct PaperRun {
-    Drive drive = paper_drive(stand_in_map());
+    explicit PaperRun(const LossMap& map = stand_in_map()) : drive(paper_drive(map)) {}
+
+    Drive drive;
     Signals signals{sine(1.0275, 1.0), Signal{}};
     std::size_t samples = 2001;
 
@@ -68,6 +78,10 @@ struct PaperRun {
         Table table(n_channels * samples);
         run_exact(drive, signals, {}, options(), table.data());
         return table;
+    }
+    // Both loss maps, by name: the table of the scenario file and the plane of the reference end states.
+    static std::vector<std::pair<const char*, PaperRun>> both() {
+        return {{"table", PaperRun()}, {"plane", PaperRun(plane_map(0.02, 0.04, 0.06))}};
     }
     // Largest error of load speed and twist, relative to the largest of each.
     double error(const Table& a, const Table& exact) const { return lostmotion::error(a, exact, samples); }

@@ -1,26 +1,57 @@
-// Times the paper's run (2-DOF-NL, E_CA = 1.0275, 1 Hz, 2 s from rest, 1 kHz, stand-in loss table) by both solvers.
-// Prints one line a case: name, best time [ms], largest error of load speed and twist against the exact run, relative.
+// What a run costs: over simulated time, number of switchings and size of the loss map; a frequency response; and the
+// floating-point peak of this machine. Prints one line a case: table, then its cells.
 #include <cstdio>
 
 #include "lostmotion/response.hpp"
-#include "lostmotion/simulation.hpp"
 #include "paper_run.hpp"
 
 using namespace lostmotion;
 
 namespace {
 
-struct SamplesOnly {
-    Sampler sampler;
-    bool segment(const Segment<SwitchedDrive>& s) { return sampler.segment(s); }
-    void switching(const Switching&) {}
-};
-
 struct Nothing {
     bool segment(const Segment<SwitchedDrive>&) { return true; }
     void switching(const Switching&) {}
     void step(const Regime&, const Memory&, const DenseStep&, bool) {}
 };
+
+struct Cost {
+    double again = 0.0, first = 0.0;  // [ms], the same drive again and a new one
+    std::size_t switchings = 0;
+};
+
+// Without samples, so that only the motion itself is timed.
+Cost cost_of(const Drive& drive, const Signals& signals, double duration, int repeats) {
+    RunOptions options;
+    options.duration = duration;
+    options.energy = false;
+    options.max_switchings = 0;
+    Cost cost;
+    Workspace workspace(drive);
+    cost.first = best_ms(repeats, [&] { run_exact(drive, signals, {}, options, nullptr); });
+    cost.again = best_ms(
+        repeats, [&] { cost.switchings = run_exact(workspace, signals, {}, options, nullptr).switching_count; });
+    return cost;
+}
+
+void costs() {
+    const PaperRun paper;
+    for (const double duration : {1.0, 10.0, 100.0, 1000.0}) {
+        const Cost c = cost_of(paper.drive, paper.signals, duration, duration > 10.0 ? 3 : 100);
+        std::printf("time|%g|%zu|%.4f|%.4f\n", duration, c.switchings, c.again, c.again / duration);
+    }
+    for (const double amplitude : {0.025, 0.1, 0.3, 1.0275})
+        for (const double frequency : {0.2, 1.0, 5.0, 25.0}) {
+            const Cost c = cost_of(paper.drive, Signals{sine(amplitude, frequency), Signal{}}, 10.0, 20);
+            std::printf("events|%g|%g|%zu|%.4f|%.3f\n", amplitude, frequency, c.switchings, c.again,
+                        c.switchings > 0 ? 1e3 * c.again / static_cast<double>(c.switchings) : 0.0);
+        }
+    for (const int fine : {1, 2, 4, 8, 16}) {
+        const PaperRun finer(stand_in_map(fine));
+        const Cost c = cost_of(finer.drive, finer.signals, 2.0, 50);
+        std::printf("map|%d x %d|%zu|%.4f|%.4f\n", 6 * fine + 1, 10 * fine + 1, c.switchings, c.again, c.first);
+    }
+}
 
 // Follows a transient until no state changes by more than `tolerance` of its size over a period. Returns the periods.
 template <class Solver>
@@ -65,7 +96,7 @@ void response(const Drive& drive) {
             missed = 0;
             for (const ResponseResult& r : respond_all(pool, points, {}, threads, going)) missed += !r.motion.converged;
         });
-        std::printf("response, 480 points by shooting, %u thread%s, %d not found|%.6f|\n", threads,
+        std::printf("response|480 points by shooting, %u thread%s, %d not found|%.6f\n", threads,
                     threads > 1 ? "s" : "", missed, time);
     }
     // Every eighth point, times eight.
@@ -77,7 +108,7 @@ void response(const Drive& drive) {
             follow(solver, p.period, 1e-10);
         }
     });
-    std::printf("response, transients followed to 1e-10, exact solver, 1 thread|%.6f|\n", 8.0 * exact);
+    std::printf("response|transients followed to 1e-10, exact solver, 1 thread|%.6f\n", 8.0 * exact);
     const double adaptive = best_ms(1, [&] {
         for (std::size_t k = 0; k < points.size(); k += 8) {
             const ResponsePoint& p = points[k];
@@ -85,49 +116,33 @@ void response(const Drive& drive) {
             follow(solver, p.period, 1e-6);  // its own noise hides anything finer
         }
     });
-    std::printf("response, transients followed to 1e-6, adaptive solver at 1e-8, 1 thread|%.6f|\n", 8.0 * adaptive);
+    std::printf("response|transients followed to 1e-6, adaptive solver at 1e-8, 1 thread|%.6f\n", 8.0 * adaptive);
 }
+
+// Multiplications and additions in equal numbers, in chains side by side; nothing leaves the registers. [Gflop/s]
+constexpr int chains = 6, rounds = 1000000;
+
+[[gnu::noinline]] void multiply_and_add() {
+    const Vec factor = Vec{} + 1.0000000001, summand = Vec{} + 1e-9;
+    Vec product[chains], sum[chains];
+#pragma GCC unroll 6
+    for (int c = 0; c < chains; ++c) product[c] = sum[c] = factor;
+    for (int k = 0; k < rounds; ++k) {
+#pragma GCC unroll 6
+        for (int c = 0; c < chains; ++c) {
+            product[c] *= factor;
+            sum[c] += summand;
+            asm volatile("" : "+x"(product[c]), "+x"(sum[c]));  // so that no round is left out
+        }
+    }
+}
+
+double peak() { return 2.0 * chains * vec_width * rounds / (1e6 * best_ms(10, multiply_and_add)); }
 
 }  // namespace
 
 int main() {
-    const PaperRun paper;
-    const Drive& drive = paper.drive;
-    const Signals& signals = paper.signals;
-    const std::size_t samples = paper.samples;
-    RunOptions options = paper.options();
-    Table exact(n_channels * samples), other(n_channels * samples);
-
-    const double cold = best_ms(300, [&] { run_exact(drive, signals, {}, options, exact.data()); });
-    std::printf("exact, new drive|%.6f|0\n", cold);
-
-    const SwitchedDrive system(drive);
-    ExactSolver<SwitchedDrive> solver(system, signals, 1e-3, drive.balanced_scale());
-    const double warm = best_ms(300, [&] {
-        SamplesOnly observer{Sampler(drive, 0.0, 1e-3, samples, other.data())};
-        solver.begin(0.0, {}, {});
-        solver.advance(2.0, observer);
-    });
-    std::printf("exact, same drive again|%.6f|%.3g\n", warm, paper.error(other, exact));
-
-    options.energy = true;
-    const double ledger = best_ms(300, [&] { run_exact(drive, signals, {}, options, other.data()); });
-    std::printf("exact, new drive, with energy ledger|%.6f|%.3g\n", ledger, paper.error(other, exact));
-
-    for (const double tolerance : {1e-6, 1e-8}) {
-        const double time = best_ms(50, [&] { run_adaptive(drive, signals, {}, options, tolerance, other.data()); });
-        std::printf("adaptive (Dormand-Prince 5(4)), rtol %g|%.6f|%.3g\n", tolerance, time, paper.error(other, exact));
-    }
-
-    Simulation simulation(drive, 1e-3);
-    double t = 0.0;
-    const double step = best_ms(20, [&] {
-        for (int k = 0; k < 1000; ++k, t += 1e-3) {
-            const double c = 1.0275 * std::sin(2.0 * pi * t);
-            simulation.advance(1e-3, c, c, 0.0, 0.0);
-        }
-    });
-    std::printf("step of 1 ms (Simulation)|%.6f|\n", step / 1000.0);
-
-    response(drive);
+    costs();
+    response(PaperRun().drive);
+    std::printf("peak|%.3f\n", peak());
 }

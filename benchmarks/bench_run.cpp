@@ -1,0 +1,88 @@
+// Times the paper's run (2-DOF-NL, E_CA = 1.0275, 1 Hz, 2 s from rest, 1 kHz) by both solvers.
+// Prints one line a case: loss map, name, best time [ms], largest error of load speed and twist against the exact run,
+// relative. With a number: makes the run that often and prints nothing, for counting instructions.
+#include <cstdio>
+#include <cstdlib>
+
+#include "lostmotion/simulation.hpp"
+#include "paper_run.hpp"
+
+using namespace lostmotion;
+
+namespace {
+
+struct SamplesOnly {
+    Sampler sampler;
+    bool segment(const Segment<SwitchedDrive>& s) { return sampler.segment(s); }
+    void switching(const Switching&) {}
+};
+
+// The same drive again and again.
+class Repeated {
+ public:
+    explicit Repeated(const PaperRun& paper)
+        : paper_(paper),
+          system_(paper.drive),
+          solver_(system_, paper.signals, 1e-3, paper.drive.balanced_scale()),
+          table(n_channels * paper.samples) {}
+    void run() {
+        SamplesOnly observer{Sampler(paper_.drive, 0.0, 1e-3, paper_.samples, table.data())};
+        solver_.begin(0.0, {}, {});
+        solver_.advance(2.0, observer);
+    }
+
+ private:
+    const PaperRun& paper_;
+    SwitchedDrive system_;
+    ExactSolver<SwitchedDrive> solver_;
+
+ public:
+    Table table;
+};
+
+void compare(const char* map, const PaperRun& paper) {
+    const Drive& drive = paper.drive;
+    RunOptions options = paper.options();
+    Table exact(n_channels * paper.samples), other(n_channels * paper.samples);
+    const double cold = best_ms(300, [&] { run_exact(drive, paper.signals, {}, options, exact.data()); });
+    std::printf("%s|exact, new drive|%.6f|0\n", map, cold);
+
+    Repeated repeated(paper);
+    const double warm = best_ms(600, [&] { repeated.run(); });
+    std::printf("%s|exact, same drive again|%.6f|%.3g\n", map, warm, paper.error(repeated.table, exact));
+
+    options.energy = true;
+    const double ledger = best_ms(300, [&] { run_exact(drive, paper.signals, {}, options, other.data()); });
+    std::printf("%s|exact, new drive, with energy ledger|%.6f|%.3g\n", map, ledger, paper.error(other, exact));
+
+    options.energy = false;
+    for (const double tolerance : {1e-6, 1e-8}) {
+        const double time =
+            best_ms(50, [&] { run_adaptive(drive, paper.signals, {}, options, tolerance, other.data()); });
+        std::printf("%s|adaptive (Dormand-Prince 5(4)), rtol %g|%.6f|%.3g\n", map, tolerance, time,
+                    paper.error(other, exact));
+    }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    if (argc > 1) {
+        const PaperRun paper;
+        Repeated repeated(paper);
+        for (int k = std::atoi(argv[1]); k > 0; --k) repeated.run();
+        return 0;
+    }
+    for (const auto& [map, paper] : PaperRun::both()) compare(map, paper);
+
+    const PaperRun paper;
+    Simulation simulation(paper.drive, 1e-3);
+    double t = 0.0;
+    const double step = best_ms(20, [&] {
+        for (int k = 0; k < 1000; ++k, t += 1e-3) {
+            const double c = 1.0275 * std::sin(2.0 * pi * t);
+            simulation.advance(1e-3, c, c, 0.0, 0.0);
+        }
+    });
+    std::printf("table|step of 1 ms (Simulation)|%.6f|\n", step / 1000.0);
+}

@@ -1,0 +1,43 @@
+"""Text that reads well in the terminal and as Markdown, and the clock."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+
+def best(repeats: int, work: Callable[[], object]) -> float:
+    """Least time of several [ms]."""
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - begin)
+    return 1e3 * min(times)
+
+
+class Report:
+    """Lines, as they are added."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def add(self, *lines: str) -> None:
+        self.lines += lines
+
+    def section(self, title: str, text: str) -> None:
+        self.add("", f"## {title}", "", text, "")
+
+    def table(self, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        widths = [max(len(str(r[k])) for r in [header, *rows]) for k in range(len(header))]
+
+        def line(cells: Sequence[str]) -> str:
+            first, *rest = (str(c) for c in cells)
+            aligned = [first.ljust(widths[0]), *(c.rjust(w) for c, w in zip(rest, widths[1:], strict=True))]
+            return "| " + " | ".join(aligned) + " |"
+
+        rule = "|".join(("-" * (w + 1) + ":") if k else "-" * (w + 2) for k, w in enumerate(widths))
+        self.add(line(header), f"|{rule}|", *(line(r) for r in rows))
+
+    def text(self) -> str:
+        return "\n".join(self.lines) + "\n"
