@@ -28,7 +28,9 @@ def start_up(*command: str) -> float:
 
 def outputs(build: Path) -> dict[str, list[list[str]]]:
     """What the C++ programs print; those for AVX2 only where the processor has it, and costs by the better one alone."""
-    wanted = [p for p in PROGRAMS if (build / p).exists() and (_instruction_set.supports_avx2() or not p.endswith("avx2"))]
+    wanted = [
+        p for p in PROGRAMS if (build / p).exists() and (_instruction_set.supports_avx2() or not p.endswith("avx2"))
+    ]
     if "bench_costs_avx2" in wanted:
         wanted.remove("bench_costs_any")
     return {

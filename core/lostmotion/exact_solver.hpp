@@ -316,11 +316,10 @@ class ExactSolver {
         }
         if (first == 0) return false;
         // value = h^k (derivative_k / k! + what follows), bounded at the far end.
-        constexpr std::array<double, 4> factorial{1.0, 1.0, 2.0, 6.0};
-        double least = derivative[first] / factorial[first] - bounds_.fourth[g] * std::pow(h, 4 - first) / 24.0;
-        for (int k = first + 1; k < 4; ++k)
-            least += std::min(0.0, derivative[k]) * std::pow(h, k - first) / factorial[k];
-        return least > 0.0;
+        constexpr std::array<double, 5> factorial{1.0, 1.0, 2.0, 6.0, 24.0};
+        double least = derivative[first] / factorial[first], power = h;
+        for (int k = first + 1; k < 4; ++k, power *= h) least += power * std::min(0.0, derivative[k]) / factorial[k];
+        return least > power * bounds_.fourth[g] / factorial[4];
     }
 
     // Earliest of the certified crossings; `end` is left there.

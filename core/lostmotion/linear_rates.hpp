@@ -51,6 +51,10 @@ struct Matrix {
     [[gnu::always_inline]] double angle_row(const double* v) const {
         return (angle[0] * v[0] + angle[1] * v[1]) + (angle[2] * v[2] + angle[3] * v[3]);
     }
+    void add_diagonal(double value) {
+        for (int k = 0; k < coupled; ++k) column[k][k] += value;
+        angle_own += value;
+    }
     // factor * other, entry by entry
     void add(double factor, const Matrix& other) {
         combine(other, [factor](double own, double others) { return own + factor * others; });
@@ -118,7 +122,8 @@ struct LinearRates {
         add_scaled(c, m.held_torque, per_held);
         return c;
     }
-    State operator()(const State& x, const State& constant, const std::array<double, n_inputs>& u) const {
+    [[gnu::always_inline]] State operator()(const State& x, const State& constant,
+                                            const std::array<double, n_inputs>& u) const {
         State out = higher(x, u);
         add_scaled(out, 1.0, constant);
         return out;

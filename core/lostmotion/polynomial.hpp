@@ -42,7 +42,7 @@ struct Cubic {
     double zero(double b) const {
         // By powers, for the sake of speed: c0 + z (a1 + z (a2 + z a3)).
         const double a1 = 3.0 * (c1 - c0), a2 = 3.0 * (c0 - 2.0 * c1 + c2), a3 = c3 - c0 + 3.0 * (c1 - c2);
-        double a = 0.0, z = 0.5 * b;
+        double a = 0.0, z = b * std::clamp(c0 / (c0 - (*this)(b)), 0.25, 0.75);
         for (int k = 0; k < 60; ++k) {
             const double value = c0 + z * (a1 + z * (a2 + z * a3)), slope = a1 + z * (2.0 * a2 + z * (3.0 * a3));
             (value > 0.0 ? a : b) = z;

@@ -232,11 +232,33 @@ class Propagator {
 
     // G over at most one base interval.
     Matrix integral_series(double h) const {
-        Matrix term = Matrix::diagonal(h), sum;
-        for (int k = 1; k <= Expansion::most; ++k) {
-            sum.add(1.0, term);
-            term = linear_->rate * term;
-            term.scale(h / (k + 1));
+        Matrix one = linear_->rate, two = squared_, three = cubed_;
+        one.scale(h);
+        two.scale(h * h);
+        three.scale(h * h * h);
+        Matrix sum = power_series<1>(one, two, three);
+        sum.scale(h);
+        return sum;
+    }
+    // sum_k B^k/(k + shift)!, from the first three powers of B; its norm is at most that of a base interval.
+    template <int shift>
+    static Matrix power_series(const Matrix& one, const Matrix& two, const Matrix& three) {
+        static_assert(Expansion::most == 12);
+        static constexpr auto coefficient = [] {
+            std::array<double, 12> c{};
+            double factorial = 1.0;  // of k + shift
+            for (int k = 0; k < 12; ++k) {
+                if (k + shift > 1) factorial *= k + shift;
+                c[k] = 1.0 / factorial;
+            }
+            return c;
+        }();
+        Matrix sum;
+        for (int k = 9; k >= 0; k -= 3) {
+            if (k < 9) sum = three * sum;
+            sum.add_diagonal(coefficient[k]);
+            sum.add(coefficient[k + 1], one);
+            sum.add(coefficient[k + 2], two);
         }
         return sum;
     }
@@ -251,13 +273,8 @@ class Propagator {
         positive.combine(Matrix{}, [h](double a, double) { return h * std::fabs(a); });
         for (int k = 0; k < Matrix::coupled; ++k)
             positive.column[k][k] = h * std::fmax(linear_->rate.column[k][k], 0.0);
-        s.growth = Matrix::diagonal(1.0);
-        Matrix bound = s.growth;
-        for (int k = 1; k <= 8; ++k) {
-            bound = positive * bound;
-            bound.scale(1.0 / k);
-            s.growth.add(1.0, bound);
-        }
+        const Matrix twice = positive * positive;
+        s.growth = power_series<0>(positive, twice, positive * twice);
         for (int q = 0; q < n_basis_; ++q) {
             const InputBasis& b = basis_[q];
             // y' = A y + b r(s), r = s, cos(omega s) - 1 or sin(omega s), by the series of r.

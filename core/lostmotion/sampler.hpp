@@ -43,7 +43,6 @@ class Sampler {
             if (level >= 0) {
                 stride_.place(p, level, s.constant, cursor);
                 stride_.run(n, instants_);
-                cursor.move_to(instant(next_ + n - 1), stride_.x());
             } else {
                 instants_.set(0, cursor.x(), cursor.input().values());
                 for (int k = 1; k < n; ++k) {
@@ -56,6 +55,7 @@ class Sampler {
             next_ += static_cast<std::size_t>(n);
             if (next_ == end) return true;
             if (next_ % 4096 == 0 && interrupted != nullptr && interrupted(interrupted_context)) return false;
+            if (level >= 0) cursor.move_to(instant(next_ - 1), stride_.x());
             cursor.advance(instant(next_) - cursor.time());
         }
     }

@@ -201,13 +201,13 @@ class InputState {
         for (int k = 2; k < n; ++k) u[k] = {};
         for (int q = first_sine_; q < size_; q += 2) {
             const int i = basis_[q].input;
-            const double omega = basis_[q].omega;
-            double s = weights_[q], c = weights_[q + 1];
-            for (int k = 0; k < n; ++k) {
-                u[k][i] += s;
-                const double next = omega * c;
-                c = -omega * s;
-                s = next;
+            const double omega = basis_[q].omega, turned_twice = -omega * omega;
+            double even = weights_[q], odd = omega * weights_[q + 1];
+            for (int k = 0; k < n; k += 2) {
+                u[k][i] += even;
+                even *= turned_twice;
+                if (k + 1 < n) u[k + 1][i] += odd;
+                odd *= turned_twice;
             }
         }
     }
