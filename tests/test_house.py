@@ -37,6 +37,7 @@ ROOMS = [
     {"plots"},
     {"pages"},
     {"rig_sheet"},
+    {"study_units"},
     {"study_file"},
     {"study_engine"},
     {"study_report"},

@@ -26,6 +26,8 @@ from lostmotion.paper import paper_scenario
 from lostmotion.study_engine import CHUNK, _core_can, run_chunk, scenario_of_run
 from lostmotion.study_file import FUNCTIONS, Study
 from lostmotion.study_report import best_runs, influence, read_table, sobol_indices
+from lostmotion.study_units import unit_of_expression
+from lostmotion.units import registry
 
 SHORT = paper_scenario("2-DOF-NL", "large").replace(**{"simulation.duration": 0.2, "simulation.sample_interval": 2e-3})
 
@@ -166,6 +168,43 @@ def test_parquet_opens_directly_with_study_and_parameters(tmp_path: Path):
     stored = json.loads(meta[b"lostmotion_study"])
     assert stored["scenario"]["gearbox"]["ratio"] == 90.0
     assert stored["keep"]["peak_speed"] == "peak(load_speed)"
+    for schema in (pq.read_schema(directory / "part-000000.parquet"), read_table(directory).schema):
+        units = {f.name: (f.metadata or {}).get(b"units", b"").decode() for f in schema}
+        assert units["load.inertia"] == "kg*m^2"
+        assert (
+            units["stiffness"] == units["lost"] == units["efficiency_driving"] == "1"
+        )  # relative; a share of energies
+        assert (units["peak_speed"], units["rms_twist"], units["starts"]) == ("rad/s", "rad", "s")
+
+
+@pytest.mark.parametrize(
+    ("expression", "unit"),
+    [
+        ("mean(input_contact == 0)", "1"),
+        ("(output_torque * motor_speed).integrate('time')", "N*m*rad"),
+        ("sqrt(mean(output_torque**2))", "N*m"),
+        ("peak(output_torque) / peak(twist)", "N*m/rad"),
+        ("bandwidth(0.1)", "Hz"),
+        ("energy.source - energy.load_work", "J"),
+        ("peak(load_speed - ideal_speed)", "rad/s"),
+        ("peak(twist) * 1e6", ""),  # of what may be a change of unit nothing is claimed
+        ("peak(twist) + peak(load_speed)", ""),
+    ],
+)
+def test_an_expression_has_the_unit_of_what_it_gives(expression: str, unit: str):
+    parse = registry().Unit
+    found = unit_of_expression(expression)
+    assert (found == "") == (unit == "")
+    assert parse("" if found == "1" else found.replace("^", "**")) == parse("" if unit == "1" else unit)
+
+
+def test_values_with_the_unit_of_something_else_are_refused():
+    with pytest.raises(ValueError, match=r"of load.inertia: has the unit of something else \(N\).*kg\*m\^2"):
+        make(vary=[{"key": "load.inertia", "uniform": ["1 N", "2 N"]}])
+    with pytest.raises(ValueError, match=r"of gearbox.stiffness.slopes: has the unit of something else"):
+        make(vary=[{"key": "gearbox.stiffness.slopes", "relative": True, "uniform": ["1 N*m/rad", "2 N*m/rad"]}])
+    read = make(vary=[{"key": "motor.rated_speed", "triangular": ["3000 rpm", "3300 rpm", 400.0]}]).vary[0].triangular
+    assert read == pytest.approx((3000 * math.pi / 30, 3300 * math.pi / 30, 400.0))
 
 
 # --- designs ---

@@ -33,6 +33,7 @@ from .study_file import (
     to_json,
     uses,
 )
+from .study_units import unit_of_expression
 from .variables import CHANNEL_NAMES, VARIABLES
 
 SLOPES = "gearbox.stiffness.slopes"
@@ -50,6 +51,15 @@ def compute_chunk(text: str, first: int, last: int, threads: int = 1) -> bytes:
 @lru_cache(maxsize=8)
 def _parsed(text: str) -> Study:
     return from_json(text)
+
+
+@lru_cache(maxsize=8)
+def _units(text: str) -> dict[str, str]:
+    """Units of the columns; empty where an expression's cannot be told."""
+    study = _parsed(text)
+    units = {v.title: v.unit for v in study.vary} | {n: unit_of_expression(e) for n, e in study.keep.items()}
+    of = {v.name: v.unit for v in VARIABLES}
+    return units | {f"{n} over time": of[n] for n in (study.trajectories.variables if study.trajectories else ())}
 
 
 def _needed(study: Study) -> frozenset[str]:
@@ -84,7 +94,9 @@ def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads
             columns[f"{name} over time"] = pa.array([None if b else row for b, row in zip(bad, kept, strict=True)])
     columns["switchings"] = pa.array(runs.switchings.astype(np.int64))
     columns["error"] = pa.array(runs.errors)
-    table = pa.table(columns)
+    units = _units(text)
+    fields = [pa.field(n, c.type, metadata={"units": units[n]} if units.get(n) else None) for n, c in columns.items()]
+    table = pa.table(columns, schema=pa.schema(fields))
     out = io.BytesIO()
     pq.write_table(
         table.replace_schema_metadata({"lostmotion_study": text, "lostmotion_version": installed_version()}), out

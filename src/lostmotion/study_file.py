@@ -12,37 +12,32 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from .errors import InputError
 from .quantities import Part
 from .results import ENERGY
 from .scenario import Scenario, load
+from .study_units import in_si, unit_of_key
 from .toml_files import read_toml
-from .units import si_number
 from .variables import VARIABLES
 
 CHUNK = 500  # runs that are computed, and written, as one
 MAX_RUNS = 100_000_000
 
 
-def _number(value: Any) -> Any:
-    return si_number(value) if isinstance(value, str) else value
-
-
-Value = Annotated[float, BeforeValidator(_number)]
-"""a number in SI, or a string with a unit"""
+WAYS = ("values", "grid", "uniform", "log_uniform", "normal", "triangular")
 
 
 class Normal(Part):
     """Normal distribution."""
 
-    mean: Value
-    deviation: Annotated[Value, Field(gt=0.0)]
+    mean: float
+    deviation: Annotated[float, Field(gt=0.0)]
 
 
 class Vary(Part):
-    """One parameter, or several that go together."""
+    """One parameter, or several that go together. Values are SI, or strings with a unit of what the key measures."""
 
     key: str = ""
     """dotted key of the scenario, such as load.inertia"""
@@ -52,23 +47,31 @@ class Vary(Part):
     """column in the result; the first key if left out"""
     relative: bool = False
     """the value multiplies what the base scenario has (of a list, each entry)"""
-    values: tuple[Value, ...] | None = None
+    values: tuple[float, ...] | None = None
     """as they are; in a random design each is as likely"""
-    grid: tuple[Value, Value, int] | None = None
+    grid: tuple[float, float, int] | None = None
     """first, last, how many"""
-    uniform: tuple[Value, Value] | None = None
-    log_uniform: tuple[Value, Value] | None = None
+    uniform: tuple[float, float] | None = None
+    log_uniform: tuple[float, float] | None = None
     normal: Normal | None = None
-    triangular: tuple[Value, Value, Value] | None = None
+    triangular: tuple[float, float, float] | None = None
     """least, most likely, largest"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_units(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        key = data.get("key") or next(iter(data.get("keys") or ()), "")
+        unit = "" if data.get("relative") else unit_of_key(str(key))
+        try:
+            return data | {way: in_si(data[way], unit) for way in WAYS if way in data}
+        except ValueError as error:
+            raise ValueError(f"of {key}: {error}") from None
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        ways = [
-            w
-            for w in ("values", "grid", "uniform", "log_uniform", "normal", "triangular")
-            if getattr(self, w) is not None
-        ]
+        ways = [w for w in WAYS if getattr(self, w) is not None]
         if bool(self.key) == bool(self.keys):
             raise ValueError("needs key or keys, one of the two")
         if len(ways) != 1:
@@ -93,6 +96,11 @@ class Vary(Part):
     @property
     def title(self) -> str:
         return self.name or self.all_keys[0]
+
+    @property
+    def unit(self) -> str:
+        """Of the values."""
+        return (unit_of_key(self.all_keys[0]) if not self.relative else None) or "1"
 
     def levels(self) -> np.ndarray | None:
         """Values of a grid or list; None for a distribution."""

@@ -30,16 +30,22 @@ def read_table(directory: Path) -> pa.Table:
     return ds.dataset(files, format="parquet").to_table().sort_by("run")
 
 
+def labelled(table: pa.Table, name: str) -> str:
+    """A column's name with its unit."""
+    unit = (table.schema.field(name).metadata or {}).get(b"units", b"1").decode()
+    return name if unit == "1" else f"{name} [{unit}]"
+
+
 def statistics(table: pa.Table, study: Study) -> list[list[Any]]:
     """Name, mean, deviation, least, 5 %, 50 %, 95 %, largest of each kept value."""
     rows = []
     for name in study.keep:
         x = _finite(table, name)
         if len(x) == 0:
-            rows.append([name, *[np.nan] * 7])
+            rows.append([labelled(table, name), *[np.nan] * 7])
             continue
         quantiles = np.quantile(x, [0.0, 0.05, 0.5, 0.95, 1.0]).tolist()
-        rows.append([name, float(x.mean()), float(x.std()), *quantiles])
+        rows.append([labelled(table, name), float(x.mean()), float(x.std()), *quantiles])
     return rows
 
 
@@ -110,7 +116,7 @@ def distributions(table: pa.Table, study: Study) -> Figure:
             axes.hist(x, bins=min(60, max(5, round(len(x) ** 0.5))), color=INK)
             for q in np.quantile(x, [0.05, 0.5, 0.95]):
                 axes.axvline(q, color=ACCENT, linewidth=1.2)
-        axes.set(xlabel=name, ylabel="runs")
+        axes.set(xlabel=labelled(table, name), ylabel="runs")
     return figure
 
 
@@ -146,9 +152,9 @@ def scatter(table: pa.Table, study: Study, most: int = 6) -> Figure:
             axes.plot(some[parameter].to_numpy(), some[name].to_numpy(), ".", markersize=2.5, color=INK, alpha=0.5)
             axes.tick_params(labelsize=7)
             if r == len(keep) - 1:
-                axes.set_xlabel(parameter, fontsize=8)
+                axes.set_xlabel(labelled(table, parameter), fontsize=8)
             if c == 0:
-                axes.set_ylabel(name, fontsize=8)
+                axes.set_ylabel(labelled(table, name), fontsize=8)
     return figure
 
 
@@ -160,7 +166,7 @@ def show(directory: Path) -> list[str]:
     failed = [e for e in table["error"].to_pylist() if e]
     lines = [study.title or str(directory), f"  {table.num_rows} of {study.total} runs, {len(failed)} failed"]
     lines += [f"    {failed.count(e)} x {e}" for e in list(dict.fromkeys(failed))[:5]]
-    width = max(len(n) for n in study.keep) + 2
+    width = max(len(r[0]) for r in rows) + 2
     lines.append("  " + header[0].ljust(width) + "".join(h.rjust(12) for h in header[1:]))
     lines += ["  " + r[0].ljust(width) + "".join(f"{x:12.5g}" for x in r[1:]) for r in rows]
     view = directory / "show"
