@@ -42,7 +42,7 @@ class RegimeCache {
 
         // How far the guards lie above a thousandth of the sizes of their terms.
         GuardTable::Values guard_room(const Instant& now) const {
-            GuardTable::Values constant, value, size;
+            GuardTable::Values constant{}, value, size;
             guards.constants(now.memory, constant);
             guards.evaluate(constant, now.x, now.input[0], value);
             guard_sizes.constants(magnitudes(now.memory), constant);
