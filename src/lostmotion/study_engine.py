@@ -62,6 +62,10 @@ def _units(text: str) -> dict[str, str]:
     return units | {f"{n} over time": of[n] for n in (study.trajectories.variables if study.trajectories else ())}
 
 
+def _asks_for(study: Study, name: str) -> bool:
+    return any(uses(e, name) for e in study.keep.values())
+
+
 def _needed(study: Study) -> frozenset[str]:
     """The result variables that the study looks at."""
     needed = {name for e in study.keep.values() for name in check_expression("", e)}
@@ -70,7 +74,7 @@ def _needed(study: Study) -> frozenset[str]:
 
 def run_chunk(study: Study, first: int, last: int, threads: int) -> Runs:
     """Simulates the runs; nearly all the time goes here, most of it with the GIL released."""
-    energy = any(uses(e, "energy") for e in study.keep.values())
+    energy = _asks_for(study, "energy")
     simulate_all = _in_the_core if _core_can(study) else _one_by_one
     return simulate_all(study, study.parameters(first, last), sorted(_sources(_needed(study))), energy, threads)
 
@@ -84,7 +88,8 @@ def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads
     for k, v in enumerate(study.vary):
         columns[v.title] = pa.array(runs.parameters[:, k])
     data = _derived(study, runs, _needed(study))
-    kept_values = {name: evaluate(e, data, runs, study, threads) for name, e in study.keep.items()}
+    names = _names(study, data, runs, threads)
+    kept_values = {name: evaluate(e, names, last - first) for name, e in study.keep.items()}
     bad = np.array([e != "" for e in runs.errors])
     for name, values in kept_values.items():
         columns[name] = pa.array(np.where(bad, np.nan, values))
@@ -136,30 +141,41 @@ def _derived(study: Study, runs: Runs, needed: frozenset[str]) -> dict[str, np.n
     return {name: whole[name] for name in needed | set(runs.samples)}
 
 
-def evaluate(expression: str, data: dict[str, np.ndarray], runs: Runs, study: Study, threads: int) -> np.ndarray:
-    """An expression over all runs of a chunk at once; shape (runs,). What cannot be found of a run is noted in its error."""
+@lru_cache(maxsize=4)
+def _instants(samples: int, interval: float) -> Any:
+    """The coordinate of the samples; making its index takes longer than many a reduction."""
+    import xarray as xr
+
+    return xr.Coordinates({"time": np.arange(samples) * interval})
+
+
+def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) -> dict[str, Any]:
+    """All that the study's expressions may use, over all runs of a chunk."""
     import xarray as xr
 
     def each_run(values: np.ndarray) -> xr.DataArray:
         return xr.DataArray(values, dims="run")
 
-    table = study.scenario.simulation
-    time = np.arange(table.samples) * table.sample_interval
-    names: dict[str, Any] = {
-        name: xr.DataArray(data[name], dims=("run", "time"), coords={"time": time})
-        for name in check_expression("", expression)
-    }
-    names["time"] = xr.DataArray(time, dims="time", coords={"time": time})
-    names["energy"] = SimpleNamespace(**{k: each_run(v) for k, v in runs.energy.items()})
-    if uses(expression, "ideal_speed"):
+    instants = _instants(study.scenario.simulation.samples, study.scenario.simulation.sample_interval)
+    used = {name for e in study.keep.values() for name in check_expression("", e)}
+    names: dict[str, Any] = {name: xr.DataArray(data[name], instants, ("run", "time")) for name in used}
+    names["time"] = xr.DataArray(instants["time"], instants)
+    if _asks_for(study, "energy"):
+        names["energy"] = SimpleNamespace(**{k: each_run(v) for k, v in runs.energy.items()})
+    if _asks_for(study, "ideal_speed"):
         names["ideal_speed"] = names["command"] * each_run(_ideal_speeds(study, runs))
     names["bandwidth"] = lambda amplitude=None: each_run(_bandwidths(study, runs, amplitude, threads))
+    return names | FUNCTIONS
+
+
+def evaluate(expression: str, names: dict[str, Any], runs: int) -> np.ndarray:
+    """Value of an expression for each run of a chunk, shape (runs,)."""
     with np.errstate(all="ignore"):
-        value = eval(compile(expression, expression, "eval"), {"__builtins__": {}}, names | FUNCTIONS)
+        value = eval(compile(expression, expression, "eval"), {"__builtins__": {}}, names)
     dims = getattr(value, "dims", ())
     if "time" in dims:
         raise InputError(f"keep: {expression!r} leaves a value for each instant; reduce it, as in peak({expression})")
-    return np.broadcast_to(np.asarray(value, dtype=float), (len(runs.errors),))
+    return np.broadcast_to(np.asarray(value, dtype=float), (runs,))
 
 
 def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
@@ -176,7 +192,10 @@ def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
 
 
 def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.ndarray:
-    """Bandwidth [Hz] of the load speed for each run, at the amplitude of its command or at the given one."""
+    """Bandwidth [Hz] of the load speed for each run, at the amplitude of its command or at the given one.
+
+    Where it cannot be found, the run's error says why.
+    """
     amplitudes = np.broadcast_to(np.nan if amplitude is None else np.asarray(amplitude, dtype=float), len(runs.errors))
 
     def find(k: int) -> float:
