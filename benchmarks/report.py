@@ -6,13 +6,13 @@ import time
 from collections.abc import Callable, Sequence
 
 
-def best(repeats: int, work: Callable[[], object]) -> float:
+def best(repeats: int, work: Callable[[], object], clock: Callable[[], float] = time.perf_counter) -> float:
     """Least time of several [ms]."""
     times = []
     for _ in range(repeats):
-        begin = time.perf_counter()
+        begin = clock()
         work()
-        times.append(time.perf_counter() - begin)
+        times.append(clock() - begin)
     return 1e3 * min(times)
 
 

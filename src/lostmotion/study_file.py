@@ -283,32 +283,41 @@ def _final(x: Any) -> Any:
     return x.isel(time=-1)
 
 
-def _over_time(name: str) -> Callable[[Any], Any]:
-    """A reduction of xarray that leaves out NaN; most variables have none, and it is the search for them that takes long."""
+def _over_time(plain: Callable[..., Any], careful: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """A reduction of xarray that leaves out NaN. Most variables have none, and it is the search for them that takes long.
+
+    plain
+        Of values and axis, by numpy.
+    careful
+        Of an array of xarray, where the plain one has met NaN.
+    """
 
     def reduce(x: Any) -> Any:
-        plain = getattr(x, name)("time", skipna=False)
-        return plain if np.isfinite(plain).all() else getattr(x, name)("time")
+        found = x.reduce(plain, "time")
+        return found if np.isfinite(found.values).all() else careful(x)
 
     return reduce
 
 
-_mean, _least, _largest = (_over_time(name) for name in ("mean", "min", "max"))
+_mean = _over_time(np.mean, lambda x: x.mean("time"))
+_rms = _over_time(lambda v, axis: np.mean(v * v, axis=axis) ** 0.5, lambda x: (x**2).mean("time") ** 0.5)
 
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "peak": lambda x: np.maximum(_largest(x), -_least(x)),
-    "rms": lambda x: _mean(x * x) ** 0.5,
+    "peak": _over_time(
+        lambda v, axis: np.maximum(np.max(v, axis=axis), -np.min(v, axis=axis)), lambda x: abs(x).max("time")
+    ),
+    "rms": _rms,
     "mean": _mean,
     "final": _final,
-    "least": _least,
-    "largest": _largest,
+    "least": _over_time(np.min, lambda x: x.min("time")),
+    "largest": _over_time(np.max, lambda x: x.max("time")),
     # First instant [s] at which the variable is more than `share` of its peak away from its start; NaN if never.
     "dead_time": lambda x, share=0.01: (
         x["time"].where(abs(x - x.isel(time=0)) > share * abs(x).max("time")).min("time")
     ),
     # Root mean square of the distance from a reference.
-    "tracking_error": lambda x, reference: _mean((x - reference) ** 2) ** 0.5,
+    "tracking_error": lambda x, reference: _rms(x - reference),
     "abs": abs,
     "sqrt": np.sqrt,
     "exp": np.exp,
