@@ -165,7 +165,7 @@ class Propagator {
         const double turned = norm_ * s;
         double left = 1.0;  // bound on the relative size of what follows
         int n = 0;
-        for (; (n <= n_states || left >= 1e-19) && n < Expansion::most; n += 2)
+        for (; (n <= n_states || left >= 1e-17) && n < Expansion::most; n += 2)
             left *= turned * turned * (reciprocal[n + 1] * reciprocal[n + 2]);
         return n;
     }
