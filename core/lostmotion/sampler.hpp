@@ -50,8 +50,7 @@ class Sampler {
                     instants_.set(k, cursor.x(), cursor.input().values());
                 }
             }
-            for (std::size_t c = 0; c < channels_.size(); ++c)
-                reader.read(channels_[c], instants_, n, out_ + c * count_ + next_);
+            for (int k = 0; k < n; k += vec_width) write(reader, k, n);
             next_ += static_cast<std::size_t>(n);
             if (next_ == end) return true;
             if (next_ % 4096 == 0 && interrupted != nullptr && interrupted(interrupted_context)) return false;
@@ -73,6 +72,20 @@ class Sampler {
         while (k > next_ && !within(k - 1)) --k;
         while (k < count_ && within(k)) ++k;
         return k;
+    }
+    // All channels at the instants k, k + 1, ... of n. What goes beyond these is written again by the segment that they
+    // belong to, but must not go beyond the channel.
+    void write(const Reader& reader, int k, int n) {
+        double* to = out_ + next_ + k;
+        const bool whole = next_ + static_cast<std::size_t>(k + vec_width) <= count_;
+        for (const int c : channels_) {
+            const Vec value = reader.read(c, instants_, k);
+            if (whole)
+                store(value, to);
+            else
+                for (int lane = 0; k + lane < n; ++lane) to[lane] = value[lane];
+            to += count_;
+        }
     }
     // The level whose length is the sampling interval, or -1.
     int level_of_interval(Propagator& p) const {
