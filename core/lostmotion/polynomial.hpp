@@ -37,19 +37,22 @@ struct Cubic {
             if (s > 0.0 && s < 1.0 && (*this)(s) < (*this)(best)) best = s;
         return best;
     }
-    // Zero between 0, where it is positive, and `b`, where it is negative, to a few digits: Newton, kept in its bracket
-    // by bisection.
+    // Zero between 0, where it is positive, and `b`, where it is negative, to a few digits: Halley's method, kept in
+    // its bracket by bisection.
     double zero(double b) const {
         // By powers, for the sake of speed: c0 + z (a1 + z (a2 + z a3)).
         const double a1 = 3.0 * (c1 - c0), a2 = 3.0 * (c0 - 2.0 * c1 + c2), a3 = c3 - c0 + 3.0 * (c1 - c2);
-        double a = 0.0, z = b * std::clamp(c0 / (c0 - (*this)(b)), 0.25, 0.75);
+        double a = 0.0, z = 0.5 * b;
+        if (b == 1.0) z = std::clamp(c0 / (c0 - c3), 0.25, 0.75);
         for (int k = 0; k < 60; ++k) {
             const double value = c0 + z * (a1 + z * (a2 + z * a3)), slope = a1 + z * (2.0 * a2 + z * (3.0 * a3));
             (value > 0.0 ? a : b) = z;
-            const double next = z - value / slope, moved = std::fabs(next - z);
+            const double half_curvature = a2 + 3.0 * (z * a3);
+            const double next = z - value * slope / (slope * slope - value * half_curvature);
+            const double moved = std::fabs(next - z);
             const bool inside = next > a && next < b;
             z = inside ? next : 0.5 * (a + b);
-            if ((inside && moved < 1e-3 * z) || b - a < 1e-9) break;
+            if ((inside && moved < 1e-2 * z) || b - a < 1e-9) break;
         }
         return z;
     }
@@ -69,9 +72,10 @@ class Polynomial {
  private:
     template <int n>
     static double sum(const double* c, double z) {
-        const double z2 = z * z, z4 = z2 * z2;
-        Quad total = Quad::load(c + n - 4);
-        for (int k = n - 8; k >= 0; k -= 4) total = Quad::load(c + k) + z4 * total;
+        const double z2 = z * z, z4 = z2 * z2, z8 = z4 * z4;
+        Quad high = Quad::load(c + 8);
+        if constexpr (n > 12) high = high + z4 * Quad::load(c + 12);
+        const Quad total = (Quad::load(c) + z4 * Quad::load(c + 4)) + z8 * high;
         alignas(32) double t[4];
         total.store(t);
         return (t[0] + t[1] * z) + (t[2] + t[3] * z) * z2;

@@ -117,11 +117,12 @@ class Propagator {
 
     // x after the step of level k; `rate` is x' at the anchor, `weights` the input state there.
     [[gnu::always_inline]] State step(int k, const State& x, const State& rate, const double* weights) {
-        Quad sum = level(k).integral * Quad::load(rate.data());
+        const Quad free = level(k).integral * Quad::load(rate.data());
         const Response* response = responses(k);
-        for (int q = 0; q < n_basis_; ++q) sum = sum + weights[q] * Quad::load(response[q].x.data());
+        Quad forced{};
+        for (int q = 0; q < n_basis_; ++q) forced = forced + weights[q] * Quad::load(response[q].x.data());
         State y;
-        (Quad::load(x.data()) + sum).store(y.data());
+        (Quad::load(x.data()) + (free + forced)).store(y.data());
         store_single(x[load_angle] + angle_step(k, rate.data(), rate[load_angle], weights), &y[load_angle]);
         return y;
     }
@@ -133,13 +134,14 @@ class Propagator {
         alignas(32) double from[Matrix::coupled];
         rate.store(from);
         angle += angle_step(k, from, turning_ * x.part[load_speed / vec_width][load_speed % vec_width], weights);
-        Quad sum = s.integral * rate, rate_sum = s.change * rate;
+        // What the inputs bring does not wait for the step before, so it is summed up by itself.
+        Quad forced{}, forced_rate{};
         for (int q = 0; q < n_basis_; ++q) {
-            sum = sum + weights[q] * Quad::load(response[q].x.data());
-            rate_sum = rate_sum + weights[q] * Quad::load(response[q].rate.data());
+            forced = forced + weights[q] * Quad::load(response[q].x.data());
+            forced_rate = forced_rate + weights[q] * Quad::load(response[q].rate.data());
         }
-        x = x + sum;
-        rate = rate + rate_sum;
+        x = x + (s.integral * rate + forced);
+        rate = rate + (s.change * rate + forced_rate);
     }
 
     // G(h) for any length: whole levels from the longest down, then the Taylor series.
@@ -169,19 +171,20 @@ class Propagator {
             left *= turned * turned * (reciprocal[n + 1] * reciprocal[n + 2]);
         return n;
     }
-    // Fills in the derivatives of the state after the first, which is given; terms and inputs are there. By A^2, so
-    // that those of even and of odd order are reckoned side by side.
+    // Fills in the derivatives of the state after the first, which is given; terms and inputs are there. By A^3, so
+    // that three of them are reckoned side by side.
     void expand(const State& rate, Expansion& about) const {
         about.x[0] = rate;
         about.x[1] = linear_->higher(rate, about.u[1]);
-        for (int k = 2; k < about.terms; ++k) {
-            const State& before = about.x[k - 2];
-            store_single(turning_ * about.x[k - 1][load_speed], &about.x[k][load_angle]);
-            Quad x = squared_ * Quad::load(before.data());
+        about.x[2] = linear_->higher(about.x[1], about.u[2]);
+        for (int k = 3; k < about.terms; ++k) {
+            Quad x = cubed_ * Quad::load(about.x[k - 3].data());
             for (int i = 0; i < n_inputs; ++i)
-                x = x + (about.u[k - 1][i] * Quad::load(rate_column_[i].data()) +
+                x = x + ((about.u[k - 2][i] * Quad::load(squared_column_[i].data()) +
+                          about.u[k - 1][i] * Quad::load(rate_column_[i].data())) +
                          about.u[k][i] * Quad::load(linear_->input_column[i].data()));
             x.store(about.x[k].data());
+            store_single(turning_ * about.x[k - 1][load_speed], &about.x[k][load_angle]);
         }
     }
     static State series(const Expansion& about, double s, const State& x) {
@@ -214,11 +217,14 @@ class Propagator {
     void prepare_derivatives() {
         squared_ = linear_->rate * linear_->rate;
         cubed_ = linear_->rate * squared_;
-        for (int i = 0; i < n_inputs; ++i) rate_column_[i] = linear_->rate * linear_->input_column[i];
+        for (int i = 0; i < n_inputs; ++i) {
+            rate_column_[i] = linear_->rate * linear_->input_column[i];
+            squared_column_[i] = linear_->rate * rate_column_[i];
+        }
         fourth_.assign(n_basis_, State{});
         for (int q = 0; q < n_basis_; ++q) {
             const InputBasis& b = basis_[q];
-            const State &B = linear_->input_column[b.input], A2B = squared_ * B;
+            const State &B = linear_->input_column[b.input], &A2B = squared_column_[b.input];
             if (b.kind == InputBasis::cosine) {  // its weight is that of the sine: u'' = -omega^2
                 add_scaled(fourth_[q], -b.omega * b.omega, rate_column_[b.input]);
             } else if (b.kind == InputBasis::sine) {  // and this one's of the cosine: u' = omega, u''' = -omega^3
@@ -362,13 +368,13 @@ class Propagator {
     }
 
     const LinearRates* linear_ = nullptr;
-    Matrix squared_, cubed_;                     // A^2, A^3
-    std::array<State, n_inputs> rate_column_{};  // A B
-    std::vector<State> fourth_;                  // n_basis: what each contributes to the fourth derivative
-    double norm_ = 0.0;                          // of A in scaled units, or the highest input frequency [1/s]
-    double base_ = 0.0;                          // length of level 0 [s]
-    int exponent_ = 0;                           // of two: base / unit
-    int longest_ = 0;                            // level
+    Matrix squared_, cubed_;                                        // A^2, A^3
+    std::array<State, n_inputs> rate_column_{}, squared_column_{};  // A B, A^2 B
+    std::vector<State> fourth_;  // n_basis: what each contributes to the fourth derivative
+    double norm_ = 0.0;          // of A in scaled units, or the highest input frequency [1/s]
+    double base_ = 0.0;          // length of level 0 [s]
+    int exponent_ = 0;           // of two: base / unit
+    int longest_ = 0;            // level
     double turning_ = 0.0;
     int n_basis_ = 0;
     InputTurns* turns_ = nullptr;
