@@ -23,7 +23,7 @@ class Cursor {
     double time() const { return input_.time(); }
     const State& x() const { return x_; }
     const InputState& input() const { return input_; }
-    const State& rate() {
+    [[gnu::always_inline]] const State& rate() {
         if (!rate_known_) rate_ = propagator_->rates()(x_, *constant_, input_.values());
         rate_known_ = true;
         return rate_;
@@ -57,7 +57,7 @@ class Cursor {
         rate_ = rate();
         Quad x = Quad::load(x_.data()), rate = Quad::load(rate_.data());
         double angle = x_[load_angle];
-        const auto step = [&](int k) {
+        const auto step = [&](int k) __attribute__((always_inline)) {
             p.step(k, x, rate, angle, input_.weights());
             input_.advance(p.length(k), p.rotations(k));
         };

@@ -154,7 +154,8 @@ class FormTable {
             store(at(one, g) + m.hysteresis_capacity * at(hysteresis_capacity, g) + m.held_torque * at(held_torque, g),
                   &out[g]);
     }
-    void evaluate(const Values& constant, const State& x, const std::array<double, n_inputs>& u, Values& out) const {
+    [[gnu::always_inline]] void evaluate(const Values& constant, const State& x, const std::array<double, n_inputs>& u,
+                                         Values& out) const {
         for (int g = 0; g < rows_; g += vec_width) store(load(&constant[g]) + terms(g, x, u), &out[g]);
     }
     // The same with inputs that are asked for their values or rates where the forms depend on them.
@@ -167,7 +168,8 @@ class FormTable {
         rates(rate, driven_ ? input.rates() : std::array<double, n_inputs>{}, out);
     }
     // Time derivatives, from those of state and inputs.
-    void rates(const State& rate, const std::array<double, n_inputs>& input_rate, Values& out) const {
+    [[gnu::always_inline]] void rates(const State& rate, const std::array<double, n_inputs>& input_rate,
+                                      Values& out) const {
         for (int g = 0; g < rows_; g += vec_width) store(terms(g, rate, input_rate), &out[g]);
     }
 

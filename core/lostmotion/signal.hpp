@@ -166,12 +166,12 @@ class InputState {
     const InputBasis& basis(int q) const { return basis_[q]; }
     const double* weights() const { return weights_.data(); }
 
-    std::array<double, n_inputs> values() const {
+    [[gnu::always_inline]] std::array<double, n_inputs> values() const {
         std::array<double, n_inputs> u = linear_;
         for (int q = first_sine_; q < size_; q += 2) u[basis_[q].input] += weights_[q];
         return u;
     }
-    std::array<double, n_inputs> rates() const {
+    [[gnu::always_inline]] std::array<double, n_inputs> rates() const {
         std::array<double, n_inputs> u = slope_;
         for (int q = first_sine_; q < size_; q += 2) u[basis_[q].input] += basis_[q].omega * weights_[q + 1];
         return u;
@@ -239,7 +239,7 @@ class InputState {
     // Moves on by h, with the rotations (cos, sin)(omega h) of the sines given in basis order.
     void advance(double h, const double* cos_sin) { advance_from(*this, h, cos_sin); }
     // To h beyond where another stands on the same stretch.
-    void advance_from(const InputState& from, double h, const double* cos_sin) {
+    [[gnu::always_inline]] void advance_from(const InputState& from, double h, const double* cos_sin) {
         time_ = from.time_ + h;
         knot_ = from.knot_;
         slope_ = from.slope_;
