@@ -61,7 +61,7 @@ struct Form {
 using LinearForm = Form<n_terms>;
 
 // State vector, with padding so that it is a whole number of vectors.
-inline constexpr int lanes = 8;
+inline constexpr int lanes = (n_states + vec_width - 1) / vec_width * vec_width;
 using State = std::array<double, lanes>;
 
 inline void add_scaled(State& y, double a, const State& x) {
