@@ -27,9 +27,8 @@ def error_of(load_speed: np.ndarray, twist: np.ndarray, exact: Dataset) -> float
 
 
 def timed(name: str, work: Callable[[], tuple[np.ndarray, np.ndarray]], exact: Dataset, repeats: int = 1) -> Row:
-    work()
-    spent = best(repeats, work)
-    return name, spent, f"{error_of(*work(), exact):.2g}"
+    found = work()
+    return name, best(repeats, work), f"{error_of(*found, exact):.2g}"
 
 
 def add_table(report: Report, rows: list[Row]) -> None:

@@ -7,7 +7,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from report import Report, best
 import lostmotion as lm
 from lostmotion import _core
 from lostmotion.run import core_inputs
-from lostmotion.study_file import CHUNK
+from lostmotion.study_file import CHUNK, to_json
 from lostmotion.variables import CHANNEL_NAMES
 
 CORES = os.cpu_count() or 1
@@ -95,15 +95,15 @@ def section(report: Report, scenario: lm.Scenario) -> None:
     report.add("", resume(make(scenario, COMMAND, 1_000_000)))
 
 
-def resume(study: lm.Study, executor: Executor | None = None) -> str:
+def resume(study: lm.Study) -> str:
     """All parts of the study but the last are there; the time to find that out and to make the last."""
     parts = study.total // CHUNK
     with tempfile.TemporaryDirectory() as directory:
         whole, some = Path(directory) / "whole", Path(directory) / "some"
-        lm.study(study.model_copy(update={"runs": CHUNK}), some, executor=executor)
+        lm.study(study.model_copy(update={"runs": CHUNK}), some)
         whole.mkdir()
         for k in range(parts - 1):
             shutil.copy(some / "part-000000.parquet", whole / f"part-{k:06d}.parquet")
-        (whole / "_study.json").write_text(study.model_dump_json(exclude_none=True))
-        taken = 1e-3 * best(1, lambda: lm.study(study, whole, executor=executor))
+        (whole / "_study.json").write_text(to_json(study))
+        taken = 1e-3 * best(1, lambda: lm.study(study, whole))
     return f"A study of 1,000,000 runs of which {parts - 1} of {parts} parts are there goes on, and is complete, in {taken:.2f} s."

@@ -66,10 +66,14 @@ def _asks_for(study: Study, name: str) -> bool:
     return any(uses(e, name) for e in study.keep.values())
 
 
+def _used(study: Study) -> set[str]:
+    """The result variables that its expressions use."""
+    return {name for e in study.keep.values() for name in check_expression("", e)}
+
+
 def _needed(study: Study) -> frozenset[str]:
     """The result variables that the study looks at."""
-    needed = {name for e in study.keep.values() for name in check_expression("", e)}
-    return frozenset(needed | set(study.trajectories.variables if study.trajectories else ()))
+    return frozenset(_used(study) | set(study.trajectories.variables if study.trajectories else ()))
 
 
 def run_chunk(study: Study, first: int, last: int, threads: int) -> Runs:
@@ -157,8 +161,7 @@ def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) 
         return xr.DataArray(values, dims="run")
 
     instants = _instants(study.scenario.simulation.samples, study.scenario.simulation.sample_interval)
-    used = {name for e in study.keep.values() for name in check_expression("", e)}
-    names: dict[str, Any] = {name: xr.DataArray(data[name], instants, ("run", "time")) for name in used}
+    names: dict[str, Any] = {name: xr.DataArray(data[name], instants, ("run", "time")) for name in _used(study)}
     names["time"] = xr.DataArray(instants["time"], instants)
     if _asks_for(study, "energy"):
         names["energy"] = SimpleNamespace(**{k: each_run(v) for k, v in runs.energy.items()})
