@@ -185,6 +185,8 @@ def test_parquet_opens_directly_with_study_and_parameters(tmp_path: Path):
         ("sqrt(mean(output_torque**2))", "N*m"),
         ("peak(output_torque) / peak(twist)", "N*m/rad"),
         ("bandwidth(0.1)", "Hz"),
+        ("bandwidth(amplitude=0.1)", "Hz"),
+        ("dead_time(load_angle, share=0.05)", "s"),
         ("energy.source - energy.load_work", "J"),
         ("peak(load_speed - ideal_speed)", "rad/s"),
         ("peak(twist) * 1e6", ""),  # of what may be a change of unit nothing is claimed

@@ -119,7 +119,7 @@ def _first(x: _Measure, *_: Any) -> _Measure:
 
 
 def _always(unit: str) -> Callable[..., _Measure]:
-    return lambda *_: _measure(unit)
+    return lambda *_, **__: _measure(unit)
 
 
 def unit_of_expression(text: str) -> str:
