@@ -77,23 +77,16 @@ class Cursor {
     // By any length: whole levels, then the Taylor series. Backward by two base intervals at most.
     void advance(double h) {
         if (h > 0.0) h = advance_by_levels(h);
-        if (h == 0.0) return;
-        Expansion about;
-        expand(h, about);
-        nudge(h, about);
+        if (h != 0.0) nudge(h);
     }
-    // The Taylor series from here, with as many terms as count over s.
-    void expand(double s, Expansion& about) {
-        about.terms = propagator_->terms(s);
-        input_.jet(about.terms + 1, about.u.data());
-        propagator_->expand(rate(), about);
-    }
-    // By a small part along that series; the inputs turn on from where they are.
-    void nudge(double s, const Expansion& about) {
-        x_ = Propagator::series(about, s, x_);
+    // By two base intervals at most, forward or backward; the inputs turn on from where they are.
+    void nudge(double s) {
+        x_ = propagator_->move(s, x_, rate(), input_.weights());
         input_.turn(s);
         rate_known_ = false;
     }
+    // A linear form of the motion from here on, as the polynomial that a series makes of it.
+    Polynomial expand(const FormSeries& series, double value) { return series.at(value, rate(), input_.weights()); }
 
  private:
     Propagator* propagator_ = nullptr;

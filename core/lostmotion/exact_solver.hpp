@@ -104,7 +104,7 @@ class ExactSolver {
         }
         while (true) {
             typename Cache::Entry& entry = cache_.entry(key_);
-            if (!entry.propagator.ready()) entry.propagator.prepare(entry.rates, turns_, scale_);
+            if (!entry.propagator.ready()) entry.prepare(turns_, scale_);
             Segment<System> segment{entry, input_, time_,       t_end,
                                     true,  now_.x, now_.memory, entry.rates.constant(now_.memory)};
             const double knot = next_knot(signals_, time_);
@@ -347,7 +347,7 @@ class ExactSolver {
                 trial_ = cursor;
                 trial_.advance(s);
             } else {
-                s = find_zero(e.regime.guards[g].form, e.propagator, memory, cursor, s, h);
+                s = find_zero(e, g, memory, cursor, s, h);
             }
             if (s < best) {
                 best = s;
@@ -360,22 +360,17 @@ class ExactSolver {
     // Where a guard falls through zero between `cursor` and h later, near an estimate. Leaves trial_ there, returns
     // when. About the nearest instant that whole levels lead to, the guard is a polynomial to rounding; Newton finds
     // its zero.
-    double find_zero(const LinearForm& form, Propagator& p, const Memory& memory, const Cursor& cursor, double estimate,
+    double find_zero(typename Cache::Entry& e, int g, const Memory& memory, const Cursor& cursor, double estimate,
                      double h) {
-        const double base = p.length(0);
+        const LinearForm& form = e.regime.guards[g].form;
+        const FormSeries& series = e.guard_series(g);
+        const double base = series.unit();
         double low = 0.0, high = h, s = estimate;
-        Expansion about;
         for (int m = 0; m < 100; ++m) {
             trial_ = cursor;
             const double rest = trial_.advance_by_levels(s), from = s - rest;
-            trial_.expand(std::fabs(rest) + 0.25 * base, about);
-            const double value = lostmotion::evaluate(form, trial_.x(), memory, about.u[0]);
-            Polynomial guard(value);
-            double power = 1.0;
-            for (int k = 1; k <= about.terms; ++k) {
-                power *= base * Propagator::reciprocal[k];
-                guard.set(k, power * evaluate_rate(form, about.x[k - 1], about.u[k]));
-            }
+            const double value = lostmotion::evaluate(form, trial_.x(), memory, trial_.input().values());
+            const Polynomial guard = trial_.expand(series, value);
             const double reach = std::fabs(rest) / base + 0.25, at = trial_.time();
             double z = rest / base;
             bool found = false;
@@ -386,7 +381,7 @@ class ExactSolver {
             }
             if (found && std::fabs(z) <= reach) {
                 s = std::clamp(from + z * base, 0.0, h);
-                trial_.nudge(s - from, about);
+                trial_.nudge(s - from);
                 return s;
             }
             // The zero lies elsewhere: there Newton leads, or half of what is left.
@@ -394,7 +389,7 @@ class ExactSolver {
             s = from + z * base;
             if (!(s > low && s < high)) s = 0.5 * (low + high);
         }
-        trial_.nudge(s - trial_.time() + cursor.time(), about);
+        trial_.nudge(s - trial_.time() + cursor.time());
         return s;
     }
 

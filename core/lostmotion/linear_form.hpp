@@ -61,11 +61,11 @@ struct Form {
 using LinearForm = Form<n_terms>;
 
 // State vector, with padding so that it is a whole number of vectors.
-inline constexpr int lanes = (n_states + vec_width - 1) / vec_width * vec_width;
+inline constexpr int lanes = (n_states + Quad::width - 1) / Quad::width * Quad::width;
 using State = std::array<double, lanes>;
 
 inline void add_scaled(State& y, double a, const State& x) {
-    for (int r = 0; r < n_states; r += vec_width) store(load(&y[r]) + a * load(&x[r]), &y[r]);
+    for (int r = 0; r < n_states; r += Quad::width) store(load<Quad::Part>(&y[r]) + a * load<Quad::Part>(&x[r]), &y[r]);
 }
 
 // What the solver must remember beside the state: the two piecewise-constant torques of the twist contact.
@@ -76,7 +76,7 @@ struct Memory {
 
 inline State magnitudes(const State& x) {
     State size;
-    for (int r = 0; r < n_states; r += vec_width) store(absolute(load(&x[r])), &size[r]);
+    for (int r = 0; r < n_states; r += Quad::width) store(absolute(load<Quad::Part>(&x[r])), &size[r]);
     return size;
 }
 inline Memory magnitudes(const Memory& m) { return {std::fabs(m.hysteresis_capacity), std::fabs(m.held_torque)}; }
@@ -126,7 +126,7 @@ inline double evaluate_rate(const LinearForm& f, const State& rate, const std::a
 template <int N>
 class FormTable {
  public:
-    static_assert(N % 4 == 0);
+    static_assert(N % vec_width == 0);
     using Values = std::array<double, N>;
 
     FormTable() { column_[one].fill(1.0); }  // forms that are not there are 1
@@ -134,7 +134,7 @@ class FormTable {
     void set(int row, const LinearForm& f) {
         assert(f.c[load_angle] == 0.0);
         for (int k = 0; k < n_terms; ++k) column_[k][row] = f.c[k];
-        rows_ = std::max(rows_, (row + 4) / 4 * 4);
+        rows_ = std::max(rows_, (row + vec_width) / vec_width * vec_width);
         driven_ = driven_ || f.c[command] != 0.0 || f.c[load_torque] != 0.0;
     }
     // The forms with the magnitudes of their coefficients.
@@ -180,7 +180,7 @@ class FormTable {
         return driven_ ? sum + (at(command, g) * u[0] + at(load_torque, g) * u[1]) : sum;
     }
 
-    alignas(32) std::array<std::array<double, N>, n_terms> column_{};
+    alignas(64) std::array<std::array<double, N>, n_terms> column_{};
     int rows_ = 0;
     bool driven_ = false;
 };

@@ -34,13 +34,13 @@ struct Matrix {
     }
     // The coupled states alone.
     [[gnu::always_inline]] Quad operator*(const Quad& v) const {
-        const Vec v0 = v.spread<0>(), v1 = v.spread<1>(), v2 = v.spread<2>(), v3 = v.spread<3>();
+        const Quad::Part v0 = v.spread<0>(), v1 = v.spread<1>(), v2 = v.spread<2>(), v3 = v.spread<3>();
         Quad out;
         for (int p = 0; p < Quad::parts; ++p) {
-            const int r = p * vec_width;
+            const int r = p * Quad::width;
             // In pairs, which the processor adds side by side.
-            out.part[p] = (load(&column[0][r]) * v0 + load(&column[1][r]) * v1) +
-                          (load(&column[2][r]) * v2 + load(&column[3][r]) * v3);
+            out.part[p] = (load<Quad::Part>(&column[0][r]) * v0 + load<Quad::Part>(&column[1][r]) * v1) +
+                          (load<Quad::Part>(&column[2][r]) * v2 + load<Quad::Part>(&column[3][r]) * v3);
         }
         return out;
     }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "vec.hpp"
@@ -58,30 +59,41 @@ struct Cubic {
     }
 };
 
-// Polynomial of degree up to 12, four coefficients at once.
+// Polynomial of degree 12, four coefficients at once.
 class Polynomial {
  public:
-    explicit Polynomial(double constant) { value_[0] = constant; }
-    void set(int k, double coefficient) {
-        value_[k] = coefficient;
-        slope_[k - 1] = k * coefficient;
+    static constexpr int degree = 12, parts = degree / 4;
+
+    explicit Polynomial(double constant) : constant_(constant) {}
+    Quad part[parts];  // the coefficients from the first degree on
+
+    double value(double z) const { return constant_ + z * sum({part[0], part[1], part[2]}, z); }
+    double slope(double z) const {
+        return sum(scaled({1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0}), z);
     }
-    double value(double z) const { return sum<16>(value_, z); }
-    double slope(double z) const { return sum<12>(slope_, z); }
+    // From 0 to z.
+    double integral(double z) const {
+        return z * (constant_ + z * sum(scaled({1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8, 1.0 / 9,
+                                                1.0 / 10, 1.0 / 11, 1.0 / 12, 1.0 / 13}),
+                                        z));
+    }
 
  private:
-    template <int n>
-    static double sum(const double* c, double z) {
-        const double z2 = z * z, z4 = z2 * z2, z8 = z4 * z4;
-        Quad high = Quad::load(c + 8);
-        if constexpr (n > 12) high = high + z4 * Quad::load(c + 12);
-        const Quad total = (Quad::load(c) + z4 * Quad::load(c + 4)) + z8 * high;
-        alignas(32) double t[4];
-        total.store(t);
+    std::array<Quad, parts> scaled(const std::array<double, degree>& by) const {
+        std::array<Quad, parts> out;
+        for (int p = 0; p < parts; ++p)
+            for (int v = 0; v < Quad::parts; ++v)
+                out[p].part[v] = part[p].part[v] * load<Quad::Part>(&by[4 * p + v * Quad::width]);
+        return out;
+    }
+    // c[0] + c[1] z + ... + c[11] z^11
+    static double sum(const std::array<Quad, parts>& c, double z) {
+        const double z2 = z * z, z4 = z2 * z2;
+        const Quad t = (c[0] + z4 * c[1]) + (z4 * z4) * c[2];
         return (t[0] + t[1] * z) + (t[2] + t[3] * z) * z2;
     }
 
-    alignas(32) double value_[16] = {}, slope_[12] = {};
+    double constant_;
 };
 
 }  // namespace lostmotion

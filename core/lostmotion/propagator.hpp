@@ -16,8 +16,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "linear_rates.hpp"
-#include "signal.hpp"
+#include "taylor.hpp"
 
 namespace lostmotion {
 
@@ -33,15 +32,6 @@ struct Response {
     State x{}, rate{};
 };
 
-// Time derivatives of state and inputs at one instant.
-struct Expansion {
-    static constexpr int most = 12;  // good for two base intervals: 0.25^13/13! < 1e-17
-
-    int terms = 0;
-    std::array<State, most> x;                             // from the first derivative on
-    std::array<std::array<double, n_inputs>, most + 1> u;  // from the value on
-};
-
 class Propagator {
  public:
     static constexpr int max_levels = 40;
@@ -52,7 +42,6 @@ class Propagator {
     // scale: natural sizes of the states; only for choosing the base interval.
     // rates and turns must outlive this.
     void prepare(const LinearRates& rates, InputTurns& turns, const State& scale) {
-        linear_ = &rates;
         turns_ = &turns;
         basis_ = turns.basis().data();
         n_basis_ = static_cast<int>(turns.basis().size());
@@ -75,20 +64,19 @@ class Propagator {
         rotations_.clear();
         steps_.reserve(usual_levels);
         responses_.reserve(static_cast<std::size_t>(usual_levels * n_basis_));
-        prepare_derivatives();
+        taylor_.prepare(rates, basis_, n_basis_);
+        load_speed_.prepare(taylor_, basis_, LinearForm::unit(load_speed), base_);
         add_base();
     }
 
     bool ready() const { return levels_ > 0; }
     void reset() { levels_ = 0; }
 
-    const LinearRates& rates() const { return *linear_; }
+    const LinearRates& rates() const { return taylor_.rates(); }
     double turning() const { return turning_; }  // rate of the load angle per load speed: 1 where the load may turn
     // The fourth time derivative of the state, from the first and the input state.
     State fourth_derivative(const State& rate, const double* weights) const {
-        State out = cubed_ * rate;
-        for (int q = 0; q < n_basis_; ++q) add_scaled(out, weights[q], fourth_[q]);
-        return out;
+        return taylor_.fourth_derivative(rate, weights);
     }
 
     const Step& level(int k) {
@@ -133,7 +121,7 @@ class Propagator {
         const Response* response = responses(k);
         alignas(32) double from[Matrix::coupled];
         rate.store(from);
-        angle += angle_step(k, from, turning_ * x.part[load_speed / vec_width][load_speed % vec_width], weights);
+        angle += angle_step(k, from, turning_ * x[load_speed], weights);
         // What the inputs bring does not wait for the step before, so it is summed up by itself.
         Quad forced{}, forced_rate{};
         for (int q = 0; q < n_basis_; ++q) {
@@ -154,56 +142,22 @@ class Propagator {
         for (int k = level_below(h); k >= 0; --k)
             for (; h >= length(k); h -= length(k)) append(level(k).change, level(k).integral);
         if (h > 0.0) {
-            const Matrix rest = integral_series(h);
-            append(linear_->rate * rest, rest);
+            const Matrix rest = taylor_.integral(h);
+            append(rates().rate * rest, rest);
         }
         return sum;
     }
 
-    // How many terms of the Taylor series count over s: at most two base intervals, forward or backward. From rest the
-    // first derivatives are zero and a later one, up to the fifth (an input, then each state in turn), comes first.
-    // An even number.
-    int terms(double s) const {
-        const double turned = norm_ * s;
-        double left = 1.0;  // bound on the relative size of what follows
-        int n = 0;
-        for (; (n <= n_states || left >= 1e-17) && n < Expansion::most; n += 2)
-            left *= turned * turned * (reciprocal[n + 1] * reciprocal[n + 2]);
-        return n;
+    // x after s, two base intervals forward or backward at most.
+    [[gnu::always_inline]] State move(double s, const State& x, const State& rate, const double* weights) const {
+        State y;
+        (Quad::load(x.data()) + taylor_.change(s, rate, weights)).store(y.data());
+        const double turned = base_ * load_speed_.at(x[load_speed], rate, weights).integral(s / base_);
+        store_single(x[load_angle] + turning_ * turned, &y[load_angle]);
+        return y;
     }
-    // Fills in the derivatives of the state after the first, which is given; terms and inputs are there. By A^3, so
-    // that three of them are reckoned side by side.
-    void expand(const State& rate, Expansion& about) const {
-        about.x[0] = rate;
-        about.x[1] = linear_->higher(rate, about.u[1]);
-        about.x[2] = linear_->higher(about.x[1], about.u[2]);
-        for (int k = 3; k < about.terms; ++k) {
-            Quad x = cubed_ * Quad::load(about.x[k - 3].data());
-            for (int i = 0; i < n_inputs; ++i)
-                x = x + ((about.u[k - 2][i] * Quad::load(squared_column_[i].data()) +
-                          about.u[k - 1][i] * Quad::load(rate_column_[i].data())) +
-                         about.u[k][i] * Quad::load(linear_->input_column[i].data()));
-            x.store(about.x[k].data());
-            store_single(turning_ * about.x[k - 1][load_speed], &about.x[k][load_angle]);
-        }
-    }
-    static State series(const Expansion& about, double s, const State& x) {
-        // Terms of odd and of even order, side by side.
-        State sum = x, odd{};
-        double power = 1.0;
-        for (int k = 2; k <= about.terms; k += 2) {
-            add_scaled(odd, power * s * reciprocal[k - 1], about.x[k - 2]);
-            power *= s * s * (reciprocal[k - 1] * reciprocal[k]);
-            add_scaled(sum, power, about.x[k - 1]);
-        }
-        add_scaled(sum, 1.0, odd);
-        return sum;
-    }
-    static constexpr std::array<double, Expansion::most + 1> reciprocal = [] {
-        std::array<double, Expansion::most + 1> r{};
-        for (int k = 1; k <= Expansion::most; ++k) r[k] = 1.0 / k;
-        return r;
-    }();
+    // The Taylor series of a form of the motion, in parts of the base interval.
+    void prepare(FormSeries& series, const LinearForm& form) const { series.prepare(taylor_, basis_, form, base_); }
 
  private:
     [[gnu::always_inline]] double angle_step(int k, const double* rate, double turning, const double* weights) const {
@@ -213,93 +167,18 @@ class Propagator {
         return sum;
     }
 
-    // x'''' = A^3 x' + A^2 B u' + A B u'' + B u''', the derivatives of the inputs written by the input state.
-    void prepare_derivatives() {
-        squared_ = linear_->rate * linear_->rate;
-        cubed_ = linear_->rate * squared_;
-        for (int i = 0; i < n_inputs; ++i) {
-            rate_column_[i] = linear_->rate * linear_->input_column[i];
-            squared_column_[i] = linear_->rate * rate_column_[i];
-        }
-        fourth_.assign(n_basis_, State{});
-        for (int q = 0; q < n_basis_; ++q) {
-            const InputBasis& b = basis_[q];
-            const State &B = linear_->input_column[b.input], &A2B = squared_column_[b.input];
-            if (b.kind == InputBasis::cosine) {  // its weight is that of the sine: u'' = -omega^2
-                add_scaled(fourth_[q], -b.omega * b.omega, rate_column_[b.input]);
-            } else if (b.kind == InputBasis::sine) {  // and this one's of the cosine: u' = omega, u''' = -omega^3
-                add_scaled(fourth_[q], b.omega, A2B);
-                add_scaled(fourth_[q], -b.omega * b.omega * b.omega, B);
-            } else {
-                fourth_[q] = A2B;
-            }
-        }
-    }
-
-    // G over at most one base interval.
-    Matrix integral_series(double h) const {
-        Matrix one = linear_->rate, two = squared_, three = cubed_;
-        one.scale(h);
-        two.scale(h * h);
-        three.scale(h * h * h);
-        Matrix sum = power_series<1>(one, two, three);
-        sum.scale(h);
-        return sum;
-    }
-    // sum_k B^k/(k + shift)!, from the first three powers of B; its norm is at most that of a base interval.
-    template <int shift>
-    static Matrix power_series(const Matrix& one, const Matrix& two, const Matrix& three) {
-        static_assert(Expansion::most == 12);
-        static constexpr auto coefficient = [] {
-            std::array<double, 12> c{};
-            double factorial = 1.0;  // of k + shift
-            for (int k = 0; k < 12; ++k) {
-                if (k + shift > 1) factorial *= k + shift;
-                c[k] = 1.0 / factorial;
-            }
-            return c;
-        }();
-        Matrix sum;
-        for (int k = 9; k >= 0; k -= 3) {
-            if (k < 9) sum = three * sum;
-            sum.add_diagonal(coefficient[k]);
-            sum.add(coefficient[k + 1], one);
-            sum.add(coefficient[k + 2], two);
-        }
-        return sum;
-    }
-
     void add_base() {
         Step& s = steps_.emplace_back();
         const double h = base_;
-        s.integral = integral_series(h);
-        s.change = linear_->rate * s.integral;
+        s.integral = taylor_.integral(h);
+        s.change = rates().rate * s.integral;
         // |exp(A s)| from the powers of a matrix without negative entries beside its diagonal.
-        Matrix positive = linear_->rate;
+        Matrix positive = rates().rate;
         positive.combine(Matrix{}, [h](double a, double) { return h * std::fabs(a); });
-        for (int k = 0; k < Matrix::coupled; ++k)
-            positive.column[k][k] = h * std::fmax(linear_->rate.column[k][k], 0.0);
+        for (int k = 0; k < Matrix::coupled; ++k) positive.column[k][k] = h * std::fmax(rates().rate.column[k][k], 0.0);
         const Matrix twice = positive * positive;
-        s.growth = power_series<0>(positive, twice, positive * twice);
-        for (int q = 0; q < n_basis_; ++q) {
-            const InputBasis& b = basis_[q];
-            // y' = A y + b r(s), r = s, cos(omega s) - 1 or sin(omega s), by the series of r.
-            State y{}, coefficient{};
-            double r = b.kind == InputBasis::cosine ? -b.omega * b.omega : b.kind == InputBasis::sine ? b.omega : 1.0;
-            const int first = b.kind == InputBasis::cosine ? 2 : 1;
-            double power = h;
-            for (int k = 0; k < Expansion::most; ++k) {
-                // coefficient: k-th derivative of y at 0; the next is A times it plus b times the derivative of r.
-                coefficient = linear_->rate * coefficient;
-                if (k == first || (b.kind != InputBasis::ramp && k > first && (k - first) % 2 == 0)) {
-                    if (k > first) r *= -b.omega * b.omega;
-                    add_scaled(coefficient, r, linear_->input_column[b.input]);
-                }
-                add_scaled(y, power, coefficient);
-                power *= h / (k + 2);
-            }
-            responses_.push_back({y, {}});
-        }
+        s.growth = Taylor::power_series<0>(positive, twice, positive * twice);
+        for (int q = 0; q < n_basis_; ++q) responses_.push_back({taylor_.response(q, h), {}});
         finish_level();
     }
 
@@ -329,7 +208,7 @@ class Propagator {
             const InputBasis& basis = basis_[q];
             State y = a.change * from[q].x;
             add_scaled(y, 1.0, from[q].x);
-            const State constant = a.integral * linear_->input_column[basis.input];
+            const State constant = a.integral * rates().input_column[basis.input];
             if (basis.kind == InputBasis::ramp) {
                 add_scaled(y, 1.0, from[q].x);
                 add_scaled(y, length(k), constant);
@@ -362,19 +241,17 @@ class Propagator {
                                  : b.kind == InputBasis::cosine ? cosine_change(k, q)
                                                                 : turn[q];
             Response& r = responses_[static_cast<std::size_t>(k) * n_basis_ + q];
-            r.rate = linear_->rate * r.x;
-            add_scaled(r.rate, input, linear_->input_column[b.input]);
+            r.rate = rates().rate * r.x;
+            add_scaled(r.rate, input, rates().input_column[b.input]);
         }
     }
 
-    const LinearRates* linear_ = nullptr;
-    Matrix squared_, cubed_;                                        // A^2, A^3
-    std::array<State, n_inputs> rate_column_{}, squared_column_{};  // A B, A^2 B
-    std::vector<State> fourth_;  // n_basis: what each contributes to the fourth derivative
-    double norm_ = 0.0;          // of A in scaled units, or the highest input frequency [1/s]
-    double base_ = 0.0;          // length of level 0 [s]
-    int exponent_ = 0;           // of two: base / unit
-    int longest_ = 0;            // level
+    Taylor taylor_;
+    FormSeries load_speed_;
+    double norm_ = 0.0;  // of A in scaled units, or the highest input frequency [1/s]
+    double base_ = 0.0;  // length of level 0 [s]
+    int exponent_ = 0;   // of two: base / unit
+    int longest_ = 0;    // level
     double turning_ = 0.0;
     int n_basis_ = 0;
     InputTurns* turns_ = nullptr;

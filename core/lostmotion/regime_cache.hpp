@@ -25,6 +25,7 @@ class RegimeCache {
         GuardTable guards, guard_sizes;
         int touch_guard = -1;  // the one that also ends the regime by touching zero
         Propagator propagator;
+        std::vector<FormSeries> series;  // of the guards that have been crossed
 
         void set(const Regime& r) {
             regime = r;
@@ -38,6 +39,16 @@ class RegimeCache {
             }
             guard_sizes = guards.magnitudes();
             propagator.reset();
+        }
+        void prepare(InputTurns& turns, const State& scale) {
+            propagator.prepare(rates, turns, scale);
+            series.resize(static_cast<std::size_t>(regime.n_guards));
+            for (FormSeries& s : series) s.reset();
+        }
+        const FormSeries& guard_series(int g) {
+            FormSeries& s = series[static_cast<std::size_t>(g)];
+            if (!s.ready()) propagator.prepare(s, regime.guards[g].form);
+            return s;
         }
 
         // How far the guards lie above a thousandth of the sizes of their terms.

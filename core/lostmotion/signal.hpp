@@ -66,6 +66,15 @@ struct InputBasis {
     int input;
     double omega;  // [rad/s]
 
+    // Its k-th time derivative at the anchor instant, k > 0.
+    double derivative(int k) const {
+        if (kind == ramp) return k == 1 ? 1.0 : 0.0;
+        if ((kind == cosine) != (k % 2 == 0)) return 0.0;
+        double d = k % 2 == 0 ? 1.0 : omega;
+        for (int n = 2; n <= k; n += 2) d *= -omega * omega;
+        return d;
+    }
+
     friend bool operator==(const InputBasis&, const InputBasis&) = default;
 };
 

@@ -1,0 +1,172 @@
+// Taylor series of the motion in one regime about an instant.
+//
+// From the rate x' and the input state w at that instant the k-th time derivative of the state is
+//     A^(k-1) x' + sum_q w_q D_qk,     D_q(k+1) = A D_qk + B r_q^(k),
+// where r_q^(k) is the k-th derivative of the q-th function by which the inputs depart from their anchor values.
+#pragma once
+
+#include <array>
+#include <cassert>
+#include <vector>
+
+#include "linear_rates.hpp"
+#include "polynomial.hpp"
+#include "signal.hpp"
+
+namespace lostmotion {
+
+class Taylor {
+ public:
+    static constexpr int terms = Polynomial::degree;  // good for two base intervals: 0.25^13/13! < 1e-17
+
+    void prepare(const LinearRates& rates, const InputBasis* basis, int n_basis) {
+        rates_ = &rates;
+        n_basis_ = n_basis;
+        squared_ = rates.rate * rates.rate;
+        cubed_ = rates.rate * squared_;
+        driven_.clear();
+        for (int q = 0; q < n_basis; ++q) {
+            State derivative{};
+            for (int k = 1; k <= terms; ++k) {
+                driven_.push_back(derivative);
+                derivative = rates.rate * derivative;
+                add_scaled(derivative, basis[q].derivative(k), rates.input_column[basis[q].input]);
+            }
+        }
+    }
+
+    const LinearRates& rates() const { return *rates_; }
+    int n_basis() const { return n_basis_; }
+    // D_qk, k = 1 .. terms
+    const State& driven(int q, int k) const { return driven_[static_cast<std::size_t>(q * terms + k - 1)]; }
+
+    State fourth_derivative(const State& rate, const double* weights) const {
+        State out = cubed_ * rate;
+        for (int q = 0; q < n_basis_; ++q) add_scaled(out, weights[q], driven(q, 4));
+        return out;
+    }
+
+    // By how much the coupled states change over s. In powers of A^3, so that few products wait for one another.
+    [[gnu::always_inline]] Quad change(double s, const State& rate, const double* weights) const {
+        const Quad v = Quad::load(rate.data()), v1 = rates_->rate * v, v2 = squared_ * v;
+        const double s2 = s * s, s3 = s2 * s;
+        Quad free{}, forced{};
+        for (int k = terms - 2; k > 0; k -= 3) {
+            const double c0 = s * over_factorial[k], c1 = s2 * over_factorial[k + 1], c2 = s3 * over_factorial[k + 2];
+            Quad inputs{};
+            for (int q = 0; q < n_basis_; ++q) {
+                const State* d = &driven(q, k);
+                inputs = inputs + weights[q] * ((c0 * Quad::load(d[0].data()) + c1 * Quad::load(d[1].data())) +
+                                                c2 * Quad::load(d[2].data()));
+            }
+            const Quad own = (c0 * v + c1 * v1) + c2 * v2;
+            free = k == terms - 2 ? own : s3 * (cubed_ * free) + own;
+            forced = k == terms - 2 ? inputs : s3 * forced + inputs;
+        }
+        return free + forced;
+    }
+
+    // G over at most one base interval.
+    Matrix integral(double h) const {
+        Matrix one = rates_->rate, two = squared_, three = cubed_;
+        one.scale(h);
+        two.scale(h * h);
+        three.scale(h * h * h);
+        Matrix sum = power_series<1>(one, two, three);
+        sum.scale(h);
+        return sum;
+    }
+    // The answer from rest to the q-th function after h.
+    State response(int q, double h) const {
+        State y{};
+        double power = 1.0;
+        for (int k = 1; k <= terms; ++k) {
+            power *= h / k;
+            add_scaled(y, power, driven(q, k));
+        }
+        return y;
+    }
+
+    // sum_k B^k/(k + shift)!, from the first three powers of B; its norm is at most that of a base interval.
+    template <int shift>
+    static Matrix power_series(const Matrix& one, const Matrix& two, const Matrix& three) {
+        static_assert(terms == 12);
+        Matrix sum;
+        for (int k = 9; k >= 0; k -= 3) {
+            if (k < 9) sum = three * sum;
+            sum.add_diagonal(over_factorial[k + shift]);
+            sum.add(over_factorial[k + 1 + shift], one);
+            sum.add(over_factorial[k + 2 + shift], two);
+        }
+        return sum;
+    }
+
+ private:
+    static constexpr std::array<double, terms + 1> over_factorial = [] {
+        std::array<double, terms + 1> c{};
+        double factorial = 1.0;
+        for (int k = 0; k <= terms; ++k) {
+            if (k > 0) factorial *= k;
+            c[static_cast<std::size_t>(k)] = 1.0 / factorial;
+        }
+        return c;
+    }();
+
+    const LinearRates* rates_ = nullptr;
+    int n_basis_ = 0;
+    Matrix squared_, cubed_;     // A^2, A^3
+    std::vector<State> driven_;  // n_basis x terms
+};
+
+// The Taylor series of a linear form of the motion, in parts of a unit of time: its coefficients are linear in the rate
+// and the input state at the instant. The form must not depend on the load angle.
+class FormSeries {
+ public:
+    bool ready() const { return unit_ > 0.0; }
+    void reset() { unit_ = 0.0; }
+
+    void prepare(const Taylor& motion, const InputBasis* basis, const LinearForm& form, double unit) {
+        unit_ = unit;
+        n_basis_ = motion.n_basis();
+        assert(form.c[load_angle] == 0.0);
+        by_weight_.resize(static_cast<std::size_t>(n_basis_));
+        const Matrix& A = motion.rates().rate;
+        std::array<double, Matrix::coupled> row{};  // of the k-th derivative, on x'
+        for (int c = 0; c < Matrix::coupled; ++c) row[c] = form.c[c];
+        double power = 1.0;
+        for (int k = 1; k <= Taylor::terms; ++k) {
+            power *= unit / k;
+            for (int c = 0; c < Matrix::coupled; ++c) by_rate_[c][k - 1] = power * row[c];
+            for (int q = 0; q < n_basis_; ++q)
+                by_weight_[q][k - 1] = power * (evaluate_rate(form, motion.driven(q, k), {}) +
+                                                form.c[first_input + basis[q].input] * basis[q].derivative(k));
+            std::array<double, Matrix::coupled> next{};
+            for (int c = 0; c < Matrix::coupled; ++c)
+                for (int r = 0; r < Matrix::coupled; ++r) next[c] += row[r] * A.column[c][r];
+            row = next;
+        }
+    }
+
+    double unit() const { return unit_; }  // [s]
+    [[gnu::always_inline]] Polynomial at(double value, const State& rate, const double* weights) const {
+        Polynomial p(value);
+        for (int part = 0; part < Polynomial::parts; ++part) {
+            const auto row = [&](const Coefficients& c) { return Quad::load(&c[4 * part]); };
+            Quad sum = (rate[0] * row(by_rate_[0]) + rate[1] * row(by_rate_[1])) +
+                       (rate[2] * row(by_rate_[2]) + rate[3] * row(by_rate_[3]));
+            for (int q = 0; q < n_basis_; ++q) sum = sum + weights[q] * row(by_weight_[q]);
+            p.part[part] = sum;
+        }
+        return p;
+    }
+
+ private:
+    using Coefficients = std::array<double, Taylor::terms>;
+
+    double unit_ = 0.0;
+    int n_basis_ = 0;
+    alignas(32) std::array<Coefficients, Matrix::coupled> by_rate_{};
+    std::vector<Coefficients> by_weight_;
+};
+
+}  // namespace lostmotion
