@@ -54,11 +54,9 @@ class Cursor {
         Propagator& p = *propagator_;
         const auto n = static_cast<std::uint64_t>(h / p.length(0) + 0.5);
         if (n == 0) return h;
-        rate_ = rate();
-        Quad x = Quad::load(x_.data()), rate = Quad::load(rate_.data());
-        double angle = x_[load_angle];
+        Lanes x = load(x_), rate = load(this->rate());
         const auto step = [&](int k) __attribute__((always_inline)) {
-            p.step(k, x, rate, angle, input_.weights());
+            p.step(k, x, rate, input_.weights());
             input_.advance(p.length(k), p.rotations(k));
         };
         const int top = p.longest_level();
@@ -69,9 +67,7 @@ class Cursor {
             bits ^= 1ull << k;
         }
         x.store(x_.data());
-        store_single(angle, &x_[load_angle]);
         rate.store(rate_.data());
-        store_single(p.turning() * x_[load_speed], &rate_[load_angle]);
         return h - p.length(0) * static_cast<double>(n);
     }
     // By any length: whole levels, then the Taylor series. Backward by two base intervals at most.

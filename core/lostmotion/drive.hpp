@@ -72,7 +72,7 @@ class Drive {
     State rated_scale() const {
         const double w = gearbox.rated_input_speed, i = gearbox.ratio;
         const double d = rigid() ? 1.0 : gearbox.rated_output_torque / gearbox.curve.largest_slope();
-        return {motor.rated_torque, w, w / i, d, 1.0, 1.0};
+        return State{{motor.rated_torque, w, w / i, d, 1.0}};
     }
 
     Regime build(const RegimeKey& key) const;
@@ -120,6 +120,7 @@ inline Regime Drive::build(const RegimeKey& key) const {
     r.source_torque = closed(e.M_D);
     r.input_friction = closed(e.F_input);
     r.input_torque = closed(e.T_1);
+    r.loss_torque = closed(gearbox.ratio * e.T_1 - e.T_2);
     r.hysteresis_torque = closed(e.H);
     r.load_friction = closed(e.F_load);
     add_guards(key, e, r);

@@ -224,17 +224,17 @@ class ExactSolver {
         return Status::done;
     }
 
-    static void evaluate(const GuardTable& guards, const GuardTable::Values& constant, Cursor& at, Ends& out) {
+    [[gnu::always_inline]] static void evaluate(const GuardTable& guards, const GuardTable::Values& constant,
+                                                Cursor& at, Ends& out) {
         guards.evaluate(constant, at.x(), at.input(), out.value);
         guards.rates(at.rate(), at.input(), out.slope);
     }
 
     // |g''''| over the look, from a bound on the fourth derivative of the state that the flow carries on.
-    void bound_fourth(const GuardTable& guard_sizes, const Matrix& growth, const State& size) {
-        if (size[0] + size[1] + size[2] + size[3] == 0.0)  // at rest; growth may have overflowed
-            guard_sizes.rates(size, input_bound_, bounds_.fourth);
-        else
-            guard_sizes.rates(growth * size, input_bound_, bounds_.fourth);
+    [[gnu::always_inline]] void bound_fourth(const GuardTable& guard_sizes, const Growth& growth, State& size) {
+        if (size[0] + size[1] + size[2] + size[3] != 0.0)  // not at rest, where growth may have overflowed
+            (growth * coupled(size)).store(size.data());
+        guard_sizes.rates(size, input_bound_, bounds_.fourth);
     }
 
     // Encloses all guards over a look of length h. Whether they are positive all through it.

@@ -61,12 +61,15 @@ struct Form {
 using LinearForm = Form<n_terms>;
 
 // State vector, with padding so that it is a whole number of vectors.
-inline constexpr int lanes = (n_states + Quad::width - 1) / Quad::width * Quad::width;
-using State = std::array<double, lanes>;
+inline constexpr int lanes = (n_states + vec_width - 1) / vec_width * vec_width;
+struct alignas(8 * vec_width) State : std::array<double, lanes> {};
+using Lanes = Pack<lanes>;
 
-inline void add_scaled(State& y, double a, const State& x) {
-    for (int r = 0; r < n_states; r += Quad::width) store(load<Quad::Part>(&y[r]) + a * load<Quad::Part>(&x[r]), &y[r]);
-}
+inline Lanes load(const State& x) { return Lanes::load(x.data()); }
+// The states that are coupled with one another: all but the load angle.
+using Coupled = Pack<load_angle>;
+inline Coupled coupled(const State& x) { return Coupled::load(x.data()); }
+inline void add_scaled(State& y, double a, const State& x) { (load(y) + a * load(x)).store(y.data()); }
 
 // What the solver must remember beside the state: the two piecewise-constant torques of the twist contact.
 struct Memory {
@@ -76,7 +79,7 @@ struct Memory {
 
 inline State magnitudes(const State& x) {
     State size;
-    for (int r = 0; r < n_states; r += Quad::width) store(absolute(load<Quad::Part>(&x[r])), &size[r]);
+    absolute(load(x)).store(size.data());
     return size;
 }
 inline Memory magnitudes(const Memory& m) { return {std::fabs(m.hysteresis_capacity), std::fabs(m.held_torque)}; }

@@ -12,49 +12,33 @@ namespace lostmotion {
 // it, so its column is zero but for its own entry.
 struct Matrix {
     static constexpr int coupled = 4;
-    using Column = std::array<double, coupled>;
 
-    alignas(32) std::array<Column, coupled> column{};
-    Column angle{};          // row of the load angle
-    double angle_own = 0.0;  // its own entry
-    double unused[3] = {};
+    std::array<State, n_states> column{};
 
-    static Matrix diagonal(double value) {
-        Matrix m;
-        for (int k = 0; k < coupled; ++k) m.column[k][k] = value;
-        m.angle_own = value;
-        return m;
+    static const Matrix& identity() {
+        static const Matrix one = [] {
+            Matrix m;
+            for (int k = 0; k < n_states; ++k) m.column[k][k] = 1.0;
+            return m;
+        }();
+        return one;
     }
 
+    [[gnu::always_inline]] Lanes operator*(const Lanes& v) const {
+        return of_coupled(v) + v.spread<load_angle>() * load(column[load_angle]);
+    }
+    // The same where the column of the load angle is all zero, as in A and exp(A h) - 1.
+    [[gnu::always_inline]] Lanes of_coupled(const Lanes& v) const {
+        // In pairs, which the processor adds side by side.
+        return (v.spread<0>() * load(column[0]) + v.spread<1>() * load(column[1])) +
+               (v.spread<2>() * load(column[2]) + v.spread<3>() * load(column[3]));
+    }
     [[gnu::always_inline]] State operator*(const State& v) const {
         State out;
-        (*this * Quad::load(v.data())).store(out.data());
-        store_single(angle_row(v.data()) + angle_own * v[coupled], &out[coupled]);
+        (*this * load(v)).store(out.data());
         return out;
     }
-    // The coupled states alone.
-    [[gnu::always_inline]] Quad operator*(const Quad& v) const {
-        const Quad::Part v0 = v.spread<0>(), v1 = v.spread<1>(), v2 = v.spread<2>(), v3 = v.spread<3>();
-        Quad out;
-        for (int p = 0; p < Quad::parts; ++p) {
-            const int r = p * Quad::width;
-            // In pairs, which the processor adds side by side.
-            out.part[p] = (load<Quad::Part>(&column[0][r]) * v0 + load<Quad::Part>(&column[1][r]) * v1) +
-                          (load<Quad::Part>(&column[2][r]) * v2 + load<Quad::Part>(&column[3][r]) * v3);
-        }
-        return out;
-    }
-    double operator()(int row, int col) const {
-        if (row < coupled) return col < coupled ? column[col][row] : 0.0;
-        return col < coupled ? angle[col] : angle_own;
-    }
-    [[gnu::always_inline]] double angle_row(const double* v) const {
-        return (angle[0] * v[0] + angle[1] * v[1]) + (angle[2] * v[2] + angle[3] * v[3]);
-    }
-    void add_diagonal(double value) {
-        for (int k = 0; k < coupled; ++k) column[k][k] += value;
-        angle_own += value;
-    }
+    double operator()(int row, int col) const { return column[col][row]; }
     // factor * other, entry by entry
     void add(double factor, const Matrix& other) {
         combine(other, [factor](double own, double others) { return own + factor * others; });
@@ -71,19 +55,18 @@ struct Matrix {
     }
     friend Matrix operator*(const Matrix& a, const Matrix& b) {
         Matrix out;
-        for (int c = 0; c < coupled; ++c) {
-            const double* v = b.column[c].data();
-            (a * Quad::load(v)).store(out.column[c].data());
-            out.angle[c] = a.angle_row(v) + a.angle_own * b.angle[c];
-        }
-        out.angle_own = a.angle_own * b.angle_own;
+        for (int c = 0; c < coupled; ++c) (a * load(b.column[c])).store(out.column[c].data());
+        Lanes own{};  // a column that is written in one piece can be read in one
+        own.set<load_angle>(a.column[load_angle][load_angle] * b.column[load_angle][load_angle]);
+        own.store(out.column[load_angle].data());
         return out;
     }
 
  private:
-    static constexpr int entries = 24;  // one behind the other, so that the compiler can take several at once
+    static constexpr int entries = n_states * lanes;  // one behind the other, so that several are taken at once
 };
-static_assert(sizeof(Matrix) == 24 * sizeof(double));
+static_assert(sizeof(Matrix) == n_states * lanes * sizeof(double));
+static_assert(load_angle == Matrix::coupled);
 
 // dx/dt = A x + constant + B u of one regime. No rate depends on the load angle, and its own rate on the load speed
 // alone.
@@ -98,8 +81,7 @@ struct LinearRates {
             const LinearForm& f = regime.rate[r];
             assert(f.c[load_angle] == 0.0);
             assert(r != load_angle || (f.c[motor_torque] == 0.0 && f.c[motor_speed] == 0.0 && f.c[twist] == 0.0));
-            for (int c = 0; c < Matrix::coupled; ++c)
-                (r < Matrix::coupled ? rate.column[c][r] : rate.angle[c]) = f.c[c];
+            for (int c = 0; c < Matrix::coupled; ++c) rate.column[c][r] = f.c[c];
             for (int i = 0; i < n_inputs; ++i) input_column[i][r] = f.c[first_input + i];
             fixed[r] = f.c[one];
             per_capacity[r] = f.c[hysteresis_capacity];
@@ -124,20 +106,18 @@ struct LinearRates {
     }
     [[gnu::always_inline]] State operator()(const State& x, const State& constant,
                                             const std::array<double, n_inputs>& u) const {
-        State out = higher(x, u);
-        add_scaled(out, 1.0, constant);
+        State out;
+        (higher(load(x), u) + load(constant)).store(out.data());
         return out;
     }
     // The next time derivative of the state from one that is at least the first.
+    [[gnu::always_inline]] Lanes higher(const Lanes& derivative, const std::array<double, n_inputs>& u) const {
+        return rate.of_coupled(derivative) + (u[0] * load(input_column[0]) + u[1] * load(input_column[1]));
+    }
     [[gnu::always_inline]] State higher(const State& derivative, const std::array<double, n_inputs>& u) const {
         State out;
-        higher(Quad::load(derivative.data()), u).store(out.data());
-        store_single(rate.angle[load_speed] * derivative[load_speed], &out[load_angle]);
+        higher(load(derivative), u).store(out.data());
         return out;
-    }
-    [[gnu::always_inline]] Quad higher(const Quad& derivative, const std::array<double, n_inputs>& u) const {
-        return rate * derivative +
-               (u[0] * Quad::load(input_column[0].data()) + u[1] * Quad::load(input_column[1].data()));
     }
 };
 

@@ -65,31 +65,23 @@ class Polynomial {
     static constexpr int degree = 12, parts = degree / 4;
 
     explicit Polynomial(double constant) : constant_(constant) {}
-    Quad part[parts];  // the coefficients from the first degree on
+    Pack<4> part[parts];  // the coefficients from the first degree on
 
     double value(double z) const { return constant_ + z * sum({part[0], part[1], part[2]}, z); }
     double slope(double z) const {
         return sum(scaled({1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0}), z);
     }
-    // From 0 to z.
-    double integral(double z) const {
-        return z * (constant_ + z * sum(scaled({1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8, 1.0 / 9,
-                                                1.0 / 10, 1.0 / 11, 1.0 / 12, 1.0 / 13}),
-                                        z));
-    }
 
  private:
-    std::array<Quad, parts> scaled(const std::array<double, degree>& by) const {
-        std::array<Quad, parts> out;
-        for (int p = 0; p < parts; ++p)
-            for (int v = 0; v < Quad::parts; ++v)
-                out[p].part[v] = part[p].part[v] * load<Quad::Part>(&by[4 * p + v * Quad::width]);
+    std::array<Pack<4>, parts> scaled(const std::array<double, degree>& by) const {
+        std::array<Pack<4>, parts> out;
+        for (int p = 0; p < parts; ++p) out[p] = part[p] * Pack<4>::load(&by[4 * p]);
         return out;
     }
     // c[0] + c[1] z + ... + c[11] z^11
-    static double sum(const std::array<Quad, parts>& c, double z) {
+    static double sum(const std::array<Pack<4>, parts>& c, double z) {
         const double z2 = z * z, z4 = z2 * z2;
-        const Quad t = (c[0] + z4 * c[1]) + (z4 * z4) * c[2];
+        const Pack<4> t = (c[0] + z4 * c[1]) + (z4 * z4) * c[2];
         return (t[0] + t[1] * z) + (t[2] + t[3] * z) * z2;
     }
 

@@ -20,11 +20,23 @@
 
 namespace lostmotion {
 
+// Bound on |exp(A s)|, element by element, as far as it couples states.
+struct Growth {
+    alignas(32) std::array<std::array<double, Matrix::coupled>, Matrix::coupled> column;
+
+    double operator()(int row, int col) const { return column[col][row]; }
+    [[gnu::always_inline]] Coupled operator*(const Coupled& size) const {
+        const auto at = [this](int c) { return Coupled::load(column[c].data()); };
+        return (size.spread<0>() * at(0) + size.spread<1>() * at(1)) +
+               (size.spread<2>() * at(2) + size.spread<3>() * at(3));
+    }
+};
+
 // Everything needed to step by one length in one regime.
 struct Step {
     Matrix change;    // E(h) = exp(A h) - 1
     Matrix integral;  // G(h)
-    Matrix growth;    // bound on |exp(A s)|, element by element, for 0 <= s <= h
+    Growth growth;    // for 0 <= s <= h
 };
 
 // The response from rest to one function of an input, at the end of a step.
@@ -57,7 +69,6 @@ class Propagator {
         for (; norm_ * base_ > base_norm; base_ *= 0.5) --exponent_;
         longest_ = 0;
         while (longest_ + 1 < max_levels && fastest * length(longest_ + 1) <= 1.0) ++longest_;
-        turning_ = rates.rate.angle[load_speed];
         levels_ = 0;
         steps_.clear();
         responses_.clear();
@@ -65,7 +76,6 @@ class Propagator {
         steps_.reserve(usual_levels);
         responses_.reserve(static_cast<std::size_t>(usual_levels * n_basis_));
         taylor_.prepare(rates, basis_, n_basis_);
-        load_speed_.prepare(taylor_, basis_, LinearForm::unit(load_speed), base_);
         add_base();
     }
 
@@ -73,7 +83,6 @@ class Propagator {
     void reset() { levels_ = 0; }
 
     const LinearRates& rates() const { return taylor_.rates(); }
-    double turning() const { return turning_; }  // rate of the load angle per load speed: 1 where the load may turn
     // The fourth time derivative of the state, from the first and the input state.
     State fourth_derivative(const State& rate, const double* weights) const {
         return taylor_.fourth_derivative(rate, weights);
@@ -105,31 +114,26 @@ class Propagator {
 
     // x after the step of level k; `rate` is x' at the anchor, `weights` the input state there.
     [[gnu::always_inline]] State step(int k, const State& x, const State& rate, const double* weights) {
-        const Quad free = level(k).integral * Quad::load(rate.data());
+        const Lanes free = level(k).integral * load(rate);
         const Response* response = responses(k);
-        Quad forced{};
-        for (int q = 0; q < n_basis_; ++q) forced = forced + weights[q] * Quad::load(response[q].x.data());
+        Lanes forced{};
+        for (int q = 0; q < n_basis_; ++q) forced = forced + weights[q] * load(response[q].x);
         State y;
-        (Quad::load(x.data()) + (free + forced)).store(y.data());
-        store_single(x[load_angle] + angle_step(k, rate.data(), rate[load_angle], weights), &y[load_angle]);
+        (load(x) + (free + forced)).store(y.data());
         return y;
     }
-    // The same for x and x' at once, without a look at the rates of the regime in between. The angle's own rate is
-    // that of the load speed.
-    [[gnu::always_inline]] void step(int k, Quad& x, Quad& rate, double& angle, const double* weights) {
+    // The same for x and x' at once, without a look at the rates of the regime in between.
+    [[gnu::always_inline]] void step(int k, Lanes& x, Lanes& rate, const double* weights) {
         const Step& s = level(k);
         const Response* response = responses(k);
-        alignas(32) double from[Matrix::coupled];
-        rate.store(from);
-        angle += angle_step(k, from, turning_ * x[load_speed], weights);
         // What the inputs bring does not wait for the step before, so it is summed up by itself.
-        Quad forced{}, forced_rate{};
+        Lanes forced{}, forced_rate{};
         for (int q = 0; q < n_basis_; ++q) {
-            forced = forced + weights[q] * Quad::load(response[q].x.data());
-            forced_rate = forced_rate + weights[q] * Quad::load(response[q].rate.data());
+            forced = forced + weights[q] * load(response[q].x);
+            forced_rate = forced_rate + weights[q] * load(response[q].rate);
         }
         x = x + (s.integral * rate + forced);
-        rate = rate + (s.change * rate + forced_rate);
+        rate = rate + (s.change.of_coupled(rate) + forced_rate);
     }
 
     // G(h) for any length: whole levels from the longest down, then the Taylor series.
@@ -151,22 +155,13 @@ class Propagator {
     // x after s, two base intervals forward or backward at most.
     [[gnu::always_inline]] State move(double s, const State& x, const State& rate, const double* weights) const {
         State y;
-        (Quad::load(x.data()) + taylor_.change(s, rate, weights)).store(y.data());
-        const double turned = base_ * load_speed_.at(x[load_speed], rate, weights).integral(s / base_);
-        store_single(x[load_angle] + turning_ * turned, &y[load_angle]);
+        (load(x) + taylor_.change(s, rate, weights)).store(y.data());
         return y;
     }
     // The Taylor series of a form of the motion, in parts of the base interval.
     void prepare(FormSeries& series, const LinearForm& form) const { series.prepare(taylor_, basis_, form, base_); }
 
  private:
-    [[gnu::always_inline]] double angle_step(int k, const double* rate, double turning, const double* weights) const {
-        double sum = steps_[k].integral.angle_row(rate) + steps_[k].integral.angle_own * turning;
-        const Response* response = responses(k);
-        for (int q = 0; q < n_basis_; ++q) sum += weights[q] * response[q].x[load_angle];
-        return sum;
-    }
-
     void add_base() {
         Step& s = steps_.emplace_back();
         const double h = base_;
@@ -176,8 +171,8 @@ class Propagator {
         Matrix positive = rates().rate;
         positive.combine(Matrix{}, [h](double a, double) { return h * std::fabs(a); });
         for (int k = 0; k < Matrix::coupled; ++k) positive.column[k][k] = h * std::fmax(rates().rate.column[k][k], 0.0);
-        const Matrix twice = positive * positive;
-        s.growth = Taylor::power_series<0>(positive, twice, positive * twice);
+        const Matrix twice = positive * positive, sum = Taylor::power_series<0>(positive, twice, positive * twice);
+        for (int c = 0; c < Matrix::coupled; ++c) coupled(sum.column[c]).store(s.growth.column[c].data());
         for (int q = 0; q < n_basis_; ++q) responses_.push_back({taylor_.response(q, h), {}});
         finish_level();
     }
@@ -193,22 +188,26 @@ class Propagator {
         steps_.emplace_back();
         const Step& a = steps_[k];
         Step& b = steps_[k + 1];
-        b.change = a.change * a.change;
-        b.change.add(2.0, a.change);
-        b.integral = a.change * a.integral;
-        b.integral.add(2.0, a.integral);
-        // |exp(A (h + s))| <= |exp(A s)| |exp(A h)|, of which the second is known.
-        Matrix size = Matrix::diagonal(1.0);
-        size.combine(a.change, [](double one, double change) { return std::fabs(one + change); });
-        b.growth = a.growth * size;
-        b.growth.combine(a.growth, [](double x, double y) { return std::max(x, y); });
+        for (int c = 0; c < n_states; ++c) {
+            const Lanes g = load(a.integral.column[c]);
+            (2.0 * g + a.change.of_coupled(g)).store(b.integral.column[c].data());
+        }
+        for (int c = 0; c < Matrix::coupled; ++c) {
+            const Lanes e = load(a.change.column[c]);
+            (2.0 * e + a.change.of_coupled(e)).store(b.change.column[c].data());
+            // |exp(A (h + s))| <= |exp(A s)| |exp(A h)|, of which the second is known.
+            const Coupled size = absolute(coupled(Matrix::identity().column[c]) + coupled(a.change.column[c]));
+            most(Coupled::load(a.growth.column[c].data()), a.growth * size).store(b.growth.column[c].data());
+        }
         responses_.resize(responses_.size() + n_basis_);
         const Response* from = responses(k);
+        std::array<State, n_inputs> held;  // what a constant input brings
+        for (int i = 0; i < n_inputs; ++i) held[i] = a.integral * rates().input_column[i];
         for (int q = 0; q < n_basis_; ++q) {
             const InputBasis& basis = basis_[q];
             State y = a.change * from[q].x;
             add_scaled(y, 1.0, from[q].x);
-            const State constant = a.integral * rates().input_column[basis.input];
+            const State& constant = held[basis.input];
             if (basis.kind == InputBasis::ramp) {
                 add_scaled(y, 1.0, from[q].x);
                 add_scaled(y, length(k), constant);
@@ -247,12 +246,10 @@ class Propagator {
     }
 
     Taylor taylor_;
-    FormSeries load_speed_;
     double norm_ = 0.0;  // of A in scaled units, or the highest input frequency [1/s]
     double base_ = 0.0;  // length of level 0 [s]
     int exponent_ = 0;   // of two: base / unit
     int longest_ = 0;    // level
-    double turning_ = 0.0;
     int n_basis_ = 0;
     InputTurns* turns_ = nullptr;
     const InputBasis* basis_ = nullptr;

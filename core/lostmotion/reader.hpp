@@ -44,10 +44,10 @@ struct Instants {
     static_assert(most % vec_width == 0);
     using Column = std::array<double, most>;
 
-    alignas(32) std::array<Column, n_states> x{};
-    alignas(32) std::array<Column, n_inputs> u{};
+    alignas(64) std::array<Column, n_states> x{};
+    alignas(64) std::array<Column, n_inputs> u{};
 
-    void set(int k, const State& state, const std::array<double, n_inputs>& input) {
+    [[gnu::always_inline]] void set(int k, const Lanes& state, const std::array<double, n_inputs>& input) {
         for (int j = 0; j < n_states; ++j) x[j][k] = state[j];
         for (int i = 0; i < n_inputs; ++i) u[i][k] = input[i];
     }
@@ -79,7 +79,7 @@ class Reader {
     }
     Reading operator()(const State& x, const std::array<double, n_inputs>& u) const {
         Instants at;
-        at.set(0, x, u);
+        at.set(0, load(x), u);
         Reading out;
         for (const int c : all_channels) out.value[static_cast<std::size_t>(c)] = read(c, at, 0)[0];
         return out;
@@ -118,15 +118,14 @@ class Reader {
 
     Vec loss_coefficient(const Instants& at, int k) const {
         const Gearbox& g = drive_.gearbox;
-        const Vec T_2 = evaluate(regime_.output_torque, at, k);
-        Vec lost;
+        Vec lost = evaluate(regime_.loss_torque, at, k);
         if (shares()) {
-            const Vec F = evaluate(regime_.input_friction, at, k);
+            const Vec T_2 = evaluate(regime_.output_torque, at, k), F = evaluate(regime_.input_friction, at, k);
             for (int lane = 0; lane < vec_width; ++lane) lost[lane] = standing_loss(T_2[lane], F[lane]);
+        } else if (has_map_) {
+            lost *= static_cast<double>(regime_.key.modes[input_contact]);
         } else {
-            const Vec against = g.ratio * evaluate(regime_.input_torque, at, k) - T_2;
-            lost = has_map_ ? static_cast<double>(regime_.key.modes[input_contact]) * against
-                            : signs(load(&at.x[motor_speed][k])) * against;
+            lost *= signs(load(&at.x[motor_speed][k]));
         }
         return lost / g.rated_output_torque;
     }

@@ -61,6 +61,7 @@ struct Regime {
     LinearForm source_torque;                 // M_D [N m]
     LinearForm input_friction;                // F, all that the input contact takes [N m at the input]
     LinearForm input_torque;                  // T_1 [N m]; while the input contact is stuck, T_2/i only
+    LinearForm loss_torque;                   // i T_1 - T_2 [N m]: the losses, signed as the input speed
     LinearForm hysteresis_torque;             // H [N m]
     LinearForm load_friction;                 // what the load contact takes [N m]
     std::array<Guard, max_guards> guards;

@@ -44,10 +44,10 @@ class Sampler {
                 stride_.place(p, level, s.constant, cursor);
                 stride_.run(n, instants_);
             } else {
-                instants_.set(0, cursor.x(), cursor.input().values());
+                instants_.set(0, load(cursor.x()), cursor.input().values());
                 for (int k = 1; k < n; ++k) {
                     cursor.advance(instant(next_ + k) - cursor.time());
-                    instants_.set(k, cursor.x(), cursor.input().values());
+                    instants_.set(k, load(cursor.x()), cursor.input().values());
                 }
             }
             for (int k = 0; k < n; k += vec_width) write(reader, k, n);

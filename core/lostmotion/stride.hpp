@@ -49,34 +49,25 @@ class Stride {
 
     // Where the cursor stood and n - 1 steps on from there.
     void run(int n, Instants& to) {
-        Quad x = Quad::load(x_.data()), forced = Quad::load(forced_.data());
-        const Quad growth = Quad::load(growth_.data());
-        double angle = x_[load_angle], turned = forced_[load_angle];
-        const Step& step = *step_;
+        Lanes x = load(x_), forced = load(forced_);
+        const Lanes growth = load(growth_);
         for (int k = 0;; ++k) {
-            State now;
-            x.store(now.data());
-            now[load_angle] = angle;
             std::array<double, n_inputs> u = linear_;
             for (const Turning& t : sines_) u[t.input] += t.sine;
-            to.set(k, now, u);
+            to.set(k, x, u);
             if (k + 1 == n) {
-                x_ = now;
+                x.store(x_.data());
                 return;
             }
-            Quad driven = forced;
-            double driven_angle = turned;
+            Lanes driven = forced;
             for (Turning& t : sines_) {
-                driven = driven + (t.sine * Quad::load(t.by_sine.data()) + t.cosine * Quad::load(t.by_cosine.data()));
-                driven_angle += t.sine * t.by_sine[load_angle] + t.cosine * t.by_cosine[load_angle];
+                driven = driven + (t.sine * load(t.by_sine) + t.cosine * load(t.by_cosine));
                 const double sine = t.sine * t.cos + t.cosine * t.sin;
                 t.cosine = t.cosine * t.cos - t.sine * t.sin;
                 t.sine = sine;
             }
-            angle += step.change.angle_row(now.data()) + driven_angle;
-            x = x + (step.change * x + driven);
+            x = x + (step_->change.of_coupled(x) + driven);
             forced = forced + growth;
-            turned += growth_[load_angle];
             for (int i = 0; i < n_inputs; ++i) linear_[i] += increase_[i];
         }
     }

@@ -46,21 +46,20 @@ class Taylor {
         return out;
     }
 
-    // By how much the coupled states change over s. In powers of A^3, so that few products wait for one another.
-    [[gnu::always_inline]] Quad change(double s, const State& rate, const double* weights) const {
-        const Quad v = Quad::load(rate.data()), v1 = rates_->rate * v, v2 = squared_ * v;
+    // By how much the state changes over s. In powers of A^3, so that few products wait for one another.
+    [[gnu::always_inline]] Lanes change(double s, const State& rate, const double* weights) const {
+        const Lanes v = load(rate), v1 = rates_->rate.of_coupled(v), v2 = squared_.of_coupled(v);
         const double s2 = s * s, s3 = s2 * s;
-        Quad free{}, forced{};
+        Lanes free{}, forced{};
         for (int k = terms - 2; k > 0; k -= 3) {
             const double c0 = s * over_factorial[k], c1 = s2 * over_factorial[k + 1], c2 = s3 * over_factorial[k + 2];
-            Quad inputs{};
+            Lanes inputs{};
             for (int q = 0; q < n_basis_; ++q) {
                 const State* d = &driven(q, k);
-                inputs = inputs + weights[q] * ((c0 * Quad::load(d[0].data()) + c1 * Quad::load(d[1].data())) +
-                                                c2 * Quad::load(d[2].data()));
+                inputs = inputs + weights[q] * ((c0 * load(d[0]) + c1 * load(d[1])) + c2 * load(d[2]));
             }
-            const Quad own = (c0 * v + c1 * v1) + c2 * v2;
-            free = k == terms - 2 ? own : s3 * (cubed_ * free) + own;
+            const Lanes own = (c0 * v + c1 * v1) + c2 * v2;
+            free = k == terms - 2 ? own : s3 * cubed_.of_coupled(free) + own;
             forced = k == terms - 2 ? inputs : s3 * forced + inputs;
         }
         return free + forced;
@@ -94,7 +93,7 @@ class Taylor {
         Matrix sum;
         for (int k = 9; k >= 0; k -= 3) {
             if (k < 9) sum = three * sum;
-            sum.add_diagonal(over_factorial[k + shift]);
+            sum.add(over_factorial[k + shift], Matrix::identity());
             sum.add(over_factorial[k + 1 + shift], one);
             sum.add(over_factorial[k + 2 + shift], two);
         }
@@ -151,9 +150,9 @@ class FormSeries {
     [[gnu::always_inline]] Polynomial at(double value, const State& rate, const double* weights) const {
         Polynomial p(value);
         for (int part = 0; part < Polynomial::parts; ++part) {
-            const auto row = [&](const Coefficients& c) { return Quad::load(&c[4 * part]); };
-            Quad sum = (rate[0] * row(by_rate_[0]) + rate[1] * row(by_rate_[1])) +
-                       (rate[2] * row(by_rate_[2]) + rate[3] * row(by_rate_[3]));
+            const auto row = [&](const Coefficients& c) { return Pack<4>::load(&c[4 * part]); };
+            Pack<4> sum = (rate[0] * row(by_rate_[0]) + rate[1] * row(by_rate_[1])) +
+                          (rate[2] * row(by_rate_[2]) + rate[3] * row(by_rate_[3]));
             for (int q = 0; q < n_basis_; ++q) sum = sum + weights[q] * row(by_weight_[q]);
             p.part[part] = sum;
         }

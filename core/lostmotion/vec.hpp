@@ -32,52 +32,72 @@ template <class V>
 void store(V v, double* to) {
     __builtin_memcpy(to, &v, sizeof v);
 }
-// Four numbers in as many registers as they need: the coupled states.
-struct Quad {
-    static constexpr int width = vec_width < 4 ? vec_width : 4, parts = 4 / width;
+// n numbers in as many registers as they need.
+template <int n>
+struct Pack {
+    static constexpr int width = vec_width < n ? vec_width : n, parts = n / width;
+    static_assert(parts * width == n);
     using Part = VecOf<width>::Type;
     Part part[parts];
 
-    static Quad load(const double* from) {
-        Quad q;
-        for (int p = 0; p < parts; ++p) q.part[p] = lostmotion::load<Part>(from + p * width);
-        return q;
+    static Pack load(const double* from) {
+        Pack v;
+        for (int p = 0; p < parts; ++p) v.part[p] = lostmotion::load<Part>(from + p * width);
+        return v;
     }
     void store(double* to) const {
         for (int p = 0; p < parts; ++p) lostmotion::store(part[p], to + p * width);
     }
     double operator[](int k) const { return part[k / width][k % width]; }
+    template <int k>
+    void set(double value) {
+        part[k / width][k % width] = value;
+    }
     // The k-th number in every place.
     template <int k>
-    Part spread() const {
+    Pack spread() const {
         const Part v = part[k / width];
         constexpr int at = k % width;
-        if constexpr (width == 4)
-            return __builtin_shufflevector(v, v, at, at, at, at);
-        else
-            return __builtin_shufflevector(v, v, at, at);
+        Pack all;
+        for (Part& p : all.part) {
+            if constexpr (width == 8)
+                p = __builtin_shufflevector(v, v, at, at, at, at, at, at, at, at);
+            else if constexpr (width == 4)
+                p = __builtin_shufflevector(v, v, at, at, at, at);
+            else
+                p = __builtin_shufflevector(v, v, at, at);
+        }
+        return all;
     }
-    friend Quad operator+(Quad a, const Quad& b) {
+    friend Pack operator+(Pack a, const Pack& b) {
         for (int p = 0; p < parts; ++p) a.part[p] += b.part[p];
         return a;
     }
-    friend Quad operator*(double a, Quad b) {
+    friend Pack operator*(double a, Pack b) {
         for (int p = 0; p < parts; ++p) b.part[p] *= a;
         return b;
     }
+    friend Pack operator*(Pack a, const Pack& b) {
+        for (int p = 0; p < parts; ++p) a.part[p] *= b.part[p];
+        return a;
+    }
 };
-// A single number, with zeros behind it. (What is read in one piece after it was written in several halts the
-// processor.)
-inline void store_single(double value, double* to) {
-    Quad::Part v{};
-    v[0] = value;
-    store(v, to);
-}
 
 inline Vec least(Vec a, Vec b) { return a < b ? a : b; }
 template <class V>
 V absolute(V a) {
     return a < -a ? -a : a;
+}
+template <int n>
+Pack<n> absolute(Pack<n> a) {
+    for (auto& part : a.part) part = absolute(part);
+    return a;
+}
+// The greater of two numbers, for each pair.
+template <int n>
+Pack<n> most(Pack<n> a, const Pack<n>& b) {
+    for (int p = 0; p < Pack<n>::parts; ++p) a.part[p] = a.part[p] < b.part[p] ? b.part[p] : a.part[p];
+    return a;
 }
 // One bit for each number, the first lowest.
 inline unsigned bits(Mask m) {
