@@ -98,6 +98,7 @@ class AdaptiveSolver {
         time_ = time;
         now_.x = x;
         now_.memory = memory;
+        input_.anchor(time_);
         see_inputs(input_, time_, now_);
         step_ = 0.0;
         return status_of(system_.start(cache_, now_, key_));
@@ -127,6 +128,7 @@ class AdaptiveSolver {
     template <class Observer>
     Status change_regime(const Guard* fired, Observer& observer) {
         Switching s;
+        if (fired != nullptr) input_.anchor(time_);
         const Status status = switch_regime(system_, cache_, input_, time_, fired, now_, key_, s);
         if (fired != nullptr) stopped_at_ = fired->contact;
         if (status != Status::done) return status;

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <utility>
 
@@ -27,13 +28,11 @@ class Flow {
     Flow(const LinearRates& rates, const LinearRates& sizes, const Instant& now, double coarseness = 1.0)
         : rates_(rates), sizes_(sizes), now_(now), rounding_(coarseness * rounding) {}
 
-    // Sign of the guard just after now; 0 if it stays at zero.
-    int sign(const Guard& guard) {
-        double value = evaluate(guard.form, now_.x, now_.memory, now_.input[0]);
-        double size = magnitude(guard.form, now_.x, now_.memory, now_.input_size);
+    // Sign of a form just after now, from its value and the sum of the magnitudes of its terms; 0 if it stays at zero.
+    int sign(const LinearForm& form, double value, double size) {
         for (int k = 1; k < n_derivatives; ++k) {
             // The instant itself is known to its rounding only, so a value may be off by that times its rate.
-            const auto [rate, rate_size] = derivative(guard.form, k);
+            const auto [rate, rate_size] = derivative(form, k);
             const double noise = rounding_ * size + time_rounding * std::fabs(now_.time * rate);
             if (std::fabs(value) > noise) return value > 0.0 ? +1 : -1;
             value = rate;
@@ -251,14 +250,14 @@ class SwitchedDrive {
                                                   double coarseness = 1.0) {
         const Regime& r = entry.regime;
         Flow flow(entry.rates, entry.rate_sizes, now, coarseness);
-        const auto room = entry.guard_room(now);
+        GuardTable::Values value, size;
         bool overcome = false;
-        for (int k = 0; k < r.n_guards; ++k) {
+        // Only what is near zero needs a closer look. (The rounding of the instant moves a guard by less than that.)
+        for (unsigned near = entry.near_zero(now, value, size); near != 0; near &= near - 1) {
+            const int k = std::countr_zero(near);
             const Guard& g = r.guards[k];
             if (g.kind == Guard::speed && !test_speed[g.contact]) continue;
-            // Only what is near zero needs a closer look. (The rounding of the instant moves a guard by less than
-            // that.)
-            if (room[k] > 0.0 || flow.sign(g) >= 0) continue;
+            if (flow.sign(g.form, value[k], size[k]) >= 0) continue;
             if (g.kind != Guard::speed && g.kind != Guard::capacity) return {&g, overcome};
             overcome = true;
         }
@@ -272,7 +271,8 @@ class SwitchedDrive {
         if (fired.kind == Guard::speed || fired.kind == Guard::capacity || fired.kind == Guard::outside) return false;
         RegimeKey trial = key;
         cross(fired, trial);
-        const auto& entry = cache.entry(trial);
+        auto& from = cache.entry(key);
+        const auto& entry = cache.beyond(from, static_cast<int>(&fired - from.regime.guards.data()), trial);
         if (!entry.regime.solvable) return false;
         const auto [left, overcome] = violated(entry, now, {true, true, true});
         if (left != nullptr || overcome) return false;

@@ -97,6 +97,7 @@ class ExactSolver {
     template <class Observer>
     Status advance(double t_end, Observer& observer) {
         input_.anchor(time_);
+        crossings_ = 0;  // so that what follows depends on the state alone
         if (jump_pending_) {
             jump_pending_ = false;
             const Status status = change_regime(nullptr, observer);
@@ -126,7 +127,7 @@ class ExactSolver {
     }
 
  private:
-    static constexpr double converging = 1e-9;  // Newton's next correction is the square of the last
+    static constexpr double converging = 1e-7;  // the next correction is less than the square of the last
     static constexpr int first_level = 6;       // of the first look
 
     static double elementary(double unit) {
@@ -139,11 +140,20 @@ class ExactSolver {
         jump_pending_ = false;
         last_level_ = first_level;  // so that what follows depends on the state alone
     }
-    void anchor_inputs() { see_inputs(input_, time_, now_); }
+    void anchor_inputs() {
+        input_.anchor(time_);
+        see_inputs(input_, time_, now_);
+    }
 
     template <class Observer>
     Status change_regime(const Guard* fired, Observer& observer) {
         Switching s;
+        if (fired != nullptr) {
+            if (++crossings_ % 8 == 0)
+                input_.anchor(time_);
+            else
+                input_ = reached_->input();
+        }
         const Status status = switch_regime(system_, cache_, input_, time_, fired, now_, key_, s);
         if (fired != nullptr) stopped_at_ = fired->contact;
         if (status != Status::done) return status;
@@ -206,6 +216,7 @@ class ExactSolver {
                 }
                 if (verdict == Verdict::crossing) {
                     first_crossing(e, segment.memory, *cursor, *here, *there, h, *end, fired);
+                    reached_ = end;
                     time_ = end->time();
                     now_.x = end->x();
                     last_level_ = level;
@@ -358,8 +369,7 @@ class ExactSolver {
     }
 
     // Where a guard falls through zero between `cursor` and h later, near an estimate. Leaves trial_ there, returns
-    // when. About the nearest instant that whole levels lead to, the guard is a polynomial to rounding; Newton finds
-    // its zero.
+    // when. About the nearest instant that whole levels lead to, the guard is a polynomial to rounding.
     double find_zero(typename Cache::Entry& e, int g, const Memory& memory, const Cursor& cursor, double estimate,
                      double h) {
         const LinearForm& form = e.regime.guards[g].form;
@@ -375,7 +385,9 @@ class ExactSolver {
             double z = rest / base;
             bool found = false;
             for (int n = 0; n < 60 && !found && std::fabs(z) <= reach; ++n) {
-                const double moved = -guard.value(z) / guard.slope(z);
+                // Halley's method
+                const double f = guard.value(z), slope = guard.slope(z);
+                const double moved = -f * slope / (slope * slope - f * guard.half_curvature(z));
                 z += moved;
                 found = std::fabs(moved) <= converging * std::fabs(z) || at + base * moved == at;
             }
@@ -384,7 +396,7 @@ class ExactSolver {
                 trial_.nudge(s - from);
                 return s;
             }
-            // The zero lies elsewhere: there Newton leads, or half of what is left.
+            // The zero lies elsewhere: where the last step led, or in half of what is left.
             (value > 0.0 ? low : high) = from;
             s = from + z * base;
             if (!(s > low && s < high)) s = 0.5 * (low + high);
@@ -409,6 +421,8 @@ class ExactSolver {
     InputTurns& turns_;
     InputState input_{signals_, turns_.basis()};
     Cursor cursor_{input_}, end_ = cursor_, trial_ = cursor_;
+    const Cursor* reached_ = nullptr;  // where the last crossing was found
+    int crossings_ = 0;
     Ends ends_[2];
     Bounds bounds_;
     bool roomy_ = false;  // in the last look the guards that were clear were so by far

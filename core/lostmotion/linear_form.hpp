@@ -62,6 +62,7 @@ using LinearForm = Form<n_terms>;
 
 // State vector, with padding so that it is a whole number of vectors.
 inline constexpr int lanes = (n_states + vec_width - 1) / vec_width * vec_width;
+// A vector as long as a cache line must not lie across two.
 struct alignas(8 * vec_width) State : std::array<double, lanes> {};
 using Lanes = Pack<lanes>;
 

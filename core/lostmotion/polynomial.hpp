@@ -71,6 +71,8 @@ class Polynomial {
     double slope(double z) const {
         return sum(scaled({1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0}), z);
     }
+    // Half the second derivative, by its first terms.
+    double half_curvature(double z) const { return part[0][1] + z * (3.0 * part[0][2] + z * (6.0 * part[0][3])); }
 
  private:
     std::array<Pack<4>, parts> scaled(const std::array<double, degree>& by) const {

@@ -72,7 +72,6 @@ class Propagator {
         levels_ = 0;
         steps_.clear();
         responses_.clear();
-        rotations_.clear();
         steps_.reserve(usual_levels);
         responses_.reserve(static_cast<std::size_t>(usual_levels * n_basis_));
         taylor_.prepare(rates, basis_, n_basis_);
@@ -93,7 +92,7 @@ class Propagator {
         return steps_[k];
     }
     const Response* responses(int k) const { return responses_.data() + static_cast<std::size_t>(k) * n_basis_; }
-    const double* rotations(int k) const { return rotations_[static_cast<std::size_t>(k)]; }
+    const double* rotations(int k) const { return rotations_[k]; }
 
     double length(int k) const { return base_ * static_cast<double>(1ull << k); }
     // How many base intervals fit into s.
@@ -233,7 +232,7 @@ class Propagator {
     void finish_level() {
         const int k = levels_++;
         const double* turn = turns_->over(exponent_ + k);
-        rotations_.push_back(turn);
+        rotations_[k] = turn;
         for (int q = 0; q < n_basis_; ++q) {
             const InputBasis& b = basis_[q];
             const double input = b.kind == InputBasis::ramp     ? length(k)
@@ -254,9 +253,9 @@ class Propagator {
     InputTurns* turns_ = nullptr;
     const InputBasis* basis_ = nullptr;
     int levels_ = 0;
-    std::vector<Step> steps_;               // one a level
-    std::vector<Response> responses_;       // levels x n_basis
-    std::vector<const double*> rotations_;  // one a level: cos and sin of omega * length
+    std::vector<Step> steps_;                            // one a level
+    std::vector<Response> responses_;                    // levels x n_basis
+    std::array<const double*, max_levels> rotations_{};  // of each level: cos and sin of omega * length
 };
 
 }  // namespace lostmotion

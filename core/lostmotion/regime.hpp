@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 
 #include "linear_form.hpp"
@@ -22,16 +24,19 @@ struct RegimeKey {
     Modes modes{absent, absent, absent};
     std::int8_t amplifier = 0;   // -1, +1: at the voltage limit
     std::int16_t piece = 0;      // of the torsion curve
+    std::int16_t unused = 0;     // so that all bits are given
     std::int32_t cell = 0;       // slipping: triangle; stuck: load interval for starting forward ...
     std::int32_t cell_back = 0;  // ... and backward
 
-    friend bool operator==(const RegimeKey& a, const RegimeKey& b) { return a.packed() == b.packed(); }
+    std::array<std::uint64_t, 2> words() const { return std::bit_cast<std::array<std::uint64_t, 2>>(*this); }
+    friend bool operator==(const RegimeKey& a, const RegimeKey& b) { return a.words() == b.words(); }
 
-    std::uint64_t packed() const {
-        const auto bits = [](auto v, int n) { return static_cast<std::uint64_t>(v) & ((1ull << n) - 1); };
-        return bits(modes[0], 2) | bits(modes[1], 2) << 2 | bits(modes[2], 2) << 4 | bits(amplifier, 2) << 6 |
-               bits(piece, 8) << 8 | bits(cell, 28) << 16 | bits(cell_back, 20) << 44;
-    }
+    struct Hash {
+        std::size_t operator()(const RegimeKey& key) const {
+            const auto [a, b] = key.words();
+            return (a * 0x9e3779b97f4a7c15u) ^ (b * 0xc2b2ae3d27d4eb4fu);
+        }
+    };
 };
 
 // A regime holds while each of its guards is >= 0.
@@ -53,6 +58,7 @@ struct Guard {
 };
 
 inline constexpr int max_guards = 16;
+using GuardTable = FormTable<max_guards>;
 
 struct Regime {
     RegimeKey key;

@@ -10,8 +10,6 @@
 
 namespace lostmotion {
 
-using GuardTable = FormTable<max_guards>;
-
 template <class System>
 class RegimeCache {
  public:
@@ -25,13 +23,15 @@ class RegimeCache {
         GuardTable guards, guard_sizes;
         int touch_guard = -1;  // the one that also ends the regime by touching zero
         Propagator propagator;
-        std::vector<FormSeries> series;  // of the guards that have been crossed
+        std::array<FormSeries, max_guards> series;   // of the guards that have been crossed
+        std::array<Entry*, max_guards> neighbour{};  // what lies beyond each guard, as far as it is known
 
         void set(const Regime& r) {
             regime = r;
             rates = LinearRates(r);
             rate_sizes = rates.magnitudes();
             guards = {};
+            neighbour = {};
             touch_guard = -1;
             for (int g = 0; g < r.n_guards; ++g) {
                 guards.set(g, r.guards[g].form);
@@ -42,25 +42,26 @@ class RegimeCache {
         }
         void prepare(InputTurns& turns, const State& scale) {
             propagator.prepare(rates, turns, scale);
-            series.resize(static_cast<std::size_t>(regime.n_guards));
             for (FormSeries& s : series) s.reset();
         }
         const FormSeries& guard_series(int g) {
-            FormSeries& s = series[static_cast<std::size_t>(g)];
+            FormSeries& s = series[g];
             if (!s.ready()) propagator.prepare(s, regime.guards[g].form);
             return s;
         }
 
-        // How far the guards lie above a thousandth of the sizes of their terms.
-        GuardTable::Values guard_room(const Instant& now) const {
-            GuardTable::Values constant{}, value, size;
+        // Guards and the sums of the magnitudes of their terms. Returns, as bits, those that do not lie above a
+        // thousandth of the latter.
+        unsigned near_zero(const Instant& now, GuardTable::Values& value, GuardTable::Values& size) const {
+            GuardTable::Values constant;
             guards.constants(now.memory, constant);
             guards.evaluate(constant, now.x, now.input[0], value);
             guard_sizes.constants(magnitudes(now.memory), constant);
             guard_sizes.evaluate(constant, magnitudes(now.x), now.input_size, size);
+            unsigned near = 0;
             for (int g = 0; g < guards.rows(); g += vec_width)
-                store(load(&value[g]) - 1e-3 * load(&size[g]), &value[g]);
-            return value;
+                near |= bits(load(&value[g]) <= 1e-3 * load(&size[g])) << g;
+            return near;
         }
         // Sum of the magnitudes of the terms of the guard that ends by touching, a speed.
         double touch_size(const State& x) const {
@@ -74,9 +75,8 @@ class RegimeCache {
     const Regime& regime(const RegimeKey& key) { return entry(key).regime; }
 
     Entry& entry(const RegimeKey& key) {
-        const std::uint64_t packed = key.packed();
-        if (last_ != nullptr && packed == last_packed_) return *last_;
-        std::unique_ptr<Entry>& found = entries_[packed];
+        if (last_ != nullptr && key == last_->regime.key) return *last_;
+        std::unique_ptr<Entry>& found = entries_[key];
         if (!found) {
             if (spare_.empty()) {
                 found = std::make_unique<Entry>();
@@ -87,8 +87,13 @@ class RegimeCache {
             found->set(system_.build(key));
         }
         last_ = found.get();
-        last_packed_ = packed;
-        return *found;
+        return *last_;
+    }
+    // The same, where a guard of another regime leads to this one.
+    Entry& beyond(Entry& from, int guard, const RegimeKey& key) {
+        Entry*& neighbour = from.neighbour[guard];
+        if (neighbour == nullptr) neighbour = &entry(key);
+        return *(last_ = neighbour);
     }
 
     // Forgets all regimes, since the system has changed. Their memory is kept for others.
@@ -115,8 +120,7 @@ class RegimeCache {
     const System& system_;
     std::unique_ptr<InputTurns> turns_;
     Entry* last_ = nullptr;  // the one asked for last
-    std::uint64_t last_packed_ = 0;
-    std::unordered_map<std::uint64_t, std::unique_ptr<Entry>> entries_;
+    std::unordered_map<RegimeKey, std::unique_ptr<Entry>, RegimeKey::Hash> entries_;
     std::vector<std::unique_ptr<Entry>> spare_;
 };
 

@@ -33,14 +33,14 @@ struct Switching {
 };
 
 // Inputs and their rates at an instant, for the search of contact modes. At a jump: the right limit.
-inline void see_inputs(InputState& input, double time, Instant& now) {
-    input.anchor(time);
+inline void see_inputs(const InputState& input, double time, Instant& now) {
     now.time = time;
     now.input = input.jet();
     now.input_size = input.sizes();
 }
 
-// Finds the regime that follows after `fired` has reached zero or, if that is nullptr, after an input has jumped.
+// Finds the regime that follows after `fired` has reached zero, with the inputs of that instant, or, if it is nullptr,
+// after an input has jumped.
 template <class System, class Cache>
 Status switch_regime(const System& system, Cache& cache, InputState& input, double time, const Guard* fired,
                      Instant& now, RegimeKey& key, Switching& s) {
@@ -56,6 +56,7 @@ Status switch_regime(const System& system, Cache& cache, InputState& input, doub
     } else {
         input.anchor_left(time);
         s.torque_before = evaluate(old.output_torque, now.x, now.memory, input.values());
+        input.anchor(time);
     }
     see_inputs(input, time, now);
     if (fired != nullptr) s.torque_before = evaluate(old.output_torque, now.x, now.memory, now.input[0]);

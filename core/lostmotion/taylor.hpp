@@ -25,6 +25,7 @@ class Taylor {
         squared_ = rates.rate * rates.rate;
         cubed_ = rates.rate * squared_;
         driven_.clear();
+        driven_.reserve(static_cast<std::size_t>(n_basis * terms));
         for (int q = 0; q < n_basis; ++q) {
             State derivative{};
             for (int k = 1; k <= terms; ++k) {
@@ -125,20 +126,21 @@ class FormSeries {
     void reset() { unit_ = 0.0; }
 
     void prepare(const Taylor& motion, const InputBasis* basis, const LinearForm& form, double unit) {
+        assert(form.c[load_angle] == 0.0);
         unit_ = unit;
         n_basis_ = motion.n_basis();
-        assert(form.c[load_angle] == 0.0);
-        by_weight_.resize(static_cast<std::size_t>(n_basis_));
+        rows_.resize(static_cast<std::size_t>(Matrix::coupled + n_basis_));
         const Matrix& A = motion.rates().rate;
         std::array<double, Matrix::coupled> row{};  // of the k-th derivative, on x'
         for (int c = 0; c < Matrix::coupled; ++c) row[c] = form.c[c];
         double power = 1.0;
         for (int k = 1; k <= Taylor::terms; ++k) {
             power *= unit / k;
-            for (int c = 0; c < Matrix::coupled; ++c) by_rate_[c][k - 1] = power * row[c];
+            for (int c = 0; c < Matrix::coupled; ++c) rows_[c][k - 1] = power * row[c];
             for (int q = 0; q < n_basis_; ++q)
-                by_weight_[q][k - 1] = power * (evaluate_rate(form, motion.driven(q, k), {}) +
-                                                form.c[first_input + basis[q].input] * basis[q].derivative(k));
+                rows_[Matrix::coupled + q][k - 1] =
+                    power * (evaluate_rate(form, motion.driven(q, k), {}) +
+                             form.c[first_input + basis[q].input] * basis[q].derivative(k));
             std::array<double, Matrix::coupled> next{};
             for (int c = 0; c < Matrix::coupled; ++c)
                 for (int r = 0; r < Matrix::coupled; ++r) next[c] += row[r] * A.column[c][r];
@@ -150,22 +152,18 @@ class FormSeries {
     [[gnu::always_inline]] Polynomial at(double value, const State& rate, const double* weights) const {
         Polynomial p(value);
         for (int part = 0; part < Polynomial::parts; ++part) {
-            const auto row = [&](const Coefficients& c) { return Pack<4>::load(&c[4 * part]); };
-            Pack<4> sum = (rate[0] * row(by_rate_[0]) + rate[1] * row(by_rate_[1])) +
-                          (rate[2] * row(by_rate_[2]) + rate[3] * row(by_rate_[3]));
-            for (int q = 0; q < n_basis_; ++q) sum = sum + weights[q] * row(by_weight_[q]);
+            const auto row = [&](int k) { return Pack<4>::load(&rows_[static_cast<std::size_t>(k)][4 * part]); };
+            Pack<4> sum = (rate[0] * row(0) + rate[1] * row(1)) + (rate[2] * row(2) + rate[3] * row(3));
+            for (int q = 0; q < n_basis_; ++q) sum = sum + weights[q] * row(Matrix::coupled + q);
             p.part[part] = sum;
         }
         return p;
     }
 
  private:
-    using Coefficients = std::array<double, Taylor::terms>;
-
     double unit_ = 0.0;
     int n_basis_ = 0;
-    alignas(32) std::array<Coefficients, Matrix::coupled> by_rate_{};
-    std::vector<Coefficients> by_weight_;
+    std::vector<std::array<double, Taylor::terms>> rows_;  // by each coupled rate, by each weight
 };
 
 }  // namespace lostmotion
