@@ -242,7 +242,7 @@ class ExactSolver {
     }
 
     // |g''''| over the look, from a bound on the fourth derivative of the state that the flow carries on.
-    [[gnu::always_inline]] void bound_fourth(const GuardTable& guard_sizes, const Growth& growth, State& size) {
+    [[gnu::always_inline]] void bound_fourth(const GuardTable& guard_sizes, const Matrix& growth, State& size) {
         if (size[0] + size[1] + size[2] + size[3] != 0.0)  // not at rest, where growth may have overflowed
             (growth * coupled(size)).store(size.data());
         guard_sizes.rates(size, input_bound_, bounds_.fourth);

@@ -60,15 +60,26 @@ struct Form {
 
 using LinearForm = Form<n_terms>;
 
-// State vector, with padding so that it is a whole number of vectors.
-inline constexpr int lanes = (n_states + vec_width - 1) / vec_width * vec_width;
-// A vector as long as a cache line must not lie across two.
-struct alignas(8 * vec_width) State : std::array<double, lanes> {};
-using Lanes = Pack<lanes>;
+// The first four states are coupled with one another; the load angle follows the load speed and nothing depends on it.
+inline constexpr int n_coupled = 4;
+static_assert(load_angle == n_coupled);
+using Coupled = Pack<n_coupled>;
+struct alignas(sizeof(Coupled::Part)) State : std::array<double, n_states> {};
 
+// A state in registers.
+struct Lanes {
+    Coupled coupled{};
+    double angle = 0.0;
+
+    static Lanes load(const double* from) { return {Coupled::load(from), from[load_angle]}; }
+    void store(double* to) const {
+        coupled.store(to);
+        to[load_angle] = angle;
+    }
+    friend Lanes operator+(const Lanes& a, const Lanes& b) { return {a.coupled + b.coupled, a.angle + b.angle}; }
+    friend Lanes operator*(double a, const Lanes& b) { return {a * b.coupled, a * b.angle}; }
+};
 inline Lanes load(const State& x) { return Lanes::load(x.data()); }
-// The states that are coupled with one another: all but the load angle.
-using Coupled = Pack<load_angle>;
 inline Coupled coupled(const State& x) { return Coupled::load(x.data()); }
 inline void add_scaled(State& y, double a, const State& x) { (load(y) + a * load(x)).store(y.data()); }
 
@@ -80,7 +91,8 @@ struct Memory {
 
 inline State magnitudes(const State& x) {
     State size;
-    absolute(load(x)).store(size.data());
+    absolute(coupled(x)).store(size.data());
+    size[load_angle] = std::fabs(x[load_angle]);
     return size;
 }
 inline Memory magnitudes(const Memory& m) { return {std::fabs(m.hysteresis_capacity), std::fabs(m.held_torque)}; }

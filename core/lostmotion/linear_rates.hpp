@@ -8,65 +8,77 @@
 
 namespace lostmotion {
 
-// A linear map of the states. The first four are coupled; the load angle follows the load speed and nothing depends on
-// it, so its column is zero but for its own entry.
+// A linear map of the states that does not depend on the load angle: A, exp(A h) - 1, and the integral of exp(A h) but
+// for the length h itself, by which the rate of the load angle goes into the angle.
 struct Matrix {
-    static constexpr int coupled = 4;
+    using Column = std::array<double, n_coupled>;
 
-    std::array<State, n_states> column{};
+    alignas(sizeof(Coupled::Part)) std::array<Column, n_coupled> column{};
+    Column angle{};  // the row of the load angle
 
-    static const Matrix& identity() {
-        static const Matrix one = [] {
-            Matrix m;
-            for (int k = 0; k < n_states; ++k) m.column[k][k] = 1.0;
-            return m;
-        }();
-        return one;
+    // 1 where a coupled state meets itself.
+    static constexpr Matrix identity() {
+        Matrix m;
+        for (std::size_t k = 0; k < n_coupled; ++k) m.column[k][k] = 1.0;
+        return m;
     }
 
-    [[gnu::always_inline]] Lanes operator*(const Lanes& v) const {
-        return of_coupled(v) + v.spread<load_angle>() * load(column[load_angle]);
-    }
-    // The same where the column of the load angle is all zero, as in A and exp(A h) - 1.
-    [[gnu::always_inline]] Lanes of_coupled(const Lanes& v) const {
+    [[gnu::always_inline]] Coupled coupled(int c) const { return Coupled::load(column[c].data()); }
+    [[gnu::always_inline]] Coupled operator*(const Coupled& v) const {
         // In pairs, which the processor adds side by side.
-        return (v.spread<0>() * load(column[0]) + v.spread<1>() * load(column[1])) +
-               (v.spread<2>() * load(column[2]) + v.spread<3>() * load(column[3]));
+        return (v.spread<0>() * coupled(0) + v.spread<1>() * coupled(1)) +
+               (v.spread<2>() * coupled(2) + v.spread<3>() * coupled(3));
     }
+    [[gnu::always_inline]] Lanes operator*(const Lanes& v) const { return {*this * v.coupled, angle_row(v.coupled)}; }
     [[gnu::always_inline]] State operator*(const State& v) const {
         State out;
         (*this * load(v)).store(out.data());
         return out;
     }
-    double operator()(int row, int col) const { return column[col][row]; }
+    [[gnu::always_inline]] double angle_row(const Coupled& v) const {
+        const Coupled p = Coupled::load(angle.data()) * v;
+        return (p[0] + p[1]) + (p[2] + p[3]);
+    }
+    double operator()(int row, int col) const {
+        return col == load_angle ? 0.0 : row == load_angle ? angle[col] : column[col][row];
+    }
     // factor * other, entry by entry
     void add(double factor, const Matrix& other) {
-        combine(other, [factor](double own, double others) { return own + factor * others; });
+        for (int r = 0; r < n_rows; ++r) (row(r) + factor * other.row(r)).store(row_at(r));
     }
     void scale(double factor) {
-        combine(*this, [factor](double own, double) { return own * factor; });
+        for (int r = 0; r < n_rows; ++r) (factor * row(r)).store(row_at(r));
     }
-    // f(own entry, that of the other), entry by entry
-    template <class F>
-    void combine(const Matrix& other, F&& f) {
-        double* own = column[0].data();
-        const double* others = other.column[0].data();
-        for (int k = 0; k < entries; ++k) own[k] = f(own[k], others[k]);
+    Matrix magnitudes() const {
+        Matrix out;
+        for (int r = 0; r < n_rows; ++r) absolute(row(r)).store(out.row_at(r));
+        return out;
     }
     friend Matrix operator*(const Matrix& a, const Matrix& b) {
         Matrix out;
-        for (int c = 0; c < coupled; ++c) (a * load(b.column[c])).store(out.column[c].data());
-        Lanes own{};  // a column that is written in one piece can be read in one
-        own.set<load_angle>(a.column[load_angle][load_angle] * b.column[load_angle][load_angle]);
-        own.store(out.column[load_angle].data());
+        for (int c = 0; c < n_coupled; ++c) (a * b.coupled(c)).store(out.column[c].data());
+        b.times_row(a.angle).store(out.angle.data());
+        return out;
+    }
+    // A row, on the coupled states, times this.
+    Coupled times_row(const Column& row) const {
+        const Coupled v = Coupled::load(row.data());
+        Coupled out{};
+        const auto set = [&]<int c>() __attribute__((always_inline)) {
+            const Coupled p = v * coupled(c);
+            out.set<c>((p[0] + p[1]) + (p[2] + p[3]));
+        };
+        set.template operator()<0>(), set.template operator()<1>(), set.template operator()<2>(),
+            set.template operator()<3>();
         return out;
     }
 
  private:
-    static constexpr int entries = n_states * lanes;  // one behind the other, so that several are taken at once
+    // Columns and the row of the angle, one behind the other.
+    static constexpr int n_rows = n_coupled + 1;
+    Coupled row(int r) const { return r < n_coupled ? coupled(r) : Coupled::load(angle.data()); }
+    double* row_at(int r) { return r < n_coupled ? column[r].data() : angle.data(); }
 };
-static_assert(sizeof(Matrix) == n_states * lanes * sizeof(double));
-static_assert(load_angle == Matrix::coupled);
 
 // dx/dt = A x + constant + B u of one regime. No rate depends on the load angle, and its own rate on the load speed
 // alone.
@@ -81,7 +93,7 @@ struct LinearRates {
             const LinearForm& f = regime.rate[r];
             assert(f.c[load_angle] == 0.0);
             assert(r != load_angle || (f.c[motor_torque] == 0.0 && f.c[motor_speed] == 0.0 && f.c[twist] == 0.0));
-            for (int c = 0; c < Matrix::coupled; ++c) rate.column[c][r] = f.c[c];
+            for (int c = 0; c < n_coupled; ++c) (r == load_angle ? rate.angle[c] : rate.column[c][r]) = f.c[c];
             for (int i = 0; i < n_inputs; ++i) input_column[i][r] = f.c[first_input + i];
             fixed[r] = f.c[one];
             per_capacity[r] = f.c[hysteresis_capacity];
@@ -91,7 +103,7 @@ struct LinearRates {
     // The same with the magnitudes of all coefficients.
     LinearRates magnitudes() const {
         LinearRates out = *this;
-        out.rate.combine(rate, [](double, double a) { return std::fabs(a); });
+        out.rate = rate.magnitudes();
         for (State* s : {&out.input_column[0], &out.input_column[1], &out.fixed, &out.per_capacity, &out.per_held})
             *s = lostmotion::magnitudes(*s);
         return out;
@@ -112,7 +124,7 @@ struct LinearRates {
     }
     // The next time derivative of the state from one that is at least the first.
     [[gnu::always_inline]] Lanes higher(const Lanes& derivative, const std::array<double, n_inputs>& u) const {
-        return rate.of_coupled(derivative) + (u[0] * load(input_column[0]) + u[1] * load(input_column[1]));
+        return rate * derivative + (u[0] * load(input_column[0]) + u[1] * load(input_column[1]));
     }
     [[gnu::always_inline]] State higher(const State& derivative, const std::array<double, n_inputs>& u) const {
         State out;

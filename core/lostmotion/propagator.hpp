@@ -20,28 +20,19 @@
 
 namespace lostmotion {
 
-// Bound on |exp(A s)|, element by element, as far as it couples states.
-struct Growth {
-    alignas(32) std::array<std::array<double, Matrix::coupled>, Matrix::coupled> column;
-
-    double operator()(int row, int col) const { return column[col][row]; }
-    [[gnu::always_inline]] Coupled operator*(const Coupled& size) const {
-        const auto at = [this](int c) { return Coupled::load(column[c].data()); };
-        return (size.spread<0>() * at(0) + size.spread<1>() * at(1)) +
-               (size.spread<2>() * at(2) + size.spread<3>() * at(3));
-    }
-};
-
 // Everything needed to step by one length in one regime.
 struct Step {
     Matrix change;    // E(h) = exp(A h) - 1
     Matrix integral;  // G(h)
-    Growth growth;    // for 0 <= s <= h
-};
+    double length;    // h [s]
+    Matrix growth;    // bound on |exp(A s)|, element by element, for 0 <= s <= h; of the coupled states alone
 
-// The response from rest to one function of an input, at the end of a step.
-struct Response {
-    State x{}, rate{};
+    // G(h) times a rate.
+    [[gnu::always_inline]] Lanes integrate(const Lanes& rate) const {
+        Lanes sum = integral * rate;
+        sum.angle += length * rate.angle;
+        return sum;
+    }
 };
 
 class Propagator {
@@ -61,7 +52,7 @@ class Propagator {
         norm_ = fastest;
         for (int r = 0; r < n_states; ++r) {
             double sum = 0.0;
-            for (int c = 0; c < Matrix::coupled; ++c) sum += std::fabs(rates.rate(r, c)) * scale[c] / scale[r];
+            for (int c = 0; c < n_coupled; ++c) sum += std::fabs(rates.rate(r, c)) * scale[c] / scale[r];
             norm_ = std::fmax(norm_, sum);
         }
         base_ = turns.unit();
@@ -91,7 +82,8 @@ class Propagator {
         while (levels_ <= k) add_doubled();
         return steps_[k];
     }
-    const Response* responses(int k) const { return responses_.data() + static_cast<std::size_t>(k) * n_basis_; }
+    const Driven* responses(int k) const { return &responses_[static_cast<std::size_t>(2 * k * n_basis_)]; }
+    const Driven* response_rates(int k) const { return responses(k) + n_basis_; }
     const double* rotations(int k) const { return rotations_[k]; }
 
     double length(int k) const { return base_ * static_cast<double>(1ull << k); }
@@ -113,10 +105,10 @@ class Propagator {
 
     // x after the step of level k; `rate` is x' at the anchor, `weights` the input state there.
     [[gnu::always_inline]] State step(int k, const State& x, const State& rate, const double* weights) {
-        const Lanes free = level(k).integral * load(rate);
-        const Response* response = responses(k);
+        const Lanes free = level(k).integrate(load(rate));
+        const Driven* response = responses(k);
         Lanes forced{};
-        for (int q = 0; q < n_basis_; ++q) forced = forced + weights[q] * load(response[q].x);
+        for (int q = 0; q < n_basis_; ++q) forced = forced + weights[q] * load(response[q]);
         State y;
         (load(x) + (free + forced)).store(y.data());
         return y;
@@ -124,15 +116,15 @@ class Propagator {
     // The same for x and x' at once, without a look at the rates of the regime in between.
     [[gnu::always_inline]] void step(int k, Lanes& x, Lanes& rate, const double* weights) {
         const Step& s = level(k);
-        const Response* response = responses(k);
+        const Driven *response = responses(k), *response_rate = response_rates(k);
         // What the inputs bring does not wait for the step before, so it is summed up by itself.
         Lanes forced{}, forced_rate{};
         for (int q = 0; q < n_basis_; ++q) {
-            forced = forced + weights[q] * load(response[q].x);
-            forced_rate = forced_rate + weights[q] * load(response[q].rate);
+            forced = forced + weights[q] * load(response[q]);
+            forced_rate = forced_rate + weights[q] * load(response_rate[q]);
         }
-        x = x + (s.integral * rate + forced);
-        rate = rate + (s.change.of_coupled(rate) + forced_rate);
+        x = x + (s.integrate(rate) + forced);
+        rate = rate + (s.change * rate + forced_rate);
     }
 
     // G(h) for any length: whole levels from the longest down, then the Taylor series.
@@ -163,16 +155,17 @@ class Propagator {
  private:
     void add_base() {
         Step& s = steps_.emplace_back();
-        const double h = base_;
+        const double h = s.length = base_;
         s.integral = taylor_.integral(h);
         s.change = rates().rate * s.integral;
         // |exp(A s)| from the powers of a matrix without negative entries beside its diagonal.
-        Matrix positive = rates().rate;
-        positive.combine(Matrix{}, [h](double a, double) { return h * std::fabs(a); });
-        for (int k = 0; k < Matrix::coupled; ++k) positive.column[k][k] = h * std::fmax(rates().rate.column[k][k], 0.0);
-        const Matrix twice = positive * positive, sum = Taylor::power_series<0>(positive, twice, positive * twice);
-        for (int c = 0; c < Matrix::coupled; ++c) coupled(sum.column[c]).store(s.growth.column[c].data());
-        for (int q = 0; q < n_basis_; ++q) responses_.push_back({taylor_.response(q, h), {}});
+        Matrix positive = rates().rate.magnitudes();
+        for (int k = 0; k < n_coupled; ++k) positive.column[k][k] = std::fmax(rates().rate.column[k][k], 0.0);
+        positive.scale(h);
+        const Matrix twice = positive * positive;
+        s.growth = Taylor::power_series<0>(positive, twice, positive * twice);
+        responses_.resize(static_cast<std::size_t>(2 * n_basis_));
+        for (int q = 0; q < n_basis_; ++q) responses_[static_cast<std::size_t>(q)] = taylor_.response(q, h);
         finish_level();
     }
 
@@ -187,43 +180,33 @@ class Propagator {
         steps_.emplace_back();
         const Step& a = steps_[k];
         Step& b = steps_[k + 1];
-        for (int c = 0; c < n_states; ++c) {
-            const Lanes g = load(a.integral.column[c]);
-            (2.0 * g + a.change.of_coupled(g)).store(b.integral.column[c].data());
-        }
-        for (int c = 0; c < Matrix::coupled; ++c) {
-            const Lanes e = load(a.change.column[c]);
-            (2.0 * e + a.change.of_coupled(e)).store(b.change.column[c].data());
+        b.length = 2.0 * a.length;
+        doubled(a.change, a.change, b.change);
+        doubled(a.change, a.integral, b.integral);
+        for (int c = 0; c < n_coupled; ++c) {
             // |exp(A (h + s))| <= |exp(A s)| |exp(A h)|, of which the second is known.
-            const Coupled size = absolute(coupled(Matrix::identity().column[c]) + coupled(a.change.column[c]));
-            most(Coupled::load(a.growth.column[c].data()), a.growth * size).store(b.growth.column[c].data());
+            const Coupled size = absolute(Matrix::identity().coupled(c) + a.change.coupled(c));
+            most(a.growth.coupled(c), a.growth * size).store(b.growth.column[c].data());
         }
-        responses_.resize(responses_.size() + n_basis_);
-        const Response* from = responses(k);
-        std::array<State, n_inputs> held;  // what a constant input brings
-        for (int i = 0; i < n_inputs; ++i) held[i] = a.integral * rates().input_column[i];
+        responses_.resize(responses_.size() + static_cast<std::size_t>(2 * n_basis_));
+        const Driven* from = responses(k);
+        std::array<Lanes, n_inputs> held;  // what a constant input brings
+        for (int i = 0; i < n_inputs; ++i) held[i] = a.integrate(load(rates().input_column[i]));
         for (int q = 0; q < n_basis_; ++q) {
             const InputBasis& basis = basis_[q];
-            State y = a.change * from[q].x;
-            add_scaled(y, 1.0, from[q].x);
-            const State& constant = held[basis.input];
+            const Lanes own = load(from[q]), kept = own + a.change * own, &constant = held[basis.input];
+            Lanes y;
             if (basis.kind == InputBasis::ramp) {
-                add_scaled(y, 1.0, from[q].x);
-                add_scaled(y, length(k), constant);
+                y = kept + (own + a.length * constant);
             } else {
                 const int cosine = basis.kind == InputBasis::cosine ? q : q - 1, sine = cosine + 1;
                 const double c = rotations(k)[cosine], s = rotations(k)[sine];
-                if (basis.kind == InputBasis::cosine) {
-                    add_scaled(y, c, from[cosine].x);
-                    add_scaled(y, -s, from[sine].x);
-                    add_scaled(y, cosine_change(k, q), constant);
-                } else {
-                    add_scaled(y, s, from[cosine].x);
-                    add_scaled(y, c, from[sine].x);
-                    add_scaled(y, s, constant);
-                }
+                if (basis.kind == InputBasis::cosine)
+                    y = kept + (c * own + (-s * load(from[sine]) + cosine_change(k, q) * constant));
+                else
+                    y = kept + (c * own + (s * load(from[cosine]) + s * constant));
             }
-            responses_[static_cast<std::size_t>(k + 1) * n_basis_ + q].x = y;
+            y.store(responses_[static_cast<std::size_t>(2 * (k + 1) * n_basis_ + q)].data());
         }
         finish_level();
     }
@@ -238,10 +221,15 @@ class Propagator {
             const double input = b.kind == InputBasis::ramp     ? length(k)
                                  : b.kind == InputBasis::cosine ? cosine_change(k, q)
                                                                 : turn[q];
-            Response& r = responses_[static_cast<std::size_t>(k) * n_basis_ + q];
-            r.rate = rates().rate * r.x;
-            add_scaled(r.rate, input, rates().input_column[b.input]);
+            Driven* r = &responses_[static_cast<std::size_t>(2 * k * n_basis_ + q)];
+            (rates().rate * load(*r) + input * load(rates().input_column[b.input])).store(r[n_basis_].data());
         }
+    }
+
+    // 2 m + change m
+    static void doubled(const Matrix& change, const Matrix& m, Matrix& out) {
+        for (int c = 0; c < n_coupled; ++c) (2.0 * m.coupled(c) + change * m.coupled(c)).store(out.column[c].data());
+        (2.0 * Coupled::load(m.angle.data()) + m.times_row(change.angle)).store(out.angle.data());
     }
 
     Taylor taylor_;
@@ -254,7 +242,7 @@ class Propagator {
     const InputBasis* basis_ = nullptr;
     int levels_ = 0;
     std::vector<Step> steps_;                            // one a level
-    std::vector<Response> responses_;                    // levels x n_basis
+    std::vector<Driven> responses_;                      // levels x (x, rate) x n_basis
     std::array<const double*, max_levels> rotations_{};  // of each level: cos and sin of omega * length
 };
 

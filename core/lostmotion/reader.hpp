@@ -48,7 +48,8 @@ struct Instants {
     alignas(64) std::array<Column, n_inputs> u{};
 
     [[gnu::always_inline]] void set(int k, const Lanes& state, const std::array<double, n_inputs>& input) {
-        for (int j = 0; j < n_states; ++j) x[j][k] = state[j];
+        for (int j = 0; j < n_coupled; ++j) x[j][k] = state.coupled[j];
+        x[load_angle][k] = state.angle;
         for (int i = 0; i < n_inputs; ++i) u[i][k] = input[i];
     }
 };

@@ -68,7 +68,8 @@ class Sensitivity {
                 const Components g = gradient(r.rate[row]);
                 for (int k = 0; k < n_components; ++k) rate[row] += g[k] * jacobian.row[k][c];
             }
-            const State change = G * rate;
+            State change = G * rate;
+            change[load_angle] += (s.end - s.begin) * rate[load_angle];
             for (int row = 0; row < n_states; ++row) jacobian.row[row][c] += change[row];
         }
         return true;

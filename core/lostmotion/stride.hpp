@@ -21,7 +21,7 @@ class Stride {
         const double length = propagator.length(level);
         const InputState& input = from.input();
         const LinearRates& rates = propagator.rates();
-        const Response* responses = propagator.responses(level);
+        const Driven* responses = propagator.responses(level);
         const double* rotations = propagator.rotations(level);
         x_ = from.x();
         linear_ = input.linear();
@@ -31,26 +31,24 @@ class Stride {
             add_scaled(driving, linear_[i], rates.input_column[i]);
             add_scaled(ramp, increase_[i], rates.input_column[i]);
         }
-        forced_ = step_->integral * driving;
-        growth_ = step_->integral * ramp;
+        forced_ = step_->integrate(load(driving));
+        growth_ = step_->integrate(load(ramp));
         sines_.clear();
         for (int q = 0; q < input.size(); ++q) {
             const InputBasis& basis = input.basis(q);
             if (basis.kind == InputBasis::ramp) {
-                add_scaled(forced_, input.weights()[q], responses[q].x);
+                forced_ = forced_ + input.weights()[q] * load(responses[q]);
             } else if (basis.kind == InputBasis::cosine) {
-                State whole = step_->integral * rates.input_column[basis.input];
-                add_scaled(whole, 1.0, responses[q].x);
+                const Lanes whole = step_->integrate(load(rates.input_column[basis.input])) + load(responses[q]);
                 sines_.push_back({basis.input, input.weights()[q], input.weights()[q + 1], rotations[q],
-                                  rotations[q + 1], whole, responses[q + 1].x});
+                                  rotations[q + 1], whole, load(responses[q + 1])});
             }
         }
     }
 
     // Where the cursor stood and n - 1 steps on from there.
     void run(int n, Instants& to) {
-        Lanes x = load(x_), forced = load(forced_);
-        const Lanes growth = load(growth_);
+        Lanes x = load(x_), forced = forced_;
         for (int k = 0;; ++k) {
             std::array<double, n_inputs> u = linear_;
             for (const Turning& t : sines_) u[t.input] += t.sine;
@@ -61,13 +59,13 @@ class Stride {
             }
             Lanes driven = forced;
             for (Turning& t : sines_) {
-                driven = driven + (t.sine * load(t.by_sine) + t.cosine * load(t.by_cosine));
+                driven = driven + (t.sine * t.by_sine + t.cosine * t.by_cosine);
                 const double sine = t.sine * t.cos + t.cosine * t.sin;
                 t.cosine = t.cosine * t.cos - t.sine * t.sin;
                 t.sine = sine;
             }
-            x = x + (step_->change.of_coupled(x) + driven);
-            forced = forced + growth;
+            x = x + (step_->change * x + driven);
+            forced = forced + growth_;
             for (int i = 0; i < n_inputs; ++i) linear_[i] += increase_[i];
         }
     }
@@ -79,11 +77,12 @@ class Stride {
         int input;
         double sine, cosine;  // the sine itself, and its derivative over omega
         double cos, sin;      // of omega h
-        State by_sine, by_cosine;
+        Lanes by_sine, by_cosine;
     };
 
     const Step* step_ = nullptr;
-    State x_{}, forced_{}, growth_{};
+    State x_{};
+    Lanes forced_, growth_;
     std::array<double, n_inputs> linear_{}, increase_{};
     std::vector<Turning> sines_;
 };

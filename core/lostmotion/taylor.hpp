@@ -15,6 +15,10 @@
 
 namespace lostmotion {
 
+// What a function of an input brings: as a state, in no more room than it needs.
+using Driven = std::array<double, n_states>;
+inline Lanes load(const Driven& x) { return Lanes::load(x.data()); }
+
 class Taylor {
  public:
     static constexpr int terms = Polynomial::degree;  // good for two base intervals: 0.25^13/13! < 1e-17
@@ -27,11 +31,11 @@ class Taylor {
         driven_.clear();
         driven_.reserve(static_cast<std::size_t>(n_basis * terms));
         for (int q = 0; q < n_basis; ++q) {
-            State derivative{};
+            Lanes derivative;
             for (int k = 1; k <= terms; ++k) {
-                driven_.push_back(derivative);
-                derivative = rates.rate * derivative;
-                add_scaled(derivative, basis[q].derivative(k), rates.input_column[basis[q].input]);
+                derivative.store(driven_.emplace_back().data());
+                derivative =
+                    rates.rate * derivative + basis[q].derivative(k) * load(rates.input_column[basis[q].input]);
             }
         }
     }
@@ -39,28 +43,30 @@ class Taylor {
     const LinearRates& rates() const { return *rates_; }
     int n_basis() const { return n_basis_; }
     // D_qk, k = 1 .. terms
-    const State& driven(int q, int k) const { return driven_[static_cast<std::size_t>(q * terms + k - 1)]; }
+    const Driven& driven(int q, int k) const { return driven_[static_cast<std::size_t>(q * terms + k - 1)]; }
 
     State fourth_derivative(const State& rate, const double* weights) const {
-        State out = cubed_ * rate;
-        for (int q = 0; q < n_basis_; ++q) add_scaled(out, weights[q], driven(q, 4));
+        Lanes sum = cubed_ * load(rate);
+        for (int q = 0; q < n_basis_; ++q) sum = sum + weights[q] * load(driven(q, 4));
+        State out;
+        sum.store(out.data());
         return out;
     }
 
     // By how much the state changes over s. In powers of A^3, so that few products wait for one another.
     [[gnu::always_inline]] Lanes change(double s, const State& rate, const double* weights) const {
-        const Lanes v = load(rate), v1 = rates_->rate.of_coupled(v), v2 = squared_.of_coupled(v);
+        const Lanes v = load(rate), v1 = rates_->rate * v, v2 = squared_ * v;
         const double s2 = s * s, s3 = s2 * s;
         Lanes free{}, forced{};
         for (int k = terms - 2; k > 0; k -= 3) {
             const double c0 = s * over_factorial[k], c1 = s2 * over_factorial[k + 1], c2 = s3 * over_factorial[k + 2];
             Lanes inputs{};
             for (int q = 0; q < n_basis_; ++q) {
-                const State* d = &driven(q, k);
+                const Driven* d = &driven(q, k);
                 inputs = inputs + weights[q] * ((c0 * load(d[0]) + c1 * load(d[1])) + c2 * load(d[2]));
             }
             const Lanes own = (c0 * v + c1 * v1) + c2 * v2;
-            free = k == terms - 2 ? own : s3 * cubed_.of_coupled(free) + own;
+            free = k == terms - 2 ? own : s3 * (cubed_ * free) + own;
             forced = k == terms - 2 ? inputs : s3 * forced + inputs;
         }
         return free + forced;
@@ -77,13 +83,15 @@ class Taylor {
         return sum;
     }
     // The answer from rest to the q-th function after h.
-    State response(int q, double h) const {
-        State y{};
+    Driven response(int q, double h) const {
+        Lanes sum;
         double power = 1.0;
         for (int k = 1; k <= terms; ++k) {
             power *= h / k;
-            add_scaled(y, power, driven(q, k));
+            sum = sum + power * load(driven(q, k));
         }
+        Driven y;
+        sum.store(y.data());
         return y;
     }
 
@@ -114,8 +122,8 @@ class Taylor {
 
     const LinearRates* rates_ = nullptr;
     int n_basis_ = 0;
-    Matrix squared_, cubed_;     // A^2, A^3
-    std::vector<State> driven_;  // n_basis x terms
+    Matrix squared_, cubed_;      // A^2, A^3
+    std::vector<Driven> driven_;  // n_basis x terms
 };
 
 // The Taylor series of a linear form of the motion, in parts of a unit of time: its coefficients are linear in the rate
@@ -129,22 +137,18 @@ class FormSeries {
         assert(form.c[load_angle] == 0.0);
         unit_ = unit;
         n_basis_ = motion.n_basis();
-        rows_.resize(static_cast<std::size_t>(Matrix::coupled + n_basis_));
+        rows_.resize(static_cast<std::size_t>(n_coupled + n_basis_));
         const Matrix& A = motion.rates().rate;
-        std::array<double, Matrix::coupled> row{};  // of the k-th derivative, on x'
-        for (int c = 0; c < Matrix::coupled; ++c) row[c] = form.c[c];
+        Matrix::Column row{};  // of the k-th derivative, on x'
+        for (int c = 0; c < n_coupled; ++c) row[c] = form.c[c];
         double power = 1.0;
         for (int k = 1; k <= Taylor::terms; ++k) {
             power *= unit / k;
-            for (int c = 0; c < Matrix::coupled; ++c) rows_[c][k - 1] = power * row[c];
+            for (int c = 0; c < n_coupled; ++c) rows_[c][k - 1] = power * row[c];
             for (int q = 0; q < n_basis_; ++q)
-                rows_[Matrix::coupled + q][k - 1] =
-                    power * (evaluate_rate(form, motion.driven(q, k), {}) +
-                             form.c[first_input + basis[q].input] * basis[q].derivative(k));
-            std::array<double, Matrix::coupled> next{};
-            for (int c = 0; c < Matrix::coupled; ++c)
-                for (int r = 0; r < Matrix::coupled; ++r) next[c] += row[r] * A.column[c][r];
-            row = next;
+                rows_[n_coupled + q][k - 1] = power * (dot(form, motion.driven(q, k)) +
+                                                       form.c[first_input + basis[q].input] * basis[q].derivative(k));
+            A.times_row(row).store(row.data());
         }
     }
 
@@ -154,13 +158,19 @@ class FormSeries {
         for (int part = 0; part < Polynomial::parts; ++part) {
             const auto row = [&](int k) { return Pack<4>::load(&rows_[static_cast<std::size_t>(k)][4 * part]); };
             Pack<4> sum = (rate[0] * row(0) + rate[1] * row(1)) + (rate[2] * row(2) + rate[3] * row(3));
-            for (int q = 0; q < n_basis_; ++q) sum = sum + weights[q] * row(Matrix::coupled + q);
+            for (int q = 0; q < n_basis_; ++q) sum = sum + weights[q] * row(n_coupled + q);
             p.part[part] = sum;
         }
         return p;
     }
 
  private:
+    static double dot(const LinearForm& form, const Driven& x) {
+        double sum = 0.0;
+        for (int c = 0; c < n_coupled; ++c) sum += form.c[c] * x[c];
+        return sum;
+    }
+
     double unit_ = 0.0;
     int n_basis_ = 0;
     std::vector<std::array<double, Taylor::terms>> rows_;  // by each coupled rate, by each weight

@@ -153,7 +153,7 @@ TEST_SUITE("events") {
     TEST_CASE("accumulating switchings end in a report of time and contact, not in a hang") {
         const BouncingBall ball;
         const Signals none;
-        ExactSolver<BouncingBall> solver(ball, none, 1e-3, {1, 1, 1, 1, 1, 1});
+        ExactSolver<BouncingBall> solver(ball, none, 1e-3, {1, 1, 1, 1, 1});
         struct {
             int count = 0;
             bool segment(const Segment<BouncingBall>&) { return true; }
@@ -189,7 +189,7 @@ TEST_SUITE("events") {
         };
         const SwitchedDrive system(d);
         const Signals none;
-        AdaptiveSolver<SwitchedDrive, Gravity> solver(system, none, 1e-11, {1, 1, 1, 1, 1, 1});
+        AdaptiveSolver<SwitchedDrive, Gravity> solver(system, none, 1e-11, {1, 1, 1, 1, 1});
         State x{};
         x[load_angle] = 1.0;
         REQUIRE(solver.begin(0.0, x, {}) == Status::done);

@@ -131,8 +131,8 @@ TEST_SUITE("parts") {
             p.prepare(rates, turns, drive.balanced_scale());
             for (int level = 3; level < 9; ++level)
                 for (int inner = 0; inner <= level; ++inner)
-                    for (int j = 0; j < Matrix::coupled; ++j)
-                        for (int i = 0; i < Matrix::coupled; ++i)
+                    for (int j = 0; j < n_coupled; ++j)
+                        for (int i = 0; i < n_coupled; ++i)
                             CHECK(std::fabs(p.level(inner).change(i, j) + (i == j ? 1.0 : 0.0)) <=
                                   p.level(level).growth(i, j) * (1.0 + 1e-9) + 1e-300);
         }
