@@ -248,17 +248,20 @@ class SwitchedDrive {
     static std::pair<const Guard*, bool> violated(const Entry& entry, const Instant& now,
                                                   const std::array<bool, n_contacts>& test_speed,
                                                   double coarseness = 1.0) {
-        const Regime& r = entry.regime;
         Flow flow(entry.rates, entry.rate_sizes, now, coarseness);
         GuardTable::Values value, size;
-        bool overcome = false;
         // Only what is near zero needs a closer look. (The rounding of the instant moves a guard by less than that.)
-        for (unsigned near = entry.near_zero(now, value, size); near != 0; near &= near - 1) {
+        unsigned near = entry.near_zero(now, value, size);
+        unsigned contacts = entry.capacities;
+        for (int c = 0; c < n_contacts; ++c) {
+            contacts |= entry.speeds[c];
+            if (!test_speed[c]) near &= ~entry.speeds[c];
+        }
+        bool overcome = false;
+        for (; near != 0; near &= near - 1) {
             const int k = std::countr_zero(near);
-            const Guard& g = r.guards[k];
-            if (g.kind == Guard::speed && !test_speed[g.contact]) continue;
-            if (flow.sign(g.form, value[k], size[k]) >= 0) continue;
-            if (g.kind != Guard::speed && g.kind != Guard::capacity) return {&g, overcome};
+            if (flow.sign(entry.guards.form(k), value[k], size[k]) >= 0) continue;
+            if ((contacts >> k & 1) == 0) return {&entry.regime.guards[k], overcome};
             overcome = true;
         }
         return {nullptr, overcome};

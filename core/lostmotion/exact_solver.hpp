@@ -276,16 +276,15 @@ class ExactSolver {
             clear &= bounds_.least[e.touch_guard] > rounding * touch_size_;
         }
         if (clear) return Verdict::clear;
-        const Regime& r = e.regime;
         const std::array<double, n_inputs> input_size = cursor.input().sizes();
-        for (int g = 0; g < r.n_guards; ++g) {
+        for (int g = 0; g < e.regime.n_guards; ++g) {
             const double low = bounds_.least[g], error = bounds_.error[g];
             if (low > error && g != e.touch_guard) continue;
             const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
             const bool touches = g == e.touch_guard && off_zero_ && low - error <= rounding * touch_size_ &&
                                  c.c3 > rounding * touch_size_;
             if (low > error && !touches) continue;
-            const double size = magnitude(r.guards[g].form, cursor.x(), memory, input_size);
+            const double size = magnitude(e.guards.form(g), cursor.x(), memory, input_size);
             const double tolerance =
                 rounding * size +
                 time_rounding * std::fabs(time_) * std::max(std::fabs(here.slope[g]), std::fabs(there.slope[g]));
@@ -317,10 +316,11 @@ class ExactSolver {
     bool departs(const typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, int g, double h) const {
         const Instant now{time_, cursor.x(), memory, cursor.input().jet(), cursor.input().sizes()};
         Flow flow(e.rates, e.rate_sizes, now);
+        const LinearForm form = e.guards.form(g);
         std::array<double, 4> derivative{};
         int first = 0;
         for (int k = 1; k < 4; ++k) {
-            const auto [value, size] = flow.derivative(e.regime.guards[g].form, k);
+            const auto [value, size] = flow.derivative(form, k);
             derivative[k] = value;
             if (first == 0 && value < -rounding * size) return false;
             if (first == 0 && value > rounding * size) first = k;
@@ -372,7 +372,7 @@ class ExactSolver {
     // when. About the nearest instant that whole levels lead to, the guard is a polynomial to rounding.
     double find_zero(typename Cache::Entry& e, int g, const Memory& memory, const Cursor& cursor, double estimate,
                      double h) {
-        const LinearForm& form = e.regime.guards[g].form;
+        const LinearForm form = e.guards.form(g);
         const FormSeries& series = e.guard_series(g);
         const double base = series.unit();
         double low = 0.0, high = h, s = estimate;

@@ -163,6 +163,11 @@ class FormTable {
 
     int rows() const { return rows_; }  // rounded up to whole vectors
     double coefficient(int row, int term) const { return column_[term][row]; }
+    LinearForm form(int row) const {
+        LinearForm f;
+        for (int k = 0; k < n_terms; ++k) f.c[k] = column_[k][row];
+        return f;
+    }
 
     // The parts that depend on neither state nor inputs.
     void constants(const Memory& m, Values& out) const {

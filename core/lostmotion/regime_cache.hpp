@@ -21,7 +21,9 @@ class RegimeCache {
         Regime regime;
         LinearRates rates, rate_sizes;  // and with the magnitudes of all coefficients
         GuardTable guards, guard_sizes;
-        int touch_guard = -1;  // the one that also ends the regime by touching zero
+        int touch_guard = -1;                       // the one that also ends the regime by touching zero
+        std::array<unsigned, n_contacts> speeds{};  // the guards of each contact's speed, as bits
+        unsigned capacities = 0;                    // and those of capacities
         Propagator propagator;
         std::array<FormSeries, max_guards> series;   // of the guards that have been crossed
         std::array<Entry*, max_guards> neighbour{};  // what lies beyond each guard, as far as it is known
@@ -33,9 +35,13 @@ class RegimeCache {
             guards = {};
             neighbour = {};
             touch_guard = -1;
+            speeds = {};
+            capacities = 0;
             for (int g = 0; g < r.n_guards; ++g) {
                 guards.set(g, r.guards[g].form);
                 if (r.guards[g].by_touch) touch_guard = g;
+                if (r.guards[g].kind == Guard::speed) speeds[r.guards[g].contact] |= 1u << g;
+                if (r.guards[g].kind == Guard::capacity) capacities |= 1u << g;
             }
             guard_sizes = guards.magnitudes();
             propagator.reset();

@@ -133,6 +133,7 @@ class InputState {
     InputState(const Signals& signals, const std::vector<InputBasis>& basis)
         : signals_(&signals), basis_(basis.data()), size_(static_cast<int>(basis.size())), weights_(basis.size()) {
         while (first_sine_ < size_ && basis_[first_sine_].kind == InputBasis::ramp) ++first_sine_;
+        sines_end_ = {first_sine_ + 2 * static_cast<int>(signals[0].sines.size()), size_};
         anchor(0.0);
     }
 
@@ -176,22 +177,16 @@ class InputState {
     const double* weights() const { return weights_.data(); }
 
     [[gnu::always_inline]] std::array<double, n_inputs> values() const {
-        std::array<double, n_inputs> u = linear_;
-        for (int q = first_sine_; q < size_; q += 2) u[basis_[q].input] += weights_[q];
-        return u;
+        return sum(linear_, [this](int q) { return weights_[q]; });
     }
     [[gnu::always_inline]] std::array<double, n_inputs> rates() const {
-        std::array<double, n_inputs> u = slope_;
-        for (int q = first_sine_; q < size_; q += 2) u[basis_[q].input] += basis_[q].omega * weights_[q + 1];
-        return u;
+        return sum(slope_, [this](int q) { return basis_[q].omega * weights_[q + 1]; });
     }
 
     // Sums of the magnitudes of the parts: what the rounding of the values is relative to.
     std::array<double, n_inputs> sizes() const {
-        std::array<double, n_inputs> size{std::fabs(linear_[0]), std::fabs(linear_[1])};
-        for (int q = first_sine_; q < size_; q += 2)
-            size[basis_[q].input] += std::fabs(weights_[q]) + std::fabs(weights_[q + 1]);
-        return size;
+        return sum({std::fabs(linear_[0]), std::fabs(linear_[1])},
+                   [this](int q) { return std::fabs(weights_[q]) + std::fabs(weights_[q + 1]); });
     }
     const std::array<double, n_inputs>& slope() const { return slope_; }
     // The piecewise-linear parts alone.
@@ -264,9 +259,22 @@ class InputState {
         weights_[q + 1] = c * cosine - s * sine;
     }
 
+    // For each input, what it begins with and the terms of its sines.
+    template <class Term>
+    [[gnu::always_inline]] std::array<double, n_inputs> sum(const std::array<double, n_inputs>& begin,
+                                                            Term&& term) const {
+        static_assert(n_inputs == 2);
+        double first = begin[0], second = begin[1];
+        int q = first_sine_;
+        for (; q < sines_end_[0]; q += 2) first += term(q);
+        for (; q < sines_end_[1]; q += 2) second += term(q);
+        return {first, second};
+    }
+
     const Signals* signals_;
     const InputBasis* basis_;  // ramps first, then a cosine and a sine for each sine of the signals
     int size_, first_sine_ = 0;
+    std::array<int, n_inputs> sines_end_{};  // of each input
     double time_ = 0.0;
     std::array<const Knot*, n_inputs> knot_{};
     std::array<double, n_inputs> linear_{}, slope_{};

@@ -34,14 +34,16 @@ class Stride {
         forced_ = step_->integrate(load(driving));
         growth_ = step_->integrate(load(ramp));
         sines_.clear();
+        sines_of_first_ = 0;
         for (int q = 0; q < input.size(); ++q) {
             const InputBasis& basis = input.basis(q);
             if (basis.kind == InputBasis::ramp) {
                 forced_ = forced_ + input.weights()[q] * load(responses[q]);
             } else if (basis.kind == InputBasis::cosine) {
                 const Lanes whole = step_->integrate(load(rates.input_column[basis.input])) + load(responses[q]);
-                sines_.push_back({basis.input, input.weights()[q], input.weights()[q + 1], rotations[q],
-                                  rotations[q + 1], whole, load(responses[q + 1])});
+                if (basis.input == 0) ++sines_of_first_;
+                sines_.push_back({input.weights()[q], input.weights()[q + 1], rotations[q], rotations[q + 1], whole,
+                                  load(responses[q + 1])});
             }
         }
     }
@@ -51,7 +53,8 @@ class Stride {
         Lanes x = load(x_), forced = forced_;
         for (int k = 0;; ++k) {
             std::array<double, n_inputs> u = linear_;
-            for (const Turning& t : sines_) u[t.input] += t.sine;
+            for (std::size_t n = 0; n < sines_of_first_; ++n) u[0] += sines_[n].sine;
+            for (std::size_t n = sines_of_first_; n < sines_.size(); ++n) u[1] += sines_[n].sine;
             to.set(k, x, u);
             if (k + 1 == n) {
                 x.store(x_.data());
@@ -74,7 +77,6 @@ class Stride {
 
  private:
     struct Turning {
-        int input;
         double sine, cosine;  // the sine itself, and its derivative over omega
         double cos, sin;      // of omega h
         Lanes by_sine, by_cosine;
@@ -84,7 +86,8 @@ class Stride {
     State x_{};
     Lanes forced_, growth_;
     std::array<double, n_inputs> linear_{}, increase_{};
-    std::vector<Turning> sines_;
+    std::vector<Turning> sines_;  // those of the first input before those of the second
+    std::size_t sines_of_first_ = 0;
 };
 
 }  // namespace lostmotion
