@@ -10,14 +10,15 @@ import pytest
 
 import lostmotion
 from conftest import ROOT
+from lostmotion import _instruction_set
 
 PACKAGE = ROOT / "src" / "lostmotion"
 
 # Each module may import only from rooms before its own. The way of the data: parts -> scenario -> run -> dataset ->
 # analysis -> plots -> report -> command line.
 ROOMS = [
-    {"_instruction_set"},
-    {"_core", "errors", "variables", "units"},
+    {"_instruction_set", "errors"},
+    {"_core", "variables", "units"},
     {"quantities", "toml_files"},
     {"signals", "parts"},
     {"data_sheet"},
@@ -97,7 +98,7 @@ def test_the_extension_s_stub_is_current(tmp_path: Path) -> None:
     assert (tmp_path / "_core.pyi").read_text() == (PACKAGE / "_core.pyi").read_text(), "run: make stub"
 
 
-def test_both_builds_of_the_core_give_the_same_bits() -> None:
+def test_all_builds_of_the_core_give_the_same_bits() -> None:
     script = (
         "import hashlib, sys, lostmotion as lm; from lostmotion import _core;"
         "results = [lm.simulate(lm.load(p)) for p in sys.argv[1:]];"
@@ -105,8 +106,8 @@ def test_both_builds_of_the_core_give_the_same_bits() -> None:
         "print(_core.__name__, hashlib.sha256(bits).hexdigest(), len(bits))"
     )
     scenarios = [str(p) for p in sorted((ROOT / "scenarios").glob("*.toml"))]
-    prints = []
-    for build in ("any", ""):
+    prints = {}
+    for build in _instruction_set.builds():
         done = subprocess.run(
             [sys.executable, "-c", script, *scenarios],
             env=os.environ | {"LOSTMOTION_CORE": build},
@@ -114,10 +115,22 @@ def test_both_builds_of_the_core_give_the_same_bits() -> None:
             text=True,
             check=True,
         )
-        prints.append(done.stdout.split())
-    assert prints[0][0] == "lostmotion._core_any"
-    assert prints[0][1:] == prints[1][1:]
-    assert int(prints[0][2]) > 1_000_000
+        name, *prints[build] = done.stdout.split()
+        assert name == f"lostmotion._core_{build}"
+    assert int(prints["any"][1]) > 1_000_000
+    assert all(p == prints["any"] for p in prints.values())
+
+
+def test_a_build_of_the_core_that_is_not_there_is_refused() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", "from lostmotion import _core"],
+        env=os.environ | {"LOSTMOTION_CORE": "abacus"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert "LOSTMOTION_CORE = 'abacus' is no build of the core here; take " in done.stderr
 
 
 def test_typing_marker_is_shipped() -> None:

@@ -6,6 +6,7 @@
 // sine and the cosine of the q-th sine of the inputs. Of all this, only E x waits for the step before.
 #pragma once
 
+#include <tuple>
 #include <vector>
 
 #include "cursor.hpp"
@@ -63,9 +64,7 @@ class Stride {
             Lanes driven = forced;
             for (Turning& t : sines_) {
                 driven = driven + (t.sine * t.by_sine + t.cosine * t.by_cosine);
-                const double sine = t.sine * t.cos + t.cosine * t.sin;
-                t.cosine = t.cosine * t.cos - t.sine * t.sin;
-                t.sine = sine;
+                std::tie(t.sine, t.cosine) = rotated(t.sine, t.cosine, t.cos, t.sin);
             }
             x = x + (step_->change * x + driven);
             forced = forced + growth_;

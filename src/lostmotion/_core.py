@@ -5,15 +5,19 @@ import sys
 from importlib import import_module
 from importlib.util import find_spec
 
-from ._instruction_set import supports_avx2
-
-BUILDS = ("_core_avx2", "_core_any")
+from ._instruction_set import builds
+from .errors import InputError
 
 
 def _build() -> str:
-    """LOSTMOTION_CORE=any takes the build for any processor (to compare the two)."""
-    wide = os.environ.get("LOSTMOTION_CORE") != "any" and supports_avx2()
-    return BUILDS[0] if wide and find_spec(f".{BUILDS[0]}", __package__) else BUILDS[1]
+    """The environment variable LOSTMOTION_CORE names a build to take (to compare them)."""
+    usable = [name for name in builds() if find_spec(f"._core_{name}", __package__)]
+    wanted = os.environ.get("LOSTMOTION_CORE") or usable[0]
+    if wanted not in usable:
+        raise InputError(
+            f"environment: LOSTMOTION_CORE = '{wanted}' is no build of the core here; take {', '.join(usable)}"
+        )
+    return f"_core_{wanted}"
 
 
 sys.modules[__name__] = import_module(f".{_build()}", __package__)

@@ -1,2 +1,2 @@
-def supports_avx2() -> bool:
-    """Whether processor and system can run the build of the core for AVX2."""
+def builds() -> list[str]:
+    """Names of the builds of the core that processor and system can run, the widest vectors first."""
