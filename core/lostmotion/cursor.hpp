@@ -70,12 +70,12 @@ class Cursor {
         rate.store(rate_.data());
         return h - p.length(0) * static_cast<double>(n);
     }
-    // By any length: whole levels, then the Taylor series. Backward by two base intervals at most.
+    // By any length: whole levels, then the Taylor series. Backward by one base interval at most.
     void advance(double h) {
         if (h > 0.0) h = advance_by_levels(h);
         if (h != 0.0) nudge(h);
     }
-    // By two base intervals at most, forward or backward; the inputs turn on from where they are.
+    // By one base interval at most, forward or backward; the inputs turn on from where they are.
     void nudge(double s) {
         x_ = propagator_->move(s, x_, rate(), input_.weights());
         input_.turn(s);

@@ -401,7 +401,8 @@ class ExactSolver {
             s = from + z * base;
             if (!(s > low && s < high)) s = 0.5 * (low + high);
         }
-        trial_.nudge(s - trial_.time() + cursor.time());
+        trial_ = cursor;
+        trial_.advance(s);
         return s;
     }
 

@@ -39,7 +39,7 @@ class Propagator {
  public:
     static constexpr int max_levels = 40;
     static constexpr int usual_levels = 12;
-    static constexpr double base_norm = 0.125;  // |A| h of the base interval, in scaled units
+    static constexpr double base_norm = 0.25;  // |A| h of the base interval, in scaled units
 
     // turns: its unit is a length of which some power-of-two multiple or fraction is the base interval.
     // scale: natural sizes of the states; only for choosing the base interval.
@@ -143,7 +143,7 @@ class Propagator {
         return sum;
     }
 
-    // x after s, two base intervals forward or backward at most.
+    // x after s, one base interval forward or backward at most.
     [[gnu::always_inline]] State move(double s, const State& x, const State& rate, const double* weights) const {
         State y;
         (load(x) + taylor_.change(s, rate, weights)).store(y.data());

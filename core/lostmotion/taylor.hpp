@@ -21,7 +21,7 @@ inline Lanes load(const Driven& x) { return Lanes::load(x.data()); }
 
 class Taylor {
  public:
-    static constexpr int terms = Polynomial::degree;  // good for two base intervals: 0.25^13/13! < 1e-17
+    static constexpr int terms = Polynomial::degree;  // good for a base interval: 0.25^13/13! < 1e-17
 
     void prepare(const LinearRates& rates, const InputBasis* basis, int n_basis) {
         rates_ = &rates;
