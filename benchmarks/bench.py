@@ -18,7 +18,6 @@ import lostmotion as lm
 from lostmotion import _instruction_set
 
 ROOT = Path(__file__).parent.parent
-PROGRAMS = ("bench_run_any", "bench_run_avx2", "bench_costs_any", "bench_costs_avx2", "peer_cvode")
 PEERS = ("numpy", "scipy", "numba", "pathsim", "mujoco", "rumoca", "xarray", "pyarrow")
 
 
@@ -27,18 +26,16 @@ def start_up(*command: str) -> float:
 
 
 def outputs(build: Path) -> dict[str, list[list[str]]]:
-    """What the C++ programs print; those for AVX2 only where the processor has it, and costs by the better one alone."""
-    wanted = [
-        p for p in PROGRAMS if (build / p).exists() and (_instruction_set.supports_avx2() or not p.endswith("avx2"))
-    ]
-    if "bench_costs_avx2" in wanted:
-        wanted.remove("bench_costs_any")
+    """What the C++ programs print, in all builds that this processor can run; costs in the one for the widest vectors."""
+    builds = _instruction_set.builds()
+    wanted = [*(f"bench_run_{name}" for name in builds), f"bench_costs_{builds[0]}", "peer_cvode"]
     return {
         p: [
             line.split("|")
             for line in subprocess.run([build / p], check=True, capture_output=True, text=True).stdout.splitlines()
         ]
         for p in wanted
+        if (build / p).exists()
     }
 
 

@@ -31,6 +31,9 @@ def timed(name: str, work: Callable[[], tuple[np.ndarray, np.ndarray]], exact: D
     return name, best(repeats, work), f"{error_of(*found, exact):.2g}"
 
 
+VECTORS = {"avx512": ", AVX-512", "avx2": ", AVX2"}
+
+
 def add_table(report: Report, rows: list[Row]) -> None:
     reference = rows[0][1]
     report.table(
@@ -43,12 +46,16 @@ def section(report: Report, scenario: lm.Scenario, programs: dict[str, list[list
     exact = lm.simulate(scenario)
     times = exact["time"].values
 
+    widest = next(iter(programs))
+
     def compiled(loss_map: str) -> list[Row]:
+        """All cases in the build for the widest vectors, the exact solver alone in the others, CVODE."""
         rows = [
-            (f"C++: {cells[1]}{', AVX2' if program.endswith('avx2') else ''}", float(cells[2]), cells[3])
-            for program in ("bench_run_avx2", "bench_run_any", "peer_cvode")
-            for cells in programs.get(program, ())
-            if cells[0] == loss_map
+            (f"C++: {cells[1]}{VECTORS.get(program.rsplit('_', 1)[1], '')}", float(cells[2]), cells[3])
+            for program, lines in programs.items()
+            if not program.startswith("bench_costs")
+            for cells in lines
+            if cells[0] == loss_map and (program in (widest, "peer_cvode") or "exact" in cells[1])
         ]
         return sorted(rows, key=lambda row: "same drive again" not in row[0])
 
