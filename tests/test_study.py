@@ -23,10 +23,10 @@ from conftest import ROOT
 from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
-from lostmotion.study_engine import CHUNK, _core_can, run_chunk, scenario_of_run
-from lostmotion.study_file import FUNCTIONS, Study
+from lostmotion.study_chunk import _core_can, run_chunk, scenario_of_run
+from lostmotion.study_expressions import FUNCTIONS, read_expression
+from lostmotion.study_file import CHUNK, Study
 from lostmotion.study_report import best_runs, influence, read_table, sobol_indices
-from lostmotion.study_units import unit_of_expression
 from lostmotion.units import registry
 
 SHORT = paper_scenario("2-DOF-NL", "large").replace(**{"simulation.duration": 0.2, "simulation.sample_interval": 2e-3})
@@ -80,12 +80,12 @@ def test_a_row_equals_the_single_run_bit_for_bit(tmp_path: Path, engine: str):
         result = lm.simulate(scenario_of_run(study, run))
         energy = lm.energy_of(result)
         own = {
-            "peak_speed": FUNCTIONS["peak"](result["load_speed"]),
-            "rms_twist": FUNCTIONS["rms"](result["twist"]),
+            "peak_speed": FUNCTIONS["peak"].of_values(result["load_speed"]),
+            "rms_twist": FUNCTIONS["rms"].of_values(result["twist"]),
             "end": result["load_angle"][-1],
             "lost": energy["gear_losses"] / energy["source"],
             "efficiency_driving": result["efficiency"].where(result["motor_power"] > 0).mean("time"),
-            "starts": FUNCTIONS["dead_time"](result["load_angle"]),
+            "starts": FUNCTIONS["dead_time"].of_values(result["load_angle"]),
         }
         for name, value in own.items():
             assert rows[name][run] == float(value), (run, name)
@@ -195,7 +195,7 @@ def test_parquet_opens_directly_with_study_and_parameters(tmp_path: Path):
 )
 def test_an_expression_has_the_unit_of_what_it_gives(expression: str, unit: str):
     parse = registry().Unit
-    found = unit_of_expression(expression)
+    found = read_expression(expression).unit
     assert (found == "") == (unit == "")
     assert parse("" if found == "1" else found.replace("^", "**")) == parse("" if unit == "1" else unit)
 

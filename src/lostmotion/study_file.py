@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import math
 import warnings
-from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -16,8 +14,8 @@ from pydantic import Field, ValidationError, model_validator
 
 from .errors import InputError
 from .quantities import Part
-from .results import ENERGY
 from .scenario import Scenario, load
+from .study_expressions import Expression, read_expression
 from .study_units import in_si, unit_of_key
 from .toml_files import read_toml
 from .variables import VARIABLES
@@ -190,14 +188,22 @@ class Study(Part):
         for name, text in self.keep.items():
             if name in {*titles, "run", "error", "switchings"}:
                 raise ValueError(f"keeps {name!r}, a name that is taken; choose another")
-            check_expression(name, text)
-            if uses(text, "ideal_speed") and self.scenario.motor.kind != "dc":
+            try:
+                expression = read_expression(text)
+            except ValueError as error:
+                raise ValueError(f"keep.{name}: {error}") from None
+            if "ideal_speed" in expression.names and self.scenario.motor.kind != "dc":
                 raise ValueError(
                     f"keep.{name}: ideal_speed needs a motor of kind dc; a torque source has no speed of its own"
                 )
         if self.total > MAX_RUNS:
             raise ValueError(f"has {self.total} runs, more than {MAX_RUNS}")
         return self
+
+    @property
+    def expressions(self) -> dict[str, Expression]:
+        """What to keep, read."""
+        return {name: read_expression(text) for name, text in self.keep.items()}
 
     @property
     def total(self) -> int:
@@ -274,99 +280,6 @@ def _saltelli(p: int, base: int, seed: int) -> np.ndarray:
 
     problem = {"num_vars": p, "names": [str(k) for k in range(p)], "bounds": [[0.0, 1.0]] * p}
     return np.asarray(sobol.sample(problem, base, calc_second_order=True, seed=seed))
-
-
-# --- expressions of what to keep ---
-
-
-def _final(x: Any) -> Any:
-    return x.isel(time=-1)
-
-
-def _over_time(plain: Callable[..., Any], careful: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """A reduction of xarray that leaves out NaN. Most variables have none, and it is the search for them that takes long.
-
-    plain
-        Of values and axis, by numpy.
-    careful
-        Of an array of xarray, where the plain one has met NaN.
-    """
-
-    def reduce(x: Any) -> Any:
-        found = x.reduce(plain, "time")
-        return found if np.isfinite(found.values).all() else careful(x)
-
-    return reduce
-
-
-_mean = _over_time(np.mean, lambda x: x.mean("time"))
-_rms = _over_time(lambda v, axis: np.mean(v * v, axis=axis) ** 0.5, lambda x: (x**2).mean("time") ** 0.5)
-
-
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "peak": _over_time(
-        lambda v, axis: np.maximum(np.max(v, axis=axis), -np.min(v, axis=axis)), lambda x: abs(x).max("time")
-    ),
-    "rms": _rms,
-    "mean": _mean,
-    "final": _final,
-    "least": _over_time(np.min, lambda x: x.min("time")),
-    "largest": _over_time(np.max, lambda x: x.max("time")),
-    # First instant [s] at which the variable is more than `share` of its peak away from its start; NaN if never.
-    "dead_time": lambda x, share=0.01: (
-        x["time"].where(abs(x - x.isel(time=0)) > share * abs(x).max("time")).min("time")
-    ),
-    # Root mean square of the distance from a reference.
-    "tracking_error": lambda x, reference: _rms(x - reference),
-    "abs": abs,
-    "sqrt": np.sqrt,
-    "exp": np.exp,
-    "log": np.log,
-    "sign": np.sign,
-}
-"""what an expression may use, beside the methods of xarray"""
-
-OF_THE_RUN = ("energy", "time", "ideal_speed", "bandwidth")
-"""further names: the ledger; the instants; the load speed of a rigid drive without inertia, friction and load under the same
-command; the bandwidth [Hz] of the load speed, a function of the command's amplitude (left out: the run's own)"""
-
-
-def check_expression(name: str, text: str) -> set[str]:
-    """The names of variables that an expression uses.
-
-    Raises
-    ------
-    ValueError
-        It cannot be read, or uses a name that is unknown.
-    """
-    try:
-        tree = ast.parse(text, mode="eval")
-    except SyntaxError as error:
-        raise ValueError(f"keep.{name}: {text!r} cannot be read as an expression ({error.msg})") from None
-    known = {v.name for v in VARIABLES}
-    used = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Name):
-            if node.id == "ideal_speed":
-                used.add("command")
-            if node.id in FUNCTIONS or node.id in OF_THE_RUN:
-                continue
-            if node.id not in known:
-                raise ValueError(
-                    f"keep.{name}: {node.id!r} in {text!r} is neither a result variable nor one of {', '.join((*FUNCTIONS, *OF_THE_RUN))}"
-                )
-            used.add(node.id)
-        if isinstance(node, ast.Attribute):
-            if node.attr.startswith("_"):
-                raise ValueError(f"keep.{name}: {text!r} must not use {node.attr}")
-            if isinstance(node.value, ast.Name) and node.value.id == "energy" and node.attr not in ENERGY:
-                raise ValueError(f"keep.{name}: energy.{node.attr} is none of {', '.join(ENERGY)}")
-    return used
-
-
-def uses(text: str, name: str) -> bool:
-    """Whether a name stands in an expression."""
-    return any(isinstance(n, ast.Name) and n.id == name for n in ast.walk(ast.parse(text, mode="eval")))
 
 
 # --- reading ---

@@ -1,0 +1,335 @@
+"""One chunk of a study: its runs simulated, in the core or one by one, and what is kept of them as a table."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from . import _core
+from .harmonic_response import bandwidth
+from .parts import Rigid
+from .results import ENERGY, add_derived, installed_version
+from .run import core_inputs, simulate
+from .scenario import Scenario, describe
+from .study_file import Study, base_value, from_json
+from .variables import CHANNEL_NAMES, VARIABLES
+
+SLOPES = "gearbox.stiffness.slopes"
+
+
+def compute_chunk(text: str, first: int, last: int, threads: int = 1) -> bytes:
+    """The runs first .. last - 1 of a study (as JSON), as the bytes of a Parquet file. What executors are given."""
+    study = parsed(text)
+    return tabulate(study, text, first, last, run_chunk(study, first, last, threads), threads)
+
+
+@lru_cache(maxsize=8)
+def parsed(text: str) -> Study:
+    """The study of a text; each is read once."""
+    return from_json(text)
+
+
+@lru_cache(maxsize=8)
+def _units(text: str) -> dict[str, str]:
+    """Units of the columns; empty where an expression's cannot be told."""
+    study = parsed(text)
+    units = {v.title: v.unit for v in study.vary} | {n: e.unit for n, e in study.expressions.items()}
+    of = {v.name: v.unit for v in VARIABLES}
+    return units | {f"{n} over time": of[n] for n in (study.trajectories.variables if study.trajectories else ())}
+
+
+def _asks_for(study: Study, name: str) -> bool:
+    return any(name in e.names for e in study.expressions.values())
+
+
+def _used(study: Study) -> set[str]:
+    """The result variables that its expressions use."""
+    return {name for e in study.expressions.values() for name in e.variables}
+
+
+def _needed(study: Study) -> frozenset[str]:
+    """The result variables that the study looks at."""
+    return frozenset(_used(study) | set(study.trajectories.variables if study.trajectories else ()))
+
+
+def run_chunk(study: Study, first: int, last: int, threads: int) -> Runs:
+    """Simulates the runs; nearly all the time goes here, most of it with the GIL released."""
+    energy = _asks_for(study, "energy")
+    simulate_all = _in_the_core if _core_can(study) else _one_by_one
+    return simulate_all(study, study.parameters(first, last), sorted(_sources(_needed(study))), energy, threads)
+
+
+def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads: int) -> bytes:
+    """One row a run: its number, its parameters, what is kept of it, its error if it has one."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns: dict[str, Any] = {"run": pa.array(np.arange(first, last))}
+    for k, v in enumerate(study.vary):
+        columns[v.title] = pa.array(runs.parameters[:, k])
+    data = _derived(study, runs, _needed(study))
+    names = _names(study, data, runs, threads)
+    kept_values = {name: e.values(names, last - first) for name, e in study.expressions.items()}
+    bad = np.array([e != "" for e in runs.errors])
+    for name, values in kept_values.items():
+        columns[name] = pa.array(np.where(bad, np.nan, values))
+    if study.trajectories is not None:
+        for name in study.trajectories.variables:
+            kept = data[name][:, :: study.trajectories.every]
+            columns[f"{name} over time"] = pa.array([None if b else row for b, row in zip(bad, kept, strict=True)])
+    columns["switchings"] = pa.array(runs.switchings.astype(np.int64))
+    columns["error"] = pa.array(runs.errors)
+    units = _units(text)
+    fields = [pa.field(n, c.type, metadata={"units": units[n]} if units.get(n) else None) for n, c in columns.items()]
+    table = pa.table(columns, schema=pa.schema(fields))
+    out = io.BytesIO()
+    pq.write_table(
+        table.replace_schema_metadata({"lostmotion_study": text, "lostmotion_version": installed_version()}), out
+    )
+    return out.getvalue()
+
+
+class Runs(SimpleNamespace):
+    """Of a chunk: parameters (runs x parameters), samples (variable -> runs x samples), energy (entry -> runs),
+    switchings, errors, ratio (runs)."""
+
+    parameters: np.ndarray
+    samples: dict[str, np.ndarray]
+    energy: dict[str, np.ndarray]
+    switchings: np.ndarray
+    errors: list[str]
+    ratio: np.ndarray
+
+
+def _sources(needed: frozenset[str]) -> set[str]:
+    """The channels of the core that the wanted variables are made of."""
+    derived = {
+        "efficiency": {"output_torque", "input_torque", "motor_speed"},
+        "motor_power": {"motor_torque", "motor_speed"},
+    }
+    return {channel for name in needed for channel in derived.get(name, {name})}
+
+
+def _derived(study: Study, runs: Runs, needed: frozenset[str]) -> dict[str, np.ndarray]:
+    names = {v.name for v in VARIABLES if v.derived}
+    if not needed & names:
+        return runs.samples
+    whole = {
+        c: runs.samples.get(c, np.zeros((len(runs.errors), study.scenario.simulation.samples))) for c in CHANNEL_NAMES
+    }
+    add_derived(whole, runs.ratio[:, None])
+    return {name: whole[name] for name in needed | set(runs.samples)}
+
+
+@lru_cache(maxsize=4)
+def _instants(samples: int, interval: float) -> Any:
+    """The coordinate of the samples; making its index takes longer than many a reduction."""
+    import xarray as xr
+
+    return xr.Coordinates({"time": np.arange(samples) * interval})
+
+
+def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) -> dict[str, Any]:
+    """All that the study's expressions may use, over all runs of a chunk."""
+    import xarray as xr
+
+    def each_run(values: np.ndarray) -> xr.DataArray:
+        return xr.DataArray(values, dims="run")
+
+    instants = _instants(study.scenario.simulation.samples, study.scenario.simulation.sample_interval)
+    names: dict[str, Any] = {name: xr.DataArray(data[name], instants, ("run", "time")) for name in _used(study)}
+    names["time"] = xr.DataArray(instants["time"], instants)
+    if _asks_for(study, "energy"):
+        names["energy"] = SimpleNamespace(**{k: each_run(v) for k, v in runs.energy.items()})
+    if _asks_for(study, "ideal_speed"):
+        names["ideal_speed"] = names["command"] * each_run(_ideal_speeds(study, runs))
+    names["bandwidth"] = lambda amplitude=None: each_run(_bandwidths(study, runs, amplitude, threads))
+    return names
+
+
+def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
+    """Load speed [rad/s] at command 1 of a rigid drive without inertia, friction and load, for each run."""
+
+    def of(scenario: Scenario) -> float:
+        return scenario.motor.no_load_speed / scenario.gearbox.ratio
+
+    keys = {key for v in study.vary for key in v.all_keys}
+    if not any(key.startswith("motor.") or key == "gearbox.ratio" for key in keys):
+        return np.full(len(runs.errors), of(study.scenario))
+    rows = zip(runs.parameters, runs.errors, strict=True)
+    return np.array([math.nan if error else of(_changed(study, row)) for row, error in rows])
+
+
+def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.ndarray:
+    """Bandwidth [Hz] of the load speed for each run, at the amplitude of its command or at the given one.
+
+    Where it cannot be found, the run's error says why.
+    """
+    amplitudes = np.broadcast_to(np.nan if amplitude is None else np.asarray(amplitude, dtype=float), len(runs.errors))
+
+    def find(k: int) -> float:
+        if runs.errors[k]:
+            return math.nan
+        scenario = _changed(study, runs.parameters[k])
+        try:
+            return bandwidth(
+                scenario.drive(),
+                float(amplitudes[k]) if amplitude is not None else scenario.command.amplitude or 0.0,
+                mean_command=scenario.command.mean,
+                mean_load_torque=scenario.load.torque.mean,
+            )
+        except (RuntimeError, ValueError) as error:
+            runs.errors[k] = str(error)
+            return math.nan
+
+    with ThreadPoolExecutor(max_workers=threads) as pool:
+        return np.array(list(pool.map(find, range(len(runs.errors)))))
+
+
+def _changes(study: Study, row: np.ndarray) -> dict[str, Any]:
+    """Dotted keys and values of one run."""
+    out: dict[str, Any] = {}
+    for v, value in zip(study.vary, row, strict=True):
+        for key in v.all_keys:
+            base = base_value(study.scenario, key)
+            if not v.relative:
+                out[key] = float(value)
+            elif isinstance(base, tuple | list):
+                out[key] = [float(value) * x for x in base]
+            else:
+                out[key] = float(value) * float(base)
+    return out
+
+
+def _changed(study: Study, row: np.ndarray) -> Scenario:
+    return study.scenario.replace(**_changes(study, row))
+
+
+def scenario_of_run(study: Study, run: int) -> Scenario:
+    """The scenario of one run, by its number."""
+    return _changed(study, study.parameters(run, run + 1)[0])
+
+
+def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energy: bool, threads: int) -> Runs:  # noqa: ARG001
+    """Any key may vary: each run is a scenario of its own."""
+    n, samples = len(parameters), study.scenario.simulation.samples
+    runs = Runs(
+        parameters=parameters,
+        samples={c: np.full((n, samples), np.nan) for c in channels},
+        energy={e: np.full(n, np.nan) for e in ENERGY},
+        switchings=np.zeros(n),
+        errors=[""] * n,
+        ratio=np.full(n, study.scenario.gearbox.ratio),
+    )
+    for k, row in enumerate(parameters):
+        try:
+            scenario = _changed(study, row)
+            result = simulate(scenario, energy=energy)
+        except (ValidationError, RuntimeError, ValueError) as error:
+            runs.errors[k] = describe(error) if isinstance(error, ValidationError) else str(error)
+            continue
+        for c in channels:
+            runs.samples[c][k] = result[c].values
+        if energy:
+            for e, value in json.loads(result.attrs["energy"]).items():
+                runs.energy[e][k] = value
+        runs.switchings[k] = result.attrs["switching_count"]
+        runs.ratio[k] = scenario.gearbox.ratio
+    return runs
+
+
+@lru_cache(maxsize=1)
+def _fields() -> dict[str, int]:
+    return {key: k for k, key in enumerate(_core.batch_fields())}
+
+
+def _core_can(study: Study) -> bool:
+    """Whether all that varies is a plain number of the core."""
+    s = study.scenario
+    rigid = isinstance(s.gearbox.stiffness, Rigid)
+    for v in study.vary:
+        for key in v.all_keys:
+            if key not in _fields() or base_value(s, key) is None or rigid:
+                return False
+            if key == SLOPES and (not v.relative or s.gearbox.stiffness.preload > 0.0):  # type: ignore[union-attr]
+                return False
+            if key.startswith(("command.", "load.torque.")):
+                signal = s.command if key.startswith("command.") else s.load.torque
+                plain = not (signal.sines or signal.steps or signal.ramps or signal.chirp or signal.samples)
+                if not plain:
+                    return False
+    return True
+
+
+def _in_the_core(study: Study, parameters: np.ndarray, channels: list[str], energy: bool, threads: int) -> Runs:
+    """All runs in one call, the GIL released."""
+    s = study.scenario
+    keys = [(key, v, k) for k, v in enumerate(study.vary) for key in v.all_keys]
+    values = np.empty((len(parameters), len(keys)))
+    for j, (key, v, k) in enumerate(keys):
+        values[:, j] = parameters[:, k]
+        if v.relative and key != SLOPES:  # of the slopes the core takes the factor
+            values[:, j] *= float(base_value(s, key))
+    errors = _out_of_range(study, parameters)
+    good = np.array([e == "" for e in errors])
+    samples, totals = _core.run_batch(
+        *core_inputs(s),
+        [_fields()[key] for key, _, _ in keys],
+        np.ascontiguousarray(values[good]),
+        s.simulation.duration,
+        s.simulation.sample_interval,
+        s.simulation.samples,
+        energy,
+        [CHANNEL_NAMES.index(c) for c in channels],
+        threads,
+    )
+    n = len(parameters)
+    where = np.flatnonzero(good)
+    for row, (status, contact, time) in zip(where.tolist(), totals[:, :3].tolist(), strict=True):
+        if status != 0:
+            errors[row] = _core.status_text(int(status), time, int(contact))
+
+    def spread(x: np.ndarray) -> np.ndarray:
+        if len(where) == n:
+            return x
+        out = np.full((n, *x.shape[1:]), np.nan)
+        out[where] = x
+        return out
+
+    ratio = next((values[:, j] for j, (key, _, _) in enumerate(keys) if key == "gearbox.ratio"), None)
+    return Runs(
+        parameters=parameters,
+        samples={c: spread(samples[:, k]) for k, c in enumerate(channels)},
+        energy={e: spread(totals[:, 5 + k]) for k, e in enumerate(ENERGY)},
+        switchings=np.nan_to_num(spread(totals[:, 3])),
+        errors=errors,
+        ratio=np.full(n, s.gearbox.ratio) if ratio is None else ratio,
+    )
+
+
+def _out_of_range(study: Study, parameters: np.ndarray) -> list[str]:
+    """For each run, why it is no valid scenario; empty if it is.
+
+    The range of each number is an interval, so if the least and the largest value are valid, all are; a run is looked at by
+    itself only where that fails.
+    """
+    errors = [""] * len(parameters)
+    low, high = parameters.min(axis=0), parameters.max(axis=0)
+    try:
+        _changed(study, low)
+        _changed(study, high)
+    except ValidationError:
+        for k, row in enumerate(parameters):
+            try:
+                _changed(study, row)
+            except ValidationError as error:
+                errors[k] = describe(error)
+    return errors
