@@ -40,7 +40,7 @@ def section(report: Report, scenario: lm.Scenario, build: Path, programs: dict[s
     report.table(("amplitude", "frequency [Hz]", "switchings", "time [ms]", "us per switching"), rows("events"))
     report.section(
         "Cost over the size of the loss map",
-        f"{what}, 2 s, without samples. From run to run a thousand regimes are kept.",
+        f"{what}, 2 s, without samples. From run to run four thousand regimes are kept.",
     )
     report.table(("map, speeds x loads", "switchings", "same drive again [ms]", "new drive [ms]"), rows("map"))
     responses = rows("response")

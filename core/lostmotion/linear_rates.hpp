@@ -35,10 +35,7 @@ struct Matrix {
         (*this * load(v)).store(out.data());
         return out;
     }
-    [[gnu::always_inline]] double angle_row(const Coupled& v) const {
-        const Coupled p = Coupled::load(angle.data()) * v;
-        return (p[0] + p[1]) + (p[2] + p[3]);
-    }
+    [[gnu::always_inline]] double angle_row(const Coupled& v) const { return (Coupled::load(angle.data()) * v).sum(); }
     double operator()(int row, int col) const {
         return col == load_angle ? 0.0 : row == load_angle ? angle[col] : column[col][row];
     }
@@ -63,14 +60,8 @@ struct Matrix {
     // A row, on the coupled states, times this.
     Coupled times_row(const Column& row) const {
         const Coupled v = Coupled::load(row.data());
-        Coupled out{};
-        const auto set = [&]<int c>() __attribute__((always_inline)) {
-            const Coupled p = v * coupled(c);
-            out.set<c>((p[0] + p[1]) + (p[2] + p[3]));
-        };
-        set.template operator()<0>(), set.template operator()<1>(), set.template operator()<2>(),
-            set.template operator()<3>();
-        return out;
+        return Coupled::of(
+            {(v * coupled(0)).sum(), (v * coupled(1)).sum(), (v * coupled(2)).sum(), (v * coupled(3)).sum()});
     }
 
  private:

@@ -49,15 +49,15 @@ class Propagator {
         basis_ = turns.basis().data();
         n_basis_ = static_cast<int>(turns.basis().size());
         const double fastest = turns.fastest();
-        norm_ = fastest;
+        double norm = fastest;  // of A in scaled units, or the highest input frequency [1/s]
         for (int r = 0; r < n_states; ++r) {
             double sum = 0.0;
             for (int c = 0; c < n_coupled; ++c) sum += std::fabs(rates.rate(r, c)) * scale[c] / scale[r];
-            norm_ = std::fmax(norm_, sum);
+            norm = std::fmax(norm, sum);
         }
         base_ = turns.unit();
         exponent_ = 0;
-        for (; norm_ * base_ > base_norm; base_ *= 0.5) --exponent_;
+        for (; norm * base_ > base_norm; base_ *= 0.5) --exponent_;
         longest_ = 0;
         while (longest_ + 1 < max_levels && fastest * length(longest_ + 1) <= 1.0) ++longest_;
         levels_ = 0;
@@ -82,7 +82,7 @@ class Propagator {
         while (levels_ <= k) add_doubled();
         return steps_[k];
     }
-    const Driven* responses(int k) const { return &responses_[static_cast<std::size_t>(2 * k * n_basis_)]; }
+    const Driven* responses(int k) const { return responses_.data() + 2 * k * n_basis_; }
     const Driven* response_rates(int k) const { return responses(k) + n_basis_; }
     const double* rotations(int k) const { return rotations_[k]; }
 
@@ -190,7 +190,7 @@ class Propagator {
         }
         responses_.resize(responses_.size() + static_cast<std::size_t>(2 * n_basis_));
         const Driven* from = responses(k);
-        std::array<Lanes, n_inputs> held;  // what a constant input brings
+        std::array<Lanes, n_inputs> held;  // what a constant input of 1 brings
         for (int i = 0; i < n_inputs; ++i) held[i] = a.integrate(load(rates().input_column[i]));
         for (int q = 0; q < n_basis_; ++q) {
             const InputBasis& basis = basis_[q];
@@ -233,7 +233,6 @@ class Propagator {
     }
 
     Taylor taylor_;
-    double norm_ = 0.0;  // of A in scaled units, or the highest input frequency [1/s]
     double base_ = 0.0;  // length of level 0 [s]
     int exponent_ = 0;   // of two: base / unit
     int longest_ = 0;    // level

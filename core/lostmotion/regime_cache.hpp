@@ -121,7 +121,7 @@ class RegimeCache {
     }
 
  private:
-    static constexpr std::size_t most_kept = 1000;  // from run to run; each takes some tens of kilobytes
+    static constexpr std::size_t most_kept = 4000;  // from run to run; each takes about 15 kilobytes
 
     const System& system_;
     std::unique_ptr<InputTurns> turns_;

@@ -19,6 +19,7 @@ namespace lostmotion {
 using Driven = std::array<double, n_states>;
 inline Lanes load(const Driven& x) { return Lanes::load(x.data()); }
 
+// The series of the state.
 class Taylor {
  public:
     static constexpr int terms = Polynomial::degree;  // good for a base interval: 0.25^13/13! < 1e-17

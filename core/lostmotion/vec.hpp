@@ -5,6 +5,8 @@
 #include <immintrin.h>
 #endif
 
+#include <array>
+
 namespace lostmotion {
 
 template <int n>
@@ -40,6 +42,11 @@ struct Pack {
     using Part = VecOf<width>::Type;
     Part part[parts];
 
+    static Pack of(const std::array<double, n>& numbers) {
+        Pack v;
+        for (int k = 0; k < n; ++k) v.part[k / width][k % width] = numbers[k];
+        return v;
+    }
     static Pack load(const double* from) {
         Pack v;
         for (int p = 0; p < parts; ++p) v.part[p] = lostmotion::load<Part>(from + p * width);
@@ -49,9 +56,9 @@ struct Pack {
         for (int p = 0; p < parts; ++p) lostmotion::store(part[p], to + p * width);
     }
     double operator[](int k) const { return part[k / width][k % width]; }
-    template <int k>
-    void set(double value) {
-        part[k / width][k % width] = value;
+    double sum() const {
+        static_assert(n == 4);
+        return ((*this)[0] + (*this)[1]) + ((*this)[2] + (*this)[3]);
     }
     // The k-th number in every place.
     template <int k>
