@@ -24,7 +24,7 @@ from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
 from lostmotion.study_chunk import _core_can, run_chunk, scenario_of_run
-from lostmotion.study_expressions import FUNCTIONS, read_expression
+from lostmotion.study_expressions import FUNCTIONS, OF_THE_RUN, read_expression
 from lostmotion.study_file import CHUNK, Study
 from lostmotion.study_report import best_runs, influence, read_table, sobol_indices
 from lostmotion.units import registry
@@ -198,6 +198,12 @@ def test_an_expression_has_the_unit_of_what_it_gives(expression: str, unit: str)
     found = read_expression(expression).unit
     assert (found == "") == (unit == "")
     assert parse("" if found == "1" else found.replace("^", "**")) == parse("" if unit == "1" else unit)
+
+
+def test_the_page_on_studies_names_all_that_an_expression_may_use():
+    page = (ROOT / "docs" / "studies.md").read_text()
+    for name in (*FUNCTIONS, *OF_THE_RUN):
+        assert f"`{name}" in page
 
 
 def test_values_with_the_unit_of_something_else_are_refused():
