@@ -109,7 +109,7 @@ class ExactSolver {
             Segment<System> segment{entry, input_, time_,       t_end,
                                     true,  now_.x, now_.memory, entry.rates.constant(now_.memory)};
             const double knot = next_knot(signals_, time_);
-            const double limit = std::fmin(t_end, knot);
+            const double limit = std::min(t_end, knot);
             const Guard* fired = nullptr;
             const Status status = run_regime(segment, limit, fired);
             if (status != Status::done) return status;

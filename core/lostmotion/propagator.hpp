@@ -86,7 +86,7 @@ class Propagator {
     const Driven* response_rates(int k) const { return responses(k) + n_basis_; }
     const double* rotations(int k) const { return rotations_[k]; }
 
-    double length(int k) const { return base_ * static_cast<double>(1ull << k); }
+    double length(int k) const { return base_ * power_of_two[k]; }
     // How many base intervals fit into s.
     std::uint64_t intervals(double s) const {
         auto n = static_cast<std::uint64_t>(s / base_);
@@ -153,6 +153,12 @@ class Propagator {
     void prepare(FormSeries& series, const LinearForm& form) const { series.prepare(taylor_, basis_, form, base_); }
 
  private:
+    static constexpr std::array<double, max_levels> power_of_two = [] {
+        std::array<double, max_levels> p{};
+        for (int k = 0; k < max_levels; ++k) p[k] = static_cast<double>(1ull << k);
+        return p;
+    }();
+
     void add_base() {
         Step& s = steps_.emplace_back();
         const double h = s.length = base_;

@@ -1,6 +1,7 @@
 // Commands and disturbances: a piecewise-linear part plus a sum of sines, each the output of a linear system.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
@@ -50,7 +51,7 @@ struct Signal {
 using Signals = std::array<Signal, n_inputs>;  // command, load torque
 
 // The first knot of either input after t.
-inline double next_knot(const Signals& s, double t) { return std::fmin(s[0].next_knot(t), s[1].next_knot(t)); }
+inline double next_knot(const Signals& s, double t) { return std::min(s[0].next_knot(t), s[1].next_knot(t)); }
 
 // Inputs that will be set to ramps from outside, step by step.
 inline Signals ramped_inputs() {
