@@ -211,7 +211,7 @@ class ExactSolver {
                 bound_fourth(e.guard_sizes, p.level(level).growth, size);
                 const Verdict verdict = judge(e, segment.memory, *cursor, *here, *there, h, h < shortest);
                 if (verdict == Verdict::uncertain) {  // below the shortest level, by plain halves
-                    h = level > 0 ? std::min(p.length(--level), left) : 0.5 * h;
+                    h = level > 0 ? std::min(p.length(level = std::max(0, level - halvings_)), left) : 0.5 * h;
                     continue;
                 }
                 if (verdict == Verdict::crossing) {
@@ -301,7 +301,14 @@ class ExactSolver {
             }
             if (c.c0 <= tolerance && !touches && departs(e, memory, cursor, g, h)) continue;
             const double resolved = touches ? rounding * touch_size_ : tolerance;
-            if (error > resolved && !shortest) return Verdict::uncertain;
+            if (error > resolved && !shortest) {
+                // Half the length has a sixteenth of the error, which ought to be small beside what the guard does.
+                const double course = std::max(std::max(std::fabs(c.c0), std::fabs(c.c3)),
+                                               h * std::max(std::fabs(here.slope[g]), std::fabs(there.slope[g])));
+                halvings_ = 1;
+                for (double left = error / 16.0; left > 0.25 * course && halvings_ < 10; left /= 16.0) ++halvings_;
+                return Verdict::uncertain;
+            }
             // The cubic is the guard to rounding, or as near as the shortest look comes; does it dip below zero?
             const double lowest = c(c.lowest_at());
             if (lowest < -std::max(tolerance, error))
@@ -426,6 +433,7 @@ class ExactSolver {
     int crossings_ = 0;
     Ends ends_[2];
     Bounds bounds_;
+    int halvings_ = 1;    // how many times an uncertain look ought to be halved
     bool roomy_ = false;  // in the last look the guards that were clear were so by far
     struct Crossing {
         int guard;
