@@ -206,6 +206,21 @@ def test_memory_does_not_grow_with_the_duration(small: Path) -> None:
     assert grown < 60_000  # KiB: the kept switchings
 
 
+def test_memory_does_not_grow_with_the_number_of_drives(small: Path) -> None:
+    script = textwrap.dedent(f"""
+        import resource
+        import lostmotion as lm
+        scenario = lm.load({str(small)!r}, {{"command.amplitude": 1.0}})
+        peaks = []
+        for k in range(150):
+            lm.simulate(scenario.replace(**{{"load.inertia": 1.0 + 0.01 * k}}))
+            peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+        print(peaks[149] - peaks[30])
+    """)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert int(done.stdout) < 20_000  # KiB; a drive whose regimes are kept takes some 2000
+
+
 def test_misspelt_arguments_fail(small: Path) -> None:
     scenario = lm.load(small)
     with pytest.raises(TypeError, match="comand"):

@@ -299,7 +299,7 @@ class Drive(Part):
         return self
 
     def core(self) -> _core.Drive:
-        """The solver's drive; made once for equal parts."""
+        """The solver's drive; the last ones are kept for equal parts."""
         return _core_drive(self)
 
 
@@ -307,7 +307,7 @@ def _plain(part: Any, *names: str) -> dict[str, float]:
     return {name: value for name in names if (value := getattr(part, name)) is not None}
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes
 def _core_drive(drive: Drive) -> _core.Drive:
     m, g, b = drive.motor, drive.gearbox, drive.load
     motor, gearbox, load = _core.Motor(), _core.Gearbox(), _core.Load()
