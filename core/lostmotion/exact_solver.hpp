@@ -4,8 +4,8 @@
 // ends comes its cubic Hermite interpolant, which departs from the guard by at most h^4/384 max|g''''|, its slope
 // by at most sqrt(3)/216 h^3 max|g''''| (Birkhoff and Priver 1967). max|g''''| is bounded through the fourth
 // derivative of the state at the start and a bound on |exp(A s)|. The Bernstein coefficients of the cubic enclose
-// it. So a guard is certified positive, or certified to fall through zero once, or the interval is halved. There is
-// no other step size.
+// it. So a guard is certified positive, or certified to fall through zero once, or the interval is shortened. There
+// is no other step size.
 #pragma once
 
 #include <algorithm>
