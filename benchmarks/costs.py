@@ -131,7 +131,7 @@ def batches(report: Report, scenario: lm.Scenario) -> None:
 
         def work() -> None:
             inputs = core_inputs(s)
-            _core.run_batch(*inputs, fields[:used], chosen, 1.0, 1e-3, 1001, False, channels, threads)
+            _core.run_batch(*inputs, fields[:used], chosen, 1.0, 1e-3, 1001, False, channels, [], threads)
 
         return runs / (1e-3 * best(7 if runs < 5000 else 3, work))
 

@@ -131,19 +131,27 @@ NB_MODULE(CORE_MODULE, m) {
         "run_batch",
         [](SharedDrive& drive, const Signal& command, const Signal& load_torque, const std::array<double, n_states>& x,
            double capacity, const std::vector<int>& fields, const Values& values, double duration, double interval,
-           std::size_t samples, bool energy, const std::vector<int>& channels, unsigned threads,
-           const nb::object& progress) {
+           std::size_t samples, bool energy, const std::vector<int>& channels,
+           const std::vector<std::pair<std::size_t, int>>& kept, unsigned threads, const nb::object& progress) {
             return run_many(drive, Signals{command, load_torque}, x, capacity, fields, values, duration, interval,
-                            samples, energy, channels, threads, progress);
+                            samples, energy, channels, kept, threads, progress);
         },
         "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a, "fields"_a, "values"_a,
-        "duration"_a, "interval"_a, "samples"_a, "energy"_a, "channels"_a, "threads"_a, "progress"_a = nb::none(),
+        "duration"_a, "interval"_a, "samples"_a, "energy"_a, "channels"_a, "kept"_a, "threads"_a,
+        "progress"_a = nb::none(),
         nb::sig("def run_batch(drive: Drive, command: Signal, load_torque: Signal, state: "
                 "collections.abc.Sequence[float], hysteresis_capacity: float, fields: collections.abc.Sequence[int], "
                 "values: numpy.typing.NDArray[numpy.float64], duration: float, interval: float, samples: int, "
-                "energy: bool, channels: collections.abc.Sequence[int], threads: int, "
+                "energy: bool, channels: collections.abc.Sequence[int], kept: "
+                "collections.abc.Sequence[tuple[int, int]], threads: int, "
                 "progress: collections.abc.Callable[[int], None] | None = None) -> "
                 "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]"));
+    m.def(
+        "reductions", [] { return std::vector<std::string>(reduction_names.begin(), reduction_names.end()); },
+        nb::sig("def reductions() -> list[str]"));
+    m.def("reduce_rows", &reduce_rows, "how"_a, "values"_a,
+          nb::sig("def reduce_rows(how: int, values: numpy.typing.NDArray[numpy.float64]) -> "
+                  "numpy.typing.NDArray[numpy.float64]"));
     m.def(
         "linearization",
         [](SharedDrive& drive, const std::array<double, n_states>& x, double capacity,

@@ -1,8 +1,10 @@
 // What Python calls: runs of all kinds, with the GIL released.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <mutex>
+#include <numeric>
 
 #include "convert.hpp"
 #include "lostmotion/batch.hpp"
@@ -70,7 +72,8 @@ using Values = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::
 inline nb::tuple run_many(SharedDrive& drive, const Signals& signals, const std::array<double, n_states>& x,
                           double capacity, const std::vector<int>& fields, const Values& values, double duration,
                           double interval, std::size_t samples, bool energy, const std::vector<int>& channels,
-                          unsigned threads, const nb::object& progress) {
+                          const std::vector<std::pair<std::size_t, int>>& kept, unsigned threads,
+                          const nb::object& progress) {
     const std::size_t runs = values.shape(0);
     RunOptions options;
     options.duration = duration;
@@ -78,10 +81,14 @@ inline nb::tuple run_many(SharedDrive& drive, const Signals& signals, const std:
     options.samples = samples;
     options.energy = energy;
     options.channels = channels;
-    const BatchInput in{drive.drive, signals, {to_state(x), {capacity, 0.0}},
-                        options,     fields,  {values.data(), runs * fields.size()},
-                        runs};
-    auto data = std::make_unique_for_overwrite<double[]>(runs * channels.size() * samples);
+    BatchInput in{drive.drive, signals, {to_state(x), {capacity, 0.0}},
+                  options,     fields,  {values.data(), runs * fields.size()},
+                  runs,        {}};
+    for (const auto& [channel, how] : kept) in.kept.push_back({channel, static_cast<Reduction>(how)});
+    std::vector<std::size_t> shape{runs, kept.size()};
+    if (kept.empty()) shape = {runs, channels.size(), samples};
+    const std::size_t size = std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>());
+    auto data = std::make_unique_for_overwrite<double[]>(size);
     std::vector<BatchRow> rows;
     Watch watch(progress);
     {
@@ -98,8 +105,15 @@ inline nb::tuple run_many(SharedDrive& drive, const Signals& signals, const std:
         const auto energies = ledger_values(r.energy);
         std::copy(energies.begin(), energies.end(), std::copy(head.begin(), head.end(), &totals[k * width]));
     }
-    return nb::make_tuple(as_array(std::move(data), {runs, channels.size(), samples}),
-                          as_array(std::move(totals), {runs, width}));
+    return nb::make_tuple(as_array(std::move(data), shape), as_array(std::move(totals), {runs, width}));
+}
+
+// A reduction of each row.
+inline Array reduce_rows(int how, const Values& values) {
+    const std::size_t rows = values.shape(0), n = values.shape(1);
+    auto data = std::make_unique_for_overwrite<double[]>(rows);
+    for (std::size_t k = 0; k < rows; ++k) data[k] = reduce(static_cast<Reduction>(how), values.data() + k * n, n);
+    return as_array(std::move(data), {rows});
 }
 
 inline nb::dict respond_to(SharedDrive& drive, const std::vector<Point>& asked, const ResponseSpec& spec,

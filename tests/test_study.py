@@ -24,10 +24,11 @@ from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
 from lostmotion.study_chunk import _core_can, run_chunk, scenario_of_run
-from lostmotion.study_expressions import FUNCTIONS, OF_THE_RUN, read_expression
+from lostmotion.study_expressions import FUNCTIONS, OF_THE_RUN, REDUCTIONS, read_expression
 from lostmotion.study_file import CHUNK, Study
 from lostmotion.study_report import best_runs, influence, read_table, sobol_indices
 from lostmotion.units import registry
+from lostmotion.variables import CHANNEL_NAMES
 
 SHORT = paper_scenario("2-DOF-NL", "large").replace(**{"simulation.duration": 0.2, "simulation.sample_interval": 2e-3})
 
@@ -91,6 +92,21 @@ def test_a_row_equals_the_single_run_bit_for_bit(tmp_path: Path, engine: str):
             assert rows[name][run] == float(value), (run, name)
         assert rows["load_speed over time"][run] == result["load_speed"].values[::10].tolist()
         assert rows["switchings"][run] == result.attrs["switching_count"]
+
+
+def test_what_the_core_reduces_equals_what_is_made_of_the_samples(tmp_path: Path):
+    keep = {how: f"{how}({variable})" for how, variable in zip(REDUCTIONS, CHANNEL_NAMES[2:], strict=False)}
+    reduced, sampled = (make(keep=keep | more) for more in ({}, {"more": "peak(abs(twist))"}))
+    assert not run_chunk(reduced, 0, 4, 1).samples
+    assert run_chunk(sampled, 0, 4, 1).samples
+    rows, same = (rows_of(lm.study(s, tmp_path / name)) for s, name in ((reduced, "r"), (sampled, "s")))
+    assert len(keep) == 6
+    assert {name: rows[name] for name in keep} == {name: same[name] for name in keep}
+    result = lm.simulate(scenario_of_run(reduced, 5))
+    plain = {"peak": lambda v: np.max(np.abs(v)), "rms": lambda v: np.sqrt(np.mean(v**2)), "mean": np.mean}
+    plain |= {"final": lambda v: v[-1], "least": np.min, "largest": np.max}
+    for (how, function), variable in zip(plain.items(), CHANNEL_NAMES[2:], strict=False):
+        assert rows[how][5] == pytest.approx(function(result[variable].values), rel=1e-13), how
 
 
 def test_bandwidth_and_tracking_error_of_each_run(tmp_path: Path):

@@ -7,6 +7,7 @@
 #include <limits>
 #include <span>
 
+#include "reduction.hpp"
 #include "response.hpp"
 
 namespace lostmotion {
@@ -66,6 +67,12 @@ inline std::span<const BatchField> batch_fields() {
     return fields;
 }
 
+// One number to keep of each run: a reduction of the samples of a channel, by its place among those of the run.
+struct Kept {
+    std::size_t channel = 0;
+    Reduction how = Reduction::peak;
+};
+
 struct BatchInput {
     const Drive& drive;
     const Signals& signals;
@@ -74,6 +81,7 @@ struct BatchInput {
     std::span<const int> fields;     // numbers in batch_fields()
     std::span<const double> values;  // runs x fields
     std::size_t runs = 0;
+    std::vector<Kept> kept;  // none: the samples themselves
 };
 
 struct BatchRow {
@@ -85,11 +93,12 @@ struct BatchRow {
     EnergyLedger energy;
 };
 
-// samples: runs x channels x samples; NaN all through a run that did not end well.
-inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in, double* samples, unsigned threads,
+// out: runs x channels x samples or, of what is to be kept, runs x kept; NaN all through a run that did not end well.
+inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in, double* out, unsigned threads,
                                        const std::function<bool(std::size_t)>& waiting) {
     std::vector<BatchRow> rows(in.runs);
     const std::size_t width = in.options.channels.size() * in.options.samples;
+    const std::size_t row_size = in.kept.empty() ? width : in.kept.size();
     bool drive_varies = false;
     for (const int f : in.fields) drive_varies = drive_varies || batch_fields()[static_cast<std::size_t>(f)].drive;
     work_through(in.runs, threads, waiting, [&](auto next, std::atomic<bool>& stop) {
@@ -98,6 +107,7 @@ inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in
         options.max_switchings = 0;
         options.interrupted = [](void* flag) { return static_cast<std::atomic<bool>*>(flag)->load(); };
         options.interrupted_context = &stop;
+        std::vector<double> scratch(in.kept.empty() ? 0 : width);
         for (std::size_t k = next(); k < in.runs && !stop; k = next()) {
             Drive drive = in.drive;
             Signals signals = in.signals;
@@ -105,10 +115,16 @@ inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in
             for (std::size_t f = 0; f < in.fields.size(); ++f)
                 batch_fields()[static_cast<std::size_t>(in.fields[f])].set(drive, signals, start,
                                                                            in.values[k * in.fields.size() + f]);
-            const std::span<double> out(samples + k * width, width);
             if (drive_varies) workspace->set(drive);
-            const RunReport report = run_exact(*workspace, signals, start, options, out.data());
-            if (report.status != Status::done) std::ranges::fill(out, std::numeric_limits<double>::quiet_NaN());
+            double* samples = in.kept.empty() ? out + k * width : scratch.data();
+            const RunReport report = run_exact(*workspace, signals, start, options, samples);
+            const std::span<double> row(out + k * row_size, row_size);
+            if (report.status != Status::done) {
+                std::ranges::fill(row, std::numeric_limits<double>::quiet_NaN());
+            } else {
+                for (std::size_t j = 0; j < in.kept.size(); ++j)
+                    row[j] = reduce(in.kept[j].how, samples + in.kept[j].channel * options.samples, options.samples);
+            }
             rows[k] = {report.status,       report.contact, report.time, static_cast<double>(report.switching_count),
                        report.left_data_at, report.energy};
         }

@@ -101,6 +101,7 @@ Pack<n> absolute(Pack<n> a) {
     return a;
 }
 // The greater of two numbers, for each pair.
+inline double most(double a, double b) { return a < b ? b : a; }
 template <int n>
 Pack<n> most(Pack<n> a, const Pack<n>& b) {
     for (int p = 0; p < Pack<n>::parts; ++p) a.part[p] = a.part[p] < b.part[p] ? b.part[p] : a.part[p];

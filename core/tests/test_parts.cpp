@@ -1,6 +1,9 @@
 // Curves, maps, propagation and the Runge-Kutta tableau on their own.
 #include <doctest/doctest.h>
 
+#include <random>
+
+#include "lostmotion/reduction.hpp"
 #include "support.hpp"
 
 using namespace lostmotion;
@@ -136,6 +139,30 @@ TEST_SUITE("parts") {
                             CHECK(std::fabs(p.level(inner).change(i, j) + (i == j ? 1.0 : 0.0)) <=
                                   p.level(level).growth(i, j) * (1.0 + 1e-9) + 1e-300);
         }
+    }
+    TEST_CASE("reductions are what they are called, for any number of samples") {
+        std::mt19937 random(5);
+        std::uniform_real_distribution<double> uniform(-2.0, 1.0);
+        for (std::size_t n = 1; n < 40; ++n) {
+            std::vector<double> v(n);
+            for (double& x : v) x = uniform(random);
+            Long sum = 0.0L, squares = 0.0L;
+            double peak = 0.0;
+            for (const double x : v) {
+                sum += x;
+                squares += static_cast<Long>(x) * x;
+                peak = std::max(peak, std::fabs(x));
+            }
+            CHECK(reduce(Reduction::peak, v.data(), n) == peak);
+            CHECK(reduce(Reduction::least, v.data(), n) == *std::min_element(v.begin(), v.end()));
+            CHECK(reduce(Reduction::largest, v.data(), n) == *std::max_element(v.begin(), v.end()));
+            CHECK(reduce(Reduction::last, v.data(), n) == v.back());
+            CHECK(reduce(Reduction::mean, v.data(), n) ==
+                  doctest::Approx(static_cast<double>(sum / n)).epsilon(1e-14).scale(1.0));
+            CHECK(reduce(Reduction::rms, v.data(), n) ==
+                  doctest::Approx(static_cast<double>(std::sqrt(squares / n))).epsilon(1e-14));
+        }
+        CHECK(std::isnan(reduce(Reduction::mean, nullptr, 0)));
     }
     TEST_CASE("Dormand-Prince tableau satisfies its conditions of order") {
         using DP = DormandPrince;

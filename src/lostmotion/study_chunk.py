@@ -19,6 +19,7 @@ from .parts import Rigid
 from .results import ENERGY, add_derived, installed_version
 from .run import core_inputs, simulate
 from .scenario import Scenario, describe
+from .study_expressions import REDUCTIONS
 from .study_file import Study, base_value, from_json
 from .variables import CHANNEL_NAMES, VARIABLES
 
@@ -55,6 +56,14 @@ def _used(study: Study) -> set[str]:
     return {name for e in study.expressions.values() for name in e.variables}
 
 
+def _reductions(study: Study) -> dict[str, tuple[str, str]]:
+    """Reduction and variable of each column that needs samples, if they are all of that kind, so that the core can do them and
+    no samples need leave it; else empty."""
+    reductions = {name: e.reduction for name, e in study.expressions.items() if e.variables}
+    known = {name: r for name, r in reductions.items() if r is not None}
+    return known if study.trajectories is None and len(known) == len(reductions) else {}
+
+
 def _needed(study: Study) -> frozenset[str]:
     """The result variables that the study looks at."""
     return frozenset(_used(study) | set(study.trajectories.variables if study.trajectories else ()))
@@ -62,9 +71,11 @@ def _needed(study: Study) -> frozenset[str]:
 
 def run_chunk(study: Study, first: int, last: int, threads: int) -> Runs:
     """Simulates the runs; nearly all the time goes here, most of it with the GIL released."""
-    energy = _asks_for(study, "energy")
-    simulate_all = _in_the_core if _core_can(study) else _one_by_one
-    return simulate_all(study, study.parameters(first, last), sorted(_sources(_needed(study))), energy, threads)
+    parameters, energy = study.parameters(first, last), _asks_for(study, "energy")
+    channels = sorted(_sources(_needed(study)))
+    if _core_can(study):
+        return _in_the_core(study, parameters, channels, _reductions(study), energy, threads)
+    return _one_by_one(study, parameters, channels, energy)
 
 
 def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads: int) -> bytes:
@@ -75,12 +86,14 @@ def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads
     columns: dict[str, Any] = {"run": pa.array(np.arange(first, last))}
     for k, v in enumerate(study.vary):
         columns[v.title] = pa.array(runs.parameters[:, k])
-    data = _derived(study, runs, _needed(study))
+    data = {} if runs.kept else _derived(study, runs, _needed(study))
     names = _names(study, data, runs, threads)
-    kept_values = {name: e.values(names, last - first) for name, e in study.expressions.items()}
+    kept_values = runs.kept | {
+        name: e.values(names, last - first) for name, e in study.expressions.items() if name not in runs.kept
+    }
     bad = np.array([e != "" for e in runs.errors])
-    for name, values in kept_values.items():
-        columns[name] = pa.array(np.where(bad, np.nan, values))
+    for name in study.keep:
+        columns[name] = pa.array(np.where(bad, np.nan, kept_values[name]))
     if study.trajectories is not None:
         for name in study.trajectories.variables:
             kept = data[name][:, :: study.trajectories.every]
@@ -98,11 +111,12 @@ def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads
 
 
 class Runs(SimpleNamespace):
-    """Of a chunk: parameters (runs x parameters), samples (variable -> runs x samples), energy (entry -> runs),
-    switchings, errors, ratio (runs)."""
+    """Of a chunk: parameters (runs x parameters), samples (variable -> runs x samples), what the core has made of them instead
+    (column -> runs), energy (entry -> runs), switchings, errors, ratio (runs)."""
 
     parameters: np.ndarray
     samples: dict[str, np.ndarray]
+    kept: dict[str, np.ndarray]
     energy: dict[str, np.ndarray]
     switchings: np.ndarray
     errors: list[str]
@@ -145,7 +159,9 @@ def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) 
         return xr.DataArray(values, dims="run")
 
     instants = _instants(study.scenario.simulation.samples, study.scenario.simulation.sample_interval)
-    names: dict[str, Any] = {name: xr.DataArray(data[name], instants, ("run", "time")) for name in _used(study)}
+    names: dict[str, Any] = {
+        name: xr.DataArray(data[name], instants, ("run", "time")) for name in _used(study) & data.keys()
+    }
     names["time"] = xr.DataArray(instants["time"], instants)
     if _asks_for(study, "energy"):
         names["energy"] = SimpleNamespace(**{k: each_run(v) for k, v in runs.energy.items()})
@@ -218,12 +234,13 @@ def scenario_of_run(study: Study, run: int) -> Scenario:
     return _changed(study, study.parameters(run, run + 1)[0])
 
 
-def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energy: bool, threads: int) -> Runs:  # noqa: ARG001
+def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energy: bool) -> Runs:
     """Any key may vary: each run is a scenario of its own."""
     n, samples = len(parameters), study.scenario.simulation.samples
     runs = Runs(
         parameters=parameters,
         samples={c: np.full((n, samples), np.nan) for c in channels},
+        kept={},
         energy={e: np.full(n, np.nan) for e in ENERGY},
         switchings=np.zeros(n),
         errors=[""] * n,
@@ -269,7 +286,14 @@ def _core_can(study: Study) -> bool:
     return True
 
 
-def _in_the_core(study: Study, parameters: np.ndarray, channels: list[str], energy: bool, threads: int) -> Runs:
+def _in_the_core(
+    study: Study,
+    parameters: np.ndarray,
+    channels: list[str],
+    reductions: dict[str, tuple[str, str]],
+    energy: bool,
+    threads: int,
+) -> Runs:
     """All runs in one call, the GIL released."""
     s = study.scenario
     keys = [(key, v, k) for k, v in enumerate(study.vary) for key in v.all_keys]
@@ -280,7 +304,7 @@ def _in_the_core(study: Study, parameters: np.ndarray, channels: list[str], ener
             values[:, j] *= float(base_value(s, key))
     errors = _out_of_range(study, parameters)
     good = np.array([e == "" for e in errors])
-    samples, totals = _core.run_batch(
+    made, totals = _core.run_batch(
         *core_inputs(s),
         [_fields()[key] for key, _, _ in keys],
         np.ascontiguousarray(values[good]),
@@ -289,6 +313,7 @@ def _in_the_core(study: Study, parameters: np.ndarray, channels: list[str], ener
         s.simulation.samples,
         energy,
         [CHANNEL_NAMES.index(c) for c in channels],
+        [(channels.index(variable), REDUCTIONS.index(how)) for how, variable in reductions.values()],
         threads,
     )
     n = len(parameters)
@@ -307,7 +332,8 @@ def _in_the_core(study: Study, parameters: np.ndarray, channels: list[str], ener
     ratio = next((values[:, j] for j, (key, _, _) in enumerate(keys) if key == "gearbox.ratio"), None)
     return Runs(
         parameters=parameters,
-        samples={c: spread(samples[:, k]) for k, c in enumerate(channels)},
+        samples={} if reductions else {c: spread(made[:, k]) for k, c in enumerate(channels)},
+        kept={name: spread(made[:, k]) for k, name in enumerate(reductions)},
         energy={e: spread(totals[:, 5 + k]) for k, e in enumerate(ENERGY)},
         switchings=np.nan_to_num(spread(totals[:, 3])),
         errors=errors,

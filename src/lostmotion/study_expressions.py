@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from . import _core
 from .errors import InputError
 from .results import ENERGY
 from .units import registry
-from .variables import VARIABLES
+from .variables import CHANNEL_NAMES, VARIABLES
 
 # --- units ---
 
@@ -85,6 +86,10 @@ def _always(unit: str) -> Callable[..., _Measure]:
 # --- functions ---
 
 
+REDUCTIONS = tuple(_core.reductions())
+"""of a variable over time, as the core knows them"""
+
+
 def _final(x: Any) -> Any:
     return x.isel(time=-1)
 
@@ -93,7 +98,7 @@ def _over_time(plain: Callable[..., Any], careful: Callable[[Any], Any]) -> Call
     """A reduction of xarray that leaves out NaN. Most variables have none, and it is the search for them that takes long.
 
     plain
-        Of values and axis, by numpy.
+        Of values and axis; may pass over NaN, or give NaN.
     careful
         Of an array of xarray, where the plain one has met NaN.
     """
@@ -105,13 +110,19 @@ def _over_time(plain: Callable[..., Any], careful: Callable[[Any], Any]) -> Call
     return reduce
 
 
-def _root_mean_square(values: np.ndarray, axis: int) -> np.ndarray:
-    along = np.moveaxis(values, axis, -1)
-    return np.asarray(np.sqrt(np.einsum("...t,...t->...", along, along) / along.shape[-1]))
+def _reduced(name: str, careful: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """A reduction by the core, so that a chunk that the core has reduced has the same bits."""
+    how = REDUCTIONS.index(name)
+
+    def plain(values: np.ndarray, axis: int) -> np.ndarray:
+        along = np.moveaxis(values, axis, -1)
+        rows = np.ascontiguousarray(along, dtype=float).reshape(-1, along.shape[-1])
+        return _core.reduce_rows(how, rows).reshape(along.shape[:-1])
+
+    return _over_time(plain, careful)
 
 
-_mean = _over_time(np.mean, lambda x: x.mean("time"))
-_rms = _over_time(_root_mean_square, lambda x: (x**2).mean("time") ** 0.5)
+_rms = _reduced("rms", lambda x: (x**2).mean("time") ** 0.5)
 
 
 class Function(NamedTuple):
@@ -122,17 +133,12 @@ class Function(NamedTuple):
 
 
 FUNCTIONS = {
-    "peak": Function(
-        _over_time(
-            lambda v, axis: np.maximum(np.max(v, axis=axis), -np.min(v, axis=axis)), lambda x: abs(x).max("time")
-        ),
-        _first,
-    ),
+    "peak": Function(_reduced("peak", lambda x: abs(x).max("time")), _first),
     "rms": Function(_rms, _first),
-    "mean": Function(_mean, _first),
+    "mean": Function(_reduced("mean", lambda x: x.mean("time")), _first),
     "final": Function(_final, _first),
-    "least": Function(_over_time(np.min, lambda x: x.min("time")), _first),
-    "largest": Function(_over_time(np.max, lambda x: x.max("time")), _first),
+    "least": Function(_reduced("least", lambda x: x.min("time")), _first),
+    "largest": Function(_reduced("largest", lambda x: x.max("time")), _first),
     # First instant [s] at which the variable is more than `share` of its peak away from its start; NaN if never.
     "dead_time": Function(
         lambda x, share=0.01: x["time"].where(abs(x - x.isel(time=0)) > share * abs(x).max("time")).min("time"),
@@ -191,6 +197,12 @@ class Expression:
                     raise ValueError(f"energy.{node.attr} is none of {', '.join(ENERGY)}")
         self.variables = (self.names & known) | ({"command"} if "ideal_speed" in self.names else frozenset())
         """the result variables that it needs"""
+        self.reduction: tuple[str, str] | None = None
+        """reduction and variable, if it is nothing else, so that the core can do it"""
+        match tree.body:
+            case ast.Call(ast.Name(reduction), [ast.Name(variable)], []):
+                if reduction in REDUCTIONS and variable in CHANNEL_NAMES:
+                    self.reduction = reduction, variable
 
     @cached_property
     def _code(self) -> CodeType:

@@ -1,0 +1,61 @@
+// What is kept of a variable over time: one number of many samples.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include "vec.hpp"
+
+namespace lostmotion {
+
+enum class Reduction : int { peak, rms, mean, last, least, largest };
+inline constexpr std::array<const char*, 6> reduction_names{"peak", "rms", "mean", "final", "least", "largest"};
+
+using Eight = Pack<8>;
+
+// The sum of a term of each. Eight are summed up side by side in every build, so that all give the same bits.
+template <class Term>
+double sum_over(const double* v, std::size_t n, Term&& term) {
+    Eight sum{};
+    std::size_t k = 0;
+    for (; k + 8 <= n; k += 8) sum = sum + term(Eight::load(v + k));
+    double total = ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7]));
+    for (; k < n; ++k) total += term(v[k]);
+    return total;
+}
+
+// The one that `better` prefers of them all, as `seen`.
+template <class Better, class Seen>
+double best_of(const double* v, std::size_t n, Better&& better, Seen&& seen) {
+    double best = seen(v[0]);
+    if (n >= 8) {
+        Eight found = seen(Eight::load(v));
+        for (std::size_t k = 8; k + 8 <= n; k += 8) found = better(found, seen(Eight::load(v + k)));
+        found = better(found, seen(Eight::load(v + n - 8)));
+        for (int k = 0; k < 8; ++k) best = better(best, found[k]);
+    } else {
+        for (std::size_t k = 1; k < n; ++k) best = better(best, seen(v[k]));
+    }
+    return best;
+}
+
+// NaN without samples; undefined if one of them is NaN.
+inline double reduce(Reduction r, const double* v, std::size_t n) {
+    if (n == 0) return std::numeric_limits<double>::quiet_NaN();
+    const auto count = static_cast<double>(n);
+    const auto itself = [](auto x) { return x; };
+    const auto largest = [](auto a, auto b) { return most(a, b); };
+    switch (r) {
+        case Reduction::peak: return best_of(v, n, largest, [](auto x) { return absolute(x); });
+        case Reduction::rms: return std::sqrt(sum_over(v, n, [](auto x) { return x * x; }) / count);
+        case Reduction::mean: return sum_over(v, n, itself) / count;
+        case Reduction::last: return v[n - 1];
+        case Reduction::least: return -best_of(v, n, largest, [](auto x) { return -1.0 * x; });
+        default: return best_of(v, n, largest, itself);
+    }
+}
+
+}  // namespace lostmotion
