@@ -45,6 +45,7 @@ ROOMS = [
     {"study_report"},
     {"listing"},
     {"response_sheet"},
+    {"run_sheet", "terminal"},
     {"reproduce", "report"},
     {"cli"},
     {"__init__", "__main__"},

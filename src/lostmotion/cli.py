@@ -5,17 +5,12 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Protocol
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
-    import xarray
+from .terminal import fail, progress, workers, writing
 
 app = typer.Typer(
     name="lostmotion",
@@ -35,69 +30,15 @@ def main() -> None:
     try:
         app()
     except InputError as error:
-        _fail(str(error))
+        fail(str(error))
     except KeyboardInterrupt:
-        _fail("interrupted; nothing was written", 130)
+        fail("interrupted; nothing was written", 130)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except (RuntimeError, ValueError) as error:
         # What a solver or a check of a whole scenario reports is a result for the user; anything else is our defect.
-        _fail(" ".join(str(error).split()))
-
-
-def _fail(text: str, code: int = 1) -> None:
-    print(f"lostmotion: {text}", file=sys.stderr)
-    sys.exit(code)
-
-
-class Step(Protocol):
-    """Tells a progress bar of one more piece of work, or of how many are done."""
-
-    def __call__(self, done: int | None = None) -> None: ...
-
-
-@contextmanager
-def _progress(total: int, what: str) -> Iterator[Step]:
-    """A progress bar with rate and remaining time on stderr, where that is a terminal."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        ProgressColumn,
-        Task,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    class Rate(ProgressColumn):
-        def render(self, task: Task) -> str:
-            return f"{task.speed:.0f}/s" if task.speed else ""
-
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
-        task = bar.add_task(what, total=total)
-
-        def step(done: int | None = None) -> None:
-            if done is None:
-                bar.advance(task)
-            else:
-                bar.update(task, completed=done)
-
-        yield step
-
-
-@contextmanager
-def _writing(directory: Path, then: str = "") -> Iterator[None]:
-    """What goes wrong with a directory that is written to, as one line."""
-    from .errors import InputError
-
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"{directory}: cannot be written: {error.strerror}{then}") from None
+        fail(" ".join(str(error).split()))
 
 
 @app.command()
@@ -117,7 +58,7 @@ def reproduce(
     from .reproduce import WORK
     from .reproduce import reproduce as work
 
-    with _writing(output), _progress(WORK, "Reproducing") as step:
+    with writing(output), progress(WORK, "Reproducing") as step:
         report = work(output, step)
     print(f"The report is at {report}")
 
@@ -177,6 +118,8 @@ def run(
         result = simulate(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
     except RuntimeError as error:
         raise InputError(f"{scenario}: {error}") from None
+    from .run_sheet import summary
+
     print(summary(result))
     if explain is not None:
         from .explanation import explain as explain_instant
@@ -244,7 +187,7 @@ def response(
     from .response_sheet import write_response
 
     responses = {}
-    with _progress(len(loaded) * len(wanted) * len(grid), "Response") as step:
+    with progress(len(loaded) * len(wanted) * len(grid), "Response") as step:
         for name, s in loaded.items():
             kind: Source = "command" if source == "command" else "load_torque"
             responses[name] = frequency_response(
@@ -258,7 +201,7 @@ def response(
                 progress=step,
             )
     first = loaded[scenario.stem]
-    with _writing(output):
+    with writing(output):
         figure, found = write_response(output, responses, first.drive(), variable)
     result = responses[scenario.stem]
     print(first.title or scenario.stem)
@@ -316,7 +259,7 @@ def rig(
     from .test_rig import measure
 
     report = measure(part, sheet, notes)
-    with _writing(output):
+    with writing(output):
         page = write_sheet(output, sheet.name, report, sheet, notes)
     print(sheet.title or sheet.name)
     for c in report.comparisons:
@@ -417,38 +360,14 @@ def study(
     loaded = load_study(what)
     directory = output or Path(Path(what).stem)
     with ExitStack() as stack:
-        executor = stack.enter_context(_executor(processes, scheduler)) if processes or scheduler else None
-        report = stack.enter_context(_progress(loaded.total, "Runs"))
+        executor = stack.enter_context(workers(processes, scheduler)) if processes or scheduler else None
+        report = stack.enter_context(progress(loaded.total, "Runs"))
         try:
-            with _writing(directory, "; what is written stays"):
+            with writing(directory, "; what is written stays"):
                 work(loaded, directory, threads=threads, executor=executor, progress=report)
         except KeyboardInterrupt:
-            _fail(f"interrupted; what is in {directory} stays, and the same command goes on with it", 130)
+            fail(f"interrupted; what is in {directory} stays, and the same command goes on with it", 130)
     print(f"{loaded.total} runs are in {directory}; `lostmotion study show {directory}` looks at them")
-
-
-@contextmanager
-def _executor(processes: int | None, scheduler: str | None) -> Iterator[Executor]:
-    """Worker processes of this machine, or the workers of a Dask cluster."""
-    if scheduler is None:
-        from concurrent.futures import ProcessPoolExecutor
-        from multiprocessing import get_context
-
-        with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-            yield pool
-        return
-    from .errors import InputError
-
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InputError("--scheduler needs Dask: pip install lostmotion[study]") from None
-    try:
-        client: Any = Client(scheduler, timeout="10s")  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:
-        raise InputError(f"--scheduler {scheduler}: cannot be reached ({error})") from None
-    with client:
-        yield client.get_executor(pure=False)
 
 
 drive_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Check a drive against its task.")
@@ -497,40 +416,3 @@ def version() -> None:
     from importlib.metadata import version as installed
 
     print(installed("lostmotion"))
-
-
-def summary(result: xarray.Dataset) -> str:
-    """A run in a few lines: the end, the extremes, the contacts, the energy."""
-    from .results import energy_of
-
-    last = result.isel(time=-1)
-    stuck = float((result["input_contact"] == 0).mean())
-    lines = [
-        result.attrs["title"] or "(no title)",
-        f"  {float(last['time']):g} s, {result.attrs['switching_count']} switchings, solver {result.attrs['solver']}",
-        f"  at the end: motor {float(last['motor_speed']):.6g} rad/s, load {float(last['load_speed']):.6g} rad/s "
-        f"at {float(last['load_angle']):.6g} rad, twist {1e3 * float(last['twist']):.4g} mrad",
-        f"  largest: motor torque {float(abs(result['motor_torque']).max()):.4g} N·m, output torque "
-        f"{float(abs(result['output_torque']).max()):.4g} N·m, load speed {float(abs(result['load_speed']).max()):.4g} rad/s",
-        f"  input shaft stuck for {100.0 * stuck:.1f} % of the samples",
-    ]
-    if "energy" in result.attrs:
-        e = energy_of(result)
-        names = (
-            "gear_losses",
-            "hysteresis",
-            "motor_friction",
-            "input_damper",
-            "load_damper",
-            "load_friction",
-            "load_work",
-        )
-        parts = ", ".join(f"{name.replace('_', ' ')} {e[name]:.4g}" for name in names if e[name] != 0.0)
-        lines.append(
-            f"  energy [J]: from the motor {e['source']:.4g}; {parts}; stored {e['kinetic_change'] + e['elastic_change']:.4g}"
-        )
-        if e["turned_over"] > 0.0:
-            lines.append(f"  energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}")
-    lines += [f"  warning: {result.attrs['warning']}"] if "warning" in result.attrs else []
-    lines += [f"  note: {result.attrs['note']}"] if "note" in result.attrs else []
-    return "\n".join(lines)

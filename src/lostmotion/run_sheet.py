@@ -1,0 +1,45 @@
+"""A run as text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .results import energy_of
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def summary(result: xarray.Dataset) -> str:
+    """A run in a few lines: the end, the extremes, the contacts, the energy."""
+    last = result.isel(time=-1)
+    stuck = float((result["input_contact"] == 0).mean())
+    lines = [
+        result.attrs["title"] or "(no title)",
+        f"  {float(last['time']):g} s, {result.attrs['switching_count']} switchings, solver {result.attrs['solver']}",
+        f"  at the end: motor {float(last['motor_speed']):.6g} rad/s, load {float(last['load_speed']):.6g} rad/s "
+        f"at {float(last['load_angle']):.6g} rad, twist {1e3 * float(last['twist']):.4g} mrad",
+        f"  largest: motor torque {float(abs(result['motor_torque']).max()):.4g} N·m, output torque "
+        f"{float(abs(result['output_torque']).max()):.4g} N·m, load speed {float(abs(result['load_speed']).max()):.4g} rad/s",
+        f"  input shaft stuck for {100.0 * stuck:.1f} % of the samples",
+    ]
+    if "energy" in result.attrs:
+        e = energy_of(result)
+        names = (
+            "gear_losses",
+            "hysteresis",
+            "motor_friction",
+            "input_damper",
+            "load_damper",
+            "load_friction",
+            "load_work",
+        )
+        parts = ", ".join(f"{name.replace('_', ' ')} {e[name]:.4g}" for name in names if e[name] != 0.0)
+        lines.append(
+            f"  energy [J]: from the motor {e['source']:.4g}; {parts}; stored {e['kinetic_change'] + e['elastic_change']:.4g}"
+        )
+        if e["turned_over"] > 0.0:
+            lines.append(f"  energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}")
+    lines += [f"  warning: {result.attrs['warning']}"] if "warning" in result.attrs else []
+    lines += [f"  note: {result.attrs['note']}"] if "note" in result.attrs else []
+    return "\n".join(lines)
