@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -20,10 +20,11 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from conftest import ROOT
+from lostmotion import study_chunk
 from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
-from lostmotion.study_chunk import _core_can, run_chunk, scenario_of_run
+from lostmotion.study_chunk import _core_can, pieces, run_piece, scenario_of_run
 from lostmotion.study_expressions import FUNCTIONS, OF_THE_RUN, REDUCTIONS, read_expression
 from lostmotion.study_file import CHUNK, Study
 from lostmotion.study_report import best_runs, influence, read_table, sobol_indices
@@ -97,8 +98,8 @@ def test_a_row_equals_the_single_run_bit_for_bit(tmp_path: Path, engine: str):
 def test_what_the_core_reduces_equals_what_is_made_of_the_samples(tmp_path: Path):
     keep = {how: f"{how}({variable})" for how, variable in zip(REDUCTIONS, CHANNEL_NAMES[2:], strict=False)}
     reduced, sampled = (make(keep=keep | more) for more in ({}, {"more": "peak(abs(twist))"}))
-    assert not run_chunk(reduced, 0, 4, 1).samples
-    assert run_chunk(sampled, 0, 4, 1).samples
+    assert not run_piece(reduced, 0, 4, 1).samples
+    assert run_piece(sampled, 0, 4, 1).samples
     rows, same = (rows_of(lm.study(s, tmp_path / name)) for s, name in ((reduced, "r"), (sampled, "s")))
     assert len(keep) == 6
     assert {name: rows[name] for name in keep} == {name: same[name] for name in keep}
@@ -107,6 +108,17 @@ def test_what_the_core_reduces_equals_what_is_made_of_the_samples(tmp_path: Path
     plain |= {"final": lambda v: v[-1], "least": np.min, "largest": np.max}
     for (how, function), variable in zip(plain.items(), CHANNEL_NAMES[2:], strict=False):
         assert rows[how][5] == pytest.approx(function(result[variable].values), rel=1e-13), how
+
+
+def test_long_runs_are_made_in_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    study = make(trajectories={"variables": ["load_speed"], "every": 10})
+    rows = rows_of(lm.study(study, tmp_path / "one"))
+    assert pieces(study, 0, 32) == [(0, 32)]
+    monkeypatch.setattr(study_chunk, "MOST_NUMBERS", 13 * SHORT.simulation.samples * 7)
+    assert pieces(study, 0, 32) == [(0, 7), (7, 14), (14, 21), (21, 28), (28, 32)]
+    assert rows_of(lm.study(study, tmp_path / "many")) == rows
+    with ThreadPoolExecutor(1) as pool:
+        assert rows_of(lm.study(study, tmp_path / "pool", executor=pool)) == rows
 
 
 def test_bandwidth_and_tracking_error_of_each_run(tmp_path: Path):
@@ -169,7 +181,7 @@ def test_a_run_without_a_continuation_is_recorded_too(tmp_path: Path):
     rows = rows_of(lm.study(what, tmp_path / "s"))
     assert rows["error"][0] == ""
     assert "left the range" in rows["error"][1]
-    runs = run_chunk(what, 0, 2, 1)
+    runs = run_piece(what, 0, 2, 1)
     assert np.isfinite(runs.samples["load_speed"][0]).all()
     assert np.isnan(runs.samples["load_speed"][1]).all()  # none is left as the memory happened to be
 

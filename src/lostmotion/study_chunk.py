@@ -8,7 +8,7 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -23,13 +23,31 @@ from .study_expressions import REDUCTIONS
 from .study_file import Study, base_value, from_json
 from .variables import CHANNEL_NAMES, VARIABLES
 
+if TYPE_CHECKING:
+    import pyarrow as pa
+
 SLOPES = "gearbox.stiffness.slopes"
+MOST_NUMBERS = 2**23  # of samples that are held at once: 64 megabytes
 
 
 def compute_chunk(text: str, first: int, last: int, threads: int = 1) -> bytes:
     """The runs first .. last - 1 of a study (as JSON), as the bytes of a Parquet file. What executors are given."""
     study = parsed(text)
-    return tabulate(study, text, first, last, run_chunk(study, first, last, threads), threads)
+    return as_parquet(
+        text,
+        [tabulate(study, text, a, b, run_piece(study, a, b, threads), threads) for a, b in pieces(study, first, last)],
+    )
+
+
+def pieces(study: Study, first: int, last: int) -> list[tuple[int, int]]:
+    """The parts of a chunk, so that the samples of each can be held at once; most chunks are one piece."""
+    needed = _needed(study)
+    if not needed or (_core_can(study) and _reductions(study)):
+        return [(first, last)]
+    derived = any(v.derived and v.name in needed for v in VARIABLES)
+    arrays = len(CHANNEL_NAMES) if derived else len(needed)
+    size = max(1, MOST_NUMBERS // (arrays * study.scenario.simulation.samples))
+    return [(a, min(a + size, last)) for a in range(first, last, size)]
 
 
 @lru_cache(maxsize=8)
@@ -69,7 +87,7 @@ def _needed(study: Study) -> frozenset[str]:
     return frozenset(_used(study) | set(study.trajectories.variables if study.trajectories else ()))
 
 
-def run_chunk(study: Study, first: int, last: int, threads: int) -> Runs:
+def run_piece(study: Study, first: int, last: int, threads: int) -> Runs:
     """Simulates the runs; nearly all the time goes here, most of it with the GIL released."""
     parameters, energy = study.parameters(first, last), _asks_for(study, "energy")
     channels = sorted(_sources(_needed(study)))
@@ -78,10 +96,9 @@ def run_chunk(study: Study, first: int, last: int, threads: int) -> Runs:
     return _one_by_one(study, parameters, channels, energy)
 
 
-def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads: int) -> bytes:
+def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads: int) -> pa.Table:
     """One row a run: its number, its parameters, what is kept of it, its error if it has one."""
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     columns: dict[str, Any] = {"run": pa.array(np.arange(first, last))}
     for k, v in enumerate(study.vary):
@@ -102,16 +119,22 @@ def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads
     columns["error"] = pa.array(runs.errors)
     units = _units(text)
     fields = [pa.field(n, c.type, metadata={"units": units[n]} if units.get(n) else None) for n, c in columns.items()]
-    table = pa.table(columns, schema=pa.schema(fields))
+    return pa.table(columns, schema=pa.schema(fields))
+
+
+def as_parquet(text: str, tables: list[pa.Table]) -> bytes:
+    """The tables of a chunk as one file, with the study in its metadata."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    about = {"lostmotion_study": text, "lostmotion_version": installed_version()}
     out = io.BytesIO()
-    pq.write_table(
-        table.replace_schema_metadata({"lostmotion_study": text, "lostmotion_version": installed_version()}), out
-    )
+    pq.write_table(pa.concat_tables(tables).replace_schema_metadata(about), out)
     return out.getvalue()
 
 
 class Runs(SimpleNamespace):
-    """Of a chunk: parameters (runs x parameters), samples (variable -> runs x samples), what the core has made of them instead
+    """Of a piece: parameters (runs x parameters), samples (variable -> runs x samples), what the core has made of them instead
     (column -> runs), energy (entry -> runs), switchings, errors, ratio (runs)."""
 
     parameters: np.ndarray

@@ -6,10 +6,11 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from pathlib import Path
+from typing import Any
 
 from .errors import InputError
 from .results import write_bytes
-from .study_chunk import compute_chunk, parsed, run_chunk, tabulate
+from .study_chunk import as_parquet, compute_chunk, parsed, pieces, run_piece, tabulate
 from .study_file import CHUNK, Study, from_json, to_json
 
 
@@ -121,22 +122,31 @@ def _compute(
 
 
 def _compute_here(text: str, missing: list[tuple[int, int]], threads: int) -> Iterator[tuple[int, int, bytes]]:
-    """While a chunk is simulated, the one before it is made into a table beside it."""
+    """While a piece is simulated, the one before it is made into a table beside it."""
     study = parsed(text)
     before: tuple[int, int, Future[bytes]] | None = None
     with ThreadPoolExecutor(max_workers=1) as beside:
         for first, last in missing:
+            tables: list[Future[Any]] = []
             try:
-                runs = run_chunk(study, first, last, threads)
+                for a, b in pieces(study, first, last):
+                    runs = run_piece(study, a, b, threads)
+                    if tables:
+                        tables[-1].result()
+                    tables.append(beside.submit(tabulate, study, text, a, b, runs, threads))
             except BaseException:  # interrupted; what is simulated is not lost
                 if before is not None:
                     yield before[0], before[1], before[2].result()
                 raise
             if before is not None:
                 yield before[0], before[1], before[2].result()
-            before = first, last, beside.submit(tabulate, study, text, first, last, runs, threads)
+            before = first, last, beside.submit(_together, text, tables)
         if before is not None:
             yield before[0], before[1], before[2].result()
+
+
+def _together(text: str, tables: list[Future[Any]]) -> bytes:
+    return as_parquet(text, [table.result() for table in tables])
 
 
 def study_of(directory: str | Path) -> Study:
