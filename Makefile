@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+FORMATTED := $(wildcard core/lostmotion/*.hpp core/tests/*.[ch]pp bindings/*.[ch]pp benchmarks/*.[ch]pp)
 SOURCES := $(wildcard core/lostmotion/*.hpp bindings/*.cpp bindings/*.hpp scenarios/*.toml) CMakeLists.txt pyproject.toml
 
 .PHONY: demo test bench docs lint format clean
@@ -37,7 +38,7 @@ lint: $(VENV)/built
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/clang-format --dry-run --Werror core/lostmotion/*.hpp core/tests/*.cpp core/tests/*.hpp bindings/*.cpp bindings/*.hpp benchmarks/*.cpp benchmarks/*.hpp
+	$(BIN)/clang-format --dry-run --Werror $(FORMATTED)
 
 .PHONY: stub
 stub: $(VENV)/built
@@ -46,7 +47,7 @@ stub: $(VENV)/built
 format: $(VENV)/tools
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
-	$(BIN)/clang-format -i core/lostmotion/*.hpp core/tests/*.cpp core/tests/*.hpp bindings/*.cpp bindings/*.hpp benchmarks/*.cpp benchmarks/*.hpp
+	$(BIN)/clang-format -i $(FORMATTED)
 
 # Tools and libraries, then the package itself; only what changed is compiled again.
 $(VENV)/tools: pyproject.toml

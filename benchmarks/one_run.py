@@ -18,6 +18,7 @@ import lostmotion as lm
 from lostmotion.paper import paper_scenario
 
 Row = tuple[str, float, str]  # name, [ms], largest error
+VECTORS = {"avx512": ", AVX-512", "avx2": ", AVX2"}  # of a build
 
 
 def error_of(load_speed: np.ndarray, twist: np.ndarray, exact: Dataset) -> float:
@@ -29,9 +30,6 @@ def error_of(load_speed: np.ndarray, twist: np.ndarray, exact: Dataset) -> float
 def timed(name: str, work: Callable[[], tuple[np.ndarray, np.ndarray]], exact: Dataset, repeats: int = 1) -> Row:
     found = work()
     return name, best(repeats, work), f"{error_of(*found, exact):.2g}"
-
-
-VECTORS = {"avx512": ", AVX-512", "avx2": ", AVX2"}
 
 
 def add_table(report: Report, rows: list[Row]) -> None:

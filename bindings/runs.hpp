@@ -36,15 +36,21 @@ class SharedDrive : public WorkspacePool {
     std::vector<std::unique_ptr<Workspace>> idle_;
 };
 
-inline nb::tuple run(SharedDrive& shared, const Signals& signals, const std::array<double, n_states>& x,
-                     double capacity, double duration, double interval, std::size_t samples, bool energy,
-                     double tolerance, std::size_t max_switchings) {
-    auto data = std::make_unique_for_overwrite<double[]>(n_channels * samples);
+// What every run is asked for.
+inline RunOptions to_record(double duration, double interval, std::size_t samples, bool energy) {
     RunOptions options;
     options.duration = duration;
     options.sample_interval = interval;
     options.samples = samples;
     options.energy = energy;
+    return options;
+}
+
+inline nb::tuple run(SharedDrive& shared, const Signals& signals, const std::array<double, n_states>& x,
+                     double capacity, double duration, double interval, std::size_t samples, bool energy,
+                     double tolerance, std::size_t max_switchings) {
+    auto data = std::make_unique_for_overwrite<double[]>(n_channels * samples);
+    RunOptions options = to_record(duration, interval, samples, energy);
     options.max_switchings = max_switchings;
     options.interrupted = poll_signals;
     const Start start{to_state(x), {capacity, 0.0}};
@@ -75,11 +81,7 @@ inline nb::tuple run_many(SharedDrive& drive, const Signals& signals, const std:
                           const std::vector<std::pair<std::size_t, int>>& kept, unsigned threads,
                           const nb::object& progress) {
     const std::size_t runs = values.shape(0);
-    RunOptions options;
-    options.duration = duration;
-    options.sample_interval = interval;
-    options.samples = samples;
-    options.energy = energy;
+    RunOptions options = to_record(duration, interval, samples, energy);
     options.channels = channels;
     BatchInput in{drive.drive, signals, {to_state(x), {capacity, 0.0}},
                   options,     fields,  {values.data(), runs * fields.size()},

@@ -25,10 +25,9 @@ from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
 from lostmotion.study_chunk import _core_can, pieces, run_piece, scenario_of_run
-from lostmotion.study_expressions import FUNCTIONS, OF_THE_RUN, REDUCTIONS, read_expression
+from lostmotion.study_expressions import FUNCTIONS, REDUCTIONS
 from lostmotion.study_file import CHUNK, Study
 from lostmotion.study_report import best_runs, influence, read_table, sobol_indices
-from lostmotion.units import registry
 from lostmotion.variables import CHANNEL_NAMES
 
 SHORT = paper_scenario("2-DOF-NL", "large").replace(**{"simulation.duration": 0.2, "simulation.sample_interval": 2e-3})
@@ -203,35 +202,6 @@ def test_parquet_opens_directly_with_study_and_parameters(tmp_path: Path):
             units["stiffness"] == units["lost"] == units["efficiency_driving"] == "1"
         )  # relative; a share of energies
         assert (units["peak_speed"], units["rms_twist"], units["starts"]) == ("rad/s", "rad", "s")
-
-
-@pytest.mark.parametrize(
-    ("expression", "unit"),
-    [
-        ("mean(input_contact == 0)", "1"),
-        ("(output_torque * motor_speed).integrate('time')", "N*m*rad"),
-        ("sqrt(mean(output_torque**2))", "N*m"),
-        ("peak(output_torque) / peak(twist)", "N*m/rad"),
-        ("bandwidth(0.1)", "Hz"),
-        ("bandwidth(amplitude=0.1)", "Hz"),
-        ("dead_time(load_angle, share=0.05)", "s"),
-        ("energy.source - energy.load_work", "J"),
-        ("peak(load_speed - ideal_speed)", "rad/s"),
-        ("peak(twist) * 1e6", ""),  # of what may be a change of unit nothing is claimed
-        ("peak(twist) + peak(load_speed)", ""),
-    ],
-)
-def test_an_expression_has_the_unit_of_what_it_gives(expression: str, unit: str):
-    parse = registry().Unit
-    found = read_expression(expression).unit
-    assert (found == "") == (unit == "")
-    assert parse("" if found == "1" else found.replace("^", "**")) == parse("" if unit == "1" else unit)
-
-
-def test_the_page_on_studies_names_all_that_an_expression_may_use():
-    page = (ROOT / "docs" / "studies.md").read_text()
-    for name in (*FUNCTIONS, *OF_THE_RUN):
-        assert f"`{name}" in page
 
 
 def test_values_with_the_unit_of_something_else_are_refused():

@@ -52,6 +52,7 @@ class Cursor {
     // h >= 0, half a base interval forward or backward at most.
     double advance_by_levels(double h) {
         Propagator& p = *propagator_;
+        // By way of a signed number, which processors make of a floating-point one at once.
         const auto n = static_cast<std::uint64_t>(static_cast<std::int64_t>(h / p.length(0) + 0.5));
         if (n == 0) return h;
         Lanes x = load(x_), rate = load(this->rate());

@@ -49,10 +49,8 @@ class ExactSolver {
           cache_(shared == nullptr ? *own_ : *shared),
           scale_(scale),
           unit_(elementary(unit)),
-          turns_(cache_.serve(unit_, input_basis(signals))) {
-        const auto bound = input_.fourth_derivative_bound();
-        for (int i = 0; i < n_inputs; ++i) input_bound_[i] = bound[i];
-    }
+          turns_(cache_.serve(unit_, input_basis(signals))),
+          input_bound_(input_.fourth_derivative_bound()) {}
     ExactSolver(const ExactSolver&) = delete;
     ExactSolver& operator=(const ExactSolver&) = delete;
 
@@ -419,7 +417,6 @@ class ExactSolver {
     Cache& cache_;
     State scale_;
     double unit_;
-    std::array<double, n_inputs> input_bound_{};
 
     double time_ = 0.0;
     Instant now_;
@@ -428,6 +425,7 @@ class ExactSolver {
     long looks_ = 0;
     InputTurns& turns_;
     InputState input_{signals_, turns_.basis()};
+    std::array<double, n_inputs> input_bound_;  // on the fourth derivative of each, for all time
     Cursor cursor_{input_}, end_ = cursor_, trial_ = cursor_;
     const Cursor* reached_ = nullptr;  // where the last crossing was found
     int crossings_ = 0;

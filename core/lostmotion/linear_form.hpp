@@ -79,7 +79,7 @@ struct Lanes {
     friend Lanes operator+(const Lanes& a, const Lanes& b) { return {a.coupled + b.coupled, a.angle + b.angle}; }
     friend Lanes operator*(double a, const Lanes& b) { return {a * b.coupled, a * b.angle}; }
 };
-inline Lanes load(const State& x) { return Lanes::load(x.data()); }
+inline Lanes load(const std::array<double, n_states>& x) { return Lanes::load(x.data()); }
 inline Coupled coupled(const State& x) { return Coupled::load(x.data()); }
 inline void add_scaled(State& y, double a, const State& x) { (load(y) + a * load(x)).store(y.data()); }
 

@@ -65,9 +65,9 @@ class Polynomial {
     static constexpr int degree = 12, parts = degree / 4;
 
     explicit Polynomial(double constant) : constant_(constant) {}
-    Pack<4> part[parts];  // the coefficients from the first degree on
+    std::array<Pack<4>, parts> part;  // the coefficients from the first degree on
 
-    double value(double z) const { return constant_ + z * sum({part[0], part[1], part[2]}, z); }
+    double value(double z) const { return constant_ + z * sum(part, z); }
     double slope(double z) const {
         return sum(scaled({1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0}), z);
     }

@@ -54,8 +54,8 @@ class Stride {
         Lanes x = load(x_), forced = forced_;
         for (int k = 0;; ++k) {
             std::array<double, n_inputs> u = linear_;
-            for (std::size_t n = 0; n < sines_of_first_; ++n) u[0] += sines_[n].sine;
-            for (std::size_t n = sines_of_first_; n < sines_.size(); ++n) u[1] += sines_[n].sine;
+            for (std::size_t q = 0; q < sines_of_first_; ++q) u[0] += sines_[q].sine;
+            for (std::size_t q = sines_of_first_; q < sines_.size(); ++q) u[1] += sines_[q].sine;
             to.set(k, x, u);
             if (k + 1 == n) {
                 x.store(x_.data());

@@ -17,7 +17,6 @@ namespace lostmotion {
 
 // What a function of an input brings: as a state, in no more room than it needs.
 using Driven = std::array<double, n_states>;
-inline Lanes load(const Driven& x) { return Lanes::load(x.data()); }
 
 // The series of the state.
 class Taylor {

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 SLOPES = "gearbox.stiffness.slopes"
+DERIVED = frozenset(v.name for v in VARIABLES if v.derived)
 MOST_NUMBERS = 2**23  # of samples that are held at once: 64 megabytes
 
 
@@ -44,8 +45,7 @@ def pieces(study: Study, first: int, last: int) -> list[tuple[int, int]]:
     needed = _needed(study)
     if not needed or (_core_can(study) and _reductions(study)):
         return [(first, last)]
-    derived = any(v.derived and v.name in needed for v in VARIABLES)
-    arrays = len(CHANNEL_NAMES) if derived else len(needed)
+    arrays = len(CHANNEL_NAMES) if needed & DERIVED else len(needed)
     size = max(1, MOST_NUMBERS // (arrays * study.scenario.simulation.samples))
     return [(a, min(a + size, last)) for a in range(first, last, size)]
 
@@ -156,8 +156,7 @@ def _sources(needed: frozenset[str]) -> set[str]:
 
 
 def _derived(study: Study, runs: Runs, needed: frozenset[str]) -> dict[str, np.ndarray]:
-    names = {v.name for v in VARIABLES if v.derived}
-    if not needed & names:
+    if not needed & DERIVED:
         return runs.samples
     whole = {
         c: runs.samples.get(c, np.zeros((len(runs.errors), study.scenario.simulation.samples))) for c in CHANNEL_NAMES
@@ -175,7 +174,7 @@ def _instants(samples: int, interval: float) -> Any:
 
 
 def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) -> dict[str, Any]:
-    """All that the study's expressions may use, over all runs of a chunk."""
+    """All that the study's expressions may use, over all runs of a piece."""
     import xarray as xr
 
     def each_run(values: np.ndarray) -> xr.DataArray:
