@@ -21,16 +21,21 @@ inline constexpr double rounding = 0x1p14 * std::numeric_limits<double>::epsilon
 // Rounding of an instant, relative to the time since the start.
 inline constexpr double time_rounding = 4.0 * std::numeric_limits<double>::epsilon();
 
+// A form that is further from zero than this multiple needs no closer look: the rounding of the instant moves it by less.
+inline constexpr double clear_of_zero = 1e-3;
+
 // Time derivatives of the state along the flow of one regime, computed as far as they are asked for.
 class Flow {
  public:
-    // sizes: the rates with the magnitudes of their coefficients. coarseness: how many times `rounding` counts as zero.
-    Flow(const LinearRates& rates, const LinearRates& sizes, const Instant& now, double coarseness = 1.0)
-        : rates_(rates), sizes_(sizes), now_(now), rounding_(coarseness * rounding) {}
+    // coarseness: how many times `rounding` counts as zero.
+    Flow(const LinearRates& rates, const Instant& now, double coarseness = 1.0)
+        : rates_(rates), now_(now), rounding_(coarseness * rounding) {}
 
-    // Sign of a form just after now, from its value and the sum of the magnitudes of its terms; 0 if it stays at zero.
-    int sign(const LinearForm& form, double value, double size) {
-        for (int k = 1; k < n_derivatives; ++k) {
+    // Sign that the k-th derivative of a form has just after now, from its value and the sum of the magnitudes of its
+    // terms; 0 if it stays at zero.
+    int sign(const LinearForm& form, int k, double value, double size) {
+        while (++k < n_derivatives) {
+            if (std::fabs(value) > clear_of_zero * size) return value > 0.0 ? +1 : -1;
             // The instant itself is known to its rounding only, so a value may be off by that times its rate.
             const auto [rate, rate_size] = derivative(form, k);
             const double noise = rounding_ * size + time_rounding * std::fabs(now_.time * rate);
@@ -40,6 +45,13 @@ class Flow {
         }
         return 0;
     }
+
+    // First derivative of the state, and the sums of the magnitudes of its terms.
+    const State& rate() {
+        if (order_ < 1) extend();
+        return x_[1];
+    }
+    const State& rate_size() const { return size_[1]; }
 
     // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
     std::pair<double, double> derivative(const LinearForm& f, int k) {
@@ -56,15 +68,15 @@ class Flow {
         const int k = order_++;
         if (k == 0) {
             x_[1] = rates_(now_.x, rates_.constant(now_.memory), now_.input[0]);
-            size_[1] = sizes_(magnitudes(now_.x), sizes_.constant(magnitudes(now_.memory)), now_.input_size);
+            size_[1] = rates_.size(magnitudes(now_.x), magnitudes(now_.memory), now_.input_size);
         } else {
             const auto& u = now_.input[k];
             x_[k + 1] = rates_.higher(x_[k], u);
-            size_[k + 1] = sizes_.higher(size_[k], {std::fabs(u[0]), std::fabs(u[1])});
+            size_[k + 1] = rates_.higher_size(size_[k], {std::fabs(u[0]), std::fabs(u[1])});
         }
     }
 
-    const LinearRates &rates_, &sizes_;
+    const LinearRates& rates_;
     const Instant& now_;
     double rounding_;
     int order_ = 0;
@@ -226,7 +238,10 @@ class SwitchedDrive {
             const auto& entry = cache.entry(trial);
             if (!entry.regime.solvable) return Found::inconsistent;
             // The mode of a contact that moves was chosen by its speed.
-            const auto [left, overcome] = violated(entry, now, at_rest, coarseness);
+            unsigned ignored = 0;
+            for (int c = 0; c < n_contacts; ++c)
+                if (!at_rest[c]) ignored |= entry.speeds[c];
+            const auto [left, overcome] = violated(entry, now, ignored, coarseness);
             if (left != nullptr && left->kind == Guard::outside) return Found::outside;
             if (left == nullptr) {
                 if (overcome) return Found::inconsistent;
@@ -243,25 +258,32 @@ class SwitchedDrive {
     }
 
     // A guard of the curve, the map or the amplifier that does not hold just after now, and whether a contact's does
-    // not. Speeds are tested for the given contacts only.
+    // not. Guards that are set in `ignored` are not looked at.
     template <class Entry>
-    static std::pair<const Guard*, bool> violated(const Entry& entry, const Instant& now,
-                                                  const std::array<bool, n_contacts>& test_speed,
+    static std::pair<const Guard*, bool> violated(const Entry& entry, const Instant& now, unsigned ignored,
                                                   double coarseness = 1.0) {
-        Flow flow(entry.rates, entry.rate_sizes, now, coarseness);
-        GuardTable::Values value, size;
-        // Only what is near zero needs a closer look. (The rounding of the instant moves a guard by less than that.)
-        unsigned near = entry.near_zero(now, value, size);
-        unsigned contacts = entry.capacities;
-        for (int c = 0; c < n_contacts; ++c) {
-            contacts |= entry.speeds[c];
-            if (!test_speed[c]) near &= ~entry.speeds[c];
-        }
+        const GuardTable& guards = entry.guards;
+        GuardTable::Values constant, value, size, slope, slope_size;
+        guards.constants(now.memory, constant);
+        guards.evaluate(constant, now.x, now.input[0], value);
+        guards.sizes(magnitudes(now.memory), magnitudes(now.x), now.input_size, size);
+        unsigned near = 0;
+        for (int g = 0; g < guards.rows(); g += vec_width)
+            near |= bits(load(&value[g]) <= clear_of_zero * load(&size[g])) << g;
+        near &= ~ignored;
+        if (near == 0) return {nullptr, false};
+        Flow flow(entry.rates, now, coarseness);
+        guards.rates(flow.rate(), now.input[1], slope);
+        guards.rate_sizes(flow.rate_size(), magnitudes(now.input[1]), slope_size);
         bool overcome = false;
         for (; near != 0; near &= near - 1) {
             const int k = std::countr_zero(near);
-            if (flow.sign(entry.guards.form(k), value[k], size[k]) >= 0) continue;
-            if ((contacts >> k & 1) == 0) return {&entry.regime.guards[k], overcome};
+            const double noise = coarseness * rounding * size[k] + time_rounding * std::fabs(now.time * slope[k]);
+            const int sign = std::fabs(value[k]) > noise
+                                 ? (value[k] > 0.0 ? +1 : -1)
+                                 : flow.sign(guards.form(k), 1, slope[k], slope_size[k]);
+            if (sign >= 0) continue;
+            if ((entry.contacts >> k & 1) == 0) return {&entry.regime.guards[k], overcome};
             overcome = true;
         }
         return {nullptr, overcome};
@@ -272,14 +294,16 @@ class SwitchedDrive {
     template <class Cache>
     bool goes_on(Cache& cache, const Instant& now, const Guard& fired, RegimeKey& key) const {
         if (fired.kind == Guard::speed || fired.kind == Guard::capacity || fired.kind == Guard::outside) return false;
-        RegimeKey trial = key;
-        cross(fired, trial);
         auto& from = cache.entry(key);
-        const auto& entry = cache.beyond(from, static_cast<int>(&fired - from.regime.guards.data()), trial);
+        const auto& entry = cache.beyond(from, static_cast<int>(&fired - from.regime.guards.data()), [&] {
+            RegimeKey beyond = key;
+            cross(fired, beyond);
+            return beyond;
+        });
         if (!entry.regime.solvable) return false;
-        const auto [left, overcome] = violated(entry, now, {true, true, true});
+        const auto [left, overcome] = violated(entry, now, 0);
         if (left != nullptr || overcome) return false;
-        key = trial;
+        key = entry.regime.key;
         return true;
     }
 

@@ -28,7 +28,7 @@ class Cursor {
         rate_known_ = true;
         return rate_;
     }
-    State fourth_derivative() { return propagator_->fourth_derivative(rate(), input_.weights()); }
+    Coupled fourth_derivative() { return propagator_->taylor().fourth_derivative(coupled(rate()), input_); }
 
     void anchor(double time) {
         input_.follow(time);
@@ -44,9 +44,11 @@ class Cursor {
     void step_from(Cursor& from, int level) {
         propagator_ = from.propagator_;
         constant_ = from.constant_;
-        x_ = propagator_->step(level, from.x_, from.rate(), from.input_.weights());
-        input_.advance_from(from.input_, propagator_->length(level), propagator_->rotations(level));
-        rate_known_ = false;
+        const Lanes x = propagator_->step(level, load(from.x_), load(from.rate()), from.input_.weights());
+        input_.advance_from(from.input_, propagator_->length(level), propagator_->turns(level));
+        x.store(x_.data());
+        propagator_->rates()(x, load(*constant_), input_.values()).store(rate_.data());
+        rate_known_ = true;
     }
     // By whole levels, from the longest down, to the nearest of the instants that they lead to. Returns what is left of
     // h >= 0, half a base interval forward or backward at most.
@@ -58,7 +60,7 @@ class Cursor {
         Lanes x = load(x_), rate = load(this->rate());
         const auto step = [&](int k) __attribute__((always_inline)) {
             p.step(k, x, rate, input_.weights());
-            input_.advance(p.length(k), p.rotations(k));
+            input_.advance(p.length(k), p.turns(k));
         };
         const int top = p.longest_level();
         for (std::uint64_t m = n >> top; m > 0; --m) step(top);
@@ -74,16 +76,18 @@ class Cursor {
     // By any length: whole levels, then the Taylor series. Backward by one base interval at most.
     void advance(double h) {
         if (h > 0.0) h = advance_by_levels(h);
-        if (h != 0.0) nudge(h);
+        if (h == 0.0) return;
+        Expansion e;
+        expand(e);
+        nudge(e, h);
     }
+    void expand(Expansion& out) { propagator_->taylor().expand(load(rate()), input_, out); }
     // By one base interval at most, forward or backward; the inputs turn on from where they are.
-    void nudge(double s) {
-        x_ = propagator_->move(s, x_, rate(), input_.weights());
+    void nudge(const Expansion& here, double s) {
+        (load(x_) + here.change(s)).store(x_.data());
         input_.turn(s);
         rate_known_ = false;
     }
-    // A linear form of the motion from here on, as the polynomial that a series makes of it.
-    Polynomial expand(const FormSeries& series, double value) { return series.at(value, rate(), input_.weights()); }
 
  private:
     Propagator* propagator_ = nullptr;

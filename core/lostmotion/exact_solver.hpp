@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -31,7 +32,7 @@ struct Segment {
     State x;                  // at begin
     Memory memory;
     State constant;  // the part of dx/dt that depends on neither state nor inputs
-    State x_end{};   // at end, before any stop there
+    State x_end;     // at end, before any stop there
 };
 
 template <class System>
@@ -104,10 +105,11 @@ class ExactSolver {
         while (true) {
             typename Cache::Entry& entry = cache_.entry(key_);
             if (!entry.propagator.ready()) entry.prepare(turns_, scale_);
-            Segment<System> segment{entry, input_, time_,       t_end,
-                                    true,  now_.x, now_.memory, entry.rates.constant(now_.memory)};
-            const double knot = next_knot(signals_, time_);
-            const double limit = std::min(t_end, knot);
+            Segment<System> segment{entry,  input_,      time_,
+                                    t_end,  true,        now_.x,
+                                    now_.memory, entry.rates.constant(now_.memory), now_.x};
+            if (!(time_ < knot_)) knot_ = next_knot(signals_, time_);
+            const double limit = std::min(t_end, knot_);
             const Guard* fired = nullptr;
             const Status status = run_regime(segment, limit, fired);
             if (status != Status::done) return status;
@@ -116,7 +118,7 @@ class ExactSolver {
             segment.last = fired == nullptr && time_ >= t_end;
             if (!observer.segment(segment)) return Status::interrupted;
             if (segment.last) {
-                jump_pending_ = knot == t_end;  // it belongs to what comes after
+                jump_pending_ = knot_ == t_end;  // it belongs to what comes after
                 return Status::done;
             }
             const Status switched = change_regime(fired, observer);
@@ -127,6 +129,8 @@ class ExactSolver {
  private:
     static constexpr double converging = 1e-7;  // the next correction is less than the square of the last
     static constexpr int first_level = 6;       // of the first look
+    // A third of the length times the error of the slope of a cubic, over the error of its value.
+    static constexpr double slope_share = 0.00802 / 3.0 * 384.0;
 
     static double elementary(double unit) {
         while (unit > 1e-2) unit *= 0.5;
@@ -136,6 +140,7 @@ class ExactSolver {
         time_ = time;
         accumulation_ = {};
         jump_pending_ = false;
+        knot_ = time;
         last_level_ = first_level;  // so that what follows depends on the state alone
     }
     void anchor_inputs() {
@@ -182,8 +187,9 @@ class ExactSolver {
         off_zero_ = false;
         touch_size_ = 0.0;
         evaluate(e.guards, constant, *cursor, *here);
-        State forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
-        for (int i = 0; i < n_inputs; ++i) add_scaled(forced, input_bound_[i], e.rate_sizes.input_column[i]);
+        Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
+        for (int i = 0; i < n_inputs; ++i)
+            forced = forced + input_bound_[i] * absolute(coupled(e.rates.input_column[i]));
         int level = std::min(last_level_, p.level_below(limit - time_));
         const double shortest = 1e-7 * p.length(0);
         for (long count = 1; time_ < limit; ++count) {
@@ -193,7 +199,7 @@ class ExactSolver {
             if (count % 64 == 0) cursor->anchor(time_);
             const State& rate = cursor->rate();
             if (!(std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100)) return Status::outside;
-            const State fourth = magnitudes(cursor->fourth_derivative());
+            const Coupled fourth = absolute(cursor->fourth_derivative());
             const double left = limit - time_;
             double h = std::min(p.length(level), left);
             while (true) {
@@ -204,9 +210,7 @@ class ExactSolver {
                     end->advance(h);
                 }
                 evaluate(e.guards, constant, *end, *there);
-                State size = fourth;
-                add_scaled(size, h, forced);
-                bound_fourth(e.guard_sizes, p.level(level).growth, size);
+                bound_fourth(e.guards, p.level(level).growth, fourth + h * forced);
                 const Verdict verdict = judge(e, segment.memory, *cursor, *here, *there, h, h < shortest);
                 if (verdict == Verdict::uncertain) {  // below the shortest level, by plain halves
                     h = level > 0 ? std::min(p.length(level = std::max(0, level - halvings_)), left) : 0.5 * h;
@@ -240,57 +244,62 @@ class ExactSolver {
     }
 
     // |g''''| over the look, from a bound on the fourth derivative of the state that the flow carries on.
-    [[gnu::always_inline]] void bound_fourth(const GuardTable& guard_sizes, const Matrix& growth, State& size) {
-        if (size[0] + size[1] + size[2] + size[3] != 0.0)  // not at rest, where growth may have overflowed
-            (growth * coupled(size)).store(size.data());
-        guard_sizes.rates(size, input_bound_, bounds_.fourth);
+    [[gnu::always_inline]] void bound_fourth(const GuardTable& guards, const Matrix& growth, const Coupled& size) {
+        State most{};
+        if (size.sum() != 0.0)  // not at rest, where growth may have overflowed
+            (growth * size).store(most.data());
+        guards.rate_sizes(most, input_bound_, bounds_.fourth);
     }
 
-    // Encloses all guards over a look of length h. Whether they are positive all through it.
-    bool enclose(int rows, const Ends& here, const Ends& there, double h) {
+    // Encloses all guards over a look of length h. Returns, as bits, those that are not certain to be positive all
+    // through it.
+    unsigned enclose(int rows, const Ends& here, const Ends& there, double h) {
         const double third = h / 3.0, share = h * h * h * h / 384.0;
-        Mask clear = Vec{} == Vec{}, roomy = clear;
+        unsigned doubtful = 0;
+        Mask roomy = Vec{} == Vec{};
         for (int g = 0; g < rows; g += vec_width) {
             const Vec begin = load(&here.value[g]), end = load(&there.value[g]);
             const Vec c1 = begin + third * load(&here.slope[g]), c2 = end - third * load(&there.slope[g]);
             const Vec low = least(least(begin, end), least(c1, c2)), error = share * load(&bounds_.fourth[g]);
             store(low, &bounds_.least[g]);
             store(error, &bounds_.error[g]);
-            const Mask above = low > error;
-            clear &= above;
-            roomy &= (low > 64.0 * error) | ~above;
+            const Mask below = low <= error;
+            // One that starts on zero or above and rises all through is certain, too.
+            const Vec rise = least(c1 - begin, least(c2 - c1, end - c2));
+            const Mask rises = (rise > slope_share * error) & (begin >= 0.0);
+            doubtful |= bits(below & ~rises) << g;
+            roomy &= (low > 64.0 * error) | below;
         }
         roomy_ = all(roomy);
-        return all(clear);
+        return doubtful;
     }
 
     Verdict judge(const typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here,
                   const Ends& there, double h, bool shortest) {
-        bool clear = enclose(e.guards.rows(), here, there, h);
+        unsigned doubtful = enclose(e.guards.rows(), here, there, h);
         n_crossing_ = 0;
         if (e.touch_guard >= 0) {
             touch_size_ = std::max(touch_size_, e.touch_size(cursor.x()));
             off_zero_ |= here.value[e.touch_guard] > rounding * touch_size_;
-            clear &= bounds_.least[e.touch_guard] > rounding * touch_size_;
+            if (bounds_.least[e.touch_guard] <= rounding * touch_size_) doubtful |= 1u << e.touch_guard;
         }
-        if (clear) return Verdict::clear;
-        const std::array<double, n_inputs> input_size = cursor.input().sizes();
-        for (int g = 0; g < e.regime.n_guards; ++g) {
+        if (doubtful == 0) return Verdict::clear;
+        GuardTable::Values size;
+        e.guards.sizes(magnitudes(memory), magnitudes(cursor.x()), cursor.input(), size);
+        for (; doubtful != 0; doubtful &= doubtful - 1) {
+            const int g = std::countr_zero(doubtful);
             const double low = bounds_.least[g], error = bounds_.error[g];
-            if (low > error && g != e.touch_guard) continue;
             const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
             const bool touches = g == e.touch_guard && off_zero_ && low - error <= rounding * touch_size_ &&
                                  c.c3 > rounding * touch_size_;
             if (low > error && !touches) continue;
-            const double size = magnitude(e.guards.form(g), cursor.x(), memory, input_size);
             const double tolerance =
-                rounding * size +
+                rounding * size[g] +
                 time_rounding * std::fabs(time_) * std::max(std::fabs(here.slope[g]), std::fabs(there.slope[g]));
             if (low - error >= -tolerance && !touches) continue;
-            const double slope_error = 0.00802 * h * h * h * bounds_.fourth[g];
-            const double d0 = 3.0 / h * (c.c1 - c.c0), d1 = 3.0 / h * (c.c2 - c.c1), d2 = 3.0 / h * (c.c3 - c.c2);
-            const bool rises = std::min(d0, std::min(d1, d2)) > slope_error;
-            const bool falls = std::max(d0, std::max(d1, d2)) < -slope_error;
+            const double d0 = c.c1 - c.c0, d1 = c.c2 - c.c1, d2 = c.c3 - c.c2;
+            const bool rises = std::min(d0, std::min(d1, d2)) > slope_share * error;
+            const bool falls = std::max(d0, std::max(d1, d2)) < -slope_share * error;
             if (rises && c.c0 >= -tolerance && !(touches && c.c0 <= rounding * touch_size_)) continue;
             if (falls && c.c3 >= -tolerance) continue;
             if (falls) {
@@ -320,7 +329,7 @@ class ExactSolver {
     // A guard that starts on zero: does its first derivative that is not zero carry it away, all through the look?
     bool departs(const typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, int g, double h) const {
         const Instant now{time_, cursor.x(), memory, cursor.input().jet(), cursor.input().sizes()};
-        Flow flow(e.rates, e.rate_sizes, now);
+        Flow flow(e.rates, now);
         const LinearForm form = e.guards.form(g);
         std::array<double, 4> derivative{};
         int first = 0;
@@ -345,7 +354,7 @@ class ExactSolver {
         const auto cubic = [&](int g) {
             return Cubic(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
         };
-        std::array<double, max_guards> estimate{};
+        std::array<double, max_guards> estimate;
         for (int k = 0; k < n_crossing_; ++k) {
             const auto [g, touch] = crossing_[k];
             const Cubic c = cubic(g);
@@ -378,32 +387,32 @@ class ExactSolver {
     double find_zero(typename Cache::Entry& e, int g, const Memory& memory, const Cursor& cursor, double estimate,
                      double h) {
         const LinearForm form = e.guards.form(g);
-        const FormSeries& series = e.guard_series(g);
-        const double base = series.unit();
+        const double base = e.propagator.length(0);
         double low = 0.0, high = h, s = estimate;
         for (int m = 0; m < 100; ++m) {
             trial_ = cursor;
             const double rest = trial_.advance_by_levels(s), from = s - rest;
             const double value = lostmotion::evaluate(form, trial_.x(), memory, trial_.input().values());
-            const Polynomial guard = trial_.expand(series, value);
-            const double reach = std::fabs(rest) / base + 0.25, at = trial_.time();
-            double z = rest / base;
+            trial_.expand(expansion_);
+            const Polynomial guard = expansion_.polynomial(form, value);
+            const double reach = std::fabs(rest) + 0.25 * base, at = trial_.time();
+            double z = rest;
             bool found = false;
             for (int n = 0; n < 60 && !found && std::fabs(z) <= reach; ++n) {
                 // Halley's method
                 const double f = guard.value(z), slope = guard.slope(z);
                 const double moved = -f * slope / (slope * slope - f * guard.half_curvature(z));
                 z += moved;
-                found = std::fabs(moved) <= converging * std::fabs(z) || at + base * moved == at;
+                found = std::fabs(moved) <= converging * std::fabs(z) || at + moved == at;
             }
             if (found && std::fabs(z) <= reach) {
-                s = std::clamp(from + z * base, 0.0, h);
-                trial_.nudge(s - from);
+                s = std::clamp(from + z, 0.0, h);
+                trial_.nudge(expansion_, s - from);
                 return s;
             }
             // The zero lies elsewhere: where the last step led, or in half of what is left.
             (value > 0.0 ? low : high) = from;
-            s = from + z * base;
+            s = from + z;
             if (!(s > low && s < high)) s = 0.5 * (low + high);
         }
         trial_ = cursor;
@@ -419,6 +428,7 @@ class ExactSolver {
     double unit_;
 
     double time_ = 0.0;
+    double knot_ = 0.0;  // [s], the next of the inputs; it has been found if it lies ahead
     Instant now_;
     RegimeKey key_;
     int last_level_ = first_level;
@@ -427,6 +437,7 @@ class ExactSolver {
     InputState input_{signals_, turns_.basis()};
     std::array<double, n_inputs> input_bound_;  // on the fourth derivative of each, for all time
     Cursor cursor_{input_}, end_ = cursor_, trial_ = cursor_;
+    Expansion expansion_;
     const Cursor* reached_ = nullptr;  // where the last crossing was found
     int crossings_ = 0;
     Ends ends_[2];

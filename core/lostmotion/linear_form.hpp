@@ -79,6 +79,7 @@ struct Lanes {
     friend Lanes operator+(const Lanes& a, const Lanes& b) { return {a.coupled + b.coupled, a.angle + b.angle}; }
     friend Lanes operator*(double a, const Lanes& b) { return {a * b.coupled, a * b.angle}; }
 };
+inline Lanes absolute(const Lanes& x) { return {absolute(x.coupled), std::fabs(x.angle)}; }
 inline Lanes load(const std::array<double, n_states>& x) { return Lanes::load(x.data()); }
 inline Coupled coupled(const State& x) { return Coupled::load(x.data()); }
 inline void add_scaled(State& y, double a, const State& x) { (load(y) + a * load(x)).store(y.data()); }
@@ -91,9 +92,11 @@ struct Memory {
 
 inline State magnitudes(const State& x) {
     State size;
-    absolute(coupled(x)).store(size.data());
-    size[load_angle] = std::fabs(x[load_angle]);
+    absolute(load(x)).store(size.data());
     return size;
+}
+inline std::array<double, n_inputs> magnitudes(const std::array<double, n_inputs>& u) {
+    return {std::fabs(u[0]), std::fabs(u[1])};
 }
 inline Memory magnitudes(const Memory& m) { return {std::fabs(m.hysteresis_capacity), std::fabs(m.held_torque)}; }
 
@@ -116,10 +119,8 @@ inline double constant_part(const LinearForm& f, const Memory& m) {
 }
 
 inline double evaluate(const LinearForm& f, const State& x, const Memory& m, const std::array<double, n_inputs>& u) {
-    double sum = f.c[one] + f.c[hysteresis_capacity] * m.hysteresis_capacity + f.c[held_torque] * m.held_torque +
-                 f.c[command] * u[0] + f.c[load_torque] * u[1];
-    for (int k = 0; k < n_states; ++k) sum += f.c[k] * x[k];
-    return sum;
+    return (constant_part(f, m) + (f.c[command] * u[0] + f.c[load_torque] * u[1])) +
+           ((Coupled::load(f.c.data()) * coupled(x)).sum() + f.c[load_angle] * x[load_angle]);
 }
 
 // Sum of the magnitudes of the terms: rounding in evaluate() is a small multiple of epsilon times this.
@@ -153,14 +154,6 @@ class FormTable {
         rows_ = std::max(rows_, (row + vec_width) / vec_width * vec_width);
         driven_ = driven_ || f.c[command] != 0.0 || f.c[load_torque] != 0.0;
     }
-    // The forms with the magnitudes of their coefficients.
-    FormTable magnitudes() const {
-        FormTable out = *this;
-        for (auto& column : out.column_)
-            for (double& c : column) c = std::fabs(c);
-        return out;
-    }
-
     int rows() const { return rows_; }  // rounded up to whole vectors
     double coefficient(int row, int term) const { return column_[term][row]; }
     LinearForm form(int row) const {
@@ -188,6 +181,22 @@ class FormTable {
     void rates(const State& rate, const Input& input, Values& out) const {
         rates(rate, driven_ ? input.rates() : std::array<double, n_inputs>{}, out);
     }
+    // Sums of the magnitudes of the terms, from magnitudes of what the forms depend on.
+    void sizes(const Memory& m, const State& x, const std::array<double, n_inputs>& u, Values& out) const {
+        for (int g = 0; g < rows_; g += vec_width)
+            store(absolute(at(one, g)) +
+                      (m.hysteresis_capacity * absolute(at(hysteresis_capacity, g)) +
+                       m.held_torque * absolute(at(held_torque, g))) +
+                      terms<true>(g, x, u),
+                  &out[g]);
+    }
+    template <class Input>
+    void sizes(const Memory& m, const State& x, const Input& input, Values& out) const {
+        sizes(m, x, driven_ ? input.sizes() : std::array<double, n_inputs>{}, out);
+    }
+    void rate_sizes(const State& rate, const std::array<double, n_inputs>& input_rate, Values& out) const {
+        for (int g = 0; g < rows_; g += vec_width) store(terms<true>(g, rate, input_rate), &out[g]);
+    }
     // Time derivatives, from those of state and inputs.
     [[gnu::always_inline]] void rates(const State& rate, const std::array<double, n_inputs>& input_rate,
                                       Values& out) const {
@@ -196,9 +205,11 @@ class FormTable {
 
  private:
     Vec at(int term, int g) const { return load(&column_[term][g]); }
+    template <bool magnitudes = false>
     [[gnu::always_inline]] Vec terms(int g, const State& x, const std::array<double, n_inputs>& u) const {
-        const Vec sum = (at(0, g) * x[0] + at(1, g) * x[1]) + (at(2, g) * x[2] + at(3, g) * x[3]);
-        return driven_ ? sum + (at(command, g) * u[0] + at(load_torque, g) * u[1]) : sum;
+        const auto c = [&](int term) { return magnitudes ? absolute(at(term, g)) : at(term, g); };
+        const Vec sum = (c(0) * x[0] + c(1) * x[1]) + (c(2) * x[2] + c(3) * x[3]);
+        return driven_ ? sum + (c(command) * u[0] + c(load_torque) * u[1]) : sum;
     }
 
     alignas(64) std::array<std::array<double, N>, n_terms> column_{};

@@ -60,8 +60,7 @@ struct Matrix {
     // A row, on the coupled states, times this.
     Coupled times_row(const Column& row) const {
         const Coupled v = Coupled::load(row.data());
-        return Coupled::of(
-            {(v * coupled(0)).sum(), (v * coupled(1)).sum(), (v * coupled(2)).sum(), (v * coupled(3)).sum()});
+        return sums(v * coupled(0), v * coupled(1), v * coupled(2), v * coupled(3));
     }
 
  private:
@@ -91,14 +90,6 @@ struct LinearRates {
             per_held[r] = f.c[held_torque];
         }
     }
-    // The same with the magnitudes of all coefficients.
-    LinearRates magnitudes() const {
-        LinearRates out = *this;
-        out.rate = rate.magnitudes();
-        for (State* s : {&out.input_column[0], &out.input_column[1], &out.fixed, &out.per_capacity, &out.per_held})
-            *s = lostmotion::magnitudes(*s);
-        return out;
-    }
 
     // The part of dx/dt that depends on neither state nor inputs.
     State constant(const Memory& m) const {
@@ -107,20 +98,47 @@ struct LinearRates {
         add_scaled(c, m.held_torque, per_held);
         return c;
     }
+    [[gnu::always_inline]] Lanes operator()(const Lanes& x, const Lanes& constant,
+                                            const std::array<double, n_inputs>& u) const {
+        return higher(x, u) + constant;
+    }
     [[gnu::always_inline]] State operator()(const State& x, const State& constant,
                                             const std::array<double, n_inputs>& u) const {
         State out;
-        (higher(load(x), u) + load(constant)).store(out.data());
+        (*this)(load(x), load(constant), u).store(out.data());
         return out;
     }
+    // 1 or, if the load stands, 0: the rate of the load angle over the load speed.
+    double turning() const { return rate.angle[load_speed]; }
     // The next time derivative of the state from one that is at least the first.
     [[gnu::always_inline]] Lanes higher(const Lanes& derivative, const std::array<double, n_inputs>& u) const {
-        return rate * derivative + (u[0] * load(input_column[0]) + u[1] * load(input_column[1]));
+        return {rate * derivative.coupled + (u[0] * coupled(input_column[0]) + u[1] * coupled(input_column[1])),
+                turning() * derivative.coupled[load_speed]};
     }
     [[gnu::always_inline]] State higher(const State& derivative, const std::array<double, n_inputs>& u) const {
         State out;
         higher(load(derivative), u).store(out.data());
         return out;
+    }
+
+    // Sums of the magnitudes of the terms of both, from magnitudes of what they depend on.
+    State size(const State& x, const Memory& m, const std::array<double, n_inputs>& u) const {
+        const Lanes constant = absolute(load(fixed)) + (m.hysteresis_capacity * absolute(load(per_capacity)) +
+                                                        m.held_torque * absolute(load(per_held)));
+        State out;
+        (higher_size(load(x), u) + constant).store(out.data());
+        return out;
+    }
+    State higher_size(const State& derivative, const std::array<double, n_inputs>& u) const {
+        State out;
+        higher_size(load(derivative), u).store(out.data());
+        return out;
+    }
+
+ private:
+    Lanes higher_size(const Lanes& derivative, const std::array<double, n_inputs>& u) const {
+        return rate.magnitudes() * derivative +
+               (u[0] * absolute(load(input_column[0])) + u[1] * absolute(load(input_column[1])));
     }
 };
 

@@ -20,6 +20,22 @@
 
 namespace lostmotion {
 
+// What a pair of functions of the inputs brings: two states as columns, in no more room than they need.
+struct Driven {
+    alignas(sizeof(Pack<2>)) std::array<Matrix::Column, 2> column{};
+    std::array<double, 2> angle{};
+
+    [[gnu::always_inline]] Lanes state(int c) const { return {Coupled::load(column[c].data()), angle[c]}; }
+    void set(int c, const Lanes& x) {
+        x.coupled.store(column[c].data());
+        angle[c] = x.angle;
+    }
+    // From the weights of the pair.
+    [[gnu::always_inline]] Lanes operator*(const double* weights) const {
+        return weights[0] * state(0) + weights[1] * state(1);
+    }
+};
+
 // Everything needed to step by one length in one regime.
 struct Step {
     Matrix change;    // E(h) = exp(A h) - 1
@@ -46,8 +62,7 @@ class Propagator {
     // rates and turns must outlive this.
     void prepare(const LinearRates& rates, InputTurns& turns, const State& scale) {
         turns_ = &turns;
-        basis_ = turns.basis().data();
-        n_basis_ = static_cast<int>(turns.basis().size());
+        n_pairs_ = static_cast<int>(turns.basis().size() / 2);
         const double fastest = turns.fastest();
         double norm = fastest;  // of A in scaled units, or the highest input frequency [1/s]
         for (int r = 0; r < n_states; ++r) {
@@ -64,8 +79,8 @@ class Propagator {
         steps_.clear();
         responses_.clear();
         steps_.reserve(usual_levels);
-        responses_.reserve(static_cast<std::size_t>(usual_levels * n_basis_));
-        taylor_.prepare(rates, basis_, n_basis_);
+        responses_.reserve(static_cast<std::size_t>(usual_levels * n_pairs_));
+        taylor_.prepare(rates);
         add_base();
     }
 
@@ -73,18 +88,18 @@ class Propagator {
     void reset() { levels_ = 0; }
 
     const LinearRates& rates() const { return taylor_.rates(); }
-    // The fourth time derivative of the state, from the first and the input state.
-    State fourth_derivative(const State& rate, const double* weights) const {
-        return taylor_.fourth_derivative(rate, weights);
-    }
+    const Taylor& taylor() const { return taylor_; }
 
     const Step& level(int k) {
         while (levels_ <= k) add_doubled();
         return steps_[k];
     }
-    const Driven* responses(int k) const { return responses_.data() + 2 * k * n_basis_; }
-    const Driven* response_rates(int k) const { return responses(k) + n_basis_; }
-    const double* rotations(int k) const { return rotations_[k]; }
+    // What the pairs of functions of the inputs bring over a step of level k.
+    struct Response {
+        Driven change, rate;  // of x and of x'
+    };
+    const Response* responses(int k) const { return responses_.data() + k * n_pairs_; }
+    const Turn* turns(int k) const { return turns_of_level_[k]; }
 
     double length(int k) const { return base_ * power_of_two[k]; }
     // How many base intervals fit into s.
@@ -104,27 +119,27 @@ class Propagator {
     bool can_double(int k, double s) const { return k < longest_ && length(k + 1) <= s; }
 
     // x after the step of level k; `rate` is x' at the anchor, `weights` the input state there.
-    [[gnu::always_inline]] State step(int k, const State& x, const State& rate, const double* weights) {
-        const Lanes free = level(k).integrate(load(rate));
-        const Driven* response = responses(k);
-        Lanes forced{};
-        for (int q = 0; q < n_basis_; ++q) forced = forced + weights[q] * load(response[q]);
-        State y;
-        (load(x) + (free + forced)).store(y.data());
-        return y;
+    [[gnu::always_inline]] Lanes step(int k, const Lanes& x, const Lanes& rate, const double* weights) {
+        const Lanes free = level(k).integrate(rate);
+        const Response* response = responses(k);
+        Lanes forced = response->change * weights;
+        for (int p = 1; p < n_pairs_; ++p) forced = forced + response[p].change * (weights + 2 * p);
+        return x + (free + forced);
     }
     // The same for x and x' at once, without a look at the rates of the regime in between.
     [[gnu::always_inline]] void step(int k, Lanes& x, Lanes& rate, const double* weights) {
         const Step& s = level(k);
-        const Driven *response = responses(k), *response_rate = response_rates(k);
+        const Response* response = responses(k);
         // What the inputs bring does not wait for the step before, so it is summed up by itself.
-        Lanes forced{}, forced_rate{};
-        for (int q = 0; q < n_basis_; ++q) {
-            forced = forced + weights[q] * load(response[q]);
-            forced_rate = forced_rate + weights[q] * load(response_rate[q]);
+        Lanes forced = response->change * weights;
+        Coupled forced_rate = (response->rate * weights).coupled;
+        for (int p = 1; p < n_pairs_; ++p) {
+            forced = forced + response[p].change * (weights + 2 * p);
+            forced_rate = forced_rate + (response[p].rate * (weights + 2 * p)).coupled;
         }
         x = x + (s.integrate(rate) + forced);
-        rate = rate + (s.change * rate + forced_rate);
+        rate.coupled = rate.coupled + (s.change * rate.coupled + forced_rate);
+        rate.angle = rates().turning() * x.coupled[load_speed];
     }
 
     // G(h) for any length: whole levels from the longest down, then the Taylor series.
@@ -142,15 +157,6 @@ class Propagator {
         }
         return sum;
     }
-
-    // x after s, one base interval forward or backward at most.
-    [[gnu::always_inline]] State move(double s, const State& x, const State& rate, const double* weights) const {
-        State y;
-        (load(x) + taylor_.change(s, rate, weights)).store(y.data());
-        return y;
-    }
-    // The Taylor series of a form of the motion, in parts of the base interval.
-    void prepare(FormSeries& series, const LinearForm& form) const { series.prepare(taylor_, basis_, form, base_); }
 
  private:
     static constexpr std::array<double, max_levels> power_of_two = [] {
@@ -170,14 +176,19 @@ class Propagator {
         positive.scale(h);
         const Matrix twice = positive * positive;
         s.growth = Taylor::power_series<0>(positive, twice, positive * twice);
-        responses_.resize(static_cast<std::size_t>(2 * n_basis_));
-        for (int q = 0; q < n_basis_; ++q) responses_[static_cast<std::size_t>(q)] = taylor_.response(q, h);
+        for (int p = 0; p < n_pairs_; ++p) {
+            Driven& change = responses_.emplace_back().change;
+            for (int c = 0; c < 2; ++c) {
+                const InputBasis& function = turns_->basis()[static_cast<std::size_t>(2 * p + c)];
+                if (function.kind != InputBasis::nothing) change.set(c, taylor_.response(function, h));
+            }
+        }
         finish_level();
     }
 
-    // cos(omega length) - 1 of the function q, without cancellation.
-    double cosine_change(int k, int q) {
-        const double half = turns_->over(exponent_ + k - 1)[q + 1];
+    // cos(omega length) - 1 of a pair, without cancellation.
+    double cosine_change(int k, int pair) {
+        const double half = turns_->over(exponent_ + k - 1)[pair].sin;
         return -2.0 * half * half;
     }
 
@@ -194,41 +205,39 @@ class Propagator {
             const Coupled size = absolute(Matrix::identity().coupled(c) + a.change.coupled(c));
             most(a.growth.coupled(c), a.growth * size).store(b.growth.column[c].data());
         }
-        responses_.resize(responses_.size() + static_cast<std::size_t>(2 * n_basis_));
-        const Driven* from = responses(k);
         std::array<Lanes, n_inputs> held;  // what a constant input of 1 brings
         for (int i = 0; i < n_inputs; ++i) held[i] = a.integrate(load(rates().input_column[i]));
-        for (int q = 0; q < n_basis_; ++q) {
-            const InputBasis& basis = basis_[q];
-            const Lanes own = load(from[q]), kept = own + a.change * own, &constant = held[basis.input];
-            Lanes y;
-            if (basis.kind == InputBasis::ramp) {
-                y = kept + (own + a.length * constant);
+        for (int p = 0; p < n_pairs_; ++p) {
+            const InputBasis* basis = &turns_->basis()[static_cast<std::size_t>(2 * p)];
+            const Driven from = responses(k)[p].change;
+            Driven& to = responses_.emplace_back().change;
+            const auto kept = [&](int c) { return from.state(c) + a.change * from.state(c); };
+            if (basis->kind == InputBasis::cosine) {
+                const Turn turn = turns(k)[p];
+                const Lanes &cosine = from.state(0), &sine = from.state(1), &constant = held[basis->input];
+                to.set(0, kept(0) + (turn.cos * cosine + (-turn.sin * sine + cosine_change(k, p) * constant)));
+                to.set(1, kept(1) + (turn.cos * sine + (turn.sin * cosine + turn.sin * constant)));
             } else {
-                const int cosine = basis.kind == InputBasis::cosine ? q : q - 1, sine = cosine + 1;
-                const double c = rotations(k)[cosine], s = rotations(k)[sine];
-                if (basis.kind == InputBasis::cosine)
-                    y = kept + (c * own + (-s * load(from[sine]) + cosine_change(k, q) * constant));
-                else
-                    y = kept + (c * own + (s * load(from[cosine]) + s * constant));
+                for (int c = 0; c < 2 && basis[c].kind == InputBasis::ramp; ++c)
+                    to.set(c, kept(c) + (from.state(c) + a.length * held[basis[c].input]));
             }
-            y.store(responses_[static_cast<std::size_t>(2 * (k + 1) * n_basis_ + q)].data());
         }
         finish_level();
     }
 
-    // What follows from length and responses: the rotations of the inputs, and the rates.
+    // What follows from length and responses: the turns of the inputs, and the rates.
     void finish_level() {
         const int k = levels_++;
-        const double* turn = turns_->over(exponent_ + k);
-        rotations_[k] = turn;
-        for (int q = 0; q < n_basis_; ++q) {
-            const InputBasis& b = basis_[q];
-            const double input = b.kind == InputBasis::ramp     ? length(k)
-                                 : b.kind == InputBasis::cosine ? cosine_change(k, q)
-                                                                : turn[q];
-            Driven* r = &responses_[static_cast<std::size_t>(2 * k * n_basis_ + q)];
-            (rates().rate * load(*r) + input * load(rates().input_column[b.input])).store(r[n_basis_].data());
+        const Turn* turn = turns_of_level_[k] = turns_->over(exponent_ + k);
+        for (int p = 0; p < n_pairs_; ++p) {
+            const InputBasis* basis = &turns_->basis()[static_cast<std::size_t>(2 * p)];
+            Response& r = responses_[static_cast<std::size_t>(k * n_pairs_ + p)];
+            for (int c = 0; c < 2 && basis[c].kind != InputBasis::nothing; ++c) {
+                const double input = basis[c].kind == InputBasis::ramp     ? length(k)
+                                     : basis[c].kind == InputBasis::cosine ? cosine_change(k, p)
+                                                                           : turn[p].sin;
+                r.rate.set(c, rates().rate * r.change.state(c) + input * load(rates().input_column[basis[c].input]));
+            }
         }
     }
 
@@ -242,13 +251,12 @@ class Propagator {
     double base_ = 0.0;  // length of level 0 [s]
     int exponent_ = 0;   // of two: base / unit
     int longest_ = 0;    // level
-    int n_basis_ = 0;
+    int n_pairs_ = 0;    // of functions of the inputs
     InputTurns* turns_ = nullptr;
-    const InputBasis* basis_ = nullptr;
     int levels_ = 0;
-    std::vector<Step> steps_;                            // one a level
-    std::vector<Driven> responses_;                      // levels x (x, rate) x n_basis
-    std::array<const double*, max_levels> rotations_{};  // of each level: cos and sin of omega * length
+    std::vector<Step> steps_;          // one a level
+    std::vector<Response> responses_;  // levels x n_pairs
+    std::array<const Turn*, max_levels> turns_of_level_{};
 };
 
 }  // namespace lostmotion

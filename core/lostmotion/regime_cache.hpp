@@ -19,60 +19,36 @@ class RegimeCache {
         Entry& operator=(const Entry&) = delete;
 
         Regime regime;
-        LinearRates rates, rate_sizes;  // and with the magnitudes of all coefficients
-        GuardTable guards, guard_sizes;
+        LinearRates rates;
+        GuardTable guards;
         int touch_guard = -1;                       // the one that also ends the regime by touching zero
         std::array<unsigned, n_contacts> speeds{};  // the guards of each contact's speed, as bits
-        unsigned capacities = 0;                    // and those of capacities
+        unsigned contacts = 0;                      // and those of all speeds and capacities
         Propagator propagator;
-        std::array<FormSeries, max_guards> series;   // of the guards that have been crossed
         std::array<Entry*, max_guards> neighbour{};  // what lies beyond each guard, as far as it is known
 
         void set(const Regime& r) {
             regime = r;
             rates = LinearRates(r);
-            rate_sizes = rates.magnitudes();
             guards = {};
             neighbour = {};
             touch_guard = -1;
             speeds = {};
-            capacities = 0;
+            contacts = 0;
             for (int g = 0; g < r.n_guards; ++g) {
                 guards.set(g, r.guards[g].form);
                 if (r.guards[g].by_touch) touch_guard = g;
                 if (r.guards[g].kind == Guard::speed) speeds[r.guards[g].contact] |= 1u << g;
-                if (r.guards[g].kind == Guard::capacity) capacities |= 1u << g;
+                if (r.guards[g].kind == Guard::speed || r.guards[g].kind == Guard::capacity) contacts |= 1u << g;
             }
-            guard_sizes = guards.magnitudes();
             propagator.reset();
         }
-        void prepare(InputTurns& turns, const State& scale) {
-            propagator.prepare(rates, turns, scale);
-            for (FormSeries& s : series) s.reset();
-        }
-        const FormSeries& guard_series(int g) {
-            FormSeries& s = series[g];
-            if (!s.ready()) propagator.prepare(s, regime.guards[g].form);
-            return s;
-        }
+        void prepare(InputTurns& turns, const State& scale) { propagator.prepare(rates, turns, scale); }
 
-        // Guards and the sums of the magnitudes of their terms. Returns, as bits, those that do not lie above a
-        // thousandth of the latter.
-        unsigned near_zero(const Instant& now, GuardTable::Values& value, GuardTable::Values& size) const {
-            GuardTable::Values constant;
-            guards.constants(now.memory, constant);
-            guards.evaluate(constant, now.x, now.input[0], value);
-            guard_sizes.constants(magnitudes(now.memory), constant);
-            guard_sizes.evaluate(constant, magnitudes(now.x), now.input_size, size);
-            unsigned near = 0;
-            for (int g = 0; g < guards.rows(); g += vec_width)
-                near |= bits(load(&value[g]) <= 1e-3 * load(&size[g])) << g;
-            return near;
-        }
         // Sum of the magnitudes of the terms of the guard that ends by touching, a speed.
         double touch_size(const State& x) const {
-            return guard_sizes.coefficient(touch_guard, motor_speed) * std::fabs(x[motor_speed]) +
-                   guard_sizes.coefficient(touch_guard, load_speed) * std::fabs(x[load_speed]);
+            return std::fabs(guards.coefficient(touch_guard, motor_speed) * x[motor_speed]) +
+                   std::fabs(guards.coefficient(touch_guard, load_speed) * x[load_speed]);
         }
     };
 
@@ -95,10 +71,11 @@ class RegimeCache {
         last_ = found.get();
         return *last_;
     }
-    // The same, where a guard of another regime leads to this one.
-    Entry& beyond(Entry& from, int guard, const RegimeKey& key) {
+    // What lies beyond a guard of another regime; its key is asked for the first time only.
+    template <class Key>
+    Entry& beyond(Entry& from, int guard, Key&& key) {
         Entry*& neighbour = from.neighbour[guard];
-        if (neighbour == nullptr) neighbour = &entry(key);
+        if (neighbour == nullptr) neighbour = &entry(key());
         return *(last_ = neighbour);
     }
 

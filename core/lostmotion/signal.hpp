@@ -60,22 +60,16 @@ inline Signals ramped_inputs() {
     return s;
 }
 
-// Sine and cosine of the sum of two angles. The difference is written as a sum because compilers that are told to fuse
-// no products have fused it nevertheless (GCC 12 for AVX-512).
-[[gnu::always_inline]] inline std::pair<double, double> rotated(double sine, double cosine, double cos, double sin) {
-    const double back = -sin;
-    return {sine * cos + cosine * sin, cosine * cos + sine * back};
-}
-
 // One function of time by which an input departs from its value at an anchor instant:
-// a ramp (omega = 0), cos(omega s) - 1, or sin(omega s).
+// cos(omega s) - 1, sin(omega s), or a ramp (omega = 0).
 struct InputBasis {
-    enum Kind { ramp, cosine, sine } kind;
+    enum Kind { cosine, sine, ramp, nothing } kind;
     int input;
     double omega;  // [rad/s]
 
     // Its k-th time derivative at the anchor instant, k > 0.
     double derivative(int k) const {
+        if (kind == nothing) return 0.0;
         if (kind == ramp) return k == 1 ? 1.0 : 0.0;
         if ((kind == cosine) != (k % 2 == 0)) return 0.0;
         double d = k % 2 == 0 ? 1.0 : omega;
@@ -86,21 +80,34 @@ struct InputBasis {
     friend bool operator==(const InputBasis&, const InputBasis&) = default;
 };
 
+// In pairs: cosine and sine of each sine of the signals, those of the first input first, then the ramps. At least one
+// pair, and if need be with nothing in the last places.
 inline std::vector<InputBasis> input_basis(const Signals& signals) {
     std::vector<InputBasis> basis;
-    for (int i = 0; i < n_inputs; ++i) {
-        bool slopes = false;
-        for (const Knot& k : signals[i].knots) slopes |= k.slope != 0.0;
-        if (slopes) basis.push_back({InputBasis::ramp, i, 0.0});
-    }
     for (int i = 0; i < n_inputs; ++i)
         for (const Sine& s : signals[i].sines) {
             const double omega = 2.0 * std::numbers::pi * s.frequency;
             basis.push_back({InputBasis::cosine, i, omega});
             basis.push_back({InputBasis::sine, i, omega});
         }
+    for (int i = 0; i < n_inputs; ++i) {
+        bool slopes = false;
+        for (const Knot& k : signals[i].knots) slopes |= k.slope != 0.0;
+        if (slopes) basis.push_back({InputBasis::ramp, i, 0.0});
+    }
+    while (basis.empty() || basis.size() % 2 != 0) basis.push_back({InputBasis::nothing, 0, 0.0});
     return basis;
 }
+
+// By how much a pair of functions turns over a length of time: cos and sin of the angle (of a ramp, 1 and 0).
+struct Turn {
+    double cos, sin;
+
+    // A sine and a cosine, turned.
+    [[gnu::always_inline]] Pack<2> operator*(const Pack<2>& sine_cosine) const {
+        return cos * sine_cosine + Pack<2>::of({sin, -sin}) * sine_cosine.swapped();
+    }
+};
 
 // By how much the functions of a basis turn over lengths of time that are a unit times a power of two. What several
 // regimes ask for is reckoned once.
@@ -115,14 +122,14 @@ class InputTurns {
         for (const InputBasis& b : basis_) omega = std::fmax(omega, b.omega);
         return omega;
     }
-    // For each function, cos(omega h) of a cosine (and of a ramp, 1) and sin(omega h) of a sine; h = unit * 2^exponent.
-    const double* over(int exponent) {
+    // For each pair; h = unit * 2^exponent.
+    const Turn* over(int exponent) {
         assert(std::abs(exponent) <= reach);
-        std::vector<double>& turn = turns_[static_cast<std::size_t>(exponent + reach)];
-        if (turn.size() < basis_.size()) {
+        std::vector<Turn>& turn = turns_[static_cast<std::size_t>(exponent + reach)];
+        if (turn.empty()) {
             const double h = std::ldexp(unit_, exponent);
-            for (const InputBasis& b : basis_)
-                turn.push_back(b.kind == InputBasis::sine ? std::sin(b.omega * h) : std::cos(b.omega * h));
+            for (std::size_t q = 0; q < basis_.size(); q += 2)
+                turn.push_back({std::cos(basis_[q].omega * h), std::sin(basis_[q].omega * h)});
         }
         return turn.data();
     }
@@ -132,7 +139,7 @@ class InputTurns {
 
     double unit_;
     std::vector<InputBasis> basis_;
-    std::array<std::vector<double>, 2 * reach + 1> turns_;
+    std::array<std::vector<Turn>, 2 * reach + 1> turns_;
 };
 
 // The two inputs at one instant, as the state of the linear system that generates them.
@@ -140,9 +147,19 @@ class InputState {
  public:
     InputState(const Signals& signals, const std::vector<InputBasis>& basis)
         : signals_(&signals), basis_(basis.data()), size_(static_cast<int>(basis.size())), weights_(basis.size()) {
-        while (first_sine_ < size_ && basis_[first_sine_].kind == InputBasis::ramp) ++first_sine_;
-        sines_end_ = {first_sine_ + 2 * static_cast<int>(signals[0].sines.size()), size_};
+        sines_end_[0] = 2 * static_cast<int>(signals[0].sines.size());
+        sines_end_[1] = sines_end_[0] + 2 * static_cast<int>(signals[1].sines.size());
         anchor(0.0);
+    }
+    InputState(const InputState&) = default;
+    // Of another with the same signals.
+    InputState& operator=(const InputState& o) {
+        time_ = o.time_;
+        knot_ = o.knot_;
+        linear_ = o.linear_;
+        slope_ = o.slope_;
+        for (int q = 0; q < size_; q += 2) pair_of(o, q).store(&weights_[q]);
+        return *this;
     }
 
     // Sets all from absolute time, so that no phase error accumulates however long the run. At a knot: the right limit.
@@ -169,7 +186,6 @@ class InputState {
             slope_[i] = k.slope;
         }
         int q = 0;
-        for (; q < first_sine_; ++q) weights_[q] = slope_[basis_[q].input];
         for (int i = 0; i < n_inputs; ++i)
             for (const Sine& s : (*signals_)[i].sines) {
                 const double turns = s.frequency * t;
@@ -177,6 +193,7 @@ class InputState {
                 weights_[q++] = s.amplitude * std::sin(angle);
                 weights_[q++] = s.amplitude * std::cos(angle);
             }
+        for (; q < size_ && basis_[q].kind == InputBasis::ramp; ++q) weights_[q] = slope_[basis_[q].input];
     }
 
     double time() const { return time_; }
@@ -211,7 +228,7 @@ class InputState {
         u[0] = linear_;
         if (n > 1) u[1] = slope_;
         for (int k = 2; k < n; ++k) u[k] = {};
-        for (int q = first_sine_; q < size_; q += 2) {
+        for (int q = 0; q < sines_end_[1]; q += 2) {
             const int i = basis_[q].input;
             const double omega = basis_[q].omega, turned_twice = -omega * omega;
             double even = weights_[q], odd = omega * weights_[q + 1];
@@ -220,6 +237,27 @@ class InputState {
                 even *= turned_twice;
                 if (k + 1 < n) u[k + 1][i] += odd;
                 odd *= turned_twice;
+            }
+        }
+    }
+
+    // Whether an input is other than constant.
+    bool varies(int i) const { return slope_[i] != 0.0 || sines_end_[i] > (i == 0 ? 0 : sines_end_[0]); }
+    // Its derivatives from the first on.
+    template <std::size_t N>
+    [[gnu::always_inline]] void derivatives(std::array<std::array<double, n_inputs>, N>& u) const {
+        static_assert(N % 2 == 0);
+        u[0] = slope_;
+        for (std::size_t k = 1; k < N; ++k) u[k] = {};
+        for (int q = 0; q < sines_end_[1]; q += 2) {
+            const int i = basis_[q].input;
+            const double omega = basis_[q].omega, turned_twice = -omega * omega;
+            double odd = omega * weights_[q + 1], even = turned_twice * weights_[q];
+            for (std::size_t k = 0; k < N; k += 2) {
+                u[k][i] += odd;
+                u[k + 1][i] += even;
+                odd *= turned_twice;
+                even *= turned_twice;
             }
         }
     }
@@ -239,54 +277,48 @@ class InputState {
     void turn(double h) {
         time_ += h;
         for (int i = 0; i < n_inputs; ++i) linear_[i] += slope_[i] * h;
-        for (int q = first_sine_; q < size_; q += 2) {
+        for (int q = 0; q < sines_end_[1]; q += 2) {
             const double a = basis_[q].omega * h, a2 = a * a;
             const bool small = a2 < 1e-6;
             const double cosine = small ? 1.0 - a2 / 2.0 * (1.0 - a2 / 12.0) : std::cos(a);
             const double sine = small ? a * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0)) : std::sin(a);
-            rotate(q, weights_[q], weights_[q + 1], cosine, sine);
+            (Turn{cosine, sine} * pair_of(*this, q)).store(&weights_[q]);
         }
     }
 
-    // Moves on by h, with the rotations (cos, sin)(omega h) of the sines given in basis order.
-    void advance(double h, const double* cos_sin) { advance_from(*this, h, cos_sin); }
-    // To h beyond where another stands on the same stretch.
-    [[gnu::always_inline]] void advance_from(const InputState& from, double h, const double* cos_sin) {
+    // Moves on by h, by which the pairs turn as given.
+    [[gnu::always_inline]] void advance(double h, const Turn* turns) { advance_from(*this, h, turns); }
+    // To h beyond where another with the same signals stands, on the same stretch between knots.
+    [[gnu::always_inline]] void advance_from(const InputState& from, double h, const Turn* turns) {
         time_ = from.time_ + h;
         knot_ = from.knot_;
         slope_ = from.slope_;
         for (int i = 0; i < n_inputs; ++i) linear_[i] = from.linear_[i] + slope_[i] * h;
-        const double* w = from.weights();
-        for (int q = 0; q < first_sine_; ++q) weights_[q] = w[q];
-        for (int q = first_sine_; q < size_; q += 2) rotate(q, w[q], w[q + 1], cos_sin[q], cos_sin[q + 1]);
+        for (int q = 0; q < size_; q += 2) (*turns++ * pair_of(from, q)).store(&weights_[q]);
     }
 
  private:
-    void rotate(int q, double s, double c, double cosine, double sine) {
-        const auto [new_sine, new_cosine] = rotated(s, c, cosine, sine);
-        weights_[q] = new_sine;
-        weights_[q + 1] = new_cosine;
-    }
+    static Pack<2> pair_of(const InputState& s, int q) { return Pack<2>::load(&s.weights_[q]); }
     // For each input, what it begins with and the terms of its sines.
     template <class Term>
     [[gnu::always_inline]] std::array<double, n_inputs> sum(const std::array<double, n_inputs>& begin,
                                                             Term&& term) const {
         static_assert(n_inputs == 2);
         double first = begin[0], second = begin[1];
-        int q = first_sine_;
+        int q = 0;
         for (; q < sines_end_[0]; q += 2) first += term(q);
         for (; q < sines_end_[1]; q += 2) second += term(q);
         return {first, second};
     }
 
     const Signals* signals_;
-    const InputBasis* basis_;  // ramps first, then a cosine and a sine for each sine of the signals
-    int size_, first_sine_ = 0;
+    const InputBasis* basis_;
+    int size_;
     std::array<int, n_inputs> sines_end_{};  // of each input
     double time_ = 0.0;
     std::array<const Knot*, n_inputs> knot_{};
     std::array<double, n_inputs> linear_{}, slope_{};
-    std::vector<double> weights_;  // ramp: slope; cosine: a sin(psi); sine: a cos(psi)
+    std::vector<double> weights_;  // cosine: a sin(psi); sine: a cos(psi); ramp: slope
 };
 
 }  // namespace lostmotion

@@ -6,7 +6,6 @@
 // sine and the cosine of the q-th sine of the inputs. Of all this, only E x waits for the step before.
 #pragma once
 
-#include <tuple>
 #include <vector>
 
 #include "cursor.hpp"
@@ -22,8 +21,8 @@ class Stride {
         const double length = propagator.length(level);
         const InputState& input = from.input();
         const LinearRates& rates = propagator.rates();
-        const Driven* responses = propagator.responses(level);
-        const double* rotations = propagator.rotations(level);
+        const Propagator::Response* responses = propagator.responses(level);
+        const Turn* turns = propagator.turns(level);
         x_ = from.x();
         linear_ = input.linear();
         State driving = constant, ramp{};
@@ -36,15 +35,16 @@ class Stride {
         growth_ = step_->integrate(load(ramp));
         sines_.clear();
         sines_of_first_ = 0;
-        for (int q = 0; q < input.size(); ++q) {
+        for (int q = 0; q < input.size(); q += 2) {
             const InputBasis& basis = input.basis(q);
-            if (basis.kind == InputBasis::ramp) {
-                forced_ = forced_ + input.weights()[q] * load(responses[q]);
-            } else if (basis.kind == InputBasis::cosine) {
-                const Lanes whole = step_->integrate(load(rates.input_column[basis.input])) + load(responses[q]);
+            const Driven& response = responses[q / 2].change;
+            const double* weights = input.weights() + q;
+            if (basis.kind == InputBasis::cosine) {
+                const Lanes whole = step_->integrate(load(rates.input_column[basis.input])) + response.state(0);
                 if (basis.input == 0) ++sines_of_first_;
-                sines_.push_back({input.weights()[q], input.weights()[q + 1], rotations[q], rotations[q + 1], whole,
-                                  load(responses[q + 1])});
+                sines_.push_back({Pack<2>::load(weights), turns[q / 2], whole, response.state(1)});
+            } else {
+                forced_ = forced_ + response * weights;
             }
         }
     }
@@ -54,8 +54,8 @@ class Stride {
         Lanes x = load(x_), forced = forced_;
         for (int k = 0;; ++k) {
             std::array<double, n_inputs> u = linear_;
-            for (std::size_t q = 0; q < sines_of_first_; ++q) u[0] += sines_[q].sine;
-            for (std::size_t q = sines_of_first_; q < sines_.size(); ++q) u[1] += sines_[q].sine;
+            for (std::size_t q = 0; q < sines_of_first_; ++q) u[0] += sines_[q].sine_cosine[0];
+            for (std::size_t q = sines_of_first_; q < sines_.size(); ++q) u[1] += sines_[q].sine_cosine[0];
             to.set(k, x, u);
             if (k + 1 == n) {
                 x.store(x_.data());
@@ -63,8 +63,8 @@ class Stride {
             }
             Lanes driven = forced;
             for (Turning& t : sines_) {
-                driven = driven + (t.sine * t.by_sine + t.cosine * t.by_cosine);
-                std::tie(t.sine, t.cosine) = rotated(t.sine, t.cosine, t.cos, t.sin);
+                driven = driven + (t.sine_cosine[0] * t.by_sine + t.sine_cosine[1] * t.by_cosine);
+                t.sine_cosine = t.turn * t.sine_cosine;
             }
             x = x + (step_->change * x + driven);
             forced = forced + growth_;
@@ -76,8 +76,8 @@ class Stride {
 
  private:
     struct Turning {
-        double sine, cosine;  // the sine itself, and its derivative over omega
-        double cos, sin;      // of omega h
+        Pack<2> sine_cosine;  // the sine itself, and its derivative over omega
+        Turn turn;
         Lanes by_sine, by_cosine;
     };
 

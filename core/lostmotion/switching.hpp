@@ -35,7 +35,7 @@ struct Switching {
 // Inputs and their rates at an instant, for the search of contact modes. At a jump: the right limit.
 inline void see_inputs(const InputState& input, double time, Instant& now) {
     now.time = time;
-    now.input = input.jet();
+    input.jet(n_derivatives, now.input.data());
     now.input_size = input.sizes();
 }
 

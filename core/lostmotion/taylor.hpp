@@ -1,13 +1,12 @@
 // Taylor series of the motion in one regime about an instant.
 //
-// From the rate x' and the input state w at that instant the k-th time derivative of the state is
-//     A^(k-1) x' + sum_q w_q D_qk,     D_q(k+1) = A D_qk + B r_q^(k),
-// where r_q^(k) is the k-th derivative of the q-th function by which the inputs depart from their anchor values.
+// The derivatives of the state follow from one another, x^(k+1) = A x^(k) + B u^(k). They are reckoned three at a time,
+//     x^(k+3) = A^3 x^(k) + A^2 B u^(k) + A B u^(k+1) + B u^(k+2),
+// so that few products wait for one another.
 #pragma once
 
 #include <array>
 #include <cassert>
-#include <vector>
 
 #include "linear_rates.hpp"
 #include "polynomial.hpp"
@@ -15,61 +14,111 @@
 
 namespace lostmotion {
 
-// What a function of an input brings: as a state, in no more room than it needs.
-using Driven = std::array<double, n_states>;
-
-// The series of the state.
-class Taylor {
+// The motion about an instant: its derivatives there, as far as a base interval needs them.
+class Expansion {
  public:
     static constexpr int terms = Polynomial::degree;  // good for a base interval: 0.25^13/13! < 1e-17
 
-    void prepare(const LinearRates& rates, const InputBasis* basis, int n_basis) {
+    using Inputs = std::array<std::array<double, n_inputs>, terms>;  // their derivatives, from the first on
+    Inputs input;
+    double angle_rate;                    // of the load angle, at the instant
+    bool turning;                         // whether the load speed turns it
+    std::array<Coupled, terms> coupled;   // derivatives of the other states, from the first on
+
+    // By how much the state changes over s.
+    [[gnu::always_inline]] Lanes change(double s) const {
+        const double s2 = s * s, s4 = s2 * s2;
+        const Pack<4> powers = Pack<4>::of({s, s2, s2 * s, s4});
+        Coupled sum{};
+        double angle = 0.0, power = s4 * s4;
+        for (int first = terms - 4; first >= 0; first -= 4) {
+            const Pack<4> c = (first == 0 ? powers : (first == 4 ? s4 : power) * powers) * over_factorial(first);
+            const Coupled* v = &coupled[static_cast<std::size_t>(first)];
+            sum = sum + ((c.spread<0>() * v[0] + c.spread<1>() * v[1]) + (c.spread<2>() * v[2] + c.spread<3>() * v[3]));
+            const Pack<4> rates = Pack<4>::of({v[0][load_speed], v[1][load_speed], v[2][load_speed], v[3][load_speed]});
+            angle += (c * over_next(first) * rates).sum();
+        }
+        return {sum, s * (angle_rate + (turning ? angle : 0.0))};
+    }
+
+    // A form of the motion that does not depend on the load angle, as a polynomial in the time [s] from the instant.
+    [[gnu::always_inline]] Polynomial polynomial(const LinearForm& form, double value) const {
+        assert(form.c[load_angle] == 0.0);
+        Polynomial p(value);
+        const Coupled c = Coupled::load(form.c.data());
+        const double first = form.c[first_input], second = form.c[first_input + 1];
+        for (int part = 0; part < Polynomial::parts; ++part) {
+            const Coupled* v = &coupled[static_cast<std::size_t>(4 * part)];
+            p.part[part] = sums(c * v[0], c * v[1], c * v[2], c * v[3]);
+            if (first != 0.0 || second != 0.0) {
+                const auto* u = &input[static_cast<std::size_t>(4 * part)];
+                const auto of = [&](int k) { return first * u[k][0] + second * u[k][1]; };
+                p.part[part] = p.part[part] + Pack<4>::of({of(0), of(1), of(2), of(3)});
+            }
+            p.part[part] = p.part[part] * over_factorial(4 * part);
+        }
+        return p;
+    }
+
+    // 1/k! of four terms
+    static Pack<4> over_factorial(int first) {
+        static constexpr std::array<double, terms> table = [] {
+            std::array<double, terms> c{};
+            double factorial = 1.0;
+            for (int k = 1; k <= terms; ++k) c[static_cast<std::size_t>(k - 1)] = 1.0 / (factorial *= k);
+            return c;
+        }();
+        return Pack<4>::load(&table[static_cast<std::size_t>(first)]);
+    }
+
+ private:
+    // 1/(k + 1) of four terms
+    static Pack<4> over_next(int first) {
+        static constexpr std::array<double, terms> table = [] {
+            std::array<double, terms> c{};
+            for (int k = 1; k <= terms; ++k) c[static_cast<std::size_t>(k - 1)] = 1.0 / (k + 1);
+            return c;
+        }();
+        return Pack<4>::load(&table[static_cast<std::size_t>(first)]);
+    }
+};
+
+// What it takes to expand the motions of one regime.
+class Taylor {
+ public:
+    void prepare(const LinearRates& rates) {
         rates_ = &rates;
-        n_basis_ = n_basis;
         squared_ = rates.rate * rates.rate;
         cubed_ = rates.rate * squared_;
-        driven_.clear();
-        driven_.reserve(static_cast<std::size_t>(n_basis * terms));
-        for (int q = 0; q < n_basis; ++q) {
-            Lanes derivative;
-            for (int k = 1; k <= terms; ++k) {
-                derivative.store(driven_.emplace_back().data());
-                derivative =
-                    rates.rate * derivative + basis[q].derivative(k) * load(rates.input_column[basis[q].input]);
-            }
+        for (int i = 0; i < n_inputs; ++i) {
+            const Coupled B = coupled(rates.input_column[i]);
+            input_[i] = {B, rates.rate * B, squared_ * B};
         }
     }
 
     const LinearRates& rates() const { return *rates_; }
-    int n_basis() const { return n_basis_; }
-    // D_qk, k = 1 .. terms
-    const Driven& driven(int q, int k) const { return driven_[static_cast<std::size_t>(q * terms + k - 1)]; }
 
-    State fourth_derivative(const State& rate, const double* weights) const {
-        Lanes sum = cubed_ * load(rate);
-        for (int q = 0; q < n_basis_; ++q) sum = sum + weights[q] * load(driven(q, 4));
-        State out;
-        sum.store(out.data());
-        return out;
+    // At an instant with this rate and these inputs.
+    void expand(const Lanes& rate, const InputState& input, Expansion& out) const {
+        input.derivatives(out.input);
+        expand(rate, {input.varies(0), input.varies(1)}, out);
+    }
+    // The answer from rest to a function of the inputs after h.
+    Lanes response(const InputBasis& function, double h) const {
+        Expansion e{};
+        for (int k = 1; k <= Expansion::terms; ++k)
+            e.input[static_cast<std::size_t>(k - 1)][function.input] = function.derivative(k);
+        expand({}, {function.input == 0, function.input == 1}, e);
+        return e.change(h);
     }
 
-    // By how much the state changes over s. In powers of A^3, so that few products wait for one another.
-    [[gnu::always_inline]] Lanes change(double s, const State& rate, const double* weights) const {
-        const Lanes v = load(rate), v1 = rates_->rate * v, v2 = squared_ * v;
-        const double s2 = s * s, s3 = s2 * s;
-        Lanes free{}, forced{};
-        for (int k = terms - 2; k > 0; k -= 3) {
-            const double c0 = s * over_factorial[k], c1 = s2 * over_factorial[k + 1], c2 = s3 * over_factorial[k + 2];
-            Lanes inputs{};
-            for (int q = 0; q < n_basis_; ++q) {
-                const Driven* d = &driven(q, k);
-                inputs = inputs + weights[q] * ((c0 * load(d[0]) + c1 * load(d[1])) + c2 * load(d[2]));
-            }
-            const Lanes own = (c0 * v + c1 * v1) + c2 * v2;
-            free = k == terms - 2 ? own : s3 * (cubed_ * free) + own;
-            forced = k == terms - 2 ? inputs : s3 * forced + inputs;
-        }
-        return free + forced;
+    // Of the coupled states.
+    [[gnu::always_inline]] Coupled fourth_derivative(const Coupled& rate, const InputState& input) const {
+        Coupled sum = cubed_ * rate;
+        const auto u = input.jet<4>();
+        for (int i = 0; i < n_inputs; ++i)
+            if (input.varies(i)) sum = sum + input_[i].bring(u[1][i], u[2][i], u[3][i]);
+        return sum;
     }
 
     // G over at most one base interval.
@@ -82,23 +131,11 @@ class Taylor {
         sum.scale(h);
         return sum;
     }
-    // The answer from rest to the q-th function after h.
-    Driven response(int q, double h) const {
-        Lanes sum;
-        double power = 1.0;
-        for (int k = 1; k <= terms; ++k) {
-            power *= h / k;
-            sum = sum + power * load(driven(q, k));
-        }
-        Driven y;
-        sum.store(y.data());
-        return y;
-    }
 
     // sum_k B^k/(k + shift)!, from the first three powers of B; its norm is at most that of a base interval.
     template <int shift>
     static Matrix power_series(const Matrix& one, const Matrix& two, const Matrix& three) {
-        static_assert(terms == 12);
+        static_assert(Expansion::terms == 12);
         Matrix sum;
         for (int k = 9; k >= 0; k -= 3) {
             if (k < 9) sum = three * sum;
@@ -110,10 +147,45 @@ class Taylor {
     }
 
  private:
-    static constexpr std::array<double, terms + 1> over_factorial = [] {
-        std::array<double, terms + 1> c{};
+    // B, A B and A^2 B of one input.
+    struct Column {
+        Coupled now, next, after;
+
+        // To x^(k+3), from the k-th derivative of the input and the two after it.
+        [[gnu::always_inline]] Coupled bring(double first, double second, double third) const {
+            return first * after + (second * next + third * now);
+        }
+    };
+
+    [[gnu::always_inline]] void expand(const Lanes& rate, const std::array<bool, n_inputs>& varies,
+                                       Expansion& out) const {
+        out.angle_rate = rate.angle;
+        out.turning = rates_->rate.angle[load_speed] != 0.0;
+        const auto recur = [&](auto forced) __attribute__((always_inline)) {
+            auto& v = out.coupled;
+            v[0] = rate.coupled;
+            v[1] = forced(rates_->rate * v[0], -2);
+            v[2] = forced(squared_ * v[0], -1);
+            for (int k = 0; k + 3 < Expansion::terms; ++k) v[k + 3] = forced(cubed_ * v[k], k);
+        };
+        const auto force = [&](Coupled x, int k, int i) __attribute__((always_inline)) {
+            const auto u = [&](int j) { return j < 0 ? 0.0 : out.input[static_cast<std::size_t>(j)][i]; };
+            return x + input_[i].bring(u(k), u(k + 1), u(k + 2));
+        };
+        if (varies[0] && varies[1])
+            recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(force(x, k, 0), k, 1); });
+        else if (varies[0])
+            recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(x, k, 0); });
+        else if (varies[1])
+            recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(x, k, 1); });
+        else
+            recur([](Coupled x, int) __attribute__((always_inline)) { return x; });
+    }
+
+    static constexpr std::array<double, Expansion::terms + 1> over_factorial = [] {
+        std::array<double, Expansion::terms + 1> c{};
         double factorial = 1.0;
-        for (int k = 0; k <= terms; ++k) {
+        for (int k = 0; k <= Expansion::terms; ++k) {
             if (k > 0) factorial *= k;
             c[static_cast<std::size_t>(k)] = 1.0 / factorial;
         }
@@ -121,59 +193,8 @@ class Taylor {
     }();
 
     const LinearRates* rates_ = nullptr;
-    int n_basis_ = 0;
-    Matrix squared_, cubed_;      // A^2, A^3
-    std::vector<Driven> driven_;  // n_basis x terms
-};
-
-// The Taylor series of a linear form of the motion, in parts of a unit of time: its coefficients are linear in the rate
-// and the input state at the instant. The form must not depend on the load angle.
-class FormSeries {
- public:
-    bool ready() const { return unit_ > 0.0; }
-    void reset() { unit_ = 0.0; }
-
-    void prepare(const Taylor& motion, const InputBasis* basis, const LinearForm& form, double unit) {
-        assert(form.c[load_angle] == 0.0);
-        unit_ = unit;
-        n_basis_ = motion.n_basis();
-        rows_.resize(static_cast<std::size_t>(n_coupled + n_basis_));
-        const Matrix& A = motion.rates().rate;
-        Matrix::Column row{};  // of the k-th derivative, on x'
-        for (int c = 0; c < n_coupled; ++c) row[c] = form.c[c];
-        double power = 1.0;
-        for (int k = 1; k <= Taylor::terms; ++k) {
-            power *= unit / k;
-            for (int c = 0; c < n_coupled; ++c) rows_[c][k - 1] = power * row[c];
-            for (int q = 0; q < n_basis_; ++q)
-                rows_[n_coupled + q][k - 1] = power * (dot(form, motion.driven(q, k)) +
-                                                       form.c[first_input + basis[q].input] * basis[q].derivative(k));
-            A.times_row(row).store(row.data());
-        }
-    }
-
-    double unit() const { return unit_; }  // [s]
-    [[gnu::always_inline]] Polynomial at(double value, const State& rate, const double* weights) const {
-        Polynomial p(value);
-        for (int part = 0; part < Polynomial::parts; ++part) {
-            const auto row = [&](int k) { return Pack<4>::load(&rows_[static_cast<std::size_t>(k)][4 * part]); };
-            Pack<4> sum = (rate[0] * row(0) + rate[1] * row(1)) + (rate[2] * row(2) + rate[3] * row(3));
-            for (int q = 0; q < n_basis_; ++q) sum = sum + weights[q] * row(n_coupled + q);
-            p.part[part] = sum;
-        }
-        return p;
-    }
-
- private:
-    static double dot(const LinearForm& form, const Driven& x) {
-        double sum = 0.0;
-        for (int c = 0; c < n_coupled; ++c) sum += form.c[c] * x[c];
-        return sum;
-    }
-
-    double unit_ = 0.0;
-    int n_basis_ = 0;
-    std::vector<std::array<double, Taylor::terms>> rows_;  // by each coupled rate, by each weight
+    Matrix squared_, cubed_;  // A^2, A^3
+    std::array<Column, n_inputs> input_;
 };
 
 }  // namespace lostmotion

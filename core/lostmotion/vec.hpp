@@ -76,6 +76,13 @@ struct Pack {
         }
         return all;
     }
+    // The two numbers of each pair exchanged.
+    Pack swapped() const {
+        static_assert(width == 2);
+        Pack out;
+        for (int p = 0; p < parts; ++p) out.part[p] = __builtin_shufflevector(part[p], part[p], 1, 0);
+        return out;
+    }
     friend Pack operator+(Pack a, const Pack& b) {
         for (int p = 0; p < parts; ++p) a.part[p] += b.part[p];
         return a;
@@ -89,6 +96,27 @@ struct Pack {
         return a;
     }
 };
+
+// The sums of four packs.
+template <int n>
+[[gnu::always_inline]] inline Pack<n> sums(const Pack<n>& a, const Pack<n>& b, const Pack<n>& c, const Pack<n>& d) {
+    static_assert(n == 4);
+    Pack<n> out;
+    if constexpr (Pack<n>::parts == 1) {
+        const auto pairs = [](auto v, auto w) {
+            return __builtin_shufflevector(v, w, 0, 4, 2, 6) + __builtin_shufflevector(v, w, 1, 5, 3, 7);
+        };
+        const auto ab = pairs(a.part[0], b.part[0]), cd = pairs(c.part[0], d.part[0]);
+        out.part[0] = __builtin_shufflevector(ab, cd, 0, 1, 4, 5) + __builtin_shufflevector(ab, cd, 2, 3, 6, 7);
+    } else {
+        const auto pairs = [](auto v, auto w) {
+            return __builtin_shufflevector(v, w, 0, 2) + __builtin_shufflevector(v, w, 1, 3);
+        };
+        out.part[0] = pairs(a.part[0], b.part[0]) + pairs(a.part[1], b.part[1]);
+        out.part[1] = pairs(c.part[0], d.part[0]) + pairs(c.part[1], d.part[1]);
+    }
+    return out;
+}
 
 inline Vec least(Vec a, Vec b) { return a < b ? a : b; }
 template <class V>

@@ -103,7 +103,7 @@ TEST_SUITE("parts") {
                 if (key.modes[c] == 0 && !(c == twist_contact && drive.rigid())) key.modes[c] = 1;
             const Regime r = drive.build(key);
             Propagator p;
-            InputTurns turns(1e-3, {});
+            InputTurns turns(1e-3, input_basis({}));
             const LinearRates rates(r);
             p.prepare(rates, turns, drive.balanced_scale());
             const State scale = drive.balanced_scale();
@@ -129,7 +129,7 @@ TEST_SUITE("parts") {
             RegimeKey key;
             REQUIRE(system.start(cache, now, key) == Found::yes);
             Propagator p;
-            InputTurns turns(1e-3, {});
+            InputTurns turns(1e-3, input_basis({}));
             const LinearRates rates(drive.build(key));
             p.prepare(rates, turns, drive.balanced_scale());
             for (int level = 3; level < 9; ++level)
