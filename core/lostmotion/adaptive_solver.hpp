@@ -136,7 +136,7 @@ class AdaptiveSolver {
         return accumulation_.add(time_, 1.0) ? Status::zeno : Status::done;
     }
 
-    State rates(const LinearRates& linear, const State& constant, double t, const State& x) {
+    State rates(const LinearRates& linear, const Column& constant, double t, const State& x) {
         State out = linear(x, constant, input_at(t));
         remainder_(t, x, out);
         return out;
@@ -147,7 +147,7 @@ class AdaptiveSolver {
         const auto& entry = cache_.entry(key_);
         const Regime& r = entry.regime;
         const LinearRates& linear = entry.rates;
-        const State fixed = linear.constant(now_.memory);
+        const Column fixed = linear.constant(now_.memory);
         GuardTable::Values constant;
         entry.guards.constants(now_.memory, constant);
         using DP = DormandPrince;

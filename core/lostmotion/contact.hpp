@@ -21,7 +21,8 @@ inline constexpr double rounding = 0x1p14 * std::numeric_limits<double>::epsilon
 // Rounding of an instant, relative to the time since the start.
 inline constexpr double time_rounding = 4.0 * std::numeric_limits<double>::epsilon();
 
-// A form that is further from zero than this multiple needs no closer look: the rounding of the instant moves it by less.
+// A form that is further from zero than this multiple needs no closer look: the rounding of the instant moves it by
+// less.
 inline constexpr double clear_of_zero = 1e-3;
 
 // Time derivatives of the state along the flow of one regime, computed as far as they are asked for.
@@ -269,7 +270,7 @@ class SwitchedDrive {
         guards.sizes(magnitudes(now.memory), magnitudes(now.x), now.input_size, size);
         unsigned near = 0;
         for (int g = 0; g < guards.rows(); g += vec_width)
-            near |= bits(load(&value[g]) <= clear_of_zero * load(&size[g])) << g;
+            near |= (all_bits & ~above(load(&value[g]), clear_of_zero * load(&size[g]))) << g;
         near &= ~ignored;
         if (near == 0) return {nullptr, false};
         Flow flow(entry.rates, now, coarseness);
@@ -279,9 +280,8 @@ class SwitchedDrive {
         for (; near != 0; near &= near - 1) {
             const int k = std::countr_zero(near);
             const double noise = coarseness * rounding * size[k] + time_rounding * std::fabs(now.time * slope[k]);
-            const int sign = std::fabs(value[k]) > noise
-                                 ? (value[k] > 0.0 ? +1 : -1)
-                                 : flow.sign(guards.form(k), 1, slope[k], slope_size[k]);
+            const int sign = std::fabs(value[k]) > noise ? (value[k] > 0.0 ? +1 : -1)
+                                                         : flow.sign(guards.form(k), 1, slope[k], slope_size[k]);
             if (sign >= 0) continue;
             if ((entry.contacts >> k & 1) == 0) return {&entry.regime.guards[k], overcome};
             overcome = true;

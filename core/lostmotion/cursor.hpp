@@ -12,7 +12,7 @@ class Cursor {
     explicit Cursor(const InputState& input) : input_(input) {}
 
     // On a regime, at a state and the inputs of its instant.
-    void place(Propagator& propagator, const State& constant, const InputState& input, const State& x) {
+    void place(Propagator& propagator, const Column& constant, const InputState& input, const State& x) {
         propagator_ = &propagator;
         constant_ = &constant;
         input_ = input;
@@ -47,7 +47,7 @@ class Cursor {
         const Lanes x = propagator_->step(level, load(from.x_), load(from.rate()), from.input_.weights());
         input_.advance_from(from.input_, propagator_->length(level), propagator_->turns(level));
         x.store(x_.data());
-        propagator_->rates()(x, load(*constant_), input_.values()).store(rate_.data());
+        propagator_->rates()(x.coupled, *constant_, input_.values()).store(rate_.data());
         rate_known_ = true;
     }
     // By whole levels, from the longest down, to the nearest of the instants that they lead to. Returns what is left of
@@ -55,7 +55,7 @@ class Cursor {
     double advance_by_levels(double h) {
         Propagator& p = *propagator_;
         // By way of a signed number, which processors make of a floating-point one at once.
-        const auto n = static_cast<std::uint64_t>(static_cast<std::int64_t>(h / p.length(0) + 0.5));
+        const auto n = static_cast<std::uint64_t>(static_cast<std::int64_t>(h * p.per_length() + 0.5));
         if (n == 0) return h;
         Lanes x = load(x_), rate = load(this->rate());
         const auto step = [&](int k) __attribute__((always_inline)) {
@@ -91,7 +91,7 @@ class Cursor {
 
  private:
     Propagator* propagator_ = nullptr;
-    const State* constant_ = nullptr;
+    const Column* constant_ = nullptr;
     InputState input_;
     State x_{}, rate_{};
     bool rate_known_ = false;

@@ -31,8 +31,8 @@ struct Segment {
     bool last;                // no further segment follows in this call: `end` belongs to it
     State x;                  // at begin
     Memory memory;
-    State constant;  // the part of dx/dt that depends on neither state nor inputs
-    State x_end;     // at end, before any stop there
+    Column constant;  // the part of dx/dt that depends on neither state nor inputs
+    State x_end;      // at end, before any stop there
 };
 
 template <class System>
@@ -105,9 +105,8 @@ class ExactSolver {
         while (true) {
             typename Cache::Entry& entry = cache_.entry(key_);
             if (!entry.propagator.ready()) entry.prepare(turns_, scale_);
-            Segment<System> segment{entry,  input_,      time_,
-                                    t_end,  true,        now_.x,
-                                    now_.memory, entry.rates.constant(now_.memory), now_.x};
+            Segment<System> segment{
+                entry, input_, time_, t_end, true, now_.x, now_.memory, entry.rates.constant(now_.memory), now_.x};
             if (!(time_ < knot_)) knot_ = next_knot(signals_, time_);
             const double limit = std::min(t_end, knot_);
             const Guard* fired = nullptr;
@@ -188,8 +187,7 @@ class ExactSolver {
         touch_size_ = 0.0;
         evaluate(e.guards, constant, *cursor, *here);
         Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
-        for (int i = 0; i < n_inputs; ++i)
-            forced = forced + input_bound_[i] * absolute(coupled(e.rates.input_column[i]));
+        for (int i = 0; i < n_inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
         int level = std::min(last_level_, p.level_below(limit - time_));
         const double shortest = 1e-7 * p.length(0);
         for (long count = 1; time_ < limit; ++count) {
@@ -245,9 +243,8 @@ class ExactSolver {
 
     // |g''''| over the look, from a bound on the fourth derivative of the state that the flow carries on.
     [[gnu::always_inline]] void bound_fourth(const GuardTable& guards, const Matrix& growth, const Coupled& size) {
-        State most{};
-        if (size.sum() != 0.0)  // not at rest, where growth may have overflowed
-            (growth * size).store(most.data());
+        State most;
+        (growth * size).store(most.data());
         guards.rate_sizes(most, input_bound_, bounds_.fourth);
     }
 
@@ -255,22 +252,21 @@ class ExactSolver {
     // through it.
     unsigned enclose(int rows, const Ends& here, const Ends& there, double h) {
         const double third = h / 3.0, share = h * h * h * h / 384.0;
-        unsigned doubtful = 0;
-        Mask roomy = Vec{} == Vec{};
+        unsigned doubtful = 0, tight = 0;
         for (int g = 0; g < rows; g += vec_width) {
             const Vec begin = load(&here.value[g]), end = load(&there.value[g]);
             const Vec c1 = begin + third * load(&here.slope[g]), c2 = end - third * load(&there.slope[g]);
             const Vec low = least(least(begin, end), least(c1, c2)), error = share * load(&bounds_.fourth[g]);
             store(low, &bounds_.least[g]);
             store(error, &bounds_.error[g]);
-            const Mask below = low <= error;
+            const unsigned clear = above(low, error);
             // One that starts on zero or above and rises all through is certain, too.
             const Vec rise = least(c1 - begin, least(c2 - c1, end - c2));
-            const Mask rises = (rise > slope_share * error) & (begin >= 0.0);
-            doubtful |= bits(below & ~rises) << g;
-            roomy &= (low > 64.0 * error) | below;
+            const unsigned rises = above(rise, slope_share * error) & ~above(Vec{}, begin);
+            doubtful |= (all_bits & ~(clear | rises)) << g;
+            tight |= clear & ~above(low, 64.0 * error);
         }
-        roomy_ = all(roomy);
+        roomy_ = tight == 0;
         return doubtful;
     }
 
@@ -356,7 +352,7 @@ class ExactSolver {
         };
         std::array<double, max_guards> estimate;
         for (int k = 0; k < n_crossing_; ++k) {
-            const auto [g, touch] = crossing_[k];
+            const auto& [g, touch] = crossing_[k];
             const Cubic c = cubic(g);
             estimate[g] = touch ? c.lowest_at() : c.zero(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
         }
@@ -364,7 +360,7 @@ class ExactSolver {
             std::sort(crossing_.begin(), crossing_.begin() + n_crossing_,
                       [&](const Crossing& a, const Crossing& b) { return estimate[a.guard] < estimate[b.guard]; });
         for (int k = 0; k < n_crossing_; ++k) {
-            const auto [g, touch] = crossing_[k];
+            const auto& [g, touch] = crossing_[k];
             // Still positive where another has crossed: later.
             if (k > 0 && cubic(g)(best / h) > bounds_.error[g]) continue;
             double s = estimate[g] * h;

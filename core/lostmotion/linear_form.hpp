@@ -65,6 +65,7 @@ inline constexpr int n_coupled = 4;
 static_assert(load_angle == n_coupled);
 using Coupled = Pack<n_coupled>;
 struct alignas(sizeof(Coupled::Part)) State : std::array<double, n_states> {};
+struct alignas(sizeof(Coupled::Part)) Column : std::array<double, n_coupled> {};  // the coupled states alone
 
 // A state in registers.
 struct Lanes {
@@ -82,6 +83,7 @@ struct Lanes {
 inline Lanes absolute(const Lanes& x) { return {absolute(x.coupled), std::fabs(x.angle)}; }
 inline Lanes load(const std::array<double, n_states>& x) { return Lanes::load(x.data()); }
 inline Coupled coupled(const State& x) { return Coupled::load(x.data()); }
+inline Coupled load(const Column& x) { return Coupled::load(x.data()); }
 inline void add_scaled(State& y, double a, const State& x) { (load(y) + a * load(x)).store(y.data()); }
 
 // What the solver must remember beside the state: the two piecewise-constant torques of the twist contact.

@@ -20,34 +20,30 @@
 
 namespace lostmotion {
 
-// What a pair of functions of the inputs brings: two states as columns, in no more room than they need.
-struct Driven {
-    alignas(sizeof(Pack<2>)) std::array<Matrix::Column, 2> column{};
-    std::array<double, 2> angle{};
+// Everything needed to step by one length h in one regime.
+struct Step {
+    Integral integral;  // G(h)
+    Matrix growth;      // bound on |exp(A s)|, element by element, for 0 <= s <= h; 1e200 if it is no less
+    Matrix change;      // E(h) = exp(A h) - 1
+};
 
-    [[gnu::always_inline]] Lanes state(int c) const { return {Coupled::load(column[c].data()), angle[c]}; }
+// What a pair of functions of the inputs brings over one length.
+struct Response {
+    std::array<Column, 2> change;  // of x
+    std::array<double, 2> angle;
+    std::array<Column, 2> rate;  // of x'
+
+    Lanes of(int c) const { return {load(change[c]), angle[c]}; }
     void set(int c, const Lanes& x) {
-        x.coupled.store(column[c].data());
+        x.coupled.store(change[c].data());
         angle[c] = x.angle;
     }
     // From the weights of the pair.
     [[gnu::always_inline]] Lanes operator*(const double* weights) const {
-        return weights[0] * state(0) + weights[1] * state(1);
+        return weights[0] * of(0) + weights[1] * of(1);
     }
-};
-
-// Everything needed to step by one length in one regime.
-struct Step {
-    Matrix change;    // E(h) = exp(A h) - 1
-    Matrix integral;  // G(h)
-    double length;    // h [s]
-    Matrix growth;    // bound on |exp(A s)|, element by element, for 0 <= s <= h; of the coupled states alone
-
-    // G(h) times a rate.
-    [[gnu::always_inline]] Lanes integrate(const Lanes& rate) const {
-        Lanes sum = integral * rate;
-        sum.angle += length * rate.angle;
-        return sum;
+    [[gnu::always_inline]] Coupled rates(const double* weights) const {
+        return weights[0] * load(rate[0]) + weights[1] * load(rate[1]);
     }
 };
 
@@ -55,7 +51,8 @@ class Propagator {
  public:
     static constexpr int max_levels = 40;
     static constexpr int usual_levels = 12;
-    static constexpr double base_norm = 0.25;  // |A| h of the base interval, in scaled units
+    static constexpr double unbounded = 1e200;  // growth from here on is no longer reckoned
+    static constexpr double base_norm = 0.25;   // |A| h of the base interval, in scaled units
 
     // turns: its unit is a length of which some power-of-two multiple or fraction is the base interval.
     // scale: natural sizes of the states; only for choosing the base interval.
@@ -67,19 +64,18 @@ class Propagator {
         double norm = fastest;  // of A in scaled units, or the highest input frequency [1/s]
         for (int r = 0; r < n_states; ++r) {
             double sum = 0.0;
-            for (int c = 0; c < n_coupled; ++c) sum += std::fabs(rates.rate(r, c)) * scale[c] / scale[r];
+            for (int c = 0; c < n_coupled; ++c)
+                sum += std::fabs(r == load_angle ? (c == load_speed ? rates.turning : 0.0) : rates.rate(r, c)) *
+                       scale[c] / scale[r];
             norm = std::fmax(norm, sum);
         }
         base_ = turns.unit();
         exponent_ = 0;
         for (; norm * base_ > base_norm; base_ *= 0.5) --exponent_;
+        per_base_ = 1.0 / base_;
         longest_ = 0;
         while (longest_ + 1 < max_levels && fastest * length(longest_ + 1) <= 1.0) ++longest_;
         levels_ = 0;
-        steps_.clear();
-        responses_.clear();
-        steps_.reserve(usual_levels);
-        responses_.reserve(static_cast<std::size_t>(usual_levels * n_pairs_));
         taylor_.prepare(rates);
         add_base();
     }
@@ -94,14 +90,11 @@ class Propagator {
         while (levels_ <= k) add_doubled();
         return steps_[k];
     }
-    // What the pairs of functions of the inputs bring over a step of level k.
-    struct Response {
-        Driven change, rate;  // of x and of x'
-    };
     const Response* responses(int k) const { return responses_.data() + k * n_pairs_; }
     const Turn* turns(int k) const { return turns_of_level_[k]; }
 
     double length(int k) const { return base_ * power_of_two[k]; }
+    double per_length() const { return per_base_; }  // 1 / length(0), rounded
     // How many base intervals fit into s.
     std::uint64_t intervals(double s) const {
         auto n = static_cast<std::uint64_t>(s / base_);
@@ -120,10 +113,10 @@ class Propagator {
 
     // x after the step of level k; `rate` is x' at the anchor, `weights` the input state there.
     [[gnu::always_inline]] Lanes step(int k, const Lanes& x, const Lanes& rate, const double* weights) {
-        const Lanes free = level(k).integrate(rate);
+        const Lanes free = level(k).integral * rate;
         const Response* response = responses(k);
-        Lanes forced = response->change * weights;
-        for (int p = 1; p < n_pairs_; ++p) forced = forced + response[p].change * (weights + 2 * p);
+        Lanes forced = *response * weights;
+        for (int p = 1; p < n_pairs_; ++p) forced = forced + response[p] * (weights + 2 * p);
         return x + (free + forced);
     }
     // The same for x and x' at once, without a look at the rates of the regime in between.
@@ -131,29 +124,32 @@ class Propagator {
         const Step& s = level(k);
         const Response* response = responses(k);
         // What the inputs bring does not wait for the step before, so it is summed up by itself.
-        Lanes forced = response->change * weights;
-        Coupled forced_rate = (response->rate * weights).coupled;
+        Lanes forced = *response * weights;
+        Coupled forced_rate = response->rates(weights);
         for (int p = 1; p < n_pairs_; ++p) {
-            forced = forced + response[p].change * (weights + 2 * p);
-            forced_rate = forced_rate + (response[p].rate * (weights + 2 * p)).coupled;
+            forced = forced + response[p] * (weights + 2 * p);
+            forced_rate = forced_rate + response[p].rates(weights + 2 * p);
         }
-        x = x + (s.integrate(rate) + forced);
+        x = x + (s.integral * rate + forced);
         rate.coupled = rate.coupled + (s.change * rate.coupled + forced_rate);
-        rate.angle = rates().turning() * x.coupled[load_speed];
+        rate.angle = rates().turning * x.coupled[load_speed];
     }
 
     // G(h) for any length: whole levels from the longest down, then the Taylor series.
-    Matrix integral(double h) {
-        Matrix sum;
-        const auto append = [&sum](const Matrix& change, const Matrix& integral) {
-            sum.add(1.0, change * sum);  // G(s + h) = G(h) + exp(A h) G(s)
-            sum.add(1.0, integral);
+    Integral integral(double h) {
+        Integral sum;
+        const auto append = [this, &sum](const Matrix& change, const Integral& next) {
+            // G(s + h) = G(h) + exp(A h) G(s)
+            (load(sum.angle) + (sum.coupled.after(angle_change(next)) + load(next.angle))).store(sum.angle.data());
+            sum.coupled.add(1.0, change * sum.coupled);
+            sum.coupled.add(1.0, next.coupled);
+            sum.length += next.length;
         };
         for (int k = level_below(h); k >= 0; --k)
             for (; h >= length(k); h -= length(k)) append(level(k).change, level(k).integral);
         if (h > 0.0) {
-            const Matrix rest = taylor_.integral(h);
-            append(rates().rate * rest, rest);
+            const Integral rest = taylor_.integral(h);
+            append(rates().rate * rest.coupled, rest);
         }
         return sum;
     }
@@ -165,24 +161,34 @@ class Propagator {
         return p;
     }();
 
+    // The row of the load angle in exp(A h) - 1.
+    Coupled angle_change(const Integral& over_h) const { return rates().turning * over_h.coupled.row(load_speed); }
+
+    // Room for one level more. What an earlier use has left there is written over.
+    void make_room() {
+        const auto levels = static_cast<std::size_t>(levels_ + 1), pairs = static_cast<std::size_t>(n_pairs_);
+        if (steps_.size() < levels) steps_.resize(std::max<std::size_t>(levels, usual_levels));
+        if (responses_.size() < levels * pairs) responses_.resize(std::max<std::size_t>(levels, usual_levels) * pairs);
+    }
+
     void add_base() {
-        Step& s = steps_.emplace_back();
-        const double h = s.length = base_;
+        make_room();
+        Step& s = steps_[0];
+        const double h = base_;
         s.integral = taylor_.integral(h);
-        s.change = rates().rate * s.integral;
+        s.change = rates().rate * s.integral.coupled;
         // |exp(A s)| from the powers of a matrix without negative entries beside its diagonal.
         Matrix positive = rates().rate.magnitudes();
         for (int k = 0; k < n_coupled; ++k) positive.column[k][k] = std::fmax(rates().rate.column[k][k], 0.0);
         positive.scale(h);
         const Matrix twice = positive * positive;
         s.growth = Taylor::power_series<0>(positive, twice, positive * twice);
-        for (int p = 0; p < n_pairs_; ++p) {
-            Driven& change = responses_.emplace_back().change;
+        for (int p = 0; p < n_pairs_; ++p)
             for (int c = 0; c < 2; ++c) {
                 const InputBasis& function = turns_->basis()[static_cast<std::size_t>(2 * p + c)];
-                if (function.kind != InputBasis::nothing) change.set(c, taylor_.response(function, h));
+                responses_[static_cast<std::size_t>(p)].set(
+                    c, function.kind == InputBasis::nothing ? Lanes{} : taylor_.response(function, h));
             }
-        }
         finish_level();
     }
 
@@ -193,33 +199,40 @@ class Propagator {
     }
 
     void add_doubled() {
+        make_room();
         const int k = levels_ - 1;
-        steps_.emplace_back();
-        const Step& a = steps_[k];
-        Step& b = steps_[k + 1];
-        b.length = 2.0 * a.length;
-        doubled(a.change, a.change, b.change);
-        doubled(a.change, a.integral, b.integral);
+        const Step& a = steps_[static_cast<std::size_t>(k)];
+        Step& b = steps_[static_cast<std::size_t>(k + 1)];
         for (int c = 0; c < n_coupled; ++c) {
+            const Column &change = a.change.column[c], &integral = a.integral.coupled.column[c];
+            (2.0 * load(change) + a.change * change).store(b.change.column[c].data());
+            (2.0 * load(integral) + a.change * integral).store(b.integral.coupled.column[c].data());
             // |exp(A (h + s))| <= |exp(A s)| |exp(A h)|, of which the second is known.
-            const Coupled size = absolute(Matrix::identity().coupled(c) + a.change.coupled(c));
-            most(a.growth.coupled(c), a.growth * size).store(b.growth.column[c].data());
+            const Coupled size = absolute(Matrix::identity().at(c) + load(change));
+            least(most(a.growth.at(c), a.growth * size), unbounded).store(b.growth.column[c].data());
         }
-        std::array<Lanes, n_inputs> held;  // what a constant input of 1 brings
-        for (int i = 0; i < n_inputs; ++i) held[i] = a.integrate(load(rates().input_column[i]));
+        const Coupled angle = angle_change(a.integral);
+        (2.0 * load(a.integral.angle) + a.integral.coupled.after(angle)).store(b.integral.angle.data());
+        b.integral.length = 2.0 * a.integral.length;
         for (int p = 0; p < n_pairs_; ++p) {
             const InputBasis* basis = &turns_->basis()[static_cast<std::size_t>(2 * p)];
-            const Driven from = responses(k)[p].change;
-            Driven& to = responses_.emplace_back().change;
-            const auto kept = [&](int c) { return from.state(c) + a.change * from.state(c); };
+            const Response& from = responses(k)[p];
+            Response& to = responses_[static_cast<std::size_t>((k + 1) * n_pairs_ + p)];
+            const auto held = [&](int input) { return a.integral * rates().input_column[input]; };
+            const auto kept = [&](int c) {
+                const Lanes own = from.of(c);
+                return Lanes{own.coupled + a.change * from.change[c], own.angle + (angle * own.coupled).sum()};
+            };
             if (basis->kind == InputBasis::cosine) {
                 const Turn turn = turns(k)[p];
-                const Lanes &cosine = from.state(0), &sine = from.state(1), &constant = held[basis->input];
+                const Lanes cosine = from.of(0), sine = from.of(1), constant = held(basis->input);
                 to.set(0, kept(0) + (turn.cos * cosine + (-turn.sin * sine + cosine_change(k, p) * constant)));
                 to.set(1, kept(1) + (turn.cos * sine + (turn.sin * cosine + turn.sin * constant)));
             } else {
-                for (int c = 0; c < 2 && basis[c].kind == InputBasis::ramp; ++c)
-                    to.set(c, kept(c) + (from.state(c) + a.length * held[basis[c].input]));
+                for (int c = 0; c < 2; ++c)
+                    to.set(c, basis[c].kind == InputBasis::nothing
+                                  ? Lanes{}
+                                  : kept(c) + (from.of(c) + length(k) * held(basis[c].input)));
             }
         }
         finish_level();
@@ -232,29 +245,26 @@ class Propagator {
         for (int p = 0; p < n_pairs_; ++p) {
             const InputBasis* basis = &turns_->basis()[static_cast<std::size_t>(2 * p)];
             Response& r = responses_[static_cast<std::size_t>(k * n_pairs_ + p)];
-            for (int c = 0; c < 2 && basis[c].kind != InputBasis::nothing; ++c) {
-                const double input = basis[c].kind == InputBasis::ramp     ? length(k)
+            for (int c = 0; c < 2; ++c) {
+                const double input = basis[c].kind == InputBasis::nothing  ? 0.0
+                                     : basis[c].kind == InputBasis::ramp   ? length(k)
                                      : basis[c].kind == InputBasis::cosine ? cosine_change(k, p)
                                                                            : turn[p].sin;
-                r.rate.set(c, rates().rate * r.change.state(c) + input * load(rates().input_column[basis[c].input]));
+                (rates().rate * r.change[c] + input * load(rates().input_column[basis[c].input]))
+                    .store(r.rate[c].data());
             }
         }
     }
 
-    // 2 m + change m
-    static void doubled(const Matrix& change, const Matrix& m, Matrix& out) {
-        for (int c = 0; c < n_coupled; ++c) (2.0 * m.coupled(c) + change * m.coupled(c)).store(out.column[c].data());
-        (2.0 * Coupled::load(m.angle.data()) + m.times_row(change.angle)).store(out.angle.data());
-    }
-
     Taylor taylor_;
     double base_ = 0.0;  // length of level 0 [s]
-    int exponent_ = 0;   // of two: base / unit
-    int longest_ = 0;    // level
-    int n_pairs_ = 0;    // of functions of the inputs
+    double per_base_ = 0.0;
+    int exponent_ = 0;  // of two: base / unit
+    int longest_ = 0;   // level
+    int n_pairs_ = 0;   // of functions of the inputs
     InputTurns* turns_ = nullptr;
     int levels_ = 0;
-    std::vector<Step> steps_;          // one a level
+    std::vector<Step> steps_;          // one a level, kept when others are reckoned
     std::vector<Response> responses_;  // levels x n_pairs
     std::array<const Turn*, max_levels> turns_of_level_{};
 };

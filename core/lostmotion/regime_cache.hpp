@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <new>
 #include <unordered_map>
 #include <vector>
 
@@ -27,9 +28,10 @@ class RegimeCache {
         Propagator propagator;
         std::array<Entry*, max_guards> neighbour{};  // what lies beyond each guard, as far as it is known
 
-        void set(const Regime& r) {
-            regime = r;
-            rates = LinearRates(r);
+        void set(const System& system, const RegimeKey& key) {
+            // In place, since they are large.
+            const Regime& r = *new (&regime) Regime(system.build(key));
+            new (&rates) LinearRates(r);
             guards = {};
             neighbour = {};
             touch_guard = -1;
@@ -66,7 +68,7 @@ class RegimeCache {
                 found = std::move(spare_.back());
                 spare_.pop_back();
             }
-            found->set(system_.build(key));
+            found->set(system_, key);
         }
         last_ = found.get();
         return *last_;

@@ -60,7 +60,7 @@ class Sensitivity {
         x_ = s.x_end;
         memory_ = s.memory;
         if (!(s.end > s.begin)) return true;
-        const Matrix G = s.entry.propagator.integral(s.end - s.begin);
+        const Integral G = s.entry.propagator.integral(s.end - s.begin);
         // x(s) = x + G x', column by column.
         for (int c = 0; c < n_components; ++c) {
             State rate{};
@@ -68,8 +68,8 @@ class Sensitivity {
                 const Components g = gradient(r.rate[row]);
                 for (int k = 0; k < n_components; ++k) rate[row] += g[k] * jacobian.row[k][c];
             }
-            State change = G * rate;
-            change[load_angle] += (s.end - s.begin) * rate[load_angle];
+            State change;
+            (G * load(rate)).store(change.data());
             for (int row = 0; row < n_states; ++row) jacobian.row[row][c] += change[row];
         }
         return true;

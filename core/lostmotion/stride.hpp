@@ -16,37 +16,43 @@ namespace lostmotion {
 class Stride {
  public:
     // On a regime, with steps of one level, from where a cursor stands.
-    void place(Propagator& propagator, int level, const State& constant, const Cursor& from) {
+    void place(Propagator& propagator, int level, const Column& constant, const Cursor& from) {
         step_ = &propagator.level(level);
         const double length = propagator.length(level);
         const InputState& input = from.input();
         const LinearRates& rates = propagator.rates();
-        const Propagator::Response* responses = propagator.responses(level);
+        const Response* responses = propagator.responses(level);
         const Turn* turns = propagator.turns(level);
+        turning_ = rates.turning * step_->integral.coupled.row(load_speed);
         x_ = from.x();
         linear_ = input.linear();
-        State driving = constant, ramp{};
+        Coupled driving = load(constant), ramp{};
         for (int i = 0; i < n_inputs; ++i) {
             increase_[i] = input.slope()[i] * length;
-            add_scaled(driving, linear_[i], rates.input_column[i]);
-            add_scaled(ramp, increase_[i], rates.input_column[i]);
+            driving = driving + linear_[i] * load(rates.input_column[i]);
+            ramp = ramp + increase_[i] * load(rates.input_column[i]);
         }
-        forced_ = step_->integrate(load(driving));
-        growth_ = step_->integrate(load(ramp));
-        sines_.clear();
+        forced_ = step_->integral * Lanes{driving};
+        growth_ = step_->integral * Lanes{ramp};
+        std::size_t sines = 0;
+        sines_.resize(static_cast<std::size_t>(input.size() / 2));
         sines_of_first_ = 0;
         for (int q = 0; q < input.size(); q += 2) {
             const InputBasis& basis = input.basis(q);
-            const Driven& response = responses[q / 2].change;
+            const Response& response = responses[q / 2];
             const double* weights = input.weights() + q;
             if (basis.kind == InputBasis::cosine) {
-                const Lanes whole = step_->integrate(load(rates.input_column[basis.input])) + response.state(0);
                 if (basis.input == 0) ++sines_of_first_;
-                sines_.push_back({Pack<2>::load(weights), turns[q / 2], whole, response.state(1)});
+                Turning& t = sines_[sines++];  // in place, for the sake of speed
+                t.sine_cosine = Pack<2>::load(weights);
+                t.turn = turns[q / 2];
+                t.by_sine = step_->integral * rates.input_column[basis.input] + response.of(0);
+                t.by_cosine = response.of(1);
             } else {
                 forced_ = forced_ + response * weights;
             }
         }
+        sines_.resize(sines);
     }
 
     // Where the cursor stood and n - 1 steps on from there.
@@ -66,7 +72,8 @@ class Stride {
                 driven = driven + (t.sine_cosine[0] * t.by_sine + t.sine_cosine[1] * t.by_cosine);
                 t.sine_cosine = t.turn * t.sine_cosine;
             }
-            x = x + (step_->change * x + driven);
+            const Lanes own{step_->change * x.coupled, (turning_ * x.coupled).sum()};
+            x = x + (own + driven);
             forced = forced + growth_;
             for (int i = 0; i < n_inputs; ++i) linear_[i] += increase_[i];
         }
@@ -82,6 +89,7 @@ class Stride {
     };
 
     const Step* step_ = nullptr;
+    Coupled turning_;  // the row of the load angle in exp(A h) - 1
     State x_{};
     Lanes forced_, growth_;
     std::array<double, n_inputs> linear_{}, increase_{};

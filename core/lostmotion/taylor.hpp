@@ -21,9 +21,9 @@ class Expansion {
 
     using Inputs = std::array<std::array<double, n_inputs>, terms>;  // their derivatives, from the first on
     Inputs input;
-    double angle_rate;                    // of the load angle, at the instant
-    bool turning;                         // whether the load speed turns it
-    std::array<Coupled, terms> coupled;   // derivatives of the other states, from the first on
+    double angle_rate;                   // of the load angle
+    double turning;                      // its rate over the load speed
+    std::array<Coupled, terms> coupled;  // derivatives of the other states, from the first on
 
     // By how much the state changes over s.
     [[gnu::always_inline]] Lanes change(double s) const {
@@ -38,7 +38,7 @@ class Expansion {
             const Pack<4> rates = Pack<4>::of({v[0][load_speed], v[1][load_speed], v[2][load_speed], v[3][load_speed]});
             angle += (c * over_next(first) * rates).sum();
         }
-        return {sum, s * (angle_rate + (turning ? angle : 0.0))};
+        return {sum, s * (angle_rate + turning * angle)};
     }
 
     // A form of the motion that does not depend on the load angle, as a polynomial in the time [s] from the instant.
@@ -83,6 +83,21 @@ class Expansion {
     }
 };
 
+// G(h), the integral of exp(A s) from 0 to h.
+struct Integral {
+    Matrix coupled;
+    Column angle{};  // the row of the load angle, but for its own rate
+    double length = 0.0;
+
+    // By how much the state changes that had this rate.
+    [[gnu::always_inline]] Lanes operator*(const Lanes& rate) const {
+        return {coupled * rate.coupled, (load(angle) * rate.coupled).sum() + length * rate.angle};
+    }
+    [[gnu::always_inline]] Lanes operator*(const Column& rate) const {
+        return {coupled * rate, (load(angle) * load(rate)).sum()};
+    }
+};
+
 // What it takes to expand the motions of one regime.
 class Taylor {
  public:
@@ -91,7 +106,7 @@ class Taylor {
         squared_ = rates.rate * rates.rate;
         cubed_ = rates.rate * squared_;
         for (int i = 0; i < n_inputs; ++i) {
-            const Coupled B = coupled(rates.input_column[i]);
+            const Coupled B = load(rates.input_column[i]);
             input_[i] = {B, rates.rate * B, squared_ * B};
         }
     }
@@ -122,13 +137,21 @@ class Taylor {
     }
 
     // G over at most one base interval.
-    Matrix integral(double h) const {
+    Integral integral(double h) const {
         Matrix one = rates_->rate, two = squared_, three = cubed_;
         one.scale(h);
         two.scale(h * h);
         three.scale(h * h * h);
-        Matrix sum = power_series<1>(one, two, three);
-        sum.scale(h);
+        Integral sum{power_series<1>(one, two, three), {}, h};
+        sum.coupled.scale(h);
+        // The load angle is turned by the integral of the load speed's row.
+        const Coupled first = Matrix::identity().row(load_speed), second = one.row(load_speed),
+                      third = two.row(load_speed);
+        Coupled row{};
+        for (int k = Expansion::terms - 3; k >= 0; k -= 3)
+            row = three.after(row) +
+                  (over_factorial[k + 2] * first + (over_factorial[k + 3] * second + over_factorial[k + 4] * third));
+        (rates_->turning * h * h * row).store(sum.angle.data());
         return sum;
     }
 
@@ -160,7 +183,7 @@ class Taylor {
     [[gnu::always_inline]] void expand(const Lanes& rate, const std::array<bool, n_inputs>& varies,
                                        Expansion& out) const {
         out.angle_rate = rate.angle;
-        out.turning = rates_->rate.angle[load_speed] != 0.0;
+        out.turning = rates_->turning;
         const auto recur = [&](auto forced) __attribute__((always_inline)) {
             auto& v = out.coupled;
             v[0] = rate.coupled;
@@ -182,12 +205,12 @@ class Taylor {
             recur([](Coupled x, int) __attribute__((always_inline)) { return x; });
     }
 
-    static constexpr std::array<double, Expansion::terms + 1> over_factorial = [] {
-        std::array<double, Expansion::terms + 1> c{};
+    static constexpr std::array<double, Expansion::terms + 2> over_factorial = [] {
+        std::array<double, Expansion::terms + 2> c{};
         double factorial = 1.0;
-        for (int k = 0; k <= Expansion::terms; ++k) {
-            if (k > 0) factorial *= k;
-            c[static_cast<std::size_t>(k)] = 1.0 / factorial;
+        for (std::size_t k = 0; k < c.size(); ++k) {
+            if (k > 0) factorial *= static_cast<double>(k);
+            c[k] = 1.0 / factorial;
         }
         return c;
     }();

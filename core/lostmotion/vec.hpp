@@ -22,7 +22,6 @@ inline constexpr int vec_width = 4;
 inline constexpr int vec_width = 2;
 #endif
 using Vec = VecOf<vec_width>::Type;
-using Mask = decltype(Vec{} < Vec{});
 
 template <class V = Vec>
 V load(const double* from) {
@@ -135,20 +134,27 @@ Pack<n> most(Pack<n> a, const Pack<n>& b) {
     for (int p = 0; p < Pack<n>::parts; ++p) a.part[p] = a.part[p] < b.part[p] ? b.part[p] : a.part[p];
     return a;
 }
-// One bit for each number, the first lowest.
-inline unsigned bits(Mask m) {
+// Each number, but `bound` at most.
+template <int n>
+Pack<n> least(Pack<n> a, double bound) {
+    const auto limit = typename Pack<n>::Part{} + bound;
+    for (auto& part : a.part) part = part < limit ? part : limit;
+    return a;
+}
+// Where a > b, as bits, the first number lowest.
+inline unsigned above(Vec a, Vec b) {
 #if defined __AVX512DQ__ && defined __AVX512VL__
-    return _mm512_movepi64_mask((__m512i)m);
+    return _mm512_cmp_pd_mask(a, b, _CMP_GT_OQ);
 #elif defined __AVX__
-    return static_cast<unsigned>(_mm256_movemask_pd((__m256d)m));
+    return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(a, b, _CMP_GT_OQ)));
 #elif defined __SSE2__
-    return static_cast<unsigned>(_mm_movemask_pd((__m128d)m));
+    return static_cast<unsigned>(_mm_movemask_pd(_mm_cmpgt_pd(a, b)));
 #else
     unsigned out = 0;
-    for (int k = 0; k < vec_width; ++k) out |= m[k] != 0 ? 1u << k : 0u;
+    for (int k = 0; k < vec_width; ++k) out |= a[k] > b[k] ? 1u << k : 0u;
     return out;
 #endif
 }
-inline bool all(Mask m) { return bits(m) == (1u << vec_width) - 1; }
+inline constexpr unsigned all_bits = (1u << vec_width) - 1;
 
 }  // namespace lostmotion
