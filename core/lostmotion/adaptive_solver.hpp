@@ -129,7 +129,7 @@ class AdaptiveSolver {
     Status change_regime(const Guard* fired, Observer& observer) {
         Switching s;
         if (fired != nullptr) input_.anchor(time_);
-        const Status status = switch_regime(system_, cache_, input_, time_, fired, now_, key_, s);
+        const Status status = switch_regime(system_, cache_, input_, time_, fired, true, now_, key_, s);
         if (fired != nullptr) stopped_at_ = fired->contact;
         if (status != Status::done) return status;
         observer.switching(s);

@@ -154,13 +154,22 @@ class ExactSolver {
             if (++crossings_ % 8 == 0)
                 input_.anchor(time_);
             else
-                input_ = reached_->input();
+                input_ = end_->input();
         }
-        const Status status = switch_regime(system_, cache_, input_, time_, fired, now_, key_, s);
+        const Status status = switch_regime(system_, cache_, input_, time_, fired, keeps(observer), now_, key_, s);
         if (fired != nullptr) stopped_at_ = fired->contact;
         if (status != Status::done) return status;
         observer.switching(s);
         return accumulation_.add(time_, unit_) ? Status::zeno : Status::done;
+    }
+
+    // Whether an observer keeps what it is told of the next switching, the torques among them.
+    template <class Observer>
+    static bool keeps(const Observer& observer) {
+        if constexpr (requires { observer.keeps_switchings(); })
+            return observer.keeps_switchings();
+        else
+            return false;
     }
 
     enum class Verdict { clear, crossing, uncertain };
@@ -180,7 +189,7 @@ class ExactSolver {
         Propagator& p = e.propagator;
         GuardTable::Values constant;
         e.guards.constants(segment.memory, constant);
-        Cursor *cursor = &cursor_, *end = &end_;
+        Cursor *&cursor = cursor_, *&end = end_;
         Ends *here = &ends_[0], *there = &ends_[1];
         cursor->place(p, segment.constant, input_, now_.x);
         off_zero_ = false;
@@ -215,8 +224,7 @@ class ExactSolver {
                     continue;
                 }
                 if (verdict == Verdict::crossing) {
-                    first_crossing(e, segment.memory, *cursor, *here, *there, h, *end, fired);
-                    reached_ = end;
+                    first_crossing(e, segment.memory, *cursor, *here, *there, h, fired);
                     time_ = end->time();
                     now_.x = end->x();
                     last_level_ = level;
@@ -343,9 +351,9 @@ class ExactSolver {
         return least > power * bounds_.fourth[g] / factorial[4];
     }
 
-    // Earliest of the certified crossings; `end` is left there.
+    // Earliest of the certified crossings; end_ is left there.
     void first_crossing(typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here,
-                        const Ends& there, double h, Cursor& end, const Guard*& fired) {
+                        const Ends& there, double h, const Guard*& fired) {
         double best = std::numeric_limits<double>::infinity();
         const auto cubic = [&](int g) {
             return Cubic(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
@@ -365,14 +373,14 @@ class ExactSolver {
             if (k > 0 && cubic(g)(best / h) > bounds_.error[g]) continue;
             double s = estimate[g] * h;
             if (touch) {
-                trial_ = cursor;
-                trial_.advance(s);
+                *trial_ = cursor;
+                trial_->advance(s);
             } else {
                 s = find_zero(e, g, memory, cursor, s, h);
             }
             if (s < best) {
                 best = s;
-                std::swap(end, trial_);
+                std::swap(end_, trial_);
                 fired = &e.regime.guards[g];
             }
         }
@@ -386,12 +394,12 @@ class ExactSolver {
         const double base = e.propagator.length(0);
         double low = 0.0, high = h, s = estimate;
         for (int m = 0; m < 100; ++m) {
-            trial_ = cursor;
-            const double rest = trial_.advance_by_levels(s), from = s - rest;
-            const double value = lostmotion::evaluate(form, trial_.x(), memory, trial_.input().values());
-            trial_.expand(expansion_);
+            *trial_ = cursor;
+            const double rest = trial_->advance_by_levels(s), from = s - rest;
+            const double value = lostmotion::evaluate(form, trial_->x(), memory, trial_->input().values());
+            trial_->expand(expansion_);
             const Polynomial guard = expansion_.polynomial(form, value);
-            const double reach = std::fabs(rest) + 0.25 * base, at = trial_.time();
+            const double reach = std::fabs(rest) + 0.25 * base, at = trial_->time();
             double z = rest;
             bool found = false;
             for (int n = 0; n < 60 && !found && std::fabs(z) <= reach; ++n) {
@@ -403,7 +411,7 @@ class ExactSolver {
             }
             if (found && std::fabs(z) <= reach) {
                 s = std::clamp(from + z, 0.0, h);
-                trial_.nudge(expansion_, s - from);
+                trial_->nudge(expansion_, s - from);
                 return s;
             }
             // The zero lies elsewhere: where the last step led, or in half of what is left.
@@ -411,8 +419,8 @@ class ExactSolver {
             s = from + z;
             if (!(s > low && s < high)) s = 0.5 * (low + high);
         }
-        trial_ = cursor;
-        trial_.advance(s);
+        *trial_ = cursor;
+        trial_->advance(s);
         return s;
     }
 
@@ -432,9 +440,9 @@ class ExactSolver {
     InputTurns& turns_;
     InputState input_{signals_, turns_.basis()};
     std::array<double, n_inputs> input_bound_;  // on the fourth derivative of each, for all time
-    Cursor cursor_{input_}, end_ = cursor_, trial_ = cursor_;
+    std::array<Cursor, 3> cursors_{Cursor(input_), Cursor(input_), Cursor(input_)};
+    Cursor *cursor_ = &cursors_[0], *end_ = &cursors_[1], *trial_ = &cursors_[2];  // they change their roles
     Expansion expansion_;
-    const Cursor* reached_ = nullptr;  // where the last crossing was found
     int crossings_ = 0;
     Ends ends_[2];
     Bounds bounds_;

@@ -38,8 +38,8 @@ struct Cubic {
             if (s > 0.0 && s < 1.0 && (*this)(s) < (*this)(best)) best = s;
         return best;
     }
-    // Zero between 0, where it is positive, and `b`, where it is negative, to a few digits: Halley's method, kept in
-    // its bracket by bisection.
+    // Zero between 0, where it is positive, and `b`, where it is negative, to two or three digits: Halley's method,
+    // kept in its bracket by bisection.
     double zero(double b) const {
         // By powers, for the sake of speed: c0 + z (a1 + z (a2 + z a3)).
         const double a1 = 3.0 * (c1 - c0), a2 = 3.0 * (c0 - 2.0 * c1 + c2), a3 = c3 - c0 + 3.0 * (c1 - c2);
@@ -53,7 +53,7 @@ struct Cubic {
             const double moved = std::fabs(next - z);
             const bool inside = next > a && next < b;
             z = inside ? next : 0.5 * (a + b);
-            if ((inside && moved < 1e-2 * z) || b - a < 1e-9) break;
+            if ((inside && moved < 0.1 * z) || b - a < 1e-9) break;
         }
         return z;
     }

@@ -53,8 +53,10 @@ class Recorder {
     bool segment(const Segment<SwitchedDrive>& s) {
         return sampler_.segment(s) && (!options_.energy || meter_.segment(s));
     }
+    bool keeps_switchings() const { return report_.switching_count < options_.max_switchings; }
     void switching(const Switching& s) {
-        if (report_.switching_count++ < options_.max_switchings) report_.switchings.push_back(s);
+        if (keeps_switchings()) report_.switchings.push_back(s);
+        ++report_.switching_count;
     }
     void end(const State& x) {
         meter_.end(x);

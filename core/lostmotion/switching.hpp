@@ -40,9 +40,9 @@ inline void see_inputs(const InputState& input, double time, Instant& now) {
 }
 
 // Finds the regime that follows after `fired` has reached zero, with the inputs of that instant, or, if it is nullptr,
-// after an input has jumped.
+// after an input has jumped. torques: whether those of the record are wanted.
 template <class System, class Cache>
-Status switch_regime(const System& system, Cache& cache, InputState& input, double time, const Guard* fired,
+Status switch_regime(const System& system, Cache& cache, InputState& input, double time, const Guard* fired, bool torques,
                      Instant& now, RegimeKey& key, Switching& s) {
     s.time = time;
     s.before = key;
@@ -55,17 +55,17 @@ Status switch_regime(const System& system, Cache& cache, InputState& input, doub
         if (fired->kind == Guard::outside) return Status::outside;
     } else {
         input.anchor_left(time);
-        s.torque_before = evaluate(old.output_torque, now.x, now.memory, input.values());
+        if (torques) s.torque_before = evaluate(old.output_torque, now.x, now.memory, input.values());
         input.anchor(time);
     }
     see_inputs(input, time, now);
-    if (fired != nullptr) s.torque_before = evaluate(old.output_torque, now.x, now.memory, now.input[0]);
+    if (fired != nullptr && torques) s.torque_before = evaluate(old.output_torque, now.x, now.memory, now.input[0]);
     const Found found = system.next(cache, now, fired, key);
     if (found != Found::yes) return status_of(found);
     s.after = key;
     s.x = now.x;
     s.memory = now.memory;
-    s.torque_after = evaluate(cache.regime(key).output_torque, now.x, now.memory, now.input[0]);
+    if (torques) s.torque_after = evaluate(cache.regime(key).output_torque, now.x, now.memory, now.input[0]);
     return Status::done;
 }
 
