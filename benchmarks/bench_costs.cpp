@@ -11,7 +11,6 @@ namespace {
 
 struct Nothing {
     bool segment(const Segment<SwitchedDrive>&) { return true; }
-    void switching(const Switching&) {}
     void step(const Regime&, const Memory&, const DenseStep&, bool) {}
 };
 

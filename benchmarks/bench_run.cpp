@@ -14,7 +14,6 @@ namespace {
 struct SamplesOnly {
     Sampler sampler;
     bool segment(const Segment<SwitchedDrive>& s) { return sampler.segment(s); }
-    void switching(const Switching&) {}
 };
 
 // The same drive again and again.

@@ -93,6 +93,7 @@ class AdaptiveSolver {
     const std::vector<InputBasis>& basis() const { return basis_; }
     Contact stopped_at() const { return stopped_at_; }
     long steps() const { return steps_; }
+    std::size_t switchings() const { return switchings_; }
 
     Status begin(double time, const State& x, const Memory& memory) {
         time_ = time;
@@ -101,6 +102,7 @@ class AdaptiveSolver {
         input_.anchor(time_);
         see_inputs(input_, time_, now_);
         step_ = 0.0;
+        switchings_ = 0;
         return status_of(system_.start(cache_, now_, key_));
     }
 
@@ -127,12 +129,15 @@ class AdaptiveSolver {
  private:
     template <class Observer>
     Status change_regime(const Guard* fired, Observer& observer) {
-        Switching s;
         if (fired != nullptr) input_.anchor(time_);
-        const Status status = switch_regime(system_, cache_, input_, time_, fired, true, now_, key_, s);
+        Switching s;
+        const bool wanted = wants_switching(observer);
+        const Status status = switch_regime(system_, cache_, input_, time_, fired, now_, key_, wanted ? &s : nullptr);
         if (fired != nullptr) stopped_at_ = fired->contact;
         if (status != Status::done) return status;
-        observer.switching(s);
+        ++switchings_;
+        if constexpr (requires { observer.switching(s); })
+            if (wanted) observer.switching(s);
         return accumulation_.add(time_, 1.0) ? Status::zeno : Status::done;
     }
 
@@ -285,6 +290,7 @@ class AdaptiveSolver {
     Instant now_;
     RegimeKey key_;
     long steps_ = 0;
+    std::size_t switchings_ = 0;
     Accumulation accumulation_;
     bool off_zero_ = false;  // whether the guard that may touch has been off zero in this regime
     Contact stopped_at_ = input_contact;

@@ -11,24 +11,24 @@ class Cursor {
  public:
     explicit Cursor(const InputState& input) : input_(input) {}
 
-    // On a regime, at a state and the inputs of its instant.
-    void place(Propagator& propagator, const Column& constant, const InputState& input, const State& x) {
+    // On a regime, at a state; the inputs are those of the instant already.
+    void place(Propagator& propagator, const Column& constant, const State& x) {
         propagator_ = &propagator;
         constant_ = &constant;
-        input_ = input;
         x_ = x;
         rate_known_ = false;
     }
+    InputState& inputs() { return input_; }
 
     double time() const { return input_.time(); }
     const State& x() const { return x_; }
     const InputState& input() const { return input_; }
-    [[gnu::always_inline]] const State& rate() {
+    [[gnu::always_inline]] const State& rate() const {
         if (!rate_known_) rate_ = propagator_->rates()(x_, *constant_, input_.values());
         rate_known_ = true;
         return rate_;
     }
-    Coupled fourth_derivative() { return propagator_->taylor().fourth_derivative(coupled(rate()), input_); }
+    Coupled fourth_derivative() const { return propagator_->taylor().fourth_derivative(coupled(rate()), input_); }
 
     void anchor(double time) {
         input_.follow(time);
@@ -41,7 +41,7 @@ class Cursor {
     }
 
     // To one step beyond where another stands on the same stretch.
-    void step_from(Cursor& from, int level) {
+    void step_from(const Cursor& from, int level) {
         propagator_ = from.propagator_;
         constant_ = from.constant_;
         const Lanes x = propagator_->step(level, load(from.x_), load(from.rate()), from.input_.weights());
@@ -50,14 +50,15 @@ class Cursor {
         propagator_->rates()(x.coupled, *constant_, input_.values()).store(rate_.data());
         rate_known_ = true;
     }
-    // By whole levels, from the longest down, to the nearest of the instants that they lead to. Returns what is left of
-    // h >= 0, half a base interval forward or backward at most.
-    double advance_by_levels(double h) {
-        Propagator& p = *propagator_;
+    // To the nearest of the instants that whole levels lead to from where another stands, from the longest down.
+    // Returns what is left of h >= 0, half a base interval forward or backward at most.
+    double advance_by_levels(const Cursor& from, double h) {
+        Propagator& p = *(propagator_ = from.propagator_);
+        constant_ = from.constant_;
+        input_ = from.input_;
         // By way of a signed number, which processors make of a floating-point one at once.
         const auto n = static_cast<std::uint64_t>(static_cast<std::int64_t>(h * p.per_length() + 0.5));
-        if (n == 0) return h;
-        Lanes x = load(x_), rate = load(this->rate());
+        Lanes x = load(from.x_), rate = load(from.rate());
         const auto step = [&](int k) __attribute__((always_inline)) {
             p.step(k, x, rate, input_.weights());
             input_.advance(p.length(k), p.turns(k));
@@ -71,17 +72,22 @@ class Cursor {
         }
         x.store(x_.data());
         rate.store(rate_.data());
+        rate_known_ = true;
         return h - p.length(0) * static_cast<double>(n);
     }
     // By any length: whole levels, then the Taylor series. Backward by one base interval at most.
-    void advance(double h) {
-        if (h > 0.0) h = advance_by_levels(h);
+    void advance(double h) { advance_from(*this, h); }
+    void advance_from(const Cursor& from, double h) {
+        if (h > 0.0)
+            h = advance_by_levels(from, h);
+        else if (this != &from)
+            *this = from;
         if (h == 0.0) return;
         Expansion e;
         expand(e);
         nudge(e, h);
     }
-    void expand(Expansion& out) { propagator_->taylor().expand(load(rate()), input_, out); }
+    void expand(Expansion& out) const { propagator_->taylor().expand(load(rate()), input_, out); }
     // By one base interval at most, forward or backward; the inputs turn on from where they are.
     void nudge(const Expansion& here, double s) {
         (load(x_) + here.change(s)).store(x_.data());
@@ -93,8 +99,9 @@ class Cursor {
     Propagator* propagator_ = nullptr;
     const Column* constant_ = nullptr;
     InputState input_;
-    State x_{}, rate_{};
-    bool rate_known_ = false;
+    State x_{};
+    mutable State rate_{};  // once it has been asked for
+    mutable bool rate_known_ = false;
 };
 
 }  // namespace lostmotion

@@ -49,9 +49,9 @@ class EnergyMeter {
         const Regime& r = s.entry.regime;
         if (r.at_rest[input_contact] && r.at_rest[load_contact]) return true;
         Propagator& p = s.entry.propagator;
-        if (!cursor_) end_ = cursor_.emplace(s.input);
+        if (!cursor_) end_ = cursor_.emplace(s.at.input());
         Cursor &cursor = *cursor_, &end = *end_;
-        cursor.place(p, s.constant, s.input, s.x);
+        cursor = s.at;
         const Factors factors(drive_, r, s.memory);
         Powers here, there;
         factors.powers(p, cursor, here);
@@ -83,7 +83,6 @@ class EnergyMeter {
         level_ = level;
         return true;
     }
-    void switching(const Switching&) {}
 
  private:
     static constexpr int orders = 5;  // value and four derivatives

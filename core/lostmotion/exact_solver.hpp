@@ -26,10 +26,9 @@ namespace lostmotion {
 template <class System>
 struct Segment {
     typename RegimeCache<System>::Entry& entry;
-    const InputState& input;  // at begin
-    double begin, end;        // [s]
-    bool last;                // no further segment follows in this call: `end` belongs to it
-    State x;                  // at begin
+    const Cursor& at;   // where it begins
+    double begin, end;  // [s]
+    bool last;          // no further segment follows in this call: `end` belongs to it
     Memory memory;
     Column constant;  // the part of dx/dt that depends on neither state nor inputs
     State x_end;      // at end, before any stop there
@@ -51,7 +50,8 @@ class ExactSolver {
           scale_(scale),
           unit_(elementary(unit)),
           turns_(cache_.serve(unit_, input_basis(signals))),
-          input_bound_(input_.fourth_derivative_bound()) {}
+          cursors_{start(), start(), start(), start()},
+          input_bound_(begin_->input().fourth_derivative_bound()) {}
     ExactSolver(const ExactSolver&) = delete;
     ExactSolver& operator=(const ExactSolver&) = delete;
 
@@ -68,10 +68,12 @@ class ExactSolver {
     double unit() const { return unit_; }
     Contact stopped_at() const { return stopped_at_; }
     long looks() const { return looks_; }
+    std::size_t switchings() const { return switchings_; }
 
     // Sets the state and finds the regime it is in.
     Status begin(double time, const State& x, const Memory& memory) {
         set_time(time);
+        switchings_ = 0;
         now_.x = x;
         now_.memory = memory;
         anchor_inputs();
@@ -95,7 +97,7 @@ class ExactSolver {
     // Runs to t_end. The observer gets every segment and every switching as they come.
     template <class Observer>
     Status advance(double t_end, Observer& observer) {
-        input_.anchor(time_);
+        begin_->inputs().anchor(time_);
         crossings_ = 0;  // so that what follows depends on the state alone
         if (jump_pending_) {
             jump_pending_ = false;
@@ -105,8 +107,9 @@ class ExactSolver {
         while (true) {
             typename Cache::Entry& entry = cache_.entry(key_);
             if (!entry.propagator.ready()) entry.prepare(turns_, scale_);
-            Segment<System> segment{
-                entry, input_, time_, t_end, true, now_.x, now_.memory, entry.rates.constant(now_.memory), now_.x};
+            Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
+                                    now_.x};
+            begin_->place(entry.propagator, segment.constant, now_.x);
             if (!(time_ < knot_)) knot_ = next_knot(signals_, time_);
             const double limit = std::min(t_end, knot_);
             const Guard* fired = nullptr;
@@ -131,6 +134,7 @@ class ExactSolver {
     // A third of the length times the error of the slope of a cubic, over the error of its value.
     static constexpr double slope_share = 0.00802 / 3.0 * 384.0;
 
+    Cursor start() const { return Cursor(InputState(signals_, turns_.basis())); }
     static double elementary(double unit) {
         while (unit > 1e-2) unit *= 0.5;
         return unit;
@@ -143,33 +147,26 @@ class ExactSolver {
         last_level_ = first_level;  // so that what follows depends on the state alone
     }
     void anchor_inputs() {
-        input_.anchor(time_);
-        see_inputs(input_, time_, now_);
+        begin_->inputs().anchor(time_);
+        see_inputs(begin_->input(), time_, now_);
     }
 
     template <class Observer>
     Status change_regime(const Guard* fired, Observer& observer) {
-        Switching s;
         if (fired != nullptr) {
-            if (++crossings_ % 8 == 0)
-                input_.anchor(time_);
-            else
-                input_ = end_->input();
+            std::swap(begin_, there_);
+            if (++crossings_ % 8 == 0) begin_->inputs().anchor(time_);
         }
-        const Status status = switch_regime(system_, cache_, input_, time_, fired, keeps(observer), now_, key_, s);
+        Switching s;
+        const bool wanted = wants_switching(observer);
+        const Status status =
+            switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, wanted ? &s : nullptr);
         if (fired != nullptr) stopped_at_ = fired->contact;
         if (status != Status::done) return status;
-        observer.switching(s);
+        ++switchings_;
+        if constexpr (requires { observer.switching(s); })
+            if (wanted) observer.switching(s);
         return accumulation_.add(time_, unit_) ? Status::zeno : Status::done;
-    }
-
-    // Whether an observer keeps what it is told of the next switching, the torques among them.
-    template <class Observer>
-    static bool keeps(const Observer& observer) {
-        if constexpr (requires { observer.keeps_switchings(); })
-            return observer.keeps_switchings();
-        else
-            return false;
     }
 
     enum class Verdict { clear, crossing, uncertain };
@@ -189,9 +186,8 @@ class ExactSolver {
         Propagator& p = e.propagator;
         GuardTable::Values constant;
         e.guards.constants(segment.memory, constant);
-        Cursor *&cursor = cursor_, *&end = end_;
+        Cursor *cursor = begin_, *end = there_;
         Ends *here = &ends_[0], *there = &ends_[1];
-        cursor->place(p, segment.constant, input_, now_.x);
         off_zero_ = false;
         touch_size_ = 0.0;
         evaluate(e.guards, constant, *cursor, *here);
@@ -213,8 +209,7 @@ class ExactSolver {
                 if (h == p.length(level)) {
                     end->step_from(*cursor, level);
                 } else {
-                    *end = *cursor;
-                    end->advance(h);
+                    end->advance_from(*cursor, h);
                 }
                 evaluate(e.guards, constant, *end, *there);
                 bound_fourth(e.guards, p.level(level).growth, fourth + h * forced);
@@ -225,15 +220,17 @@ class ExactSolver {
                 }
                 if (verdict == Verdict::crossing) {
                     first_crossing(e, segment.memory, *cursor, *here, *there, h, fired);
-                    time_ = end->time();
-                    now_.x = end->x();
+                    time_ = there_->time();
+                    now_.x = there_->x();
                     last_level_ = level;
                     return Status::done;
                 }
                 time_ = h == left ? limit : time_ + h;
                 break;
             }
-            std::swap(cursor, end);
+            cursor = end;
+            std::swap(here_, there_);
+            end = there_;
             std::swap(here, there);
             // Twice the length has at least sixteen times the error; try it where there is room for more than that.
             if (roomy_ && p.can_double(level, limit - time_)) ++level;
@@ -351,7 +348,7 @@ class ExactSolver {
         return least > power * bounds_.fourth[g] / factorial[4];
     }
 
-    // Earliest of the certified crossings; end_ is left there.
+    // Earliest of the certified crossings; there_ is left at it.
     void first_crossing(typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here,
                         const Ends& there, double h, const Guard*& fired) {
         double best = std::numeric_limits<double>::infinity();
@@ -373,14 +370,13 @@ class ExactSolver {
             if (k > 0 && cubic(g)(best / h) > bounds_.error[g]) continue;
             double s = estimate[g] * h;
             if (touch) {
-                *trial_ = cursor;
-                trial_->advance(s);
+                trial_->advance_from(cursor, s);
             } else {
                 s = find_zero(e, g, memory, cursor, s, h);
             }
             if (s < best) {
                 best = s;
-                std::swap(end_, trial_);
+                std::swap(there_, trial_);
                 fired = &e.regime.guards[g];
             }
         }
@@ -394,8 +390,7 @@ class ExactSolver {
         const double base = e.propagator.length(0);
         double low = 0.0, high = h, s = estimate;
         for (int m = 0; m < 100; ++m) {
-            *trial_ = cursor;
-            const double rest = trial_->advance_by_levels(s), from = s - rest;
+            const double rest = trial_->advance_by_levels(cursor, s), from = s - rest;
             const double value = lostmotion::evaluate(form, trial_->x(), memory, trial_->input().values());
             trial_->expand(expansion_);
             const Polynomial guard = expansion_.polynomial(form, value);
@@ -419,8 +414,7 @@ class ExactSolver {
             s = from + z;
             if (!(s > low && s < high)) s = 0.5 * (low + high);
         }
-        *trial_ = cursor;
-        trial_->advance(s);
+        trial_->advance_from(cursor, s);
         return s;
     }
 
@@ -437,11 +431,13 @@ class ExactSolver {
     RegimeKey key_;
     int last_level_ = first_level;
     long looks_ = 0;
+    std::size_t switchings_ = 0;
     InputTurns& turns_;
-    InputState input_{signals_, turns_.basis()};
+    // Where the present segment begins, the two ends of a look, and one that is tried out. They change their roles, not
+    // their contents.
+    std::array<Cursor, 4> cursors_;
+    Cursor *begin_ = &cursors_[0], *here_ = &cursors_[1], *there_ = &cursors_[2], *trial_ = &cursors_[3];
     std::array<double, n_inputs> input_bound_;  // on the fourth derivative of each, for all time
-    std::array<Cursor, 3> cursors_{Cursor(input_), Cursor(input_), Cursor(input_)};
-    Cursor *cursor_ = &cursors_[0], *end_ = &cursors_[1], *trial_ = &cursors_[2];  // they change their roles
     Expansion expansion_;
     int crossings_ = 0;
     Ends ends_[2];

@@ -53,11 +53,8 @@ class Recorder {
     bool segment(const Segment<SwitchedDrive>& s) {
         return sampler_.segment(s) && (!options_.energy || meter_.segment(s));
     }
-    bool keeps_switchings() const { return report_.switching_count < options_.max_switchings; }
-    void switching(const Switching& s) {
-        if (keeps_switchings()) report_.switchings.push_back(s);
-        ++report_.switching_count;
-    }
+    bool wants_switching() const { return report_.switchings.size() < options_.max_switchings; }
+    void switching(const Switching& s) { report_.switchings.push_back(s); }
     void end(const State& x) {
         meter_.end(x);
         report_.energy = meter_.ledger;
@@ -107,6 +104,7 @@ inline RunReport run_exact(Workspace& workspace, const Signals& signals, const S
     report.x = solver.state();
     report.memory = solver.memory();
     report.steps = solver.looks();
+    report.switching_count = solver.switchings();
     return report;
 }
 
@@ -132,9 +130,8 @@ class AdaptiveRecorder {
             for (int c = 0; c < n_channels; ++c) out_[c * options_.samples + next_] = reading.value[c];
         }
     }
-    void switching(const Switching& s) {
-        if (report_.switching_count++ < options_.max_switchings) report_.switchings.push_back(s);
-    }
+    bool wants_switching() const { return report_.switchings.size() < options_.max_switchings; }
+    void switching(const Switching& s) { report_.switchings.push_back(s); }
 
  private:
     const Drive& drive_;
@@ -162,6 +159,7 @@ inline RunReport run_adaptive(const Drive& drive, const Signals& signals, const 
     report.x = solver.state();
     report.memory = solver.memory();
     report.steps = solver.steps();
+    report.switching_count = solver.switchings();
     return report;
 }
 

@@ -32,10 +32,9 @@ class Sampler {
         const std::size_t end = due(s);
         if (next_ == end) return true;
         Propagator& p = s.entry.propagator;
-        if (!cursor_) cursor_.emplace(s.input);
+        if (!cursor_) cursor_.emplace(s.at.input());
         Cursor& cursor = *cursor_;
-        cursor.place(p, s.constant, s.input, s.x);
-        cursor.advance(instant(next_) - s.begin);
+        cursor.advance_from(s.at, instant(next_) - s.begin);
         const int level = level_of_interval(p);
         const Reader reader(drive_, s.entry.regime, s.memory);
         while (true) {
@@ -58,7 +57,6 @@ class Sampler {
             cursor.advance(instant(next_) - cursor.time());
         }
     }
-    void switching(const Switching&) {}
 
  private:
     double instant(std::size_t k) const { return begin_ + static_cast<double>(k) * interval_; }

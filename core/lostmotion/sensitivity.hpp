@@ -52,9 +52,9 @@ class Sensitivity {
     bool smooth = true;  // false: a switching by a touch, or with a rate that is lost in rounding
 
     bool segment(const Segment<SwitchedDrive>& s) {
-        if (!input_) input_.emplace(s.input);
+        if (!input_) input_.emplace(s.at.input());
         for (int k = 0; k < n_states; ++k)
-            size[k] = std::fmax(size[k], std::fmax(std::fabs(s.x[k]), std::fabs(s.x_end[k])));
+            size[k] = std::fmax(size[k], std::fmax(std::fabs(s.at.x()[k]), std::fabs(s.x_end[k])));
         const Regime& r = s.entry.regime;
         regime_ = &r;
         x_ = s.x_end;

@@ -60,7 +60,6 @@ class Simulation {
  private:
     struct Nothing {
         bool segment(const Segment<SwitchedDrive>&) { return true; }
-        void switching(const Switching&) {}
     };
     void advance_nowhere() {
         solver_.resume(now_.time, now_.x, now_.memory, now_.key);

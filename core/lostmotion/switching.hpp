@@ -39,33 +39,48 @@ inline void see_inputs(const InputState& input, double time, Instant& now) {
     now.input_size = input.sizes();
 }
 
+// Whether an observer of a run is to be told of the next switching: if it has switching(), and wants_switching() does
+// not say otherwise.
+template <class Observer>
+bool wants_switching(const Observer& observer) {
+    if constexpr (!requires(Observer o, Switching s) { o.switching(s); })
+        return false;
+    else if constexpr (requires { observer.wants_switching(); })
+        return observer.wants_switching();
+    else
+        return true;
+}
+
 // Finds the regime that follows after `fired` has reached zero, with the inputs of that instant, or, if it is nullptr,
-// after an input has jumped. torques: whether those of the record are wanted.
+// after an input has jumped. Fills the record, if one is wanted.
 template <class System, class Cache>
-Status switch_regime(const System& system, Cache& cache, InputState& input, double time, const Guard* fired, bool torques,
-                     Instant& now, RegimeKey& key, Switching& s) {
-    s.time = time;
-    s.before = key;
-    s.input_jump = fired == nullptr;
-    const Regime& old = cache.regime(key);
-    if (fired != nullptr) {
-        s.kind = fired->kind;
-        s.contact = fired->contact;
-        s.guard = static_cast<int>(fired - old.guards.data());
-        if (fired->kind == Guard::outside) return Status::outside;
-    } else {
-        input.anchor_left(time);
-        if (torques) s.torque_before = evaluate(old.output_torque, now.x, now.memory, input.values());
-        input.anchor(time);
+Status switch_regime(const System& system, Cache& cache, InputState& input, double time, const Guard* fired,
+                     Instant& now, RegimeKey& key, Switching* record) {
+    if (fired != nullptr && fired->kind == Guard::outside) return Status::outside;
+    if (record != nullptr) {
+        const Regime& old = cache.regime(key);
+        if (fired == nullptr) input.anchor_left(time);
+        *record = {};
+        record->time = time;
+        record->input_jump = fired == nullptr;
+        record->before = key;
+        record->torque_before = evaluate(old.output_torque, now.x, now.memory, input.values());
+        if (fired != nullptr) {
+            record->kind = fired->kind;
+            record->contact = fired->contact;
+            record->guard = static_cast<int>(fired - old.guards.data());
+        }
     }
+    if (fired == nullptr) input.anchor(time);
     see_inputs(input, time, now);
-    if (fired != nullptr && torques) s.torque_before = evaluate(old.output_torque, now.x, now.memory, now.input[0]);
     const Found found = system.next(cache, now, fired, key);
     if (found != Found::yes) return status_of(found);
-    s.after = key;
-    s.x = now.x;
-    s.memory = now.memory;
-    if (torques) s.torque_after = evaluate(cache.regime(key).output_torque, now.x, now.memory, now.input[0]);
+    if (record != nullptr) {
+        record->after = key;
+        record->x = now.x;
+        record->memory = now.memory;
+        record->torque_after = evaluate(cache.regime(key).output_torque, now.x, now.memory, now.input[0]);
+    }
     return Status::done;
 }
 

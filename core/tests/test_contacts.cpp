@@ -123,7 +123,6 @@ TEST_SUITE("contacts") {
         ExactSolver<SwitchedDrive> solver(system, signals, 1e-3, drive.balanced_scale());
         struct {
             bool segment(const Segment<SwitchedDrive>&) { return true; }
-            void switching(const Switching&) {}
         } nothing;
         REQUIRE(solver.begin(0.0, {}, {}) == Status::done);
         int stuck = 0;

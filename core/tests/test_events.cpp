@@ -195,7 +195,6 @@ TEST_SUITE("events") {
         REQUIRE(solver.begin(0.0, x, {}) == Status::done);
         struct {
             void step(const Regime&, const Memory&, const DenseStep&, bool) {}
-            void switching(const Switching&) {}
         } nothing;
         const double period = 4.0 * std::comp_ellint_1(std::sin(0.5)) / std::sqrt(25.0 / 1.001);
         REQUIRE(solver.advance(period, nothing) == Status::done);
