@@ -15,8 +15,7 @@ class Cursor {
     void place(Propagator& propagator, const Column& constant, const State& x) {
         propagator_ = &propagator;
         constant_ = &constant;
-        x_ = x;
-        rate_known_ = false;
+        arrive(load(x));
     }
     InputState& inputs() { return input_; }
 
@@ -46,9 +45,7 @@ class Cursor {
         constant_ = from.constant_;
         const Lanes x = propagator_->step(level, load(from.x_), load(from.rate()), from.input_.weights());
         input_.advance_from(from.input_, propagator_->length(level), propagator_->turns(level));
-        x.store(x_.data());
-        propagator_->rates()(x.coupled, *constant_, input_.values()).store(rate_.data());
-        rate_known_ = true;
+        arrive(x);
     }
     // To the nearest of the instants that whole levels lead to from where another stands, from the longest down.
     // Returns what is left of h >= 0, half a base interval forward or backward at most.
@@ -96,6 +93,13 @@ class Cursor {
     }
 
  private:
+    // At a state that the inputs belong to.
+    [[gnu::always_inline]] void arrive(const Lanes& x) {
+        x.store(x_.data());
+        propagator_->rates()(x.coupled, *constant_, input_.values()).store(rate_.data());
+        rate_known_ = true;
+    }
+
     Propagator* propagator_ = nullptr;
     const Column* constant_ = nullptr;
     InputState input_;
