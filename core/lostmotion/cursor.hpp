@@ -84,6 +84,14 @@ class Cursor {
         expand(e);
         nudge(e, h);
     }
+    // The same, with the constant at another place.
+    void nudge(const Column& constant, double s) {
+        constant_ = &constant;
+        if (s == 0.0) return;
+        Expansion e;
+        expand(e);
+        nudge(e, s);
+    }
     void expand(Expansion& out) const { propagator_->taylor().expand(load(rate()), input_, out); }
     // By one base interval at most, forward or backward; the inputs turn on from where they are.
     void nudge(const Expansion& here, double s) {

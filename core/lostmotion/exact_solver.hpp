@@ -25,7 +25,8 @@ namespace lostmotion {
 // A stretch of time spent in one regime, from which an observer can evaluate the exact state at any instant.
 template <class System>
 struct Segment {
-    typename RegimeCache<System>::Entry& entry;
+    using Entry = typename RegimeCache<System>::Entry;
+    Entry& entry;
     const Cursor& at;   // where it begins
     double begin, end;  // [s]
     bool last;          // no further segment follows in this call: `end` belongs to it

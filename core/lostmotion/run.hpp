@@ -56,6 +56,7 @@ class Recorder {
     bool wants_switching() const { return report_.switchings.size() < options_.max_switchings; }
     void switching(const Switching& s) { report_.switchings.push_back(s); }
     void end(const State& x) {
+        sampler_.write();
         meter_.end(x);
         report_.energy = meter_.ledger;
         report_.left_data_at = sampler_.left_data_at;

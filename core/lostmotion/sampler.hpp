@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
-#include <optional>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "exact_solver.hpp"
 #include "reader.hpp"
@@ -18,47 +19,79 @@ class Sampler {
  public:
     Sampler(const Drive& drive, double begin, double interval, std::size_t count, double* out,
             std::span<const int> channels = all_channels)
-        : drive_(drive), begin_(begin), interval_(interval), count_(count), out_(out), channels_(channels) {}
+        : drive_(drive), begin_(begin), interval_(interval), count_(count), out_(out), channels_(channels) {
+        pieces_.reserve(most_pieces);
+    }
 
     // Polled now and then; true ends the run.
     bool (*interrupted)(void*) = nullptr;
     void* interrupted_context = nullptr;
 
-    std::size_t written() const { return next_; }
     double left_data_at = std::numeric_limits<double>::infinity();  // first instant outside the loss map's data [s]
 
     bool segment(const Segment<SwitchedDrive>& s) {
         if (!s.entry.regime.in_data) left_data_at = std::fmin(left_data_at, s.begin);
         const std::size_t end = due(s);
-        if (next_ == end) return true;
-        Propagator& p = s.entry.propagator;
-        if (!cursor_) cursor_.emplace(s.at.input());
-        Cursor& cursor = *cursor_;
-        cursor.advance_from(s.at, instant(next_) - s.begin);
-        const int level = level_of_interval(p);
-        const Reader reader(drive_, s.entry.regime, s.memory);
-        while (true) {
-            const int n = static_cast<int>(std::min<std::size_t>(end - next_, Instants::most - next_ % Instants::most));
-            if (level >= 0) {
-                stride_.place(p, level, s.constant, cursor);
-                stride_.run(n, instants_);
-            } else {
-                instants_.set(0, load(cursor.x()), cursor.input().values());
-                for (int k = 1; k < n; ++k) {
-                    cursor.advance(instant(next_ + k) - cursor.time());
-                    instants_.set(k, load(cursor.x()), cursor.input().values());
-                }
-            }
-            for (int k = 0; k < n; k += vec_width) write(reader, k, n);
-            next_ += static_cast<std::size_t>(n);
-            if (next_ == end) return true;
-            if (next_ % 4096 == 0 && interrupted != nullptr && interrupted(interrupted_context)) return false;
-            if (level >= 0) cursor.move_to(instant(next_ - 1), stride_.x());
-            cursor.advance(instant(next_) - cursor.time());
+        if (next_ < end) {
+            if (n_pieces_ == pieces_.size()) pieces_.emplace_back(s.at);
+            Piece& p = pieces_[n_pieces_++];
+            p.entry = &s.entry;
+            p.memory = s.memory;
+            p.constant = s.constant;
+            p.first = next_;
+            p.end = next_ = end;
+            p.rest = p.cursor.advance_by_levels(s.at, instant(p.first) - s.begin);
         }
+        return s.last || n_pieces_ == most_pieces ? write() : true;
+    }
+    // Writes what has been collected. Only needed if the last segment has not come.
+    bool write() {
+        // Every piece is a chain of steps that wait for one another, so it pays to have several at hand.
+        const std::span<Piece> pieces(pieces_.data(), std::exchange(n_pieces_, 0));
+        for (Piece& p : pieces) p.cursor.nudge(p.constant, p.rest);
+        for (Piece& p : pieces)
+            if (!write(p)) return false;
+        return true;
     }
 
  private:
+    // The samples of one segment.
+    struct Piece {
+        explicit Piece(const Cursor& like) : cursor(like) {}
+        typename Segment<SwitchedDrive>::Entry* entry = nullptr;
+        Memory memory;
+        Column constant;
+        Cursor cursor;
+        std::size_t first = 0, end = 0;
+        double rest = 0.0;  // from the cursor to the first [s]
+    };
+    static constexpr std::size_t most_pieces = 16;
+
+    bool write(Piece& p) {
+        Propagator& propagator = p.entry->propagator;
+        const int level = level_of_interval(propagator);
+        const Reader reader(drive_, p.entry->regime, p.memory);
+        for (std::size_t next = p.first;;) {
+            const int n = static_cast<int>(std::min<std::size_t>(p.end - next, Instants::most - next % Instants::most));
+            if (level >= 0) {
+                stride_.place(propagator, level, p.constant, p.cursor);
+                stride_.run(n, instants_);
+            } else {
+                instants_.set(0, load(p.cursor.x()), p.cursor.input().values());
+                for (int k = 1; k < n; ++k) {
+                    p.cursor.advance(instant(next + k) - p.cursor.time());
+                    instants_.set(k, load(p.cursor.x()), p.cursor.input().values());
+                }
+            }
+            for (int k = 0; k < n; k += vec_width) write(reader, next + k, k, n);
+            next += static_cast<std::size_t>(n);
+            if (next == p.end) return true;
+            if (next % 4096 == 0 && interrupted != nullptr && interrupted(interrupted_context)) return false;
+            if (level >= 0) p.cursor.move_to(instant(next - 1), stride_.x());
+            p.cursor.advance(instant(next) - p.cursor.time());
+        }
+    }
+
     double instant(std::size_t k) const { return begin_ + static_cast<double>(k) * interval_; }
     // The number of the first sample after a segment.
     std::size_t due(const Segment<SwitchedDrive>& s) const {
@@ -71,11 +104,11 @@ class Sampler {
         while (k < count_ && within(k)) ++k;
         return k;
     }
-    // All channels at the instants k, k + 1, ... of n. What goes beyond these is written again by the segment that they
-    // belong to, but must not go beyond the channel.
-    void write(const Reader& reader, int k, int n) {
-        double* to = out_ + next_ + k;
-        const bool whole = next_ + static_cast<std::size_t>(k + vec_width) <= count_;
+    // All channels at the instants k, k + 1, ... of n, of which the first is the sample `at`. What goes beyond these is
+    // written again by the segment that they belong to, but must not go beyond the channel.
+    void write(const Reader& reader, std::size_t at, int k, int n) {
+        double* to = out_ + at;
+        const bool whole = at + vec_width <= count_;
         for (const int c : channels_) {
             const Vec value = reader.read(c, instants_, k);
             if (whole)
@@ -96,7 +129,8 @@ class Sampler {
     std::size_t count_, next_ = 0;
     double* out_;
     std::span<const int> channels_;
-    std::optional<Cursor> cursor_;  // kept from segment to segment for its memory, as the stride
+    std::vector<Piece> pieces_;  // kept for their memory, as the stride
+    std::size_t n_pieces_ = 0;   // that have been collected
     Stride stride_;
     Instants instants_;
 };
