@@ -146,19 +146,24 @@ class InputTurns {
 class InputState {
  public:
     InputState(const Signals& signals, const std::vector<InputBasis>& basis)
-        : signals_(&signals), basis_(basis.data()), size_(static_cast<int>(basis.size())), weights_(basis.size()) {
+        : signals_(&signals), basis_(basis.data()), size_(static_cast<int>(basis.size())) {
+        make_room();
         sines_end_[0] = 2 * static_cast<int>(signals[0].sines.size());
         sines_end_[1] = sines_end_[0] + 2 * static_cast<int>(signals[1].sines.size());
         anchor(0.0);
     }
-    InputState(const InputState&) = default;
+    InputState(const InputState& o)
+        : signals_(o.signals_), basis_(o.basis_), size_(o.size_), sines_end_(o.sines_end_) {
+        make_room();
+        *this = o;
+    }
     // Of another with the same signals.
     InputState& operator=(const InputState& o) {
         time_ = o.time_;
         knot_ = o.knot_;
         linear_ = o.linear_;
         slope_ = o.slope_;
-        for (int q = 0; q < size_; q += 2) pair_of(o, q).store(&weights_[q]);
+        for (int q = 0; q < size_; q += 2) pair_of(o, q).store(weights_ + q);
         return *this;
     }
 
@@ -199,7 +204,7 @@ class InputState {
     double time() const { return time_; }
     int size() const { return size_; }
     const InputBasis& basis(int q) const { return basis_[q]; }
-    const double* weights() const { return weights_.data(); }
+    const double* weights() const { return weights_; }
 
     [[gnu::always_inline]] std::array<double, n_inputs> values() const {
         return sum(linear_, [this](int q) { return weights_[q]; });
@@ -282,7 +287,7 @@ class InputState {
             const bool small = a2 < 1e-6;
             const double cosine = small ? 1.0 - a2 / 2.0 * (1.0 - a2 / 12.0) : std::cos(a);
             const double sine = small ? a * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0)) : std::sin(a);
-            (Turn{cosine, sine} * pair_of(*this, q)).store(&weights_[q]);
+            (Turn{cosine, sine} * pair_of(*this, q)).store(weights_ + q);
         }
     }
 
@@ -294,11 +299,15 @@ class InputState {
         knot_ = from.knot_;
         slope_ = from.slope_;
         for (int i = 0; i < n_inputs; ++i) linear_[i] = from.linear_[i] + slope_[i] * h;
-        for (int q = 0; q < size_; q += 2) (*turns++ * pair_of(from, q)).store(&weights_[q]);
+        for (int q = 0; q < size_; q += 2) (*turns++ * pair_of(from, q)).store(weights_ + q);
     }
 
  private:
-    static Pack<2> pair_of(const InputState& s, int q) { return Pack<2>::load(&s.weights_[q]); }
+    void make_room() {
+        if (size_ > static_cast<int>(few_.size())) many_.resize(static_cast<std::size_t>(size_));
+        weights_ = many_.empty() ? few_.data() : many_.data();
+    }
+    static Pack<2> pair_of(const InputState& s, int q) { return Pack<2>::load(s.weights_ + q); }
     // For each input, what it begins with and the terms of its sines.
     template <class Term>
     [[gnu::always_inline]] std::array<double, n_inputs> sum(const std::array<double, n_inputs>& begin,
@@ -318,7 +327,9 @@ class InputState {
     double time_ = 0.0;
     std::array<const Knot*, n_inputs> knot_{};
     std::array<double, n_inputs> linear_{}, slope_{};
-    std::vector<double> weights_;  // cosine: a sin(psi); sine: a cos(psi); ramp: slope
+    double* weights_;  // of cosine: a sin(psi); sine: a cos(psi); ramp: slope
+    std::array<double, 4> few_{};
+    std::vector<double> many_;  // instead, if they do not fit
 };
 
 }  // namespace lostmotion
