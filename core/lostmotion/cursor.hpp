@@ -47,30 +47,30 @@ class Cursor {
         input_.advance_from(from.input_, propagator_->length(level), propagator_->turns(level));
         arrive(x);
     }
-    // To the nearest of the instants that whole levels lead to from where another stands, from the longest down.
-    // Returns what is left of h >= 0, half a base interval forward or backward at most.
+    // To the nearest of the instants that whole levels, but not the shortest, lead to from where another stands; the
+    // longest first. Returns what is left of h >= 0, a base interval forward or backward at most.
     double advance_by_levels(const Cursor& from, double h) {
         Propagator& p = *(propagator_ = from.propagator_);
         constant_ = from.constant_;
         input_ = from.input_;
         // By way of a signed number, which processors make of a floating-point one at once.
-        const auto n = static_cast<std::uint64_t>(static_cast<std::int64_t>(h * p.per_length() + 0.5));
+        const auto n = static_cast<std::uint64_t>(static_cast<std::int64_t>(h * p.per_first() + 0.5));
         Lanes x = load(from.x_), rate = load(from.rate());
         const auto step = [&](int k) __attribute__((always_inline)) {
             p.step(k, x, rate, input_.weights());
             input_.advance(p.length(k), p.turns(k));
         };
-        const int top = p.longest_level();
-        for (std::uint64_t m = n >> top; m > 0; --m) step(top);
+        const int top = p.longest_level() - 1;
+        for (std::uint64_t m = n >> top; m > 0; --m) step(top + 1);
         for (std::uint64_t bits = n & ((1ull << top) - 1); bits != 0;) {
             const int k = static_cast<int>(std::bit_width(bits)) - 1;
-            step(k);
+            step(k + 1);
             bits ^= 1ull << k;
         }
         x.store(x_.data());
         rate.store(rate_.data());
         rate_known_ = true;
-        return h - p.length(0) * static_cast<double>(n);
+        return h - p.length(1) * static_cast<double>(n);
     }
     // By any length: whole levels, then the Taylor series. Backward by one base interval at most.
     void advance(double h) { advance_from(*this, h); }

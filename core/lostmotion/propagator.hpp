@@ -72,7 +72,7 @@ class Propagator {
         base_ = turns.unit();
         exponent_ = 0;
         for (; norm * base_ > base_norm; base_ *= 0.5) --exponent_;
-        per_base_ = 1.0 / base_;
+        per_first_ = 0.5 / base_;
         longest_ = 0;
         while (longest_ + 1 < max_levels && fastest * length(longest_ + 1) <= 1.0) ++longest_;
         levels_ = 0;
@@ -94,7 +94,7 @@ class Propagator {
     const Turn* turns(int k) const { return turns_of_level_[k]; }
 
     double length(int k) const { return base_ * power_of_two[k]; }
-    double per_length() const { return per_base_; }  // 1 / length(0), rounded
+    double per_first() const { return per_first_; }  // 1 / length(1), rounded
     // How many base intervals fit into s.
     std::uint64_t intervals(double s) const {
         auto n = static_cast<std::uint64_t>(s / base_);
@@ -258,7 +258,7 @@ class Propagator {
 
     Taylor taylor_;
     double base_ = 0.0;  // length of level 0 [s]
-    double per_base_ = 0.0;
+    double per_first_ = 0.0;
     int exponent_ = 0;  // of two: base / unit
     int longest_ = 0;   // level
     int n_pairs_ = 0;   // of functions of the inputs
