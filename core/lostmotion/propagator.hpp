@@ -95,18 +95,18 @@ class Propagator {
 
     double length(int k) const { return base_ * power_of_two[k]; }
     double per_first() const { return per_first_; }  // 1 / length(1), rounded
-    // How many base intervals fit into s.
-    std::uint64_t intervals(double s) const {
-        auto n = static_cast<std::uint64_t>(s / base_);
-        while (n > 0 && base_ * static_cast<double>(n) > s) --n;  // the quotient may have been rounded up
-        return n;
-    }
     // Steps stay below a sixth of the fastest input period: the doubling formula of a sine loses accuracy beyond it.
     int longest_level() const { return longest_; }
     // The highest level not longer than s (level 0 even if it is longer). Computes no level.
     int level_below(double s) const {
-        const double most = length(longest_);
-        return s >= most ? longest_ : std::max(0, static_cast<int>(std::bit_width(intervals(s))) - 1);
+        if (s >= length(longest_)) return longest_;
+        const int k = std::max(0, binary_exponent(s) - binary_exponent(base_));
+        return k > 0 && length(k) > s ? k - 1 : k;
+    }
+    // The level of just this length, or -1. Computes no level.
+    int level_of(double s) const {
+        const int k = binary_exponent(s) - binary_exponent(base_);
+        return k >= 0 && k <= longest_ && length(k) == s ? k : -1;
     }
     // Whether twice the level is a step within s.
     bool can_double(int k, double s) const { return k < longest_ && length(k + 1) <= s; }
@@ -160,6 +160,10 @@ class Propagator {
         for (int k = 0; k < max_levels; ++k) p[k] = static_cast<double>(1ull << k);
         return p;
     }();
+
+    static int binary_exponent(double positive) {
+        return static_cast<int>(std::bit_cast<std::uint64_t>(positive) >> 52);
+    }
 
     // The row of the load angle in exp(A h) - 1.
     Coupled angle_change(const Integral& over_h) const { return rates().turning * over_h.coupled.row(load_speed); }

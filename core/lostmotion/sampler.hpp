@@ -65,11 +65,11 @@ class Sampler {
         std::size_t first = 0, end = 0;
         double rest = 0.0;  // from the cursor to the first [s]
     };
-    static constexpr std::size_t most_pieces = 16;
+    static constexpr std::size_t most_pieces = 4;
 
     bool write(Piece& p) {
         Propagator& propagator = p.entry->propagator;
-        const int level = level_of_interval(propagator);
+        const int level = propagator.level_of(interval_);
         const Reader reader(drive_, p.entry->regime, p.memory);
         for (std::size_t next = p.first;;) {
             const int n = static_cast<int>(std::min<std::size_t>(p.end - next, Instants::most - next % Instants::most));
@@ -99,7 +99,7 @@ class Sampler {
             const double t = instant(k);
             return t < s.end || (s.last && t <= s.end * (1.0 + 4.0 * std::numeric_limits<double>::epsilon()));
         };
-        std::size_t k = std::clamp(static_cast<std::size_t>((s.end - begin_) / interval_), next_, count_);
+        std::size_t k = std::clamp(static_cast<std::size_t>((s.end - begin_) * per_interval_), next_, count_);
         while (k > next_ && !within(k - 1)) --k;
         while (k < count_ && within(k)) ++k;
         return k;
@@ -118,14 +118,9 @@ class Sampler {
             to += count_;
         }
     }
-    // The level whose length is the sampling interval, or -1.
-    int level_of_interval(Propagator& p) const {
-        const int k = p.level_below(interval_);
-        return p.length(k) == interval_ ? k : -1;
-    }
-
     const Drive& drive_;
     double begin_, interval_;
+    double per_interval_ = 1.0 / interval_;  // rounded
     std::size_t count_, next_ = 0;
     double* out_;
     std::span<const int> channels_;
