@@ -31,12 +31,11 @@ struct RegimeKey {
     std::array<std::uint64_t, 2> words() const { return std::bit_cast<std::array<std::uint64_t, 2>>(*this); }
     friend bool operator==(const RegimeKey& a, const RegimeKey& b) { return a.words() == b.words(); }
 
-    struct Hash {
-        std::size_t operator()(const RegimeKey& key) const {
-            const auto [a, b] = key.words();
-            return (a * 0x9e3779b97f4a7c15u) ^ (b * 0xc2b2ae3d27d4eb4fu);
-        }
-    };
+    std::size_t hash() const {
+        const auto [a, b] = words();
+        const std::uint64_t mixed = (a * 0x9e3779b97f4a7c15u) ^ (b * 0xc2b2ae3d27d4eb4fu);
+        return mixed ^ (mixed >> 32);
+    }
 };
 
 // A regime holds while each of its guards is >= 0.

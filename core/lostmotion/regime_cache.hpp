@@ -1,9 +1,9 @@
 // The regimes visited so far, each built once. A drive has finitely many; a run visits a few dozen.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <new>
-#include <unordered_map>
 #include <vector>
 
 #include "propagator.hpp"
@@ -56,22 +56,18 @@ class RegimeCache {
 
     explicit RegimeCache(const System& system) : system_(system) {}
 
-    const Regime& regime(const RegimeKey& key) { return entry(key).regime; }
+    const Regime& regime(RegimeKey key) { return entry(key).regime; }
 
-    Entry& entry(const RegimeKey& key) {
+    Entry& entry(RegimeKey key) {  // by value: two words in registers
         if (last_ != nullptr && key == last_->regime.key) return *last_;
-        std::unique_ptr<Entry>& found = entries_[key];
-        if (!found) {
-            if (spare_.empty()) {
-                found = std::make_unique<Entry>();
-            } else {
-                found = std::move(spare_.back());
-                spare_.pop_back();
-            }
-            found->set(system_, key);
+        std::size_t k = slot(key);
+        if (slots_[k] == nullptr) {
+            if (2 * (used_ + 1) > slots_.size()) k = grow(key);
+            if (used_ == entries_.size()) entries_.push_back(std::make_unique<Entry>());
+            slots_[k] = entries_[used_++].get();
+            slots_[k]->set(system_, key);
         }
-        last_ = found.get();
-        return *last_;
+        return *(last_ = slots_[k]);
     }
     // What lies beyond a guard of another regime; its key is asked for the first time only.
     template <class Key>
@@ -83,17 +79,17 @@ class RegimeCache {
 
     // Forgets all regimes, since the system has changed. Their memory is kept for others.
     void forget() {
-        for (auto& [key, entry] : entries_)
-            if (spare_.size() < most_kept) spare_.push_back(std::move(entry));
-        entries_.clear();
+        if (entries_.size() > most_kept) entries_.resize(most_kept);
+        std::ranges::fill(slots_, nullptr);
+        used_ = 0;
         last_ = nullptr;
     }
 
     // Makes ready for runs with this unit of length and these inputs; propagators for others are forgotten.
     InputTurns& serve(double unit, std::vector<InputBasis> basis) {
-        if (entries_.size() > most_kept) forget();
+        if (used_ > most_kept) forget();
         if (!turns_ || unit != turns_->unit() || basis != turns_->basis()) {
-            for (auto& [key, entry] : entries_) entry->propagator.reset();
+            for (std::size_t k = 0; k < used_; ++k) entries_[k]->propagator.reset();
             turns_ = std::make_unique<InputTurns>(unit, std::move(basis));
         }
         return *turns_;
@@ -102,11 +98,26 @@ class RegimeCache {
  private:
     static constexpr std::size_t most_kept = 4000;  // from run to run; each takes about 15 kilobytes
 
+    // Where the regime is, or where it has to go.
+    std::size_t slot(RegimeKey key) const {
+        const std::size_t mask = slots_.size() - 1;
+        std::size_t k = key.hash() & mask;
+        while (slots_[k] != nullptr && !(slots_[k]->regime.key == key)) k = (k + 1) & mask;
+        return k;
+    }
+    // Makes room for more; returns the slot of a key anew.
+    std::size_t grow(RegimeKey key) {
+        slots_.assign(2 * slots_.size(), nullptr);
+        for (std::size_t n = 0; n < used_; ++n) slots_[slot(entries_[n]->regime.key)] = entries_[n].get();
+        return slot(key);
+    }
+
     const System& system_;
     std::unique_ptr<InputTurns> turns_;
     Entry* last_ = nullptr;  // the one asked for last
-    std::unordered_map<RegimeKey, std::unique_ptr<Entry>, RegimeKey::Hash> entries_;
-    std::vector<std::unique_ptr<Entry>> spare_;
+    std::vector<std::unique_ptr<Entry>> entries_;  // those in use, then such as only keep their memory
+    std::size_t used_ = 0;
+    std::vector<Entry*> slots_ = std::vector<Entry*>(256, nullptr);  // a power of two, by hash, at most half full
 };
 
 }  // namespace lostmotion
