@@ -49,7 +49,7 @@ class Cursor {
     }
     // To the nearest of the instants that whole levels, but not the shortest, lead to from where another stands; the
     // longest first. Returns what is left of h >= 0, a base interval forward or backward at most.
-    double advance_by_levels(const Cursor& from, double h) {
+    [[gnu::always_inline]] double advance_by_levels(const Cursor& from, double h) {
         Propagator& p = *(propagator_ = from.propagator_);
         constant_ = from.constant_;
         input_ = from.input_;

@@ -131,7 +131,7 @@ class Propagator {
             forced_rate = forced_rate + response[p].rates(weights + 2 * p);
         }
         x = x + (s.integral * rate + forced);
-        rate.coupled = rate.coupled + (s.change * rate.coupled + forced_rate);
+        rate.coupled = s.change * rate.coupled + (rate.coupled + forced_rate);
         rate.angle = rates().turning * x.coupled[load_speed];
     }
 

@@ -114,7 +114,7 @@ class RegimeCache {
 
     const System& system_;
     std::unique_ptr<InputTurns> turns_;
-    Entry* last_ = nullptr;  // the one asked for last
+    Entry* last_ = nullptr;                        // the one asked for last
     std::vector<std::unique_ptr<Entry>> entries_;  // those in use, then such as only keep their memory
     std::size_t used_ = 0;
     std::vector<Entry*> slots_ = std::vector<Entry*>(256, nullptr);  // a power of two, by hash, at most half full

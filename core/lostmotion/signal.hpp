@@ -152,8 +152,7 @@ class InputState {
         sines_end_[1] = sines_end_[0] + 2 * static_cast<int>(signals[1].sines.size());
         anchor(0.0);
     }
-    InputState(const InputState& o)
-        : signals_(o.signals_), basis_(o.basis_), size_(o.size_), sines_end_(o.sines_end_) {
+    InputState(const InputState& o) : signals_(o.signals_), basis_(o.basis_), size_(o.size_), sines_end_(o.sines_end_) {
         make_room();
         *this = o;
     }

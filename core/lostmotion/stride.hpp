@@ -73,7 +73,7 @@ class Stride {
                 t.sine_cosine = t.turn * t.sine_cosine;
             }
             const Lanes own{step_->change * x.coupled, (turning_ * x.coupled).sum()};
-            x = x + (own + driven);
+            x = own + (x + driven);  // so that one sum less waits for the step before
             forced = forced + growth_;
             for (int i = 0; i < n_inputs; ++i) linear_[i] += increase_[i];
         }

@@ -114,7 +114,7 @@ class Taylor {
     const LinearRates& rates() const { return *rates_; }
 
     // At an instant with this rate and these inputs.
-    void expand(const Lanes& rate, const InputState& input, Expansion& out) const {
+    [[gnu::always_inline]] void expand(const Lanes& rate, const InputState& input, Expansion& out) const {
         input.derivatives(out.input);
         expand(rate, {input.varies(0), input.varies(1)}, out);
     }
