@@ -14,6 +14,17 @@
 
 namespace lostmotion {
 
+// 1/k!
+inline constexpr std::array<double, Polynomial::degree + 2> over_factorial = [] {
+    std::array<double, Polynomial::degree + 2> c{};
+    double factorial = 1.0;
+    for (std::size_t k = 0; k < c.size(); ++k) {
+        if (k > 0) factorial *= static_cast<double>(k);
+        c[k] = 1.0 / factorial;
+    }
+    return c;
+}();
+
 // The motion about an instant: its derivatives there, as far as a base interval needs them.
 class Expansion {
  public:
@@ -29,14 +40,15 @@ class Expansion {
     [[gnu::always_inline]] Lanes change(double s) const {
         const double s2 = s * s, s4 = s2 * s2;
         const Pack<4> powers = Pack<4>::of({s, s2, s2 * s, s4});
+        const std::array<double, Polynomial::parts> lead{1.0, s4, s4 * s4};
         Coupled sum{};
-        double angle = 0.0, power = s4 * s4;
-        for (int first = terms - 4; first >= 0; first -= 4) {
-            const Pack<4> c = (first == 0 ? powers : (first == 4 ? s4 : power) * powers) * over_factorial(first);
-            const Coupled* v = &coupled[static_cast<std::size_t>(first)];
+        double angle = 0.0;
+        for (int part = Polynomial::parts - 1; part >= 0; --part) {  // the small terms first
+            const Pack<4> c = lead[part] * powers * four_over_factorial(part);
+            const Coupled* v = &coupled[static_cast<std::size_t>(4 * part)];
             sum = sum + ((c.spread<0>() * v[0] + c.spread<1>() * v[1]) + (c.spread<2>() * v[2] + c.spread<3>() * v[3]));
             const Pack<4> rates = Pack<4>::of({v[0][load_speed], v[1][load_speed], v[2][load_speed], v[3][load_speed]});
-            angle += (c * over_next(first) * rates).sum();
+            angle += (c * four_over_next(part) * rates).sum();
         }
         return {sum, s * (angle_rate + turning * angle)};
     }
@@ -55,31 +67,23 @@ class Expansion {
                 const auto of = [&](int k) { return first * u[k][0] + second * u[k][1]; };
                 p.part[part] = p.part[part] + Pack<4>::of({of(0), of(1), of(2), of(3)});
             }
-            p.part[part] = p.part[part] * over_factorial(4 * part);
+            p.part[part] = p.part[part] * four_over_factorial(part);
         }
         return p;
     }
 
-    // 1/k! of four terms
-    static Pack<4> over_factorial(int first) {
-        static constexpr std::array<double, terms> table = [] {
-            std::array<double, terms> c{};
-            double factorial = 1.0;
-            for (int k = 1; k <= terms; ++k) c[static_cast<std::size_t>(k - 1)] = 1.0 / (factorial *= k);
-            return c;
-        }();
-        return Pack<4>::load(&table[static_cast<std::size_t>(first)]);
-    }
-
  private:
-    // 1/(k + 1) of four terms
-    static Pack<4> over_next(int first) {
+    // 1/k! and 1/(k + 1) of the four terms of a part.
+    static Pack<4> four_over_factorial(int part) {
+        return Pack<4>::load(&over_factorial[static_cast<std::size_t>(4 * part + 1)]);
+    }
+    static Pack<4> four_over_next(int part) {
         static constexpr std::array<double, terms> table = [] {
             std::array<double, terms> c{};
             for (int k = 1; k <= terms; ++k) c[static_cast<std::size_t>(k - 1)] = 1.0 / (k + 1);
             return c;
         }();
-        return Pack<4>::load(&table[static_cast<std::size_t>(first)]);
+        return Pack<4>::load(&table[static_cast<std::size_t>(4 * part)]);
     }
 };
 
@@ -171,7 +175,7 @@ class Taylor {
 
  private:
     // B, A B and A^2 B of one input.
-    struct Column {
+    struct Forcing {
         Coupled now, next, after;
 
         // To x^(k+3), from the k-th derivative of the input and the two after it.
@@ -205,19 +209,9 @@ class Taylor {
             recur([](Coupled x, int) __attribute__((always_inline)) { return x; });
     }
 
-    static constexpr std::array<double, Expansion::terms + 2> over_factorial = [] {
-        std::array<double, Expansion::terms + 2> c{};
-        double factorial = 1.0;
-        for (std::size_t k = 0; k < c.size(); ++k) {
-            if (k > 0) factorial *= static_cast<double>(k);
-            c[k] = 1.0 / factorial;
-        }
-        return c;
-    }();
-
     const LinearRates* rates_ = nullptr;
     Matrix squared_, cubed_;  // A^2, A^3
-    std::array<Column, n_inputs> input_;
+    std::array<Forcing, n_inputs> input_;
 };
 
 }  // namespace lostmotion
