@@ -19,7 +19,7 @@ struct Context {
     Memory memory;
     InputState* input = nullptr;
     LinearRates linear;
-    State constant{};
+    Column constant{};
     // Guards that have been off zero since the regime began. CVODE refuses to go on from a root, or from near one.
     std::array<bool, max_guards> left_zero{};
 };

@@ -171,8 +171,10 @@ class Propagator {
     // Room for one level more. What an earlier use has left there is written over.
     void make_room() {
         const auto levels = static_cast<std::size_t>(levels_ + 1), pairs = static_cast<std::size_t>(n_pairs_);
-        if (steps_.size() < levels) steps_.resize(std::max<std::size_t>(levels, usual_levels));
-        if (responses_.size() < levels * pairs) responses_.resize(std::max<std::size_t>(levels, usual_levels) * pairs);
+        if (steps_.empty()) steps_.reserve(usual_levels);
+        if (steps_.size() < levels) steps_.resize(levels);
+        if (responses_.empty()) responses_.reserve(usual_levels * pairs);
+        if (responses_.size() < levels * pairs) responses_.resize(levels * pairs);
     }
 
     void add_base() {

@@ -55,6 +55,12 @@ class RegimeCache {
     };
 
     explicit RegimeCache(const System& system) : system_(system) {}
+    ~RegimeCache() {
+        for (std::unique_ptr<Entry>& entry : entries_)
+            if (spare().size() < most_spare) spare().push_back(std::move(entry));
+    }
+    RegimeCache(const RegimeCache&) = delete;
+    RegimeCache& operator=(const RegimeCache&) = delete;
 
     const Regime& regime(RegimeKey key) { return entry(key).regime; }
 
@@ -63,7 +69,7 @@ class RegimeCache {
         std::size_t k = slot(key);
         if (slots_[k] == nullptr) {
             if (2 * (used_ + 1) > slots_.size()) k = grow(key);
-            if (used_ == entries_.size()) entries_.push_back(std::make_unique<Entry>());
+            if (used_ == entries_.size()) entries_.push_back(memory());
             slots_[k] = entries_[used_++].get();
             slots_[k]->set(system_, key);
         }
@@ -96,7 +102,20 @@ class RegimeCache {
     }
 
  private:
-    static constexpr std::size_t most_kept = 4000;  // from run to run; each takes about 15 kilobytes
+    static constexpr std::size_t most_kept = 4000;   // from run to run; each takes about 12 kilobytes
+    static constexpr std::size_t most_spare = 1000;  // from drive to drive, in each thread
+
+    // Entries of caches that are gone, for the sake of their memory.
+    static std::vector<std::unique_ptr<Entry>>& spare() {
+        thread_local std::vector<std::unique_ptr<Entry>> entries;
+        return entries;
+    }
+    static std::unique_ptr<Entry> memory() {
+        if (spare().empty()) return std::make_unique<Entry>();
+        std::unique_ptr<Entry> entry = std::move(spare().back());
+        spare().pop_back();
+        return entry;
+    }
 
     // Where the regime is, or where it has to go.
     std::size_t slot(RegimeKey key) const {
