@@ -193,7 +193,7 @@ class SwitchedDrive {
     Found search(Cache& cache, Instant& now, const Choices& choices, const std::array<int, n_contacts>& n,
                  const std::array<bool, n_contacts>& at_rest, double T_2, const Ended& ended, double coarseness,
                  RegimeKey& key) const {
-        const Instant before = now;
+        const Memory before = now.memory;  // all that a trial may change
         Found worst = Found::inconsistent;
         for (int slips = 0; slips <= n_contacts; ++slips)
             for (int a = 0; a < n[0]; ++a)
@@ -201,7 +201,7 @@ class SwitchedDrive {
                     for (int c = 0; c < n[2]; ++c) {
                         const Modes modes{choices[0][a], choices[1][b], choices[2][c]};
                         if ((modes[0] != 0) + (modes[1] != 0) + (modes[2] != 0) != slips) continue;
-                        now = before;
+                        now.memory = before;
                         const Found found = settle(cache, now, modes, at_rest, T_2, ended, coarseness, key);
                         if (found == Found::yes) return found;
                         if (found == Found::outside) worst = found;
