@@ -2,11 +2,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include "exact_solver.hpp"
 #include "reader.hpp"
@@ -19,9 +20,7 @@ class Sampler {
  public:
     Sampler(const Drive& drive, double begin, double interval, std::size_t count, double* out,
             std::span<const int> channels = all_channels)
-        : drive_(drive), begin_(begin), interval_(interval), count_(count), out_(out), channels_(channels) {
-        pieces_.reserve(most_pieces);
-    }
+        : drive_(drive), begin_(begin), interval_(interval), count_(count), out_(out), channels_(channels) {}
 
     // Polled now and then; true ends the run.
     bool (*interrupted)(void*) = nullptr;
@@ -33,8 +32,8 @@ class Sampler {
         if (!s.entry.regime.in_data) left_data_at = std::fmin(left_data_at, s.begin);
         const std::size_t end = due(s);
         if (next_ < end) {
-            if (n_pieces_ == pieces_.size()) pieces_.emplace_back(s.at);
-            Piece& p = pieces_[n_pieces_++];
+            std::optional<Piece>& room = pieces_[n_pieces_++];
+            Piece& p = room ? *room : room.emplace(s.at);
             p.entry = &s.entry;
             p.memory = s.memory;
             p.constant = s.constant;
@@ -47,10 +46,10 @@ class Sampler {
     // Writes what has been collected. Only needed if the last segment has not come.
     bool write() {
         // Every piece is a chain of steps that wait for one another, so it pays to have several at hand.
-        const std::span<Piece> pieces(pieces_.data(), std::exchange(n_pieces_, 0));
-        for (Piece& p : pieces) p.cursor.nudge(p.constant, p.rest);
-        for (Piece& p : pieces)
-            if (!write(p)) return false;
+        const std::span pieces(pieces_.data(), std::exchange(n_pieces_, 0));
+        for (auto& p : pieces) p->cursor.nudge(p->constant, p->rest);
+        for (auto& p : pieces)
+            if (!write(*p)) return false;
         return true;
     }
 
@@ -124,8 +123,8 @@ class Sampler {
     std::size_t count_, next_ = 0;
     double* out_;
     std::span<const int> channels_;
-    std::vector<Piece> pieces_;  // kept for their memory, as the stride
-    std::size_t n_pieces_ = 0;   // that have been collected
+    std::array<std::optional<Piece>, most_pieces> pieces_;
+    std::size_t n_pieces_ = 0;  // that have been collected
     Stride stride_;
     Instants instants_;
 };
