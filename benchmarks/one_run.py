@@ -77,9 +77,10 @@ def section(report: Report, scenario: lm.Scenario, programs: dict[str, list[list
     rows.append(("PathSim RKDP54, rtol 1e-06, in Python", spent, f"{error_of(states[:, 2], states[:, 3], exact):.2g}"))
     report.section(
         "One run",
-        "2-DOF-NL, E_CA = 1.0275, 1 Hz, 2 s from rest, sampled at 1 kHz, stand-in loss table. CVODE has the same regimes and\n"
-        "contact logic as the exact solver and differs in the integrator alone; scipy and PathSim have them written in Python.\n"
-        "Errors are of load speed and twist against the exact run, relative to the largest of each.",
+        "2-DOF-NL, E_CA = 1.0275, 1 Hz, 2 s from rest, load speed and twist sampled at 1 kHz (where it says so, and in Python,\n"
+        "all channels), stand-in loss table. CVODE has the same regimes and contact logic as the exact solver and differs in the\n"
+        "integrator alone; scipy and PathSim have them written in Python. Errors are of load speed and twist against the exact\n"
+        "run, relative to the largest of each.",
     )
     add_table(report, rows)
     report.section("The same on a plane loss map", "m_2B = 0.02 + 0.04 v + 0.06 mu: fewer switchings.")

@@ -18,6 +18,8 @@ class Cursor {
         arrive(load(x));
     }
     InputState& inputs() { return input_; }
+    // From now on the constant, which is the same, is in another place.
+    void keep(const Column& constant) { constant_ = &constant; }
 
     double time() const { return input_.time(); }
     const State& x() const { return x_; }
@@ -79,21 +81,16 @@ class Cursor {
             h = advance_by_levels(from, h);
         else if (this != &from)
             *this = from;
-        if (h == 0.0) return;
-        Expansion e;
-        expand(e);
-        nudge(e, h);
+        nudge(h);
     }
-    // The same, with the constant at another place.
-    void nudge(const Column& constant, double s) {
-        constant_ = &constant;
+    // By one base interval at most, forward or backward; the inputs turn on from where they are.
+    void nudge(double s) {
         if (s == 0.0) return;
-        Expansion e;
-        expand(e);
-        nudge(e, s);
+        Expansion here;
+        expand(here);
+        nudge(here, s);
     }
     void expand(Expansion& out) const { propagator_->taylor().expand(load(rate()), input_, out); }
-    // By one base interval at most, forward or backward; the inputs turn on from where they are.
     void nudge(const Expansion& here, double s) {
         (load(x_) + here.change(s)).store(x_.data());
         input_.turn(s);

@@ -40,6 +40,7 @@ class Sampler {
             p.first = next_;
             p.end = next_ = end;
             p.rest = p.cursor.advance_by_levels(s.at, instant(p.first) - s.begin);
+            p.cursor.keep(p.constant);
         }
         return s.last || n_pieces_ == most_pieces ? write() : true;
     }
@@ -47,7 +48,7 @@ class Sampler {
     bool write() {
         // Every piece is a chain of steps that wait for one another, so it pays to have several at hand.
         const std::span pieces(pieces_.data(), std::exchange(n_pieces_, 0));
-        for (auto& p : pieces) p->cursor.nudge(p->constant, p->rest);
+        for (auto& p : pieces) p->cursor.nudge(p->rest);
         for (auto& p : pieces)
             if (!write(*p)) return false;
         return true;
@@ -117,6 +118,7 @@ class Sampler {
             to += count_;
         }
     }
+
     const Drive& drive_;
     double begin_, interval_;
     double per_interval_ = 1.0 / interval_;  // rounded
