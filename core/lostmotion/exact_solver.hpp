@@ -95,7 +95,7 @@ class ExactSolver {
         return status_of(system_.next(cache_, now_, nullptr, key_));
     }
 
-    // Runs to t_end. The observer gets every segment and every switching as they come.
+    // Runs to t_end. The observer gets every segment as it comes and, if it wants them, the switchings between.
     template <class Observer>
     Status advance(double t_end, Observer& observer) {
         begin_->inputs().anchor(time_);
