@@ -130,14 +130,10 @@ class AdaptiveSolver {
     template <class Observer>
     Status change_regime(const Guard* fired, Observer& observer) {
         if (fired != nullptr) input_.anchor(time_);
-        Switching s;
-        const bool wanted = wants_switching(observer);
-        const Status status = switch_regime(system_, cache_, input_, time_, fired, now_, key_, wanted ? &s : nullptr);
+        const Status status = switch_regime(system_, cache_, input_, time_, fired, now_, key_, observer);
         if (fired != nullptr) stopped_at_ = fired->contact;
         if (status != Status::done) return status;
         ++switchings_;
-        if constexpr (requires { observer.switching(s); })
-            if (wanted) observer.switching(s);
         return accumulation_.add(time_, 1.0) ? Status::zeno : Status::done;
     }
 

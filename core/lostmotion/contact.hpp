@@ -37,22 +37,24 @@ class Flow {
     int sign(const LinearForm& form, int k, double value, double size) {
         while (++k < n_derivatives) {
             if (std::fabs(value) > clear_of_zero * size) return value > 0.0 ? +1 : -1;
-            // The instant itself is known to its rounding only, so a value may be off by that times its rate.
             const auto [rate, rate_size] = derivative(form, k);
-            const double noise = rounding_ * size + time_rounding * std::fabs(now_.time * rate);
-            if (std::fabs(value) > noise) return value > 0.0 ? +1 : -1;
+            if (std::fabs(value) > noise(size, rate)) return value > 0.0 ? +1 : -1;
             value = rate;
             size = rate_size;
         }
         return 0;
     }
 
-    // First derivative of the state, and the sums of the magnitudes of its terms.
-    const State& rate() {
-        if (order_ < 1) extend();
-        return x_[1];
+    // What counts as zero: rounding of the terms, and since the instant itself is known to its rounding only, a value
+    // may be off by that times its rate.
+    double noise(double size, double rate) const {
+        return rounding_ * size + time_rounding * std::fabs(now_.time * rate);
     }
-    const State& rate_size() const { return size_[1]; }
+    // First derivative of the state, and the sums of the magnitudes of its terms.
+    std::pair<const State&, const State&> rate() {
+        if (order_ < 1) extend();
+        return {x_[1], size_[1]};
+    }
 
     // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
     std::pair<double, double> derivative(const LinearForm& f, int k) {
@@ -274,14 +276,15 @@ class SwitchedDrive {
         near &= ~ignored;
         if (near == 0) return {nullptr, false};
         Flow flow(entry.rates, now, coarseness);
-        guards.rates(flow.rate(), now.input[1], slope);
-        guards.rate_sizes(flow.rate_size(), magnitudes(now.input[1]), slope_size);
+        const auto& [rate, rate_size] = flow.rate();
+        guards.rates(rate, now.input[1], slope);
+        guards.rate_sizes(rate_size, magnitudes(now.input[1]), slope_size);
         bool overcome = false;
         for (; near != 0; near &= near - 1) {
             const int k = std::countr_zero(near);
-            const double noise = coarseness * rounding * size[k] + time_rounding * std::fabs(now.time * slope[k]);
-            const int sign = std::fabs(value[k]) > noise ? (value[k] > 0.0 ? +1 : -1)
-                                                         : flow.sign(guards.form(k), 1, slope[k], slope_size[k]);
+            const int sign = std::fabs(value[k]) > flow.noise(size[k], slope[k])
+                                 ? (value[k] > 0.0 ? +1 : -1)
+                                 : flow.sign(guards.form(k), 1, slope[k], slope_size[k]);
             if (sign >= 0) continue;
             if ((entry.contacts >> k & 1) == 0) return {&entry.regime.guards[k], overcome};
             overcome = true;

@@ -158,15 +158,10 @@ class ExactSolver {
             std::swap(begin_, there_);
             if (++crossings_ % 8 == 0) begin_->inputs().anchor(time_);
         }
-        Switching s;
-        const bool wanted = wants_switching(observer);
-        const Status status =
-            switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, wanted ? &s : nullptr);
+        const Status status = switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, observer);
         if (fired != nullptr) stopped_at_ = fired->contact;
         if (status != Status::done) return status;
         ++switchings_;
-        if constexpr (requires { observer.switching(s); })
-            if (wanted) observer.switching(s);
         return accumulation_.add(time_, unit_) ? Status::zeno : Status::done;
     }
 

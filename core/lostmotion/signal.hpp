@@ -247,24 +247,6 @@ class InputState {
 
     // Whether an input is other than constant.
     bool varies(int i) const { return slope_[i] != 0.0 || sines_end_[i] > (i == 0 ? 0 : sines_end_[0]); }
-    // Its derivatives from the first on.
-    template <std::size_t N>
-    [[gnu::always_inline]] void derivatives(std::array<std::array<double, n_inputs>, N>& u) const {
-        static_assert(N % 2 == 0);
-        u[0] = slope_;
-        for (std::size_t k = 1; k < N; ++k) u[k] = {};
-        for (int q = 0; q < sines_end_[1]; q += 2) {
-            const int i = basis_[q].input;
-            const double omega = basis_[q].omega, turned_twice = -omega * omega;
-            double odd = omega * weights_[q + 1], even = turned_twice * weights_[q];
-            for (std::size_t k = 0; k < N; k += 2) {
-                u[k][i] += odd;
-                u[k + 1][i] += even;
-                odd *= turned_twice;
-                even *= turned_twice;
-            }
-        }
-    }
 
     // Bound on the fourth derivative of each input for all time.
     std::array<double, n_inputs> fourth_derivative_bound() const {

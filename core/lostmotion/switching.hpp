@@ -52,34 +52,38 @@ bool wants_switching(const Observer& observer) {
 }
 
 // Finds the regime that follows after `fired` has reached zero, with the inputs of that instant, or, if it is nullptr,
-// after an input has jumped. Fills the record, if one is wanted.
-template <class System, class Cache>
+// after an input has jumped. Tells the observer, if it wants to know.
+template <class System, class Cache, class Observer>
 Status switch_regime(const System& system, Cache& cache, InputState& input, double time, const Guard* fired,
-                     Instant& now, RegimeKey& key, Switching* record) {
+                     Instant& now, RegimeKey& key, Observer& observer) {
     if (fired != nullptr && fired->kind == Guard::outside) return Status::outside;
-    if (record != nullptr) {
+    const bool wanted = wants_switching(observer);
+    Switching s;
+    if (wanted) {
         const Regime& old = cache.regime(key);
         if (fired == nullptr) input.anchor_left(time);
-        *record = {};
-        record->time = time;
-        record->input_jump = fired == nullptr;
-        record->before = key;
-        record->torque_before = evaluate(old.output_torque, now.x, now.memory, input.values());
+        s.time = time;
+        s.input_jump = fired == nullptr;
+        s.before = key;
+        s.torque_before = evaluate(old.output_torque, now.x, now.memory, input.values());
         if (fired != nullptr) {
-            record->kind = fired->kind;
-            record->contact = fired->contact;
-            record->guard = static_cast<int>(fired - old.guards.data());
+            s.kind = fired->kind;
+            s.contact = fired->contact;
+            s.guard = static_cast<int>(fired - old.guards.data());
         }
     }
     if (fired == nullptr) input.anchor(time);
     see_inputs(input, time, now);
     const Found found = system.next(cache, now, fired, key);
     if (found != Found::yes) return status_of(found);
-    if (record != nullptr) {
-        record->after = key;
-        record->x = now.x;
-        record->memory = now.memory;
-        record->torque_after = evaluate(cache.regime(key).output_torque, now.x, now.memory, now.input[0]);
+    if constexpr (requires { observer.switching(s); }) {
+        if (wanted) {
+            s.after = key;
+            s.x = now.x;
+            s.memory = now.memory;
+            s.torque_after = evaluate(cache.regime(key).output_torque, now.x, now.memory, now.input[0]);
+            observer.switching(s);
+        }
     }
     return Status::done;
 }

@@ -30,11 +30,10 @@ class Expansion {
  public:
     static constexpr int terms = Polynomial::degree;  // good for a base interval: 0.25^13/13! < 1e-17
 
-    using Inputs = std::array<std::array<double, n_inputs>, terms>;  // their derivatives, from the first on
-    Inputs input;
-    double angle_rate;                   // of the load angle
-    double turning;                      // its rate over the load speed
-    std::array<Coupled, terms> coupled;  // derivatives of the other states, from the first on
+    std::array<std::array<double, n_inputs>, terms + 1> input;  // [k]: their k-th derivative
+    double angle_rate;                                          // of the load angle
+    double turning;                                             // its rate over the load speed
+    std::array<Coupled, terms> coupled;                         // derivatives of the other states, from the first on
 
     // By how much the state changes over s.
     [[gnu::always_inline]] Lanes change(double s) const {
@@ -63,7 +62,7 @@ class Expansion {
             const Coupled* v = &coupled[static_cast<std::size_t>(4 * part)];
             p.part[part] = sums(c * v[0], c * v[1], c * v[2], c * v[3]);
             if (first != 0.0 || second != 0.0) {
-                const auto* u = &input[static_cast<std::size_t>(4 * part)];
+                const auto* u = &input[static_cast<std::size_t>(4 * part + 1)];
                 const auto of = [&](int k) { return first * u[k][0] + second * u[k][1]; };
                 p.part[part] = p.part[part] + Pack<4>::of({of(0), of(1), of(2), of(3)});
             }
@@ -119,14 +118,14 @@ class Taylor {
 
     // At an instant with this rate and these inputs.
     [[gnu::always_inline]] void expand(const Lanes& rate, const InputState& input, Expansion& out) const {
-        input.derivatives(out.input);
+        input.jet(Expansion::terms + 1, out.input.data());
         expand(rate, {input.varies(0), input.varies(1)}, out);
     }
     // The answer from rest to a function of the inputs after h.
     Lanes response(const InputBasis& function, double h) const {
         Expansion e{};
         for (int k = 1; k <= Expansion::terms; ++k)
-            e.input[static_cast<std::size_t>(k - 1)][function.input] = function.derivative(k);
+            e.input[static_cast<std::size_t>(k)][function.input] = function.derivative(k);
         expand({}, {function.input == 0, function.input == 1}, e);
         return e.change(h);
     }
@@ -196,8 +195,8 @@ class Taylor {
             for (int k = 0; k + 3 < Expansion::terms; ++k) v[k + 3] = forced(cubed_ * v[k], k);
         };
         const auto force = [&](Coupled x, int k, int i) __attribute__((always_inline)) {
-            const auto u = [&](int j) { return j < 0 ? 0.0 : out.input[static_cast<std::size_t>(j)][i]; };
-            return x + input_[i].bring(u(k), u(k + 1), u(k + 2));
+            const auto u = [&](int j) { return j < 1 ? 0.0 : out.input[static_cast<std::size_t>(j)][i]; };
+            return x + input_[i].bring(u(k + 1), u(k + 2), u(k + 3));
         };
         if (varies[0] && varies[1])
             recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(force(x, k, 0), k, 1); });
