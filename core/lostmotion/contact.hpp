@@ -21,22 +21,21 @@ inline constexpr double rounding = 0x1p14 * std::numeric_limits<double>::epsilon
 // Rounding of an instant, relative to the time since the start.
 inline constexpr double time_rounding = 4.0 * std::numeric_limits<double>::epsilon();
 
-// A form that is further from zero than this multiple needs no closer look: the rounding of the instant moves it by
-// less.
+// A guard that is further from zero than this share of its terms, and of what they are at rated load and speed times
+// `far_from_event`, is not at zero: the rounding of the instant moves it by less. Near a zero of all its terms, the first
+// share alone says nothing.
 inline constexpr double clear_of_zero = 1e-3;
+inline constexpr double far_from_event = 1e-6;
 
 // Time derivatives of the state along the flow of one regime, computed as far as they are asked for.
 class Flow {
  public:
-    // coarseness: how many times `rounding` counts as zero.
-    Flow(const LinearRates& rates, const Instant& now, double coarseness = 1.0)
-        : rates_(rates), now_(now), rounding_(coarseness * rounding) {}
+    Flow(const LinearRates& rates, const Instant& now) : rates_(rates), now_(now) {}
 
     // Sign that the k-th derivative of a form has just after now, from its value and the sum of the magnitudes of its
     // terms; 0 if it stays at zero.
     int sign(const LinearForm& form, int k, double value, double size) {
         while (++k < n_derivatives) {
-            if (std::fabs(value) > clear_of_zero * size) return value > 0.0 ? +1 : -1;
             const auto [rate, rate_size] = derivative(form, k);
             if (std::fabs(value) > noise(size, rate)) return value > 0.0 ? +1 : -1;
             value = rate;
@@ -48,7 +47,7 @@ class Flow {
     // What counts as zero: rounding of the terms, and since the instant itself is known to its rounding only, a value
     // may be off by that times its rate.
     double noise(double size, double rate) const {
-        return rounding_ * size + time_rounding * std::fabs(now_.time * rate);
+        return rounding * size + time_rounding * std::fabs(now_.time * rate);
     }
     // First derivative of the state, and the sums of the magnitudes of its terms.
     std::pair<const State&, const State&> rate() {
@@ -81,7 +80,6 @@ class Flow {
 
     const LinearRates& rates_;
     const Instant& now_;
-    double rounding_;
     int order_ = 0;
     std::array<State, n_derivatives + 1> x_, size_;  // as far as they are known
 };
@@ -91,7 +89,13 @@ enum class Found { yes, inconsistent, outside };
 // The drive as a switched linear system: which regime follows at an event.
 class SwitchedDrive {
  public:
-    explicit SwitchedDrive(const Drive& drive) : drive_(drive) {}
+    explicit SwitchedDrive(const Drive& drive) : drive_(drive) { drive_changed(); }
+    // To be called when the drive that this refers to has been given other parameters.
+    void drive_changed() {
+        (far_from_event / clear_of_zero * lostmotion::load(drive_.rated_scale())).store(near_state_.data());
+        near_input_ = {far_from_event / clear_of_zero,
+                       far_from_event / clear_of_zero * drive_.gearbox.rated_output_torque};
+    }
     const Drive& drive() const { return drive_; }
     Regime build(const RegimeKey& key) const { return drive_.build(key); }
 
@@ -106,22 +110,17 @@ class SwitchedDrive {
     }
 
     // Regime that follows `key` at this instant: after one of its guards has reached zero, or (fired = nullptr)
-    // after an input has jumped. Speeds that reached zero are set to zero exactly; a turning point of the twist
-    // sets the hysteresis capacity anew (16).
+    // after an input has changed. Only the contact whose speed has reached zero has stopped, and a stop of the twist is
+    // a turning point, which sets the hysteresis capacity anew (16). All other contacts that move go on in their
+    // direction, however slowly: an input acts on the speeds through the accelerations only.
     template <class Cache>
     Found next(Cache& cache, Instant& now, const Guard* fired, RegimeKey& key) const {
-        if (fired != nullptr && goes_on(cache, now, *fired, key)) return Found::yes;
+        if (fired != nullptr ? goes_on(cache, now, *fired, key) : stays(cache, now, key)) return Found::yes;
         const Regime& old = cache.regime(key);
         const Ended ended{fired != nullptr && fired->kind != Guard::speed, key, fired};
         const double T_2 = evaluate(old.output_torque, now.x, now.memory, now.input[0]);
         std::array<bool, n_contacts> at_rest = old.at_rest;
-        for (int k = 0; k < old.n_guards; ++k) {
-            const Guard& g = old.guards[k];
-            if (g.kind != Guard::speed) continue;
-            const double value = evaluate(g.form, now.x, now.memory, now.input[0]);
-            const double size = magnitude(g.form, now.x, now.memory, now.input[0]);
-            if (&g == fired || std::fabs(value) <= rounding * size) at_rest[g.contact] = true;
-        }
+        if (fired != nullptr && fired->kind == Guard::speed) at_rest[fired->contact] = true;
         stop(now.x, at_rest);
         if (at_rest[twist_contact] && !old.at_rest[twist_contact] && drive_.gearbox.has_hysteresis())
             now.memory.hysteresis_capacity = drive_.gearbox.hysteresis_capacity(now.x[twist]);
@@ -163,8 +162,16 @@ class SwitchedDrive {
 
     using Choices = std::array<std::array<std::int8_t, 3>, n_contacts>;  // the modes that each contact may take
 
-    // Tries the combinations of modes. Where the motion has all but died out, rounding may make each of them look
-    // wrong; then what is zero is decided more coarsely. A drive that jams is wrong by more than that.
+    // The direction in which a contact slips: as before, unless its speed is beyond rounding and says otherwise.
+    std::int8_t direction(Contact c, const Instant& now, std::int8_t before) const {
+        const LinearForm form = drive_.contact_speed(c);
+        const double speed = evaluate(form, now.x, now.memory, now.input[0]);
+        const double size = magnitude(form, now.x, now.memory, now.input[0]);
+        if ((before == +1 || before == -1) && std::fabs(speed) <= rounding * size) return before;
+        return speed > 0.0 ? +1 : -1;
+    }
+
+    // Tries the combinations of modes.
     template <class Cache>
     Found find(Cache& cache, Instant& now, const std::array<bool, n_contacts>& at_rest, double T_2, const Ended& ended,
                RegimeKey& key) const {
@@ -179,22 +186,16 @@ class SwitchedDrive {
             } else if (at_rest[c]) {
                 for (const int mode : {0, +1, -1}) choices[k][n[k]++] = static_cast<std::int8_t>(mode);
             } else {
-                const double speed = evaluate(drive_.contact_speed(c), now.x, now.memory, now.input[0]);
-                choices[k][n[k]++] = speed > 0.0 ? +1 : -1;
+                choices[k][n[k]++] = direction(c, now, key.modes[c]);
             }
         }
-        for (const double coarseness : {1.0, 0x1p6, 0x1p12}) {
-            const Found found = search(cache, now, choices, n, at_rest, T_2, ended, coarseness, key);
-            if (found != Found::inconsistent) return found;
-        }
-        return Found::inconsistent;
+        return search(cache, now, choices, n, at_rest, T_2, ended, key);
     }
 
     // Those with most contacts stuck first.
     template <class Cache>
     Found search(Cache& cache, Instant& now, const Choices& choices, const std::array<int, n_contacts>& n,
-                 const std::array<bool, n_contacts>& at_rest, double T_2, const Ended& ended, double coarseness,
-                 RegimeKey& key) const {
+                 const std::array<bool, n_contacts>& at_rest, double T_2, const Ended& ended, RegimeKey& key) const {
         const Memory before = now.memory;  // all that a trial may change
         Found worst = Found::inconsistent;
         for (int slips = 0; slips <= n_contacts; ++slips)
@@ -204,18 +205,18 @@ class SwitchedDrive {
                         const Modes modes{choices[0][a], choices[1][b], choices[2][c]};
                         if ((modes[0] != 0) + (modes[1] != 0) + (modes[2] != 0) != slips) continue;
                         now.memory = before;
-                        const Found found = settle(cache, now, modes, at_rest, T_2, ended, coarseness, key);
+                        const Found found = settle(cache, now, modes, at_rest, T_2, ended, key);
                         if (found == Found::yes) return found;
                         if (found == Found::outside) worst = found;
                     }
         return worst;
     }
 
-    // Is this combination of modes consistent? Finds the piece of the curve and the cell of the map on the way, by
-    // walking across each of their edges that is violated; load and cell depend on each other while the twist is stuck.
+    // Is this combination of modes consistent? Piece and cell are found by a walk that begins at what the torque T_2
+    // was.
     template <class Cache>
     Found settle(Cache& cache, Instant& now, const Modes& modes, const std::array<bool, n_contacts>& at_rest,
-                 double T_2, const Ended& ended, double coarseness, RegimeKey& key) const {
+                 double T_2, const Ended& ended, RegimeKey& key) const {
         RegimeKey trial;
         trial.modes = modes;
         const Gearbox& gearbox = drive_.gearbox;
@@ -229,13 +230,28 @@ class SwitchedDrive {
                 T_2 = gearbox.curve.torque(d) + (slip == absent ? 0.0 : slip * now.memory.hysteresis_capacity);
         }
         if (modes[0] == 0 && modes[1] == 0 && modes[2] == 0 && !hold(now, T_2)) return Found::inconsistent;
-        if (gearbox.losses == Gearbox::loss_map) {
-            const int s = modes[input_contact];
-            const double mu = T_2 / gearbox.rated_output_torque;
-            const double v = std::fabs(now.x[motor_speed]) / gearbox.rated_input_speed;
-            trial.cell = s == 0 ? gearbox.map.load_interval(mu) : gearbox.map.triangle(s * mu, v);
-            trial.cell_back = s == 0 ? gearbox.map.load_interval(-mu) : 0;
+        if (gearbox.losses != Gearbox::loss_map) return walk(cache, now, at_rest, ended, trial, key);
+        const int s = modes[input_contact];
+        const double mu = T_2 / gearbox.rated_output_torque;
+        const double v = std::fabs(now.x[motor_speed]) / gearbox.rated_input_speed;
+        trial.cell = s == 0 ? gearbox.map.load_interval(mu) : gearbox.map.triangle(s * mu, v);
+        trial.cell_back = s == 0 ? gearbox.map.load_interval(-mu) : 0;
+        const Found found = walk(cache, now, at_rest, ended, trial, key);
+        if (found != Found::inconsistent || s == 0 || modes[twist_contact] != 0) return found;
+        // The torque that keeps the twist at rest depends on the cell, and the cell on the torque: begin from each load.
+        for (int j = 0; j < gearbox.map.load_intervals(); ++j) {
+            trial.cell = gearbox.map.triangle(
+                0.5 * (gearbox.map.load_interval_lower(j) + gearbox.map.load_interval_upper(j)), v);
+            const Found other = walk(cache, now, at_rest, ended, trial, key);
+            if (other == Found::yes) return other;
         }
+        return found;
+    }
+
+    // From a piece and a cell across each of their edges that is violated, until none is: do the contacts hold there?
+    template <class Cache>
+    Found walk(Cache& cache, const Instant& now, const std::array<bool, n_contacts>& at_rest, const Ended& ended,
+               RegimeKey trial, RegimeKey& key) const {
         constexpr int longest_walk = 400;
         for (int step = 0; step < longest_walk; ++step) {
             const auto& entry = cache.entry(trial);
@@ -244,7 +260,7 @@ class SwitchedDrive {
             unsigned ignored = 0;
             for (int c = 0; c < n_contacts; ++c)
                 if (!at_rest[c]) ignored |= entry.speeds[c];
-            const auto [left, overcome] = violated(entry, now, ignored, coarseness);
+            const auto [left, overcome] = violated(entry, now, ignored);
             if (left != nullptr && left->kind == Guard::outside) return Found::outside;
             if (left == nullptr) {
                 if (overcome) return Found::inconsistent;
@@ -263,19 +279,22 @@ class SwitchedDrive {
     // A guard of the curve, the map or the amplifier that does not hold just after now, and whether a contact's does
     // not. Guards that are set in `ignored` are not looked at.
     template <class Entry>
-    static std::pair<const Guard*, bool> violated(const Entry& entry, const Instant& now, unsigned ignored,
-                                                  double coarseness = 1.0) {
+    std::pair<const Guard*, bool> violated(const Entry& entry, const Instant& now, unsigned ignored) const {
         const GuardTable& guards = entry.guards;
         GuardTable::Values constant, value, size, slope, slope_size;
         guards.constants(now.memory, constant);
         guards.evaluate(constant, now.x, now.input[0], value);
-        guards.sizes(magnitudes(now.memory), magnitudes(now.x), now.input_size, size);
+        State span;
+        (lostmotion::load(magnitudes(now.x)) + lostmotion::load(near_state_)).store(span.data());
+        guards.sizes(magnitudes(now.memory), span,
+                     {now.input_size[0] + near_input_[0], now.input_size[1] + near_input_[1]}, size);
         unsigned near = 0;
         for (int g = 0; g < guards.rows(); g += vec_width)
             near |= (all_bits & ~above(load(&value[g]), clear_of_zero * load(&size[g]))) << g;
         near &= ~ignored;
         if (near == 0) return {nullptr, false};
-        Flow flow(entry.rates, now, coarseness);
+        guards.sizes(magnitudes(now.memory), magnitudes(now.x), now.input_size, size);
+        Flow flow(entry.rates, now);
         const auto& [rate, rate_size] = flow.rate();
         guards.rates(rate, now.input[1], slope);
         guards.rate_sizes(rate_size, magnitudes(now.input[1]), slope_size);
@@ -310,6 +329,21 @@ class SwitchedDrive {
         return true;
     }
 
+    // An input has changed: does the regime go on? The contacts that move keep their direction.
+    template <class Cache>
+    bool stays(Cache& cache, const Instant& now, const RegimeKey& key) const {
+        const auto& entry = cache.entry(key);
+        unsigned moving = 0;
+        for (int k = 0; k < n_contacts; ++k) {
+            const auto c = static_cast<Contact>(k);
+            if (entry.regime.at_rest[c] || key.modes[c] == absent) continue;
+            if (direction(c, now, key.modes[c]) != key.modes[c]) return false;
+            moving |= entry.speeds[c];
+        }
+        const auto [left, overcome] = violated(entry, now, moving);
+        return left == nullptr && !overcome;
+    }
+
     // Everything stands: T_2 stays where it was, or at the nearest value that twist and load contact can hold.
     bool hold(Instant& now, double T_2) const {
         const double M_Z = now.input[0][1], T_f = drive_.load.friction_torque;
@@ -325,6 +359,8 @@ class SwitchedDrive {
     }
 
     const Drive& drive_;
+    State near_state_{};  // magnitudes of states and inputs that a guard must exceed to be far from an event
+    std::array<double, n_inputs> near_input_{};
 };
 
 }  // namespace lostmotion

@@ -78,11 +78,12 @@ struct Workspace {
     // Another drive; the memory stays.
     void set(const Drive& d) {
         drive = d;
+        system.drive_changed();
         cache.forget();
     }
 
     Drive drive;
-    const SwitchedDrive system{drive};
+    SwitchedDrive system{drive};
     RegimeCache<SwitchedDrive> cache{system};
 };
 
