@@ -78,6 +78,27 @@ inline std::array<double, n_states> from_state(const State& x) {
     return v;
 }
 
+// The course of a motion and whether the inputs are constant, as numbers.
+using CourseNumbers = std::array<double, n_states + n_inputs + 5>;
+inline CourseNumbers from_course(const Course& c, bool steady) {
+    CourseNumbers v{};
+    auto next = std::copy(c.input.begin(), c.input.end(), std::copy(c.rate.begin(), c.rate.end(), v.begin()));
+    for (const double x : {double(c.rate_known), double(c.off_zero), c.touch_size, c.doubt, double(steady)})
+        *next++ = x;
+    return v;
+}
+inline Course to_course(const CourseNumbers& v) {
+    Course c;
+    std::copy_n(v.begin(), n_states, c.rate.begin());
+    std::copy_n(v.begin() + n_states, n_inputs, c.input.begin());
+    const double* rest = &v[n_states + n_inputs];
+    c.rate_known = rest[0] != 0.0;
+    c.off_zero = rest[1] != 0.0;
+    c.touch_size = rest[2];
+    c.doubt = rest[3];
+    return c;
+}
+
 // Switching as numbers: time, kind, contact, contact modes before and after, T_2 before and after.
 inline constexpr std::size_t switching_columns = 11;
 inline Array switching_table(const RunReport& report) {

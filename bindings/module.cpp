@@ -200,13 +200,15 @@ NB_MODULE(CORE_MODULE, m) {
                 return nb::make_tuple(n.time, from_state(n.x), n.memory.hysteresis_capacity, n.memory.held_torque,
                                       std::array<int, 7>{n.key.modes[0], n.key.modes[1], n.key.modes[2],
                                                          n.key.amplifier, n.key.piece, n.key.cell, n.key.cell_back},
-                                      n.input, n.started);
+                                      n.input, n.started, from_course(n.course, n.steady));
             },
-            nb::sig("def get_state(self) -> tuple[float, list[float], float, float, list[int], list[float], bool]"))
+            nb::sig("def get_state(self) -> tuple[float, list[float], float, float, list[int], list[float], bool, "
+                    "list[float]]"))
         .def(
             "set_state",
             [](Simulation& s, double time, const std::array<double, n_states>& x, double capacity, double held,
-               const std::array<int, 7>& k, const std::array<double, n_inputs>& input, bool started) {
+               const std::array<int, 7>& k, const std::array<double, n_inputs>& input, bool started,
+               const CourseNumbers& course) {
                 RegimeKey key;
                 key.modes = {static_cast<std::int8_t>(k[0]), static_cast<std::int8_t>(k[1]),
                              static_cast<std::int8_t>(k[2])};
@@ -214,7 +216,9 @@ NB_MODULE(CORE_MODULE, m) {
                 key.piece = static_cast<std::int16_t>(k[4]);
                 key.cell = k[5];
                 key.cell_back = k[6];
-                s.restore({time, to_state(x), {capacity, held}, key, input, started});
+                s.restore({time, to_state(x), {capacity, held}, key, input, started, course.back() != 0.0,
+                           to_course(course)});
             },
-            "time"_a, "state"_a, "hysteresis_capacity"_a, "held_torque"_a, "regime"_a, "input"_a, "started"_a);
+            "time"_a, "state"_a, "hysteresis_capacity"_a, "held_torque"_a, "regime"_a, "input"_a, "started"_a,
+            "course"_a = CourseNumbers{});
 }

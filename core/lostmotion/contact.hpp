@@ -22,8 +22,8 @@ inline constexpr double rounding = 0x1p14 * std::numeric_limits<double>::epsilon
 inline constexpr double time_rounding = 4.0 * std::numeric_limits<double>::epsilon();
 
 // A guard that is further from zero than this share of its terms, and of what they are at rated load and speed times
-// `far_from_event`, is not at zero: the rounding of the instant moves it by less. Near a zero of all its terms, the first
-// share alone says nothing.
+// `far_from_event`, is not at zero: the rounding of the instant moves it by less. Near a zero of all its terms, the
+// first share alone says nothing.
 inline constexpr double clear_of_zero = 1e-3;
 inline constexpr double far_from_event = 1e-6;
 
@@ -106,7 +106,7 @@ class SwitchedDrive {
         std::array<bool, n_contacts> at_rest = at_exact_rest(now.x);
         if (drive_.rigid()) at_rest[twist_contact] = true;
         const double P = drive_.rigid() ? now.memory.held_torque : drive_.gearbox.curve.torque(now.x[twist]);
-        return find(cache, now, at_rest, P, Ended{false, {}, nullptr}, key);
+        return find(cache, now, {at_rest, P}, key);
     }
 
     // Regime that follows `key` at this instant: after one of its guards has reached zero, or (fired = nullptr)
@@ -117,14 +117,16 @@ class SwitchedDrive {
     Found next(Cache& cache, Instant& now, const Guard* fired, RegimeKey& key) const {
         if (fired != nullptr ? goes_on(cache, now, *fired, key) : stays(cache, now, key)) return Found::yes;
         const Regime& old = cache.regime(key);
-        const Ended ended{fired != nullptr && fired->kind != Guard::speed, key, fired};
         const double T_2 = evaluate(old.output_torque, now.x, now.memory, now.input[0]);
         std::array<bool, n_contacts> at_rest = old.at_rest;
         if (fired != nullptr && fired->kind == Guard::speed) at_rest[fired->contact] = true;
         stop(now.x, at_rest);
         if (at_rest[twist_contact] && !old.at_rest[twist_contact] && drive_.gearbox.has_hysteresis())
             now.memory.hysteresis_capacity = drive_.gearbox.hysteresis_capacity(now.x[twist]);
-        return find(cache, now, at_rest, T_2, ended, key);
+        const Event event{at_rest, T_2, fired, key};
+        if (fired != nullptr && fired->kind == Guard::capacity && breaks_away(cache, now, event, key))
+            return Found::yes;
+        return find(cache, now, event, key);
     }
 
     // Sets the speeds of contacts at rest to what they are, to the last bit. Two at rest imply the third.
@@ -136,12 +138,26 @@ class SwitchedDrive {
     }
 
  private:
-    // A regime that the solver has seen to its end. Where the motion has all but come to rest, the derivatives at the
-    // instant alone may be too small to tell that it ends.
-    struct Ended {
-        bool known;
-        RegimeKey key;
-        const Guard* fired;
+    // What the search for the regime after an event goes by.
+    struct Event {
+        std::array<bool, n_contacts> at_rest;
+        double T_2;                    // the output torque before [N m]
+        const Guard* fired = nullptr;  // what ended the regime before, if not an input
+        RegimeKey before{};
+        bool by_value = false;  // a guard that is zero to rounding holds, whatever its derivatives
+
+        // The margins of a contact that has just come to a stop are zero by chance only. If one is, the contact may
+        // well rest for that moment, and breaks away again. So their derivatives, which rounding may falsify, are not
+        // needed.
+        bool by_value_alone(const Guard& g) const {
+            return by_value || (fired != nullptr && fired->kind == Guard::speed && g.kind == Guard::capacity &&
+                                g.contact == fired->contact);
+        }
+        // The solver has seen this regime to its end. Where the motion has all but come to rest, the derivatives at the
+        // instant alone may be too small to tell that it ends.
+        bool has_ended(const RegimeKey& key) const {
+            return fired != nullptr && fired->kind != Guard::speed && key == before;
+        }
     };
 
     // Crosses into the neighbour that a guard of the curve, the map or the amplifier leads to.
@@ -162,6 +178,19 @@ class SwitchedDrive {
 
     using Choices = std::array<std::array<std::int8_t, 3>, n_contacts>;  // the modes that each contact may take
 
+    // A contact whose capacity has been overcome begins to slip that way, from rest with no acceleration: the torques
+    // are those before. Its jerk has the sign of the fall of the capacity's margin, so that there is nothing to decide
+    // as long as all others go on as they were.
+    template <class Cache>
+    bool breaks_away(Cache& cache, Instant& now, const Event& event, RegimeKey& key) const {
+        const Contact c = event.fired->contact;
+        Modes modes = key.modes;
+        modes[c] = static_cast<std::int8_t>(event.fired->neighbour);
+        Event slipping{event.at_rest, event.T_2};
+        slipping.at_rest[c] = false;
+        return settle(cache, now, modes, slipping, key) == Found::yes;
+    }
+
     // The direction in which a contact slips: as before, unless its speed is beyond rounding and says otherwise.
     std::int8_t direction(Contact c, const Instant& now, std::int8_t before) const {
         const LinearForm form = drive_.contact_speed(c);
@@ -171,10 +200,10 @@ class SwitchedDrive {
         return speed > 0.0 ? +1 : -1;
     }
 
-    // Tries the combinations of modes.
+    // Tries the combinations of modes. If the guards that start on zero leave none, the motion is too small beside its
+    // torques for rounding to tell which of them rise: then those that are zero to rounding hold.
     template <class Cache>
-    Found find(Cache& cache, Instant& now, const std::array<bool, n_contacts>& at_rest, double T_2, const Ended& ended,
-               RegimeKey& key) const {
+    Found find(Cache& cache, Instant& now, Event event, RegimeKey& key) const {
         Choices choices{};
         std::array<int, n_contacts> n{};
         for (int k = 0; k < n_contacts; ++k) {
@@ -183,19 +212,22 @@ class SwitchedDrive {
                 choices[k][n[k]++] = absent;
             } else if (c == twist_contact && drive_.rigid()) {
                 choices[k][n[k]++] = 0;
-            } else if (at_rest[c]) {
+            } else if (event.at_rest[c]) {
                 for (const int mode : {0, +1, -1}) choices[k][n[k]++] = static_cast<std::int8_t>(mode);
             } else {
                 choices[k][n[k]++] = direction(c, now, key.modes[c]);
             }
         }
-        return search(cache, now, choices, n, at_rest, T_2, ended, key);
+        const Found found = search(cache, now, choices, n, event, key);
+        if (found != Found::inconsistent) return found;
+        event.by_value = true;
+        return search(cache, now, choices, n, event, key);
     }
 
     // Those with most contacts stuck first.
     template <class Cache>
     Found search(Cache& cache, Instant& now, const Choices& choices, const std::array<int, n_contacts>& n,
-                 const std::array<bool, n_contacts>& at_rest, double T_2, const Ended& ended, RegimeKey& key) const {
+                 const Event& event, RegimeKey& key) const {
         const Memory before = now.memory;  // all that a trial may change
         Found worst = Found::inconsistent;
         for (int slips = 0; slips <= n_contacts; ++slips)
@@ -205,7 +237,7 @@ class SwitchedDrive {
                         const Modes modes{choices[0][a], choices[1][b], choices[2][c]};
                         if ((modes[0] != 0) + (modes[1] != 0) + (modes[2] != 0) != slips) continue;
                         now.memory = before;
-                        const Found found = settle(cache, now, modes, at_rest, T_2, ended, key);
+                        const Found found = settle(cache, now, modes, event, key);
                         if (found == Found::yes) return found;
                         if (found == Found::outside) worst = found;
                     }
@@ -215,8 +247,8 @@ class SwitchedDrive {
     // Is this combination of modes consistent? Piece and cell are found by a walk that begins at what the torque T_2
     // was.
     template <class Cache>
-    Found settle(Cache& cache, Instant& now, const Modes& modes, const std::array<bool, n_contacts>& at_rest,
-                 double T_2, const Ended& ended, RegimeKey& key) const {
+    Found settle(Cache& cache, Instant& now, const Modes& modes, const Event& event, RegimeKey& key) const {
+        double T_2 = event.T_2;
         RegimeKey trial;
         trial.modes = modes;
         const Gearbox& gearbox = drive_.gearbox;
@@ -230,19 +262,20 @@ class SwitchedDrive {
                 T_2 = gearbox.curve.torque(d) + (slip == absent ? 0.0 : slip * now.memory.hysteresis_capacity);
         }
         if (modes[0] == 0 && modes[1] == 0 && modes[2] == 0 && !hold(now, T_2)) return Found::inconsistent;
-        if (gearbox.losses != Gearbox::loss_map) return walk(cache, now, at_rest, ended, trial, key);
+        if (gearbox.losses != Gearbox::loss_map) return walk(cache, now, event, trial, key);
         const int s = modes[input_contact];
         const double mu = T_2 / gearbox.rated_output_torque;
         const double v = std::fabs(now.x[motor_speed]) / gearbox.rated_input_speed;
         trial.cell = s == 0 ? gearbox.map.load_interval(mu) : gearbox.map.triangle(s * mu, v);
         trial.cell_back = s == 0 ? gearbox.map.load_interval(-mu) : 0;
-        const Found found = walk(cache, now, at_rest, ended, trial, key);
+        const Found found = walk(cache, now, event, trial, key);
         if (found != Found::inconsistent || s == 0 || modes[twist_contact] != 0) return found;
-        // The torque that keeps the twist at rest depends on the cell, and the cell on the torque: begin from each load.
+        // The torque that keeps the twist at rest depends on the cell, and the cell on the torque: begin from each
+        // load.
         for (int j = 0; j < gearbox.map.load_intervals(); ++j) {
             trial.cell = gearbox.map.triangle(
                 0.5 * (gearbox.map.load_interval_lower(j) + gearbox.map.load_interval_upper(j)), v);
-            const Found other = walk(cache, now, at_rest, ended, trial, key);
+            const Found other = walk(cache, now, event, trial, key);
             if (other == Found::yes) return other;
         }
         return found;
@@ -250,8 +283,7 @@ class SwitchedDrive {
 
     // From a piece and a cell across each of their edges that is violated, until none is: do the contacts hold there?
     template <class Cache>
-    Found walk(Cache& cache, const Instant& now, const std::array<bool, n_contacts>& at_rest, const Ended& ended,
-               RegimeKey trial, RegimeKey& key) const {
+    Found walk(Cache& cache, const Instant& now, const Event& event, RegimeKey trial, RegimeKey& key) const {
         constexpr int longest_walk = 400;
         for (int step = 0; step < longest_walk; ++step) {
             const auto& entry = cache.entry(trial);
@@ -259,14 +291,14 @@ class SwitchedDrive {
             // The mode of a contact that moves was chosen by its speed.
             unsigned ignored = 0;
             for (int c = 0; c < n_contacts; ++c)
-                if (!at_rest[c]) ignored |= entry.speeds[c];
-            const auto [left, overcome] = violated(entry, now, ignored);
+                if (!event.at_rest[c]) ignored |= entry.speeds[c];
+            const auto [left, overcome] = violated(entry, now, ignored, &event);
             if (left != nullptr && left->kind == Guard::outside) return Found::outside;
             if (left == nullptr) {
                 if (overcome) return Found::inconsistent;
-                if (ended.known && trial == ended.key) {
-                    if (ended.fired->kind == Guard::capacity) return Found::inconsistent;
-                    cross(*ended.fired, trial);
+                if (event.has_ended(trial)) {
+                    if (event.fired->kind == Guard::capacity) return Found::inconsistent;
+                    cross(*event.fired, trial);
                 }
                 key = trial;
                 return Found::yes;
@@ -279,7 +311,8 @@ class SwitchedDrive {
     // A guard of the curve, the map or the amplifier that does not hold just after now, and whether a contact's does
     // not. Guards that are set in `ignored` are not looked at.
     template <class Entry>
-    std::pair<const Guard*, bool> violated(const Entry& entry, const Instant& now, unsigned ignored) const {
+    std::pair<const Guard*, bool> violated(const Entry& entry, const Instant& now, unsigned ignored,
+                                           const Event* event = nullptr) const {
         const GuardTable& guards = entry.guards;
         GuardTable::Values constant, value, size, slope, slope_size;
         guards.constants(now.memory, constant);
@@ -301,8 +334,9 @@ class SwitchedDrive {
         bool overcome = false;
         for (; near != 0; near &= near - 1) {
             const int k = std::countr_zero(near);
-            const int sign = std::fabs(value[k]) > flow.noise(size[k], slope[k])
-                                 ? (value[k] > 0.0 ? +1 : -1)
+            const int sign = std::fabs(value[k]) > flow.noise(size[k], slope[k]) ? (value[k] > 0.0 ? +1 : -1)
+                             : event != nullptr && event->by_value_alone(entry.regime.guards[k])
+                                 ? 0
                                  : flow.sign(guards.form(k), 1, slope[k], slope_size[k]);
             if (sign >= 0) continue;
             if ((entry.contacts >> k & 1) == 0) return {&entry.regime.guards[k], overcome};

@@ -1,4 +1,8 @@
 // Moving along one regime by any length.
+//
+// Under constant inputs x'(t + s) = exp(A s) x'(t): the rate is carried on beside the state, so that it keeps its
+// relative accuracy however small it becomes; computed from the state it would end in the rounding of what cancels.
+// Where nothing drives the motion, x' = A x, nothing but x cancels, and it is the state that keeps its accuracy.
 #pragma once
 
 #include "propagator.hpp"
@@ -11,11 +15,28 @@ class Cursor {
  public:
     explicit Cursor(const InputState& input) : input_(input) {}
 
-    // On a regime, at a state; the inputs are those of the instant already.
-    void place(Propagator& propagator, const Column& constant, const State& x) {
+    // On a regime, at a state; the inputs are those of the instant already. carry: whether the rate is to be carried on
+    // under constant inputs. rate: if it is known better than from x.
+    void place(Propagator& propagator, const Column& constant, const State& x, bool carry,
+               const State* rate = nullptr) {
         propagator_ = &propagator;
         constant_ = &constant;
-        arrive(load(x));
+        carries_rate_ = false;
+        if (rate != nullptr) {
+            x_ = x;
+            rate_ = *rate;
+            rate_known_ = true;
+        } else {
+            arrive(load(x));
+        }
+        carries_rate_ = input_.constant() && (rate != nullptr || (carry && driven()));
+    }
+    bool carries_rate() const { return carries_rate_; }
+    // From now on nothing moves but the load angle.
+    void settle() {
+        rate_ = State{};
+        rate_[load_angle] = propagator_->rates().turning * x_[load_speed];
+        rate_known_ = carries_rate_ = true;
     }
     InputState& inputs() { return input_; }
     // From now on the constant, which is the same, is in another place.
@@ -33,27 +54,38 @@ class Cursor {
 
     void anchor(double time) {
         input_.follow(time);
-        rate_known_ = false;
+        rate_known_ = rate_known_ && carries_rate_;
     }
     // To a state of the same stretch that is known already.
     void move_to(double time, const State& x) {
         x_ = x;
-        anchor(time);
+        input_.follow(time);
+        rate_known_ = false;
     }
 
     // To one step beyond where another stands on the same stretch.
     void step_from(const Cursor& from, int level) {
         propagator_ = from.propagator_;
         constant_ = from.constant_;
-        const Lanes x = propagator_->step(level, load(from.x_), load(from.rate()), from.input_.weights());
-        input_.advance_from(from.input_, propagator_->length(level), propagator_->turns(level));
-        arrive(x);
+        carries_rate_ = from.carries_rate_;
+        const double length = propagator_->length(level);
+        if (carries_rate_) {
+            Lanes x = load(from.x_), rate = load(from.rate());
+            propagator_->step(level, x, rate, from.input_.weights());
+            input_.advance_from(from.input_, length, propagator_->turns(level));
+            arrive(x, rate);
+        } else {
+            const Lanes x = propagator_->step(level, load(from.x_), load(from.rate()), from.input_.weights());
+            input_.advance_from(from.input_, length, propagator_->turns(level));
+            arrive(x);
+        }
     }
     // To the nearest of the instants that whole levels, but not the shortest, lead to from where another stands; the
     // longest first. Returns what is left of h >= 0, a base interval forward or backward at most.
     [[gnu::always_inline]] double advance_by_levels(const Cursor& from, double h) {
         Propagator& p = *(propagator_ = from.propagator_);
         constant_ = from.constant_;
+        carries_rate_ = from.carries_rate_;
         input_ = from.input_;
         // By way of a signed number, which processors make of a floating-point one at once.
         const auto n = static_cast<std::uint64_t>(static_cast<std::int64_t>(h * p.per_first() + 0.5));
@@ -69,9 +101,7 @@ class Cursor {
             step(k + 1);
             bits ^= 1ull << k;
         }
-        x.store(x_.data());
-        rate.store(rate_.data());
-        rate_known_ = true;
+        arrive(x, rate);
         return h - p.length(1) * static_cast<double>(n);
     }
     // By any length: whole levels, then the Taylor series. Backward by one base interval at most.
@@ -92,9 +122,14 @@ class Cursor {
     }
     void expand(Expansion& out) const { propagator_->taylor().expand(load(rate()), input_, out); }
     void nudge(const Expansion& here, double s) {
-        (load(x_) + here.change(s)).store(x_.data());
+        const Lanes x = load(x_) + here.change(s);
         input_.turn(s);
-        rate_known_ = false;
+        if (carries_rate_) {
+            arrive(x, {coupled(rate_) + here.rate_change(s), propagator_->rates().turning * x.coupled[load_speed]});
+        } else {
+            x.store(x_.data());
+            rate_known_ = false;
+        }
     }
 
  private:
@@ -104,6 +139,19 @@ class Cursor {
         propagator_->rates()(x.coupled, *constant_, input_.values()).store(rate_.data());
         rate_known_ = true;
     }
+    [[gnu::always_inline]] void arrive(const Lanes& x, const Lanes& rate) {
+        x.store(x_.data());
+        rate.store(rate_.data());
+        rate_known_ = true;
+    }
+    // Whether anything but the state itself acts on the coupled states.
+    bool driven() const {
+        const LinearRates& rates = propagator_->rates();
+        const auto u = input_.values();
+        const Coupled drive =
+            load(*constant_) + (u[0] * load(rates.input_column[0]) + u[1] * load(rates.input_column[1]));
+        return drive[0] != 0.0 || drive[1] != 0.0 || drive[2] != 0.0 || drive[3] != 0.0;
+    }
 
     Propagator* propagator_ = nullptr;
     const Column* constant_ = nullptr;
@@ -111,6 +159,7 @@ class Cursor {
     State x_{};
     mutable State rate_{};  // once it has been asked for
     mutable bool rate_known_ = false;
+    bool carries_rate_ = false;
 };
 
 }  // namespace lostmotion

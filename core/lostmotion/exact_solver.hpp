@@ -35,6 +35,18 @@ struct Segment {
     State x_end;      // at end, before any stop there
 };
 
+// What is known of the motion in the present regime beside its state, and goes on with the regime.
+struct Course {
+    State rate{};  // x', if it is known better than from x: under constant inputs
+    bool rate_known = false;
+    std::array<double, n_inputs> input{};  // the inputs that the rate belongs to
+    // Of the speed of the twist, which ends the regime by touching zero, too. What rounding leaves of a zero is relative
+    // to the largest size of its terms.
+    bool off_zero = false;       // has it been off zero?
+    double touch_size = 0.0;     // the largest size of its terms [rad/s]
+    double doubt = 0.0;          // rounding of the rate where the regime began, relative to the rate
+};
+
 template <class System>
 class ExactSolver {
  public:
@@ -74,6 +86,7 @@ class ExactSolver {
     // Sets the state and finds the regime it is in.
     Status begin(double time, const State& x, const Memory& memory) {
         set_time(time);
+        course_ = {};
         switchings_ = 0;
         now_.x = x;
         now_.memory = memory;
@@ -81,18 +94,23 @@ class ExactSolver {
         return status_of(system_.start(cache_, now_, key_));
     }
     // Continues from a state with a known regime.
-    void resume(double time, const State& x, const Memory& memory, const RegimeKey& key) {
+    void resume(double time, const State& x, const Memory& memory, const RegimeKey& key, const Course& course = {}) {
         set_time(time);
         now_.x = x;
         now_.memory = memory;
         key_ = key;
+        course_ = course;
     }
+    const Course& course() const { return course_; }
     // From now on the input is value + slope * (t - now). Only for signals made with ramped_inputs().
     void set_ramp(int input, double value, double slope) { signals_[input].knots[0] = {time_, value, slope}; }
     // The inputs have changed at this instant: finds the regime anew.
     Status inputs_changed() {
+        const RegimeKey before = key_;
         anchor_inputs();
-        return status_of(system_.next(cache_, now_, nullptr, key_));
+        const Status status = status_of(system_.next(cache_, now_, nullptr, key_));
+        follow_inputs(before);
+        return status;
     }
 
     // Runs to t_end. The observer gets every segment as it comes and, if it wants them, the switchings between.
@@ -110,7 +128,9 @@ class ExactSolver {
             if (!entry.propagator.ready()) entry.prepare(turns_, scale_);
             Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
                                     now_.x};
-            begin_->place(entry.propagator, segment.constant, now_.x);
+            begin_->place(entry.propagator, segment.constant, now_.x, entry.touch_guard >= 0,
+                          course_.rate_known ? &course_.rate : nullptr);
+            if (begin_->input().constant() && has_settled(begin_->rate())) begin_->settle();
             if (!(time_ < knot_)) knot_ = next_knot(signals_, time_);
             const double limit = std::min(t_end, knot_);
             const Guard* fired = nullptr;
@@ -124,6 +144,7 @@ class ExactSolver {
                 jump_pending_ = knot_ == t_end;  // it belongs to what comes after
                 return Status::done;
             }
+            if (fired == nullptr && time_ < limit) continue;  // the motion has settled
             const Status switched = change_regime(fired, observer);
             if (switched != Status::done) return switched;
         }
@@ -132,6 +153,7 @@ class ExactSolver {
  private:
     static constexpr double converging = 1e-7;  // the next correction is less than the square of the last
     static constexpr int first_level = 6;       // of the first look
+    static constexpr double settled = 0x1p-400;  // of a rate [1/s], in natural sizes: below it, squares would underflow
     // A third of the length times the error of the slope of a cubic, over the error of its value.
     static constexpr double slope_share = 0.00802 / 3.0 * 384.0;
 
@@ -152,15 +174,56 @@ class ExactSolver {
         see_inputs(begin_->input(), time_, now_);
     }
 
+    bool has_settled(const State& rate) const {
+        for (int k = 0; k < n_coupled; ++k)
+            if (!(std::fabs(rate[k]) <= settled * scale_[k])) return false;
+        return true;
+    }
+    // After a change of the inputs: if the regime goes on, the rate jumps by no more than what they bring.
+    void follow_inputs(const RegimeKey& before) {
+        if (!course_.rate_known || !(key_ == before)) {
+            course_ = {};
+            return;
+        }
+        const LinearRates& rates = cache_.entry(key_).rates;
+        Lanes rate = load(course_.rate);
+        for (int i = 0; i < n_inputs; ++i)
+            rate.coupled = rate.coupled + (now_.input[0][i] - course_.input[i]) * load(rates.input_column[i]);
+        const double before_jump = slip_bound(cache_.entry(key_), coupled(course_.rate)),
+                     after_jump = slip_bound(cache_.entry(key_), rate.coupled);
+        course_.doubt = after_jump > 0.0 ? std::fmin(1.0, course_.doubt * before_jump / after_jump) : 0.0;
+        rate.store(course_.rate.data());
+        course_.off_zero = false;
+        course_.touch_size = 0.0;
+    }
+    // Bound on the speed of the twist over the first look, from the rate.
+    double slip_bound(typename Cache::Entry& e, const Coupled& rate) const {
+        if (!e.propagator.ready()) e.prepare(turns_, scale_);
+        return (e.propagator.level(first_level).growth * absolute(rate))[twist];
+    }
+    // Rounding of a rate that is computed from the state, relative to the rate, as far as it acts on the twist.
+    double rate_doubt(typename Cache::Entry& e, const Cursor& at, const Memory& memory) const {
+        State size = e.rates.size(magnitudes(at.x()), magnitudes(memory), at.input().sizes());
+        if (at.rate()[twist] == 0.0) size[twist] = 0.0;  // it starts from rest
+        const double bound = slip_bound(e, coupled(at.rate()));
+        const double rounding_of_rate = 4.0 * std::numeric_limits<double>::epsilon() * slip_bound(e, coupled(size));
+        return bound > rounding_of_rate ? rounding_of_rate / bound : 1.0;
+    }
+
     template <class Observer>
     Status change_regime(const Guard* fired, Observer& observer) {
         if (fired != nullptr) {
             std::swap(begin_, there_);
             if (++crossings_ % 8 == 0) begin_->inputs().anchor(time_);
         }
+        const RegimeKey before = key_;
         const Status status = switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, observer);
         if (fired != nullptr) stopped_at_ = fired->contact;
         if (status != Status::done) return status;
+        if (fired == nullptr)
+            follow_inputs(before);
+        else
+            course_ = {};
         ++switchings_;
         return accumulation_.add(time_, unit_) ? Status::zeno : Status::done;
     }
@@ -184,9 +247,10 @@ class ExactSolver {
         e.guards.constants(segment.memory, constant);
         Cursor *cursor = begin_, *end = there_;
         Ends *here = &ends_[0], *there = &ends_[1];
-        off_zero_ = false;
-        touch_size_ = 0.0;
-        evaluate(e.guards, constant, *cursor, *here);
+        const bool constant_inputs = cursor->input().constant();
+        if (!course_.rate_known && e.touch_guard >= 0 && cursor->carries_rate())
+            course_.doubt = rate_doubt(e, *cursor, segment.memory);
+        evaluate(e, constant, *cursor, *here);
         Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
         for (int i = 0; i < n_inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
         int level = std::min(last_level_, p.level_below(limit - time_));
@@ -197,6 +261,17 @@ class ExactSolver {
                 return Status::interrupted;
             if (count % 64 == 0) cursor->anchor(time_);
             const State& rate = cursor->rate();
+            if (constant_inputs && has_settled(rate)) {
+                now_.x = cursor->x();
+                if (time_ == segment.begin) {
+                    now_.x[load_angle] += rate[load_angle] * (limit - time_);
+                    time_ = limit;
+                }
+                keep_course(*cursor);
+                for (int k = 0; k < n_coupled; ++k) course_.rate[k] = 0.0;
+                course_.rate_known = true;
+                return Status::done;
+            }
             if (!(std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100)) return Status::outside;
             const Coupled fourth = absolute(cursor->fourth_derivative());
             const double left = limit - time_;
@@ -207,7 +282,7 @@ class ExactSolver {
                 } else {
                     end->advance_from(*cursor, h);
                 }
-                evaluate(e.guards, constant, *end, *there);
+                evaluate(e, constant, *end, *there);
                 bound_fourth(e.guards, p.level(level).growth, fourth + h * forced);
                 const Verdict verdict = judge(e, segment.memory, *cursor, *here, *there, h, h < shortest);
                 if (verdict == Verdict::uncertain) {  // below the shortest level, by plain halves
@@ -233,13 +308,22 @@ class ExactSolver {
         }
         now_.x = cursor->x();
         last_level_ = level;
+        keep_course(*cursor);
         return Status::done;
     }
 
-    [[gnu::always_inline]] static void evaluate(const GuardTable& guards, const GuardTable::Values& constant,
+    void keep_course(const Cursor& at) {
+        course_.rate = at.rate();
+        course_.rate_known = at.carries_rate();
+        course_.input = at.input().values();
+    }
+
+    // The speed of the twist is the rate of the twist.
+    [[gnu::always_inline]] static void evaluate(const typename Cache::Entry& e, const GuardTable::Values& constant,
                                                 Cursor& at, Ends& out) {
-        guards.evaluate(constant, at.x(), at.input(), out.value);
-        guards.rates(at.rate(), at.input(), out.slope);
+        e.guards.evaluate(constant, at.x(), at.input(), out.value);
+        e.guards.rates(at.rate(), at.input(), out.slope);
+        if (e.touch_guard >= 0 && at.carries_rate()) out.value[e.touch_guard] = e.slip() * at.rate()[twist];
     }
 
     // |g''''| over the look, from a bound on the fourth derivative of the state that the flow carries on.
@@ -271,14 +355,18 @@ class ExactSolver {
         return doubtful;
     }
 
-    Verdict judge(const typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here,
+    Verdict judge(typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here,
                   const Ends& there, double h, bool shortest) {
         unsigned doubtful = enclose(e.guards.rows(), here, there, h);
         n_crossing_ = 0;
+        double touch = 0.0;  // what counts as zero when the speed of the twist touches it
         if (e.touch_guard >= 0) {
-            touch_size_ = std::max(touch_size_, e.touch_size(cursor.x()));
-            off_zero_ |= here.value[e.touch_guard] > rounding * touch_size_;
-            if (bounds_.least[e.touch_guard] <= rounding * touch_size_) doubtful |= 1u << e.touch_guard;
+            course_.touch_size = std::max(course_.touch_size, cursor.carries_rate()
+                                                                  ? std::fabs(here.value[e.touch_guard])
+                                                                  : e.touch_size(cursor.x()));
+            touch = (rounding + (cursor.carries_rate() ? course_.doubt : 0.0)) * course_.touch_size;
+            course_.off_zero |= here.value[e.touch_guard] > touch;
+            if (bounds_.least[e.touch_guard] <= touch) doubtful |= 1u << e.touch_guard;
         }
         if (doubtful == 0) return Verdict::clear;
         GuardTable::Values size;
@@ -287,24 +375,26 @@ class ExactSolver {
             const int g = std::countr_zero(doubtful);
             const double low = bounds_.least[g], error = bounds_.error[g];
             const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
-            const bool touches = g == e.touch_guard && off_zero_ && low - error <= rounding * touch_size_ &&
-                                 c.c3 > rounding * touch_size_;
+            const bool touches = g == e.touch_guard && course_.off_zero && low - error <= touch && c.c3 > touch;
             if (low > error && !touches) continue;
+            const double resolution = g == e.touch_guard && cursor.carries_rate()
+                                          ? (rounding + course_.doubt) * slip_bound(e, coupled(cursor.rate()))
+                                          : rounding * size[g];
             const double tolerance =
-                rounding * size[g] +
+                resolution +
                 time_rounding * std::fabs(time_) * std::max(std::fabs(here.slope[g]), std::fabs(there.slope[g]));
             if (low - error >= -tolerance && !touches) continue;
             const double d0 = c.c1 - c.c0, d1 = c.c2 - c.c1, d2 = c.c3 - c.c2;
             const bool rises = std::min(d0, std::min(d1, d2)) > slope_share * error;
             const bool falls = std::max(d0, std::max(d1, d2)) < -slope_share * error;
-            if (rises && c.c0 >= -tolerance && !(touches && c.c0 <= rounding * touch_size_)) continue;
+            if (rises && c.c0 >= -tolerance && !(touches && c.c0 <= touch)) continue;
             if (falls && c.c3 >= -tolerance) continue;
             if (falls) {
                 crossing_[n_crossing_++] = {g, false};
                 continue;
             }
             if (c.c0 <= tolerance && !touches && departs(e, memory, cursor, g, h)) continue;
-            const double resolved = touches ? rounding * touch_size_ : tolerance;
+            const double resolved = touches ? touch : tolerance;
             if (error > resolved && !shortest) {
                 // Half the length has a sixteenth of the error, which ought to be small beside what the guard does.
                 const double course = std::max(std::max(std::fabs(c.c0), std::fabs(c.c3)),
@@ -387,7 +477,9 @@ class ExactSolver {
         double low = 0.0, high = h, s = estimate;
         for (int m = 0; m < 100; ++m) {
             const double rest = trial_->advance_by_levels(cursor, s), from = s - rest;
-            const double value = lostmotion::evaluate(form, trial_->x(), memory, trial_->input().values());
+            const double value = g == e.touch_guard && trial_->carries_rate()
+                                     ? e.slip() * trial_->rate()[twist]
+                                     : lostmotion::evaluate(form, trial_->x(), memory, trial_->input().values());
             trial_->expand(expansion_);
             const Polynomial guard = expansion_.polynomial(form, value);
             const double reach = std::fabs(rest) + 0.25 * base, at = trial_->time();
@@ -446,10 +538,7 @@ class ExactSolver {
     };
     std::array<Crossing, max_guards> crossing_{};
     int n_crossing_ = 0;
-    // Of the guard that may end this regime by a touch: has it been off zero, and the largest size of its terms. What
-    // rounding leaves of a zero is relative to the latter. (A regime has at most one such guard.)
-    bool off_zero_ = false;
-    double touch_size_ = 0.0;
+    Course course_;
     Accumulation accumulation_;
     bool jump_pending_ = false;
     Contact stopped_at_ = input_contact;

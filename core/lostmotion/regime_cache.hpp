@@ -47,7 +47,9 @@ class RegimeCache {
         }
         void prepare(InputTurns& turns, const State& scale) { propagator.prepare(rates, turns, scale); }
 
-        // Sum of the magnitudes of the terms of the guard that ends by touching, a speed.
+        // The direction in which the twist slips, whose speed is the guard that ends by touching.
+        double slip() const { return -guards.coefficient(touch_guard, load_speed); }
+        // Sum of the magnitudes of the terms of that guard.
         double touch_size(const State& x) const {
             return std::fabs(guards.coefficient(touch_guard, motor_speed) * x[motor_speed]) +
                    std::fabs(guards.coefficient(touch_guard, load_speed) * x[load_speed]);

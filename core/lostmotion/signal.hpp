@@ -42,9 +42,13 @@ struct Signal {
         }
         return low;
     }
+    // The next knot after t at which the signal changes its value or its slope.
     double next_knot(double t) const {
-        const std::size_t k = segment(t) + 1;
-        return k < knots.size() ? knots[k].time : std::numeric_limits<double>::infinity();
+        for (std::size_t k = segment(t) + 1; k < knots.size(); ++k) {
+            const Knot &before = knots[k - 1], &at = knots[k];
+            if (at.slope != 0.0 || before.slope != 0.0 || at.value != before.value) return at.time;
+        }
+        return std::numeric_limits<double>::infinity();
     }
 };
 
@@ -247,6 +251,8 @@ class InputState {
 
     // Whether an input is other than constant.
     bool varies(int i) const { return slope_[i] != 0.0 || sines_end_[i] > (i == 0 ? 0 : sines_end_[0]); }
+
+    bool constant() const { return !varies(0) && !varies(1); }
 
     // Bound on the fourth derivative of each input for all time.
     std::array<double, n_inputs> fourth_derivative_bound() const {

@@ -17,6 +17,8 @@ class Simulation {
         RegimeKey key;
         std::array<double, n_inputs> input{};  // last values, for reading variables
         bool started = false;
+        bool steady = false;  // the inputs were constant in the last interval
+        Course course;        // what is known of the motion in the present regime beside its state
     };
 
     // step: the usual interval [s]; others are allowed, this one is fastest.
@@ -39,13 +41,18 @@ class Simulation {
     // On any status but done the state is left as it was.
     Status advance(double interval, double command_begin, double command_end, double load_begin, double load_end) {
         const std::array<double, n_inputs> begin{command_begin, load_begin}, end{command_end, load_end};
-        solver_.resume(now_.time, now_.x, now_.memory, now_.key);
+        solver_.resume(now_.time, now_.x, now_.memory, now_.key, now_.course);
         for (int i = 0; i < n_inputs; ++i) solver_.set_ramp(i, begin[i], (end[i] - begin[i]) / interval);
-        Status status = now_.started ? solver_.inputs_changed() : solver_.begin(now_.time, now_.x, now_.memory);
+        const bool steady = begin == end, unchanged = now_.steady && steady && begin == now_.input;
+        Status status = Status::done;
+        if (!now_.started)
+            status = solver_.begin(now_.time, now_.x, now_.memory);
+        else if (!unchanged)
+            status = solver_.inputs_changed();
         Nothing nothing;
         if (status == Status::done) status = solver_.advance(now_.time + interval, nothing);
         if (status != Status::done) return status;
-        now_ = {solver_.time(), solver_.state(), solver_.memory(), solver_.key(), end, true};
+        now_ = {solver_.time(), solver_.state(), solver_.memory(), solver_.key(), end, true, steady, solver_.course()};
         return status;
     }
 
@@ -65,7 +72,7 @@ class Simulation {
         solver_.resume(now_.time, now_.x, now_.memory, now_.key);
         for (int i = 0; i < n_inputs; ++i) solver_.set_ramp(i, now_.input[i], 0.0);
         if (solver_.begin(now_.time, now_.x, now_.memory) == Status::done)
-            now_ = {now_.time, solver_.state(), solver_.memory(), solver_.key(), now_.input, true};
+            now_ = {now_.time, solver_.state(), solver_.memory(), solver_.key(), now_.input, true, false, {}};
     }
 
     Drive drive_;

@@ -52,6 +52,13 @@ class Expansion {
         return {sum, s * (angle_rate + turning * angle)};
     }
 
+    // By how much the rate of the coupled states changes over s.
+    Coupled rate_change(double s) const {
+        Coupled sum{};
+        for (int k = terms - 1; k > 0; --k) sum = s / k * (coupled[static_cast<std::size_t>(k)] + sum);
+        return sum;
+    }
+
     // A form of the motion that does not depend on the load angle, as a polynomial in the time [s] from the instant.
     [[gnu::always_inline]] Polynomial polynomial(const LinearForm& form, double value) const {
         assert(form.c[load_angle] == 0.0);
