@@ -216,7 +216,13 @@ NB_MODULE(CORE_MODULE, m) {
                 key.piece = static_cast<std::int16_t>(k[4]);
                 key.cell = k[5];
                 key.cell_back = k[6];
-                s.restore({time, to_state(x), {capacity, held}, key, input, started, course.back() != 0.0,
+                s.restore({time,
+                           to_state(x),
+                           {capacity, held},
+                           key,
+                           input,
+                           started,
+                           course.back() != 0.0,
                            to_course(course)});
             },
             "time"_a, "state"_a, "hysteresis_capacity"_a, "held_torque"_a, "regime"_a, "input"_a, "started"_a,

@@ -103,6 +103,7 @@ class SwitchedDrive {
     template <class Cache>
     Found start(Cache& cache, Instant& now, RegimeKey& key) const {
         for (int c = 0; c < n_contacts; ++c) key.modes[c] = drive_.has(static_cast<Contact>(c)) ? 1 : absent;
+        direct(now.x, key);
         std::array<bool, n_contacts> at_rest = at_exact_rest(now.x);
         if (drive_.rigid()) at_rest[twist_contact] = true;
         const double P = drive_.rigid() ? now.memory.held_torque : drive_.gearbox.curve.torque(now.x[twist]);
@@ -127,6 +128,15 @@ class SwitchedDrive {
         if (fired != nullptr && fired->kind == Guard::capacity && breaks_away(cache, now, event, key))
             return Found::yes;
         return find(cache, now, event, key);
+    }
+
+    // Lets the contacts that slip do so in the direction of their speeds: for a state that the motion has not led to.
+    void direct(const State& x, RegimeKey& key) const {
+        for (int k = 0; k < n_contacts; ++k) {
+            if (key.modes[k] == 0 || key.modes[k] == absent) continue;
+            const double speed = evaluate(drive_.contact_speed(static_cast<Contact>(k)), x, {}, {});
+            if (speed != 0.0) key.modes[k] = speed > 0.0 ? +1 : -1;
+        }
     }
 
     // Sets the speeds of contacts at rest to what they are, to the last bit. Two at rest imply the third.
@@ -191,15 +201,6 @@ class SwitchedDrive {
         return settle(cache, now, modes, slipping, key) == Found::yes;
     }
 
-    // The direction in which a contact slips: as before, unless its speed is beyond rounding and says otherwise.
-    std::int8_t direction(Contact c, const Instant& now, std::int8_t before) const {
-        const LinearForm form = drive_.contact_speed(c);
-        const double speed = evaluate(form, now.x, now.memory, now.input[0]);
-        const double size = magnitude(form, now.x, now.memory, now.input[0]);
-        if ((before == +1 || before == -1) && std::fabs(speed) <= rounding * size) return before;
-        return speed > 0.0 ? +1 : -1;
-    }
-
     // Tries the combinations of modes. If the guards that start on zero leave none, the motion is too small beside its
     // torques for rounding to tell which of them rise: then those that are zero to rounding hold.
     template <class Cache>
@@ -215,7 +216,7 @@ class SwitchedDrive {
             } else if (event.at_rest[c]) {
                 for (const int mode : {0, +1, -1}) choices[k][n[k]++] = static_cast<std::int8_t>(mode);
             } else {
-                choices[k][n[k]++] = direction(c, now, key.modes[c]);
+                choices[k][n[k]++] = key.modes[c];
             }
         }
         const Found found = search(cache, now, choices, n, event, key);
@@ -371,7 +372,6 @@ class SwitchedDrive {
         for (int k = 0; k < n_contacts; ++k) {
             const auto c = static_cast<Contact>(k);
             if (entry.regime.at_rest[c] || key.modes[c] == absent) continue;
-            if (direction(c, now, key.modes[c]) != key.modes[c]) return false;
             moving |= entry.speeds[c];
         }
         const auto [left, overcome] = violated(entry, now, moving);

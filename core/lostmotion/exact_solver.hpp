@@ -40,11 +40,11 @@ struct Course {
     State rate{};  // x', if it is known better than from x: under constant inputs
     bool rate_known = false;
     std::array<double, n_inputs> input{};  // the inputs that the rate belongs to
-    // Of the speed of the twist, which ends the regime by touching zero, too. What rounding leaves of a zero is relative
-    // to the largest size of its terms.
-    bool off_zero = false;       // has it been off zero?
-    double touch_size = 0.0;     // the largest size of its terms [rad/s]
-    double doubt = 0.0;          // rounding of the rate where the regime began, relative to the rate
+    // Of the speed of the twist, which ends the regime by touching zero, too. What rounding leaves of a zero is
+    // relative to the largest size of its terms.
+    bool off_zero = false;    // has it been off zero?
+    double touch_size = 0.0;  // the largest size of its terms [rad/s]
+    double doubt = 0.0;       // rounding of the rate where the regime began, relative to the rate
 };
 
 template <class System>
@@ -128,7 +128,7 @@ class ExactSolver {
             if (!entry.propagator.ready()) entry.prepare(turns_, scale_);
             Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
                                     now_.x};
-            begin_->place(entry.propagator, segment.constant, now_.x, entry.touch_guard >= 0,
+            begin_->place(entry.propagator, segment.constant, now_.x, entry.n_twist_speeds > 0,
                           course_.rate_known ? &course_.rate : nullptr);
             if (begin_->input().constant() && has_settled(begin_->rate())) begin_->settle();
             if (!(time_ < knot_)) knot_ = next_knot(signals_, time_);
@@ -151,8 +151,8 @@ class ExactSolver {
     }
 
  private:
-    static constexpr double converging = 1e-7;  // the next correction is less than the square of the last
-    static constexpr int first_level = 6;       // of the first look
+    static constexpr double converging = 1e-7;   // the next correction is less than the square of the last
+    static constexpr int first_level = 6;        // of the first look
     static constexpr double settled = 0x1p-400;  // of a rate [1/s], in natural sizes: below it, squares would underflow
     // A third of the length times the error of the slope of a cubic, over the error of its value.
     static constexpr double slope_share = 0.00802 / 3.0 * 384.0;
@@ -248,8 +248,7 @@ class ExactSolver {
         Cursor *cursor = begin_, *end = there_;
         Ends *here = &ends_[0], *there = &ends_[1];
         const bool constant_inputs = cursor->input().constant();
-        if (!course_.rate_known && e.touch_guard >= 0 && cursor->carries_rate())
-            course_.doubt = rate_doubt(e, *cursor, segment.memory);
+        if (!course_.rate_known && cursor->carries_rate()) course_.doubt = rate_doubt(e, *cursor, segment.memory);
         evaluate(e, constant, *cursor, *here);
         Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
         for (int i = 0; i < n_inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
@@ -318,12 +317,14 @@ class ExactSolver {
         course_.input = at.input().values();
     }
 
-    // The speed of the twist is the rate of the twist.
+    // Speeds that are multiples of the rate of the twist are as accurate as that.
     [[gnu::always_inline]] static void evaluate(const typename Cache::Entry& e, const GuardTable::Values& constant,
                                                 Cursor& at, Ends& out) {
         e.guards.evaluate(constant, at.x(), at.input(), out.value);
         e.guards.rates(at.rate(), at.input(), out.slope);
-        if (e.touch_guard >= 0 && at.carries_rate()) out.value[e.touch_guard] = e.slip() * at.rate()[twist];
+        if (!at.carries_rate()) return;
+        for (int k = 0; k < e.n_twist_speeds; ++k)
+            out.value[e.twist_speeds[k].guard] = e.twist_speeds[k].factor * at.rate()[twist];
     }
 
     // |g''''| over the look, from a bound on the fourth derivative of the state that the flow carries on.
@@ -361,10 +362,8 @@ class ExactSolver {
         n_crossing_ = 0;
         double touch = 0.0;  // what counts as zero when the speed of the twist touches it
         if (e.touch_guard >= 0) {
-            course_.touch_size = std::max(course_.touch_size, cursor.carries_rate()
-                                                                  ? std::fabs(here.value[e.touch_guard])
-                                                                  : e.touch_size(cursor.x()));
-            touch = (rounding + (cursor.carries_rate() ? course_.doubt : 0.0)) * course_.touch_size;
+            course_.touch_size = std::max(course_.touch_size, e.touch_size(cursor.x()));
+            touch = cursor.carries_rate() ? twist_speed_rounding(e, cursor) : rounding * course_.touch_size;
             course_.off_zero |= here.value[e.touch_guard] > touch;
             if (bounds_.least[e.touch_guard] <= touch) doubtful |= 1u << e.touch_guard;
         }
@@ -377,12 +376,11 @@ class ExactSolver {
             const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
             const bool touches = g == e.touch_guard && course_.off_zero && low - error <= touch && c.c3 > touch;
             if (low > error && !touches) continue;
-            const double resolution = g == e.touch_guard && cursor.carries_rate()
-                                          ? (rounding + course_.doubt) * slip_bound(e, coupled(cursor.rate()))
-                                          : rounding * size[g];
-            const double tolerance =
-                resolution +
-                time_rounding * std::fabs(time_) * std::max(std::fabs(here.slope[g]), std::fabs(there.slope[g]));
+            const double of_rate = cursor.carries_rate() ? e.twist_factor(g) : 0.0;
+            const double resolution =
+                of_rate != 0.0 ? std::fabs(of_rate) * twist_speed_rounding(e, cursor) : rounding * size[g];
+            const double tolerance = resolution + time_rounding * std::fabs(time_) *
+                                                      std::max(std::fabs(here.slope[g]), std::fabs(there.slope[g]));
             if (low - error >= -tolerance && !touches) continue;
             const double d0 = c.c1 - c.c0, d1 = c.c2 - c.c1, d2 = c.c3 - c.c2;
             const bool rises = std::min(d0, std::min(d1, d2)) > slope_share * error;
@@ -413,25 +411,38 @@ class ExactSolver {
         return n_crossing_ > 0 ? Verdict::crossing : Verdict::clear;
     }
 
+    // Rounding of the speed of the twist where it is its rate, carried on from where the regime began.
+    double twist_speed_rounding(typename Cache::Entry& e, const Cursor& at) const {
+        return (rounding + course_.doubt) * slip_bound(e, coupled(at.rate()));
+    }
+
     // A guard that starts on zero: does its first derivative that is not zero carry it away, all through the look?
     bool departs(const typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, int g, double h) const {
+        const auto [first, derivative] = departure(e, memory, cursor, g);
+        if (first == 0) return false;
+        // value = h^k (derivative_k / k! + what follows), bounded at the far end.
+        double least = derivative[first] * over_factorial[first], power = h;
+        for (int k = first + 1; k < 4; ++k, power *= h) least += power * std::min(0.0, derivative[k]) * over_factorial[k];
+        return least > power * bounds_.fourth[g] * over_factorial[4];
+    }
+    // The order of the first derivative of a guard, up to the third, that is not zero; 0 if there is none or it is
+    // negative.
+    struct Departure {
+        std::size_t order = 0;
+        std::array<double, 4> derivative{};
+    };
+    Departure departure(const typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, int g) const {
         const Instant now{time_, cursor.x(), memory, cursor.input().jet(), cursor.input().sizes()};
         Flow flow(e.rates, now);
         const LinearForm form = e.guards.form(g);
-        std::array<double, 4> derivative{};
-        int first = 0;
-        for (int k = 1; k < 4; ++k) {
-            const auto [value, size] = flow.derivative(form, k);
-            derivative[k] = value;
-            if (first == 0 && value < -rounding * size) return false;
-            if (first == 0 && value > rounding * size) first = k;
+        Departure out;
+        for (std::size_t k = 1; k < 4; ++k) {
+            const auto [value, size] = flow.derivative(form, static_cast<int>(k));
+            out.derivative[k] = value;
+            if (out.order == 0 && value < -rounding * size) return out;
+            if (out.order == 0 && value > rounding * size) out.order = k;
         }
-        if (first == 0) return false;
-        // value = h^k (derivative_k / k! + what follows), bounded at the far end.
-        constexpr std::array<double, 5> factorial{1.0, 1.0, 2.0, 6.0, 24.0};
-        double least = derivative[first] / factorial[first], power = h;
-        for (int k = first + 1; k < 4; ++k, power *= h) least += power * std::min(0.0, derivative[k]) / factorial[k];
-        return least > power * bounds_.fourth[g] / factorial[4];
+        return out;
     }
 
     // Earliest of the certified crossings; there_ is left at it.
@@ -468,6 +479,23 @@ class ExactSolver {
         }
     }
 
+    // A guard that starts on zero and rises, by the derivative of this order: where it comes back to zero before `end`,
+    // at most one base interval on; else `end`. Leaves trial_ there.
+    double first_return(const LinearForm& form, const Cursor& cursor, std::size_t order, double end) {
+        cursor.expand(expansion_);
+        Polynomial guard = expansion_.polynomial(form, 0.0);
+        for (std::size_t k = 1; k < order; ++k) guard.part[0].set(static_cast<int>(k - 1), 0.0);
+        double low = 0.0, high = end;
+        if (guard.value(end) < 0.0)
+            while (high - low > 4.0 * std::numeric_limits<double>::epsilon() * high) {
+                const double middle = 0.5 * (low + high);
+                (guard.value(middle) > 0.0 ? low : high) = middle;
+            }
+        *trial_ = cursor;
+        trial_->nudge(expansion_, high);
+        return high;
+    }
+
     // Where a guard falls through zero between `cursor` and h later, near an estimate. Leaves trial_ there, returns
     // when. About the nearest instant that whole levels lead to, the guard is a polynomial to rounding.
     double find_zero(typename Cache::Entry& e, int g, const Memory& memory, const Cursor& cursor, double estimate,
@@ -475,10 +503,21 @@ class ExactSolver {
         const LinearForm form = e.guards.form(g);
         const double base = e.propagator.length(0);
         double low = 0.0, high = h, s = estimate;
+        if (lostmotion::evaluate(form, cursor.x(), memory, cursor.input().values()) <=
+            rounding * magnitude(form, cursor.x(), memory, cursor.input().values())) {
+            if (const auto order = departure(e, memory, cursor, g).order; order > 0) {
+                const double end = std::min(h, base);
+                if (const double z = first_return(form, cursor, order, end); z < end) return z;
+                low = end;
+                s = std::clamp(estimate, low, h);
+            }
+        }
+        const double earliest = low;
         for (int m = 0; m < 100; ++m) {
             const double rest = trial_->advance_by_levels(cursor, s), from = s - rest;
-            const double value = g == e.touch_guard && trial_->carries_rate()
-                                     ? e.slip() * trial_->rate()[twist]
+            const double of_rate = trial_->carries_rate() ? e.twist_factor(g) : 0.0;
+            const double value = of_rate != 0.0
+                                     ? of_rate * trial_->rate()[twist]
                                      : lostmotion::evaluate(form, trial_->x(), memory, trial_->input().values());
             trial_->expand(expansion_);
             const Polynomial guard = expansion_.polynomial(form, value);
@@ -492,7 +531,7 @@ class ExactSolver {
                 z += moved;
                 found = std::fabs(moved) <= converging * std::fabs(z) || at + moved == at;
             }
-            if (found && std::fabs(z) <= reach) {
+            if (found && std::fabs(z) <= reach && (from + z >= earliest || earliest == 0.0)) {
                 s = std::clamp(from + z, 0.0, h);
                 trial_->nudge(expansion_, s - from);
                 return s;

@@ -208,6 +208,7 @@ class Shooting {
         y.key = image.end.key;
         std::array<bool, n_contacts> at_rest = workspace_.cache.regime(y.key).at_rest;
         workspace_.system.stop(y.x, at_rest);
+        workspace_.system.direct(y.x, y.key);
         return true;
     }
 

@@ -25,6 +25,14 @@ class RegimeCache {
         int touch_guard = -1;                       // the one that also ends the regime by touching zero
         std::array<unsigned, n_contacts> speeds{};  // the guards of each contact's speed, as bits
         unsigned contacts = 0;                      // and those of all speeds and capacities
+        // The guards that are multiples of the rate of the twist: its own speed, and that of one end while the other
+        // is at rest.
+        struct TwistSpeed {
+            int guard;
+            double factor;
+        };
+        std::array<TwistSpeed, n_contacts> twist_speeds{};
+        int n_twist_speeds = 0;
         Propagator propagator;
         std::array<Entry*, max_guards> neighbour{};  // what lies beyond each guard, as far as it is known
 
@@ -37,22 +45,42 @@ class RegimeCache {
             touch_guard = -1;
             speeds = {};
             contacts = 0;
+            n_twist_speeds = 0;
             for (int g = 0; g < r.n_guards; ++g) {
                 guards.set(g, r.guards[g].form);
                 if (r.guards[g].by_touch) touch_guard = g;
-                if (r.guards[g].kind == Guard::speed) speeds[r.guards[g].contact] |= 1u << g;
+                if (r.guards[g].kind == Guard::speed) {
+                    speeds[r.guards[g].contact] |= 1u << g;
+                    if (const double factor = twist_factor(r, r.guards[g].form); factor != 0.0)
+                        twist_speeds[n_twist_speeds++] = {g, factor};
+                }
                 if (r.guards[g].kind == Guard::speed || r.guards[g].kind == Guard::capacity) contacts |= 1u << g;
             }
             propagator.reset();
         }
         void prepare(InputTurns& turns, const State& scale) { propagator.prepare(rates, turns, scale); }
 
-        // The direction in which the twist slips, whose speed is the guard that ends by touching.
-        double slip() const { return -guards.coefficient(touch_guard, load_speed); }
-        // Sum of the magnitudes of the terms of that guard.
+        // How many times the rate of the twist a guard is, or 0.
+        double twist_factor(int guard) const {
+            for (int k = 0; k < n_twist_speeds; ++k)
+                if (twist_speeds[k].guard == guard) return twist_speeds[k].factor;
+            return 0.0;
+        }
+        // Sum of the magnitudes of the terms of the guard that ends by touching, a speed.
         double touch_size(const State& x) const {
             return std::fabs(guards.coefficient(touch_guard, motor_speed) * x[motor_speed]) +
                    std::fabs(guards.coefficient(touch_guard, load_speed) * x[load_speed]);
+        }
+
+     private:
+        static double twist_factor(const Regime& r, const LinearForm& speed) {
+            const LinearForm& rate = r.rate[twist];
+            const auto moving = [&r](const LinearForm& f, Term t, Contact c) { return r.at_rest[c] ? 0.0 : f.c[t]; };
+            const double a = moving(speed, motor_speed, input_contact), b = moving(speed, load_speed, load_contact),
+                         rate_a = moving(rate, motor_speed, input_contact),
+                         rate_b = moving(rate, load_speed, load_contact);
+            if (a * rate_b != b * rate_a) return 0.0;
+            return rate_a != 0.0 ? a / rate_a : rate_b != 0.0 ? b / rate_b : 0.0;
         }
     };
 

@@ -55,6 +55,7 @@ struct Pack {
         for (int p = 0; p < parts; ++p) lostmotion::store(part[p], to + p * width);
     }
     double operator[](int k) const { return part[k / width][k % width]; }
+    void set(int k, double number) { part[k / width][k % width] = number; }
     double sum() const {
         static_assert(n == 4);
         return ((*this)[0] + (*this)[1]) + ((*this)[2] + (*this)[3]);
