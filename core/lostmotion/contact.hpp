@@ -36,6 +36,7 @@ class Flow {
     // terms; 0 if it stays at zero.
     int sign(const LinearForm& form, int k, double value, double size) {
         while (++k < n_derivatives) {
+            if (k > 1 && std::fabs(value) > clear_of_zero * size) return value > 0.0 ? +1 : -1;
             const auto [rate, rate_size] = derivative(form, k);
             if (std::fabs(value) > noise(size, rate)) return value > 0.0 ? +1 : -1;
             value = rate;
@@ -154,7 +155,8 @@ class SwitchedDrive {
         double T_2;                    // the output torque before [N m]
         const Guard* fired = nullptr;  // what ended the regime before, if not an input
         RegimeKey before{};
-        bool by_value = false;  // a guard that is zero to rounding holds, whatever its derivatives
+        bool from_each_load = false;  // begin the search for the cell of the loss map from each load
+        bool by_value = false;        // a guard that is zero to rounding holds, whatever its derivatives
 
         // The margins of a contact that has just come to a stop are zero by chance only. If one is, the contact may
         // well rest for that moment, and breaks away again. So their derivatives, which rounding may falsify, are not
@@ -219,10 +221,16 @@ class SwitchedDrive {
                 choices[k][n[k]++] = key.modes[c];
             }
         }
-        const Found found = search(cache, now, choices, n, event, key);
-        if (found != Found::inconsistent) return found;
-        event.by_value = true;
-        return search(cache, now, choices, n, event, key);
+        Found found = search(cache, now, choices, n, event, key);
+        if (found == Found::inconsistent && drive_.gearbox.losses == Gearbox::loss_map) {
+            event.from_each_load = true;
+            found = search(cache, now, choices, n, event, key);
+        }
+        if (found == Found::inconsistent) {
+            event.by_value = true;
+            found = search(cache, now, choices, n, event, key);
+        }
+        return found;
     }
 
     // Those with most contacts stuck first.
@@ -270,9 +278,8 @@ class SwitchedDrive {
         trial.cell = s == 0 ? gearbox.map.load_interval(mu) : gearbox.map.triangle(s * mu, v);
         trial.cell_back = s == 0 ? gearbox.map.load_interval(-mu) : 0;
         const Found found = walk(cache, now, event, trial, key);
-        if (found != Found::inconsistent || s == 0 || modes[twist_contact] != 0) return found;
-        // The torque that keeps the twist at rest depends on the cell, and the cell on the torque: begin from each
-        // load.
+        if (found != Found::inconsistent || !event.from_each_load || s == 0 || modes[twist_contact] != 0) return found;
+        // The torque that keeps the twist at rest depends on the cell, and the cell on the torque.
         for (int j = 0; j < gearbox.map.load_intervals(); ++j) {
             trial.cell = gearbox.map.triangle(
                 0.5 * (gearbox.map.load_interval_lower(j) + gearbox.map.load_interval_upper(j)), v);

@@ -469,7 +469,7 @@ class ExactSolver {
             if (touch) {
                 trial_->advance_from(cursor, s);
             } else {
-                s = find_zero(e, g, memory, cursor, s, h);
+                s = find_zero(e, g, memory, cursor, here.value[g], s, h);
             }
             if (s < best) {
                 best = s;
@@ -496,15 +496,14 @@ class ExactSolver {
         return high;
     }
 
-    // Where a guard falls through zero between `cursor` and h later, near an estimate. Leaves trial_ there, returns
+    // Where a guard that starts with this value falls through zero within h, near an estimate. Leaves trial_ there, returns
     // when. About the nearest instant that whole levels lead to, the guard is a polynomial to rounding.
-    double find_zero(typename Cache::Entry& e, int g, const Memory& memory, const Cursor& cursor, double estimate,
-                     double h) {
+    double find_zero(typename Cache::Entry& e, int g, const Memory& memory, const Cursor& cursor, double start,
+                     double estimate, double h) {
         const LinearForm form = e.guards.form(g);
         const double base = e.propagator.length(0);
         double low = 0.0, high = h, s = estimate;
-        if (lostmotion::evaluate(form, cursor.x(), memory, cursor.input().values()) <=
-            rounding * magnitude(form, cursor.x(), memory, cursor.input().values())) {
+        if (start <= rounding * magnitude(form, cursor.x(), memory, cursor.input().values())) {
             if (const auto order = departure(e, memory, cursor, g).order; order > 0) {
                 const double end = std::min(h, base);
                 if (const double z = first_return(form, cursor, order, end); z < end) return z;
