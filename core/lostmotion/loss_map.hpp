@@ -34,6 +34,11 @@ class LossMap {
 
     bool empty() const { return values_.empty(); }
 
+    // The nodes, with the row and column that were put far outside the data.
+    const std::vector<double>& speeds() const { return speeds_; }
+    const std::vector<double>& loads() const { return loads_; }
+    const std::vector<double>& values() const { return values_; }
+
     // Number of the triangle that contains (mu, v); on an edge, one of its two.
     int triangle(double mu, double v) const {
         const int i = interval(speeds_, v), j = interval(loads_, mu);

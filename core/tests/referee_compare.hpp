@@ -1,0 +1,60 @@
+// The library's runs held against the referee.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "referee.hpp"
+#include "support.hpp"
+
+namespace lostmotion::referee {
+
+inline Case case_of(const Drive& drive, const Signals& signals, double duration, double interval) {
+    Case c;
+    c.drive = {drive.motor, drive.gearbox, drive.load};
+    c.signals = signals;
+    c.duration = duration;
+    c.sample_interval = interval;
+    return c;
+}
+
+// Largest difference at the samples of M_D, w_M, w, d, phi, each in units of its largest magnitude in the referee's
+// run. Speeds of input and load are one quantity seen from two sides and share a unit, as do twist and load angle.
+inline std::array<double, n_states> differences(const Drive& drive, const Samples& run, const Result& truth) {
+    constexpr std::array<Channel, n_states> channels{ch_motor_torque, ch_motor_speed, ch_load_speed, ch_twist,
+                                                     ch_load_angle};
+    std::array<double, n_states> gap{}, size{};
+    const std::size_t count = std::min(run.count, truth.samples.size());
+    for (int c = 0; c < n_states; ++c)
+        for (std::size_t k = 0; k < count; ++k) {
+            size[c] = std::fmax(size[c], std::fabs(truth.samples[k][c]));
+            gap[c] = std::fmax(gap[c], std::fabs(truth.samples[k][c] - run(channels[c], k)));
+        }
+    const double i = drive.gearbox.ratio;
+    size[load_speed] = std::fmax(size[load_speed], size[motor_speed] / i);
+    size[motor_speed] = i * size[load_speed];
+    size[twist] = size[load_angle] = std::fmax(size[twist], size[load_angle]);
+    for (int c = 0; c < n_states; ++c) gap[c] = gap[c] == 0.0 ? 0.0 : gap[c] / size[c];
+    return gap;
+}
+
+struct Agreement {
+    std::array<double, n_states> gap{};  // M_D, w_M, w, d, phi, relative
+    double worst = 0.0;
+    Result truth;
+};
+
+// Whether a run of `drive` is right to within `tolerance`; not so if the referee finds no single motion.
+inline bool referee_agrees(const Drive& drive, const Signals& signals, double duration, double interval,
+                           const Samples& run, double tolerance, Agreement* out = nullptr) {
+    Agreement a;
+    a.truth = referee_run(case_of(drive, signals, duration, interval));
+    a.gap = differences(drive, run, a.truth);
+    a.worst = *std::max_element(a.gap.begin(), a.gap.end());
+    const bool agrees = a.truth.outcome == Outcome::done && run.report.status == Status::done &&
+                        a.truth.samples.size() == run.count && a.worst <= tolerance;
+    if (out) *out = a;
+    return agrees;
+}
+
+}  // namespace lostmotion::referee
