@@ -5,6 +5,7 @@
 // docs/theory.md, "The drive" and "Contacts".
 #pragma once
 
+#include <algorithm>
 #include <cstdio>
 
 #include "referee_motion.hpp"
@@ -278,49 +279,38 @@ class Referee {
         return true;
     }
 
-    // While all contacts stand the torque is not determined: it keeps its value, or takes the nearest that all three
-    // can hold. Only what can be held matters for the motion, which does not depend on which of those values it is.
-    void add_held(std::vector<Combination>& out, const std::vector<Combination>& all, const Inputs& u) const {
-        bool found = false;
-        Quad nearest = 0;
-        struct Held {
-            Combination c;
-            Quad torque;
-            std::vector<TorqueLimit> limits;
-        };
-        std::vector<Held> held;
-        for (const Combination& c : all) {
+    // While all contacts stand the torque is not determined: it keeps its value, or goes to the nearest that twist and
+    // load can hold. If the input cannot hold that one, and no other combination is consistent, it goes to the nearest
+    // that all three can hold (`with_input`). The torques that can be held are an interval for each curve piece and
+    // pair of cells; nearest first.
+    std::vector<Combination> held(const std::vector<Combination>& all, const Inputs& u, bool with_input) const {
+        std::vector<std::pair<Quad, Combination>> found;
+        for (Combination c : all) {
             if (!c.modes.all_stuck()) continue;
             const Series M_D = builder_.motor_torque_at_rest(c.modes.amplifier, x_.M_D, u.E);
-            Held h{c, T_2_, builder_.torque_limits(c, x_.d, M_D, u.M_Z)};
+            const std::vector<TorqueLimit> limits = builder_.torque_limits(c, x_.d, M_D, u.M_Z);
+            const int that_push = builder_.limits_that_push() - (with_input ? 0 : 2);
             Quad low = -HUGE_VALQ, high = HUGE_VALQ;
-            bool possible = true;
-            for (const TorqueLimit& l : h.limits) {
-                if (l.q > 0) low = larger(low, -l.G[0] / l.q);
-                if (l.q < 0) high = earlier(high, -l.G[0] / l.q);
-                if (l.q == 0 && l.G[0] < -Quad(1e-25) * sizes_.input_torque) possible = false;
+            for (int l = 0; l < static_cast<int>(with_input ? limits.size() : that_push); ++l) {
+                if (limits[l].q > 0) low = larger(low, -limits[l].G[0] / limits[l].q);
+                if (limits[l].q < 0) high = earlier(high, -limits[l].G[0] / limits[l].q);
             }
-            const Quad size = larger(model_.i * sizes_.input_torque, magnitude(T_2_));
-            if (!possible || low > high + Quad(1e-25) * larger(size, larger(magnitude(low), magnitude(high)))) continue;
-            h.torque = T_2_ < low ? low : T_2_ > high ? high : T_2_;
-            if (!found || magnitude(h.torque - T_2_) < magnitude(nearest - T_2_)) nearest = h.torque;
-            found = true;
-            held.push_back(h);
-        }
-        for (Held& h : held) {
-            const Quad size = model_.i * sizes_.input_torque + magnitude(nearest) + magnitude(T_2_);
-            if (magnitude(h.torque - nearest) > Quad(1e-24) * size) continue;
-            h.c.kept_torque = nearest;
-            h.c.pushed_by = kept;
-            out.push_back(h.c);
-            for (int l = 0; l < builder_.limits_that_push(); ++l) {
-                const TorqueLimit& limit = h.limits[l];
-                if (limit.q == 0 || magnitude(limit.G[0] + limit.q * nearest) > Quad(1e-24) * magnitude(limit.q) * size)
-                    continue;
-                h.c.pushed_by = l;
-                out.push_back(h.c);
+            c.kept_torque = T_2_ < low ? low : T_2_ > high ? high : T_2_;
+            const Quad distance = magnitude(c.kept_torque - T_2_);
+            const Quad size = model_.i * sizes_.input_torque + magnitude(c.kept_torque) + magnitude(T_2_);
+            found.push_back({distance, c});
+            for (int l = 0; l < that_push; ++l) {
+                const TorqueLimit& limit = limits[l];
+                const Quad room = limit.G[0] + limit.q * c.kept_torque;
+                if (limit.q == 0 || magnitude(room) > Quad(1e-24) * magnitude(limit.q) * size) continue;
+                c.pushed_by = l;
+                found.push_back({distance, c});
             }
         }
+        std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+        std::vector<Combination> sorted;
+        for (const auto& [distance, c] : found) sorted.push_back(c);
+        return sorted;
     }
 
     bool same_motion(const Motion& a, const Motion& b) const {
@@ -336,16 +326,9 @@ class Referee {
         return a.combination.modes.all_stuck() || same(a.T_2, b.T_2, model_.i * sizes_.input_torque);
     }
 
-    // The one consistent combination from here on.
-    bool decide(Motion& motion, const std::string& cause, const ContactModes before) {
-        const Inputs u = inputs_at(t_);
-        std::vector<Combination> trials;
-        const std::vector<Combination> all = combinations(u);
-        for (const Combination& c : all)
-            if (!c.modes.all_stuck()) trials.push_back(c);
-        add_held(trials, all, u);
-        std::vector<Motion> consistent;
-        std::string rejected;
+    // Those of the trials that are consistent and have different motions.
+    std::vector<Motion> consistent(const std::vector<Combination>& trials, const Inputs& u, std::string& rejected) {
+        std::vector<Motion> found;
         for (const Combination& c : trials) {
             ++result_.combinations_tried;
             Motion trial = builder_.build(c, x_, u, sizes_, case_.duration);
@@ -360,21 +343,36 @@ class Referee {
                 continue;
             }
             bool known = false;
-            for (const Motion& other : consistent) known = known || same_motion(trial, other);
-            if (!known) consistent.push_back(trial);
+            for (const Motion& other : found) known = known || same_motion(trial, other);
+            if (!known) found.push_back(trial);
         }
-        if (consistent.size() != 1) {
-            result_.outcome = consistent.empty() ? Outcome::no_continuation : Outcome::several_continuations;
+        return found;
+    }
+
+    // The one consistent combination from here on.
+    bool decide(Motion& motion, const std::string& cause, const ContactModes before) {
+        const Inputs u = inputs_at(t_);
+        sizes_ = builder_.grown(sizes_, x_, u, h_);
+        const std::vector<Combination> all = combinations(u);
+        std::vector<Combination> trials;
+        for (const Combination& c : all)
+            if (!c.modes.all_stuck()) trials.push_back(c);
+        for (const Combination& c : held(all, u, false)) trials.push_back(c);
+        std::string rejected;
+        std::vector<Motion> found = consistent(trials, u, rejected);
+        if (found.empty()) found = consistent(held(all, u, true), u, rejected);
+        if (found.size() != 1) {
+            result_.outcome = found.empty() ? Outcome::no_continuation : Outcome::several_continuations;
             result_.details = "t = " + text(t_) + ", after " + cause + ", modes before " + before.text() + "\n  M_D " +
                               text(x_.M_D) + ", w_M " + text(x_.w_M) + ", w " + text(x_.w) + ", d " + text(x_.d) +
                               ", h " + text(h_) + ", T_2 " + text(T_2_);
-            for (const Motion& m : consistent)
+            for (const Motion& m : found)
                 result_.details += "\n  consistent: " + m.combination.modes.text() + ", T_2 " + text(m.T_2[0]) +
                                    ", dw_M/dt " + text(m.w_M[1]) + ", dw/dt " + text(m.w[1]);
             result_.details += "\n  rejected:" + rejected;
             return false;
         }
-        motion = consistent.front();
+        motion = found.front();
         if (cause != "start")
             result_.switchings.push_back({static_cast<double>(t_), cause, before, motion.combination.modes,
                                           static_cast<double>(h_), static_cast<double>(motion.T_2[0])});

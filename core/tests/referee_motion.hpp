@@ -192,13 +192,28 @@ class MotionBuilder {
     Sizes grown(Sizes s, const Motion& motion) const {
         const auto sum = [&](const Series& c) { return sum_of_magnitudes(stretched(c, motion.step)); };
         s.input_torque = larger(s.input_torque, larger(sum(motion.M_D), sum(motion.T_2) / m_.i));
-        s.input_torque = larger(s.input_torque, larger(m_.T_10, motion.combination.h / m_.i));
         s.input_speed = larger(s.input_speed, larger(sum(motion.w_M), m_.i * sum(motion.w)));
         s.twist = larger(s.twist, sum(motion.d));
-        return s;
+        return with_torques_of_twist(s);
+    }
+    // By what is there at one instant.
+    Sizes grown(Sizes s, const Point& x, const Inputs& u, Quad h) const {
+        s.input_speed = larger(s.input_speed, larger(magnitude(x.w_M), m_.i * magnitude(x.w)));
+        s.twist = larger(s.twist, magnitude(x.d));
+        const Quad output = larger(larger(magnitude(u.M_Z[0]), m_.T_f), larger(h, m_.b_Z * magnitude(x.w)));
+        const Quad input = larger(larger(magnitude(x.M_D), m_.is_dc ? Quad(0) : m_.M_DR * magnitude(u.E[0])),
+                                  larger(m_.T_10, m_.b * magnitude(x.w_M)));
+        s.input_torque = larger(s.input_torque, larger(input, output / m_.i));
+        return with_torques_of_twist(s);
     }
 
  private:
+    // At the end of a play the torque is as uncertain as the twist.
+    Sizes with_torques_of_twist(Sizes s) const {
+        for (const CurvePiece& p : m_.pieces) s.input_torque = larger(s.input_torque, p.slope * s.twist / m_.i);
+        return s;
+    }
+
     // T_1 = alpha T_2 + beta w_M + gamma
     struct Gear {
         Quad alpha, beta, gamma;
@@ -387,7 +402,9 @@ class MotionBuilder {
         for (int l = 0; l < static_cast<int>(limits.size()); ++l) {
             Guard guard;
             guard.name = limits[l].name;
-            guard.size = magnitude(limits[l].G[0]) + magnitude(limits[l].q) * m_.i * torque;
+            // The limits that push are differences of torques at the input or the output, the others of relative loads.
+            const Quad least = l < limits_that_push() ? Quad(1) : Quad(0);
+            guard.size = magnitude(limits[l].G[0]) + larger(magnitude(limits[l].q) * m_.i, least) * torque;
             if (l == c.pushed_by) {
                 // As long as the limit moves against the torque, the torque goes with it.
                 guard.name = "pushes the held torque";

@@ -144,8 +144,9 @@ class FirstZero {
         return s;
     }
 
-    // |p| is within the tolerance at s, and so it is all around a multiple zero. A zero of multiplicity m is a simple zero
-    // of the (m-1)-th derivative, and only as such well defined: take the lowest derivative for which it is simple.
+    // |p| is within the tolerance at s, and so it is all around a multiple zero. A zero of multiplicity m is a simple
+    // zero of the (m-1)-th derivative, and only as such well defined: take the lowest derivative for which it is
+    // simple.
     Quad settled(Quad s) const {
         const Series* const chain[] = {&p_, &d1_, &d2_, &d3_};
         for (int m = 1; m <= 3; ++m) {
