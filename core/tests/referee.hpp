@@ -65,34 +65,38 @@ class Referee {
         while (t_ < end) {
             const Quad stop =
                 earlier(earlier(end, next_knot_after(case_.signals[0], t_)), next_knot_after(case_.signals[1], t_));
-            const Quad step = earlier(motion.step, stop - t_);
-            const bool whole = step == stop - t_;
+            const bool whole = motion.step >= stop - t_;
+            const Quad step = whole ? stop - t_ : motion.step;
+            // What happens at a knot to within rounding happens at the knot: it is looked for a little beyond it.
+            const Quad same_instant = whole ? Quad(1e-26) * (stop + case_.duration) : Quad(0);
             std::vector<Quad> zeros;
-            const Quad first = first_zeros(motion, step, zeros);
-            const bool switches = first <= 1;
-            const Quad used = switches ? first * step : step;
-            sample(motion, used, whole && !switches ? stop : t_ + used);
+            const Quad first = first_zeros(motion, step + same_instant, zeros);
+            const bool switches = first < never;
+            const bool at_stop = whole && first >= step - same_instant;
+            const Quad used = at_stop || !switches ? step : first;
+            sample(motion, used, at_stop ? stop : t_ + used);
             move(motion, used);
-            if (whole && !switches) t_ = stop;
+            if (at_stop) t_ = stop;
             ++result_.steps;
-            if (switches) {
-                if (result_.switchings.size() >= case_.max_switchings) {
-                    result_.outcome = Outcome::too_many_switchings;
-                    return finish();
-                }
-                const std::string cause = apply(motion, zeros, first);
-                if (!decide(motion, cause, motion.combination.modes)) return finish();
-            } else if (whole && t_ < end) {
-                if (!decide(motion, "input", motion.combination.modes)) return finish();
-            } else {
+            std::string cause;
+            if (switches) cause = apply(motion, zeros, larger(first, at_stop ? step : Quad(0)) + same_instant);
+            if (at_stop && t_ < end) cause += cause.empty() ? "input" : ", input";
+            if (cause.empty()) {
                 continue_same(motion);
+                continue;
             }
+            if (result_.switchings.size() >= case_.max_switchings) {
+                result_.outcome = Outcome::too_many_switchings;
+                return finish();
+            }
+            if (!decide(motion, cause, motion.combination.modes)) return finish();
         }
         sample(motion, 0, end);
         return finish();
     }
 
  private:
+    static constexpr double never = HUGE_VAL;
     static Quad earlier(Quad a, Quad b) { return a < b ? a : b; }
     static int sign(Quad a) { return a > 0 ? 1 : a < 0 ? -1 : 0; }
 
@@ -105,9 +109,9 @@ class Referee {
         T_2_ = model_.spring_torque(x_.d);
     }
 
-    // Zeros of all guards within the step, as fractions of it; returns the first.
+    // Zeros of all guards within the step, from its start; returns the first.
     static Quad first_zeros(const Motion& motion, Quad step, std::vector<Quad>& zeros) {
-        Quad first = nowhere;
+        Quad first = never;
         for (const Guard& g : motion.guards) {
             Quad at = nowhere;
             if (!g.zero) {
@@ -116,8 +120,8 @@ class Referee {
                 const Quad size = g.zeros > 0 ? sum_of_magnitudes(p) : g.size;
                 at = FirstZero::of(p, Quad(1e-28) * size);
             }
-            zeros.push_back(at);
-            first = earlier(first, at);
+            zeros.push_back(at <= 1 ? at * step : Quad(never));
+            first = earlier(first, zeros.back());
         }
         return first;
     }
@@ -145,12 +149,12 @@ class Referee {
     }
 
     // Contacts that have stopped stop; the hysteresis is set anew.
-    std::string apply(const Motion& m, const std::vector<Quad>& zeros, Quad first) {
+    std::string apply(const Motion& m, const std::vector<Quad>& zeros, Quad latest) {
         std::string cause;
         bool input = m.combination.modes.input == stuck, twist = m.combination.modes.twist == stuck,
              load = m.combination.modes.load == stuck, turned = false;
         for (std::size_t k = 0; k < zeros.size(); ++k) {
-            if (zeros[k] > first + Quad(1e-22)) continue;
+            if (zeros[k] > latest + Quad(1e-22) * m.step) continue;
             cause += (cause.empty() ? "" : ", ") + std::string(m.guards[k].name);
             if (m.guards[k].kind == Guard::speed_of_input) input = true;
             if (m.guards[k].kind == Guard::speed_of_load) load = true;
@@ -373,10 +377,20 @@ class Referee {
             return false;
         }
         motion = found.front();
+        start_from_rest(motion);
         if (cause != "start")
             result_.switchings.push_back({static_cast<double>(t_), cause, before, motion.combination.modes,
                                           static_cast<double>(h_), static_cast<double>(motion.T_2[0])});
         return true;
+    }
+
+    // Derivatives found to vanish vanish to the last bit.
+    static void start_from_rest(Motion& m) {
+        for (const Guard& g : m.guards)
+            for (int k = 0; k < g.zeros; ++k) {
+                if (g.kind == Guard::speed_of_input) m.w_M[k] = 0;
+                if (g.kind == Guard::speed_of_load) m.w[k] = 0;
+            }
     }
 
     Result finish() {
