@@ -184,8 +184,10 @@ class Referee {
     // Signs of the derivatives at the start; false if the guard is negative just after it. `rest`: what decides if all
     // vanish.
     static bool holds(Guard& g, Quad step, bool rest) {
+        // Over a time short enough that the terms of one exponential fall from the first on: a torque that creeps up to
+        // its limit for ever, and is below rounding from it, is there.
         Quad power = 1;
-        for (int k = 0; k <= order; ++k, power *= step) {
+        for (int k = 0; k <= order; ++k, power *= step / 16) {
             const Quad term = g.c[k] * power;
             if (magnitude(term) <= Quad(1e-25) * g.size) continue;
             g.zeros = k;

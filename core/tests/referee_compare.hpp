@@ -9,10 +9,12 @@
 
 namespace lostmotion::referee {
 
-inline Case case_of(const Drive& drive, const Signals& signals, double duration, double interval) {
+inline Case case_of(const Drive& drive, const Signals& signals, double duration, double interval,
+                    const Start& start = {}) {
     Case c;
     c.drive = {drive.motor, drive.gearbox, drive.load};
     c.signals = signals;
+    std::copy(start.x.begin(), start.x.end(), c.start.begin());
     c.duration = duration;
     c.sample_interval = interval;
     return c;
@@ -46,9 +48,9 @@ struct Agreement {
 
 // Whether a run of `drive` is right to within `tolerance`; not so if the referee finds no single motion.
 inline bool referee_agrees(const Drive& drive, const Signals& signals, double duration, double interval,
-                           const Samples& run, double tolerance, Agreement* out = nullptr) {
+                           const Samples& run, double tolerance, Agreement* out = nullptr, const Start& start = {}) {
     Agreement a;
-    a.truth = referee_run(case_of(drive, signals, duration, interval));
+    a.truth = referee_run(case_of(drive, signals, duration, interval, start));
     a.gap = differences(drive, run, a.truth);
     a.worst = *std::max_element(a.gap.begin(), a.gap.end());
     const bool agrees = a.truth.outcome == Outcome::done && run.report.status == Status::done &&

@@ -89,7 +89,7 @@ inline constexpr double nowhere = 2.0;
 
 class FirstZero {
  public:
-    // Of p on (0, 1], where p > 0 just after 0 and |p| <= tolerance counts as zero: where it falls through zero or
+    // Of p on [0, 1], where p > 0 just after 0 and |p| <= tolerance counts as zero: where it falls through zero or
     // touches it; `nowhere` if it does neither.
     static Quad of(const Series& p, Quad tolerance) {
         // Most guards are far from zero, which double precision can certify.
@@ -116,7 +116,8 @@ class FirstZero {
             falling = falling && b[j] <= b[j - 1];
         }
         if (least > tolerance_) return nowhere;
-        if (greatest <= tolerance_ || width < 1e-25) return settled(from + width / 2);
+        if ((greatest <= tolerance_ && least >= -tolerance_) || width < 1e-25) return settled(from + width / 2);
+        if (greatest <= tolerance_) return from;  // zero there, and negative from there on
         if (falling && b[order] < -tolerance_ && b[0] > tolerance_) return crossing(from, from + width);
 
         // de Casteljau: halve the interval.

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "referee_compare.hpp"
+#include "round_drives.hpp"
 
 using namespace lostmotion;
 using namespace lostmotion::referee;
@@ -295,5 +296,27 @@ TEST_SUITE("referee") {
         }
         CHECK(compared >= 35);
         std::printf("referee: %d drives, %zu switchings, largest difference %.1e\n", compared, switchings, worst);
+    }
+
+    // Self-locking gears are left out: there more than one motion may be consistent.
+    TEST_CASE("exact solver agrees with the referee where events coincide") {
+        constexpr double duration = 2.0, interval = 1.0 / 32.0;
+        RoundDrives random(1);
+        int compared = 0;
+        double worst = 0.0;
+        for (int n = 0; n < 200; ++n) {
+            const RoundDrives::Run r = random.next(duration);
+            if (RoundDrives::self_locking(r.drive)) continue;
+            CAPTURE(n);
+            const Samples exact = run(r.drive, r.signals, duration, interval, r.start);
+            Agreement a;
+            CHECK_MESSAGE(referee_agrees(r.drive, r.signals, duration, interval, exact, 1e-10, &a, r.start),
+                          "differences ", a.gap[0], " ", a.gap[1], " ", a.gap[2], " ", a.gap[3], " ", a.gap[4], ", ",
+                          a.truth.details);
+            worst = std::fmax(worst, a.worst);
+            ++compared;
+        }
+        CHECK(compared >= 100);
+        std::printf("referee: %d round drives, largest difference %.1e\n", compared, worst);
     }
 }
