@@ -3,9 +3,9 @@
 // Between switchings each power is a product of two linear forms of an analytic state, whose time derivatives at both
 // ends of a panel are known. They are integrated by the two-point Hermite rule with derivatives up to order four
 // (exact for polynomials of degree nine); its difference from the rule with one derivative less sets the panel length.
-// Where the panel spans many of the shortest time constants, rounding spoils the derivatives: of a fast part of the motion
-// that has died out they are nothing but rounding times its rate to the fourth. There the powers are taken at the nodes
-// of the Gauss-Kronrod pair of 7 and 15 points (Kronrod 1965; R. Piessens et al., QUADPACK, Springer 1983).
+// Where the panel spans many of the shortest time constants, rounding spoils the derivatives: of a fast part of the
+// motion that has died out they are nothing but rounding times its rate to the fourth. There the powers are taken at
+// the nodes of the Gauss-Kronrod pair of 7 and 15 points (Kronrod 1965; R. Piessens et al., QUADPACK, Springer 1983).
 #pragma once
 
 #include <optional>
@@ -72,8 +72,8 @@ class EnergyMeter {
                 end.move_to(s.end, s.x_end);
             }
             factors.powers(p, end, there);
-            double error = add_panel(here, there, length, level == 0);
-            if (error > 1.0 && level >= first_stiff_level) error = add_stiff_panel(factors, cursor, length);
+            const double error = level < first_stiff_level ? add_panel(here, there, length, level == 0)
+                                                           : add_stiff_panel(factors, cursor, length);
             if (error > 1.0) {
                 --level;
                 continue;
@@ -214,7 +214,7 @@ class EnergyMeter {
     static constexpr double panel_tolerance = 2e-9;
     // The Gauss rule of 7 points is exact to degree 13, the Kronrod rule to degree 22.
     static constexpr double stiff_tolerance = 1e-11;
-    static constexpr int first_stiff_level = 8;  // 16 of the shortest time constants
+    static constexpr int first_stiff_level = 8;  // 64 of the shortest time constants
 
     // Of the positive half of [-1, 1], the outermost first.
     struct KronrodNode {

@@ -422,7 +422,8 @@ class ExactSolver {
         if (first == 0) return false;
         // value = h^k (derivative_k / k! + what follows), bounded at the far end.
         double least = derivative[first] * over_factorial[first], power = h;
-        for (int k = first + 1; k < 4; ++k, power *= h) least += power * std::min(0.0, derivative[k]) * over_factorial[k];
+        for (int k = first + 1; k < 4; ++k, power *= h)
+            least += power * std::min(0.0, derivative[k]) * over_factorial[k];
         return least > power * bounds_.fourth[g] * over_factorial[4];
     }
     // The order of the first derivative of a guard, up to the third, that is not zero; 0 if there is none or it is
@@ -496,8 +497,8 @@ class ExactSolver {
         return high;
     }
 
-    // Where a guard that starts with this value falls through zero within h, near an estimate. Leaves trial_ there, returns
-    // when. About the nearest instant that whole levels lead to, the guard is a polynomial to rounding.
+    // Where a guard that starts with this value falls through zero within h, near an estimate. Leaves trial_ there,
+    // returns when. About the nearest instant that whole levels lead to, the guard is a polynomial to rounding.
     double find_zero(typename Cache::Entry& e, int g, const Memory& memory, const Cursor& cursor, double start,
                      double estimate, double h) {
         const LinearForm form = e.guards.form(g);
