@@ -20,7 +20,7 @@ ROOMS = [
     {"_instruction_set", "errors"},
     {"_core", "variables", "units"},
     {"quantities", "toml_files"},
-    {"signals", "parts"},
+    {"signals", "parts", "task"},
     {"data_sheet"},
     {"loss_map_builder"},
     {"records"},
