@@ -19,8 +19,8 @@ from .parts import Rigid
 from .results import ENERGY, add_derived, installed_version
 from .run import core_inputs, simulate
 from .scenario import Scenario, describe
-from .study_expressions import REDUCTIONS
 from .study_file import Study, base_value, from_json
+from .study_functions import REDUCTIONS
 from .variables import CHANNEL_NAMES, VARIABLES
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) 
     }
     names["time"] = xr.DataArray(instants["time"], instants)
     if _asks_for(study, "energy"):
-        names["energy"] = SimpleNamespace(**{k: each_run(v) for k, v in runs.energy.items()})
+        names["energy"] = {k: each_run(v) for k, v in runs.energy.items()}
     if _asks_for(study, "ideal_speed"):
         names["ideal_speed"] = names["command"] * each_run(_ideal_speeds(study, runs))
     names["bandwidth"] = lambda amplitude=None: each_run(_bandwidths(study, runs, amplitude, threads))

@@ -192,6 +192,11 @@ class Study(Part):
                 expression = read_expression(text)
             except ValueError as error:
                 raise ValueError(f"keep.{name}: {error}") from None
+            table = self.scenario.simulation
+            if any(not -table.samples <= k < table.samples for k in expression.indices):
+                raise ValueError(f"keep.{name}: {text!r} looks at a sample that a run of {table.samples} does not have")
+            if any(not 0.0 <= t <= table.duration for t in expression.instants):
+                raise ValueError(f"keep.{name}: {text!r} looks at an instant outside the {table.duration} s of a run")
             if "ideal_speed" in expression.names and self.scenario.motor.kind != "dc":
                 raise ValueError(
                     f"keep.{name}: ideal_speed needs a motor of kind dc; a torque source has no speed of its own"
