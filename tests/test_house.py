@@ -25,6 +25,7 @@ ROOMS = [
     {"loss_map_builder"},
     {"records"},
     {"scenario"},
+    {"switchings"},
     {"results"},
     {"run"},
     {"test_rig"},

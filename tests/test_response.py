@@ -103,7 +103,7 @@ def test_linearisation_holds_where_the_input_sticks():
     start = lm.Initial(motor_speed=100.0, load_speed=1.2, twist=2e-3, hysteresis_capacity=1.0)
     model = lm.linearize(NONLINEAR, start, command=0.4)
     run = lm.simulate(NONLINEAR, command=0.4, initial=start, duration=2e-4, sample_interval=2e-4)
-    assert run.sizes["switching"] == 0
+    assert lm.switchings_of(run).sizes["switching"] == 0
     n = len(STATES)
     whole = np.zeros((n + 1, n + 1))
     whole[:n, :n] = model.A

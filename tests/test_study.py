@@ -426,13 +426,16 @@ def test_show_and_best_from_the_command_line(tmp_path: Path):
     shown = CliRunner().invoke(app, ["study", "show", str(out), "--best", "stuck_share"])
     assert shown.exit_code == 0, shown.output
     assert "256 of 256 runs, 0 failed" in shown.output
-    assert {p.name for p in (out / "show").iterdir()} >= {
+    assert {p.name for p in (tmp_path / "t-figures").iterdir()} >= {
         "statistics.csv",
         "distributions.png",
         "tornado.png",
         "scatter.png",
     }
+    import pandas as pd
+
     table = read_table(out)
+    assert len(pd.read_parquet(out)) == table.num_rows == 256  # nothing but data among the data
     best = best_runs(table, "stuck_share", 3)["stuck_share"].to_pylist()
     assert best == sorted(table["stuck_share"].to_pylist())[:3]
 

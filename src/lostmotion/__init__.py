@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from .study_engine import study as study
     from .study_file import Study as Study
     from .study_file import load_study as load_study
+    from .switchings import switchings_of as switchings_of
     from .test_rig import TestRig as TestRig
     from .variables import VARIABLES as VARIABLES
 
@@ -87,6 +88,7 @@ _HOMES = {
     "stepping": ("Simulation",),
     "study_engine": ("study",),
     "study_file": ("Study", "load_study"),
+    "switchings": ("switchings_of",),
     "test_rig": ("TestRig",),
     "variables": ("VARIABLES",),
 }

@@ -30,6 +30,12 @@ def read_table(directory: Path) -> pa.Table:
     return ds.dataset(files, format="parquet").to_table().sort_by("run")
 
 
+def figures_of(directory: Path) -> Path:
+    """Where the figures go: not among the data, all of which readers of Parquet directories try to read."""
+    whole = directory.resolve()
+    return whole.with_name(f"{whole.name}-figures")
+
+
 def labelled(table: pa.Table, name: str) -> str:
     """A column's name with its unit."""
     unit = (table.schema.field(name).metadata or {}).get(b"units", b"1").decode()
@@ -159,7 +165,7 @@ def scatter(table: pa.Table, study: Study, most: int = 6) -> Figure:
 
 
 def show(directory: Path) -> list[str]:
-    """Writes figures and statistics.csv beside the data; returns what to print."""
+    """Writes figures and statistics.csv into a directory beside that of the data; returns what to print."""
     study, table = study_of(directory), read_table(directory)
     rows = statistics(table, study)
     header = ["", "mean", "deviation", "least", "5 %", "50 %", "95 %", "largest"]
@@ -169,7 +175,7 @@ def show(directory: Path) -> list[str]:
     width = max(len(r[0]) for r in rows) + 2
     lines.append("  " + header[0].ljust(width) + "".join(h.rjust(12) for h in header[1:]))
     lines += ["  " + r[0].ljust(width) + "".join(f"{x:12.5g}" for x in r[1:]) for r in rows]
-    view = directory / "show"
+    view = figures_of(directory)
     view.mkdir(exist_ok=True)
     write_text(view / "statistics.csv", table_csv(["value", *header[1:]], rows))
     save_figure(distributions(table, study), view, "distributions")
