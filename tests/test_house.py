@@ -29,6 +29,7 @@ ROOMS = [
     {"results"},
     {"run"},
     {"test_rig"},
+    {"duty_cycle", "holding"},
     {"drive_check"},
     {"stepping"},
     {"explanation"},

@@ -381,7 +381,13 @@ def check(
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in `run`.")
     ] = None,
 ) -> None:
-    """Torques, speeds, inertia ratio, resonance, dead zone, lost motion, holding and heat, in plain words."""
+    """Torques, speeds, voltage, current, heat, inertia ratio, resonance, dead zone, lost motion and holding.
+
+    Each point names its rule and the source of the rule. The table [task] of the scenario gives the duty cycle and requirements.
+
+    \b
+    lostmotion drive check drive.toml --set task.cycle="2 s"
+    """
     from .drive_check import check_drive
     from .scenario import load
 
@@ -390,8 +396,9 @@ def check(
     print(loaded.title or str(scenario))
     for finding in findings:
         print(f"  {finding}")
-    warnings = sum(f.verdict == "warning" for f in findings)
-    print("No warnings." if warnings == 0 else f"{warnings} warning{'s' if warnings > 1 else ''}.")
+    warnings, unknown = (sum(f.verdict == verdict for f in findings) for verdict in ("warning", "unknown"))
+    counted = "No warnings." if warnings == 0 else f"{warnings} warning{'s' if warnings > 1 else ''}."
+    print(f"{counted} {unknown} not judged: no limit is given." if unknown else counted)
 
 
 @app.command()
