@@ -25,8 +25,9 @@ from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
 from lostmotion.study_chunk import _core_can, pieces, run_piece, scenario_of_run
+from lostmotion.study_design import CHUNK
 from lostmotion.study_expressions import FUNCTIONS, REDUCTIONS
-from lostmotion.study_file import CHUNK, Study
+from lostmotion.study_file import Study
 from lostmotion.study_report import best_runs, influence, read_table, sobol_indices
 from lostmotion.variables import CHANNEL_NAMES
 

@@ -19,8 +19,9 @@ from .parts import Rigid
 from .results import ENERGY, add_derived, installed_version
 from .run import core_inputs, simulate
 from .scenario import Scenario, describe
-from .study_file import Study, base_value, from_json
+from .study_file import Study, from_json
 from .study_functions import REDUCTIONS
+from .study_vary import base_value
 from .variables import CHANNEL_NAMES, VARIABLES
 
 if TYPE_CHECKING:
@@ -102,7 +103,8 @@ def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads
 
     columns: dict[str, Any] = {"run": pa.array(np.arange(first, last))}
     for k, v in enumerate(study.vary):
-        columns[v.title] = pa.array(runs.parameters[:, k])
+        numbers = runs.parameters[:, k]
+        columns[v.title] = pa.array(numbers if v.names is None else [v.value(x) for x in numbers])
     data = {} if runs.kept else _derived(study, runs, _needed(study))
     names = _names(study, data, runs, threads)
     kept_values = runs.kept | {
@@ -200,10 +202,10 @@ def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
         return scenario.motor.no_load_speed / scenario.gearbox.ratio
 
     keys = {key for v in study.vary for key in v.all_keys}
-    if not any(key.startswith("motor.") or key == "gearbox.ratio" for key in keys):
+    if not any(key.startswith("motor") or key in ("gearbox.ratio", "gearbox", "gearbox.from") for key in keys):
         return np.full(len(runs.errors), of(study.scenario))
     rows = zip(runs.parameters, runs.errors, strict=True)
-    return np.array([math.nan if error else of(_changed(study, row)) for row, error in rows])
+    return np.array([math.nan if error else of(study.scenario_at(row)) for row, error in rows])
 
 
 def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.ndarray:
@@ -216,7 +218,7 @@ def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.nd
     def find(k: int) -> float:
         if runs.errors[k]:
             return math.nan
-        scenario = _changed(study, runs.parameters[k])
+        scenario = study.scenario_at(runs.parameters[k])
         try:
             return bandwidth(
                 scenario.drive(),
@@ -232,28 +234,9 @@ def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.nd
         return np.array(list(pool.map(find, range(len(runs.errors)))))
 
 
-def _changes(study: Study, row: np.ndarray) -> dict[str, Any]:
-    """Dotted keys and values of one run."""
-    out: dict[str, Any] = {}
-    for v, value in zip(study.vary, row, strict=True):
-        for key in v.all_keys:
-            base = base_value(study.scenario, key)
-            if not v.relative:
-                out[key] = float(value)
-            elif isinstance(base, tuple | list):
-                out[key] = [float(value) * x for x in base]
-            else:
-                out[key] = float(value) * float(base)
-    return out
-
-
-def _changed(study: Study, row: np.ndarray) -> Scenario:
-    return study.scenario.replace(**_changes(study, row))
-
-
 def scenario_of_run(study: Study, run: int) -> Scenario:
     """The scenario of one run, by its number."""
-    return _changed(study, study.parameters(run, run + 1)[0])
+    return study.scenario_at(study.parameters(run, run + 1)[0])
 
 
 def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energy: bool) -> Runs:
@@ -270,7 +253,7 @@ def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energ
     )
     for k, row in enumerate(parameters):
         try:
-            scenario = _changed(study, row)
+            scenario = study.scenario_at(row)
             result = simulate(scenario, energy=energy)
         except (ValidationError, RuntimeError, ValueError) as error:
             runs.errors[k] = describe(error) if isinstance(error, ValidationError) else str(error)
@@ -372,12 +355,12 @@ def _out_of_range(study: Study, parameters: np.ndarray) -> list[str]:
     errors = [""] * len(parameters)
     low, high = parameters.min(axis=0), parameters.max(axis=0)
     try:
-        _changed(study, low)
-        _changed(study, high)
+        study.scenario_at(low)
+        study.scenario_at(high)
     except ValidationError:
         for k, row in enumerate(parameters):
             try:
-                _changed(study, row)
+                study.scenario_at(row)
             except ValidationError as error:
                 errors[k] = describe(error)
     return errors

@@ -11,7 +11,8 @@ from typing import Any
 from .errors import InputError
 from .results import write_bytes
 from .study_chunk import as_parquet, compute_chunk, parsed, pieces, run_piece, tabulate
-from .study_file import CHUNK, Study, from_json, to_json
+from .study_design import CHUNK
+from .study_file import Study, from_json, to_json
 
 
 def study(
