@@ -325,7 +325,10 @@ def study(
         str | None, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler of a cluster.")
     ] = None,
     best: Annotated[
-        str | None, typer.Option("--best", metavar="COLUMN", help="With `show`: the ten least of it.")
+        str | None,
+        typer.Option(
+            "--best", metavar="COLUMN[:largest]", help="With `show`: the ten runs with the least, or largest."
+        ),
     ] = None,
 ) -> None:
     """Many runs: vary parameters, keep what matters, go on where an interruption left off.
@@ -341,14 +344,10 @@ def study(
     if what == "show":
         if shown is None:
             raise InputError("study show: name the directory of a study, as in `lostmotion study show DIR`")
-        from .study_report import best_runs, read_table, show
+        from .study_report import best_lines, show
 
-        print("\n".join(show(shown)))
-        if best is not None:
-            rows = best_runs(read_table(shown), best).to_pylist()
-            print(f"Least {best}:")
-            for row in rows:
-                print("  " + ", ".join(f"{k} {v:.6g}" for k, v in row.items() if isinstance(v, int | float)))
+        found = best_lines(shown, best) if best is not None else []
+        print("\n".join([*show(shown), *found]))
         return
     if shown is not None:
         raise InputError(f"study {what} {shown}: too many names; the directory is given by -o")

@@ -113,11 +113,20 @@ def _fine_interval(scenario: Scenario) -> float:
 
 
 def _within(
-    rule: str, what: str, value: float, limit: float | None, unit: str, name: str, cycle: DutyCycle | None = None
+    rule: str,
+    what: str,
+    value: float,
+    limit: float | None,
+    unit: str,
+    name: str,
+    *,
+    key: str = "",
+    cycle: DutyCycle | None = None,
 ) -> Finding:
+    """Compares a figure with its limit; `key` of the scenario would give it."""
     over = "" if cycle is None else f", {cycle}"
     if limit is None:
-        return Finding(rule, what, f"{value:.4g} {unit}{over}", "unknown", f"no {name} is given")
+        return Finding(rule, what, f"{value:.4g} {unit}{over}", "unknown", f"no {name} is given: {key}")
     use = value / limit
     share = f"{value:.4g} of {limit:.4g} {unit}{over}"
     remark = "" if use <= 1.0 else f"exceeds the {name} by {100.0 * (use - 1.0):.0f} %"
@@ -139,7 +148,7 @@ def _loads(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> list
             average or g.rated_output_torque,
             "N·m",
             name,
-            cycle,
+            cycle=cycle,
         ),
         _within(
             "peak_output_torque",
@@ -147,7 +156,8 @@ def _loads(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> list
             float(abs(result["output_torque"]).max()),
             g.limits.peak_output_torque if g.limits else None,
             "N·m",
-            "repeated peak torque of the gearbox (gearbox.limits.peak_output_torque)",
+            "repeated peak torque of the gearbox",
+            key="gearbox.limits.peak_output_torque",
         ),
     ]
 
@@ -157,8 +167,8 @@ def _speeds(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> lis
     average = g.limits.average_input_speed if g.limits else None
     fastest = RPM * float(abs(result["motor_speed"]).max())
     largest = (
-        ("max_input_speed", "gearbox", g.limits.max_input_speed if g.limits else None),
-        ("max_motor_speed", "motor", m.limits.max_speed if m.limits else None),
+        ("max_input_speed", "gearbox", "max_input_speed", g.limits.max_input_speed if g.limits else None),
+        ("max_motor_speed", "motor", "max_speed", m.limits.max_speed if m.limits else None),
     )
     return [
         _within(
@@ -168,7 +178,7 @@ def _speeds(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> lis
             RPM * (average or g.rated_input_speed),
             "rpm",
             "rated input speed" if average is None else "average input speed",
-            cycle,
+            cycle=cycle,
         ),
         *(
             _within(
@@ -178,8 +188,9 @@ def _speeds(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> lis
                 None if limit is None else RPM * limit,
                 "rpm",
                 f"largest speed of the {part}",
+                key=f"{part}.limits.{key}",
             )
-            for rule, part, limit in largest
+            for rule, part, key, limit in largest
         ),
     ]
 
@@ -188,8 +199,8 @@ def _lost_motion(scenario: Scenario) -> Finding:
     g, limit = scenario.gearbox, scenario.task.max_lost_motion
     lost = 0.0 if isinstance(g.stiffness, Rigid) else TestRig(g).lost_motion()
     what = f"lost motion at ±{100.0 * LOST_MOTION_LOAD:.0f} % of rated torque"
-    name = "limit of the task (task.max_lost_motion)"
-    return _within("lost_motion", what, ARCMIN * lost, None if limit is None else ARCMIN * limit, "arcmin", name)
+    most = None if limit is None else ARCMIN * limit
+    return _within("lost_motion", what, ARCMIN * lost, most, "arcmin", "limit of the task", key="task.max_lost_motion")
 
 
 def _holding(scenario: Scenario, result: xarray.Dataset) -> list[Finding]:
@@ -240,7 +251,8 @@ def _motor_heat(scenario: Scenario, cycle: DutyCycle) -> list[Finding]:
     torque = cycle.rms_motor_torque()
     continuous = limits.continuous_torque if limits is not None else m.rated_torque if m.kind == "dc" else None
     name = "continuous torque of the motor"
-    findings = [_within("motor_torque", "motor torque, rms", torque, continuous, "N·m", name, cycle)]
+    key = "motor.limits.continuous_torque"
+    findings = [_within("motor_torque", "motor torque, rms", torque, continuous, "N·m", name, key=key, cycle=cycle)]
     if (
         limits is None
         or limits.resistance is None
@@ -282,8 +294,8 @@ def _voltage(scenario: Scenario, result: xarray.Dataset) -> Finding:
     else:
         missing = "motor.limits.resistance and motor.limits.torque_constant are missing"
         return Finding("voltage", "voltage, largest", "not known", "unknown", missing)
-    name = "limit of the amplifier (motor.voltage_limit)" if m.kind == "dc" else "motor.limits.max_voltage"
-    return _within("voltage", "voltage, largest", largest, limit, "V", name)
+    key = "motor.voltage_limit" if m.kind == "dc" else "motor.limits.max_voltage"
+    return _within("voltage", "voltage, largest", largest, limit, "V", "limit of the amplifier", key=key)
 
 
 def _current(scenario: Scenario, result: xarray.Dataset) -> Finding:
@@ -292,8 +304,8 @@ def _current(scenario: Scenario, result: xarray.Dataset) -> Finding:
         missing = "motor.limits.torque_constant is missing"
         return Finding("current", "current, largest", "not known", "unknown", missing)
     largest = float(abs(result["motor_torque"]).max()) / limits.torque_constant
-    name = "limit of motor and amplifier (motor.limits.max_current)"
-    return _within("current", "current, largest", largest, limits.max_current, "A", name)
+    name, key = "limit of motor and amplifier", "motor.limits.max_current"
+    return _within("current", "current, largest", largest, limits.max_current, "A", name, key=key)
 
 
 # --- motion ---

@@ -19,8 +19,10 @@ from .parts import Rigid
 from .results import ENERGY, add_derived, installed_version
 from .run import core_inputs, simulate
 from .scenario import Scenario, describe
+from .study_check import COLUMNS, check_columns
 from .study_file import Study, from_json
 from .study_functions import REDUCTIONS
+from .study_select import SHARES, USE
 from .study_vary import base_value
 from .variables import CHANNEL_NAMES, VARIABLES
 
@@ -61,7 +63,8 @@ def parsed(text: str) -> Study:
 def _units(text: str) -> dict[str, str]:
     """Units of the columns; empty where an expression's cannot be told."""
     study = parsed(text)
-    units = {v.title: v.unit for v in study.vary} | {n: e.unit for n, e in study.expressions.items()}
+    units = {v.title: v.unit for v in study.vary if v.names is None} | {n: e.unit for n, e in study.expressions.items()}
+    units |= {f"{USE}{rule}": "1" for rule in SHARES}
     of = {v.name: v.unit for v in VARIABLES}
     return units | {f"{n} over time": of[n] for n in (study.trajectories.variables if study.trajectories else ())}
 
@@ -117,6 +120,7 @@ def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads
         for name in study.trajectories.variables:
             kept = data[name][:, :: study.trajectories.every]
             columns[f"{name} over time"] = pa.array([None if b else row for b, row in zip(bad, kept, strict=True)])
+    columns |= {name: pa.array(values) for name, values in runs.checks.items()}
     columns["switchings"] = pa.array(runs.switchings.astype(np.int64))
     columns["error"] = pa.array(runs.errors)
     units = _units(text)
@@ -137,12 +141,13 @@ def as_parquet(text: str, tables: list[pa.Table]) -> bytes:
 
 class Runs(SimpleNamespace):
     """Of a piece: parameters (runs x parameters), samples (variable -> runs x samples), what the core has made of them instead
-    (column -> runs), energy (entry -> runs), switchings, errors, ratio (runs)."""
+    (column -> runs), energy (entry -> runs), columns of the drive check, switchings, errors, ratio (runs)."""
 
     parameters: np.ndarray
     samples: dict[str, np.ndarray]
     kept: dict[str, np.ndarray]
     energy: dict[str, np.ndarray]
+    checks: dict[str, list[float | str]]
     switchings: np.ndarray
     errors: list[str]
     ratio: np.ndarray
@@ -247,6 +252,7 @@ def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energ
         samples={c: np.full((n, samples), np.nan) for c in channels},
         kept={},
         energy={e: np.full(n, np.nan) for e in ENERGY},
+        checks={name: [empty] * n for name, empty in COLUMNS.items()} if _checks(study) else {},
         switchings=np.zeros(n),
         errors=[""] * n,
         ratio=np.full(n, study.scenario.gearbox.ratio),
@@ -255,6 +261,7 @@ def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energ
         try:
             scenario = study.scenario_at(row)
             result = simulate(scenario, energy=energy)
+            checks = check_columns(scenario) if _checks(study) else {}
         except (ValidationError, RuntimeError, ValueError) as error:
             runs.errors[k] = describe(error) if isinstance(error, ValidationError) else str(error)
             continue
@@ -263,6 +270,8 @@ def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energ
         if energy:
             for e, value in json.loads(result.attrs["energy"]).items():
                 runs.energy[e][k] = value
+        for name, value in checks.items():
+            runs.checks[name][k] = value
         runs.switchings[k] = result.attrs["switching_count"]
         runs.ratio[k] = scenario.gearbox.ratio
     return runs
@@ -273,8 +282,15 @@ def _fields() -> dict[str, int]:
     return {key: k for k, key in enumerate(_core.batch_fields())}
 
 
+def _checks(study: Study) -> bool:
+    """Whether each run goes through the drive check."""
+    return study.select is not None and study.select.drive_check
+
+
 def _core_can(study: Study) -> bool:
-    """Whether all that varies is a plain number of the core."""
+    """Whether all that varies is a plain number of the core, and the runs are all that is wanted."""
+    if _checks(study):
+        return False
     s = study.scenario
     rigid = isinstance(s.gearbox.stiffness, Rigid)
     for v in study.vary:
@@ -340,6 +356,7 @@ def _in_the_core(
         samples={} if reductions else {c: spread(made[:, k]) for k, c in enumerate(channels)},
         kept={name: spread(made[:, k]) for k, name in enumerate(reductions)},
         energy={e: spread(totals[:, 5 + k]) for k, e in enumerate(ENERGY)},
+        checks={},
         switchings=np.nan_to_num(spread(totals[:, 3])),
         errors=errors,
         ratio=np.full(n, s.gearbox.ratio) if ratio is None else ratio,

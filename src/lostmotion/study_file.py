@@ -11,14 +11,13 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
-from .drive_check import RULES
 from .errors import InputError
 from .quantities import Part
 from .scenario import Scenario, load, read_tables
 from .study_design import unit_cube
 from .study_expressions import Expression, read_expression
 from .study_records import CONDITIONS, TABLE_OF, with_records
-from .study_select import USE, Selection, check_bounds
+from .study_select import SHARES, USE, Selection, check_bounds
 from .study_vary import Vary, base_value, check_key, scaled
 from .toml_files import read_toml
 from .variables import VARIABLES
@@ -155,7 +154,7 @@ class Study(Part):
         numbers = {v.title: v.unit for v in self.vary if v.names is None}
         units = numbers | {name: e.unit for name, e in self.expressions.items()}
         if select.drive_check:
-            units |= {f"{USE}{rule}": "1" for rule in RULES}
+            units |= {f"{USE}{rule}": "1" for rule in SHARES}
         for column in select.named():
             if column not in units:
                 raise ValueError(f"select: {column!r} is no column of numbers; they are {', '.join(units)}")

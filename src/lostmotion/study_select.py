@@ -6,6 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from .drive_check import RULES
 from .quantities import Part
 from .study_units import in_si
 
@@ -13,6 +14,8 @@ Direction = Literal["least", "largest"]
 
 USE = "use of "
 """begins the columns of the drive check: the share of each limit that is used"""
+SHARES = tuple(rule for rule in RULES if rule not in ("resonance", "dead_zone", "holding", "loss_map"))
+"""rules of the drive check that compare a figure with a limit"""
 
 
 class Bound(Part):
