@@ -71,7 +71,9 @@ def test_means_are_those_of_the_maker_s_worked_example():
 
 
 def test_heat_and_loads_do_not_depend_on_how_long_the_run_rests_afterwards():
-    short, long = by_rule(move(0.25)), by_rule(move(20.0))
+    short, long, longest = (by_rule(move(duration)) for duration in (0.25, 20.0, 50_000.0))
+    assert longest["motor_torque"].use == pytest.approx(short["motor_torque"].use, rel=0.02)
+    assert longest["peak_output_torque"].use == pytest.approx(short["peak_output_torque"].use, rel=1e-3)
     for rule in ("motor_torque", "winding_temperature", "average_output_torque", "average_input_speed"):
         assert long[rule].use == pytest.approx(short[rule].use, rel=0.02), rule
         assert long[rule].verdict == short[rule].verdict

@@ -478,6 +478,13 @@ peak = "peak(load_speed)"
         ('peak = "peak', 'run = "peak', "a name that is taken"),
         ("[keep]", "[kept]", "kept"),
         ("values = [1, 2]", "values = [1, 2]\nvalue = 3", "not known"),
+        ("values = [1, 2]", "values = [true]", "load.inertia: true is no number$"),
+        ("values = [1, 2]", "grid = [1, 2, 2.5]", "key vary.0.grid.2: 2.5 must be a whole number$"),
+        ("values = [1, 2]", "values = [1, inf]", "key vary.0.values.1: inf must be a finite number"),
+        ("[[vary]]", "[vary]", "key vary: must be a list$"),
+        ("[keep]", "[[keep]]", "key keep: must be a table$"),
+        ('"peak(load_speed)"', "3", "key keep.peak: 3 must be a text in quotes$"),
+        ('design = "list"', 'design = "lists"', "'lists' must be one of 'grid', 'list'"),
     ],
 )
 def test_a_bad_study_ends_in_one_clear_line(tmp_path: Path, old: str, new: str, match: str):

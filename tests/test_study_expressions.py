@@ -208,6 +208,8 @@ HARMFUL = [
     "load_speed.sel(time=0.1, tolerance=load_speed.to_netcdf('f'))",
     "load_speed.quantile('0.5', 'time')",
     "load_speed.quantile(peak(twist))",
+    "load_speed.quantile(1.5)",
+    "dead_time(load_speed, -0.1)",
     "load_speed.where('twist > 0').mean('time')",
     "load_speed.where(twist).mean('time')",
     "load_speed.where(lambda x: x > 0).mean('time')",

@@ -78,7 +78,14 @@ def test_the_command_line_shows_the_selection(selection: tuple[lm.Study, Path]):
 
 def made(*rows: tuple[str, str, float, float]) -> list[Candidate]:
     return [
-        Candidate(k, name, (NOT_RUN,) if violated == NOT_RUN else tuple(violated.split()), violated, "", {"cost": cost, "speed": speed})
+        Candidate(
+            k,
+            name,
+            (NOT_RUN,) if violated == NOT_RUN else tuple(violated.split()),
+            violated,
+            "",
+            {"cost": cost, "speed": speed},
+        )
         for k, (name, violated, cost, speed) in enumerate(rows)
     ]
 

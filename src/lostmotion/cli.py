@@ -388,10 +388,14 @@ def check(
     lostmotion drive check drive.toml --set task.cycle="2 s"
     """
     from .drive_check import check_drive
+    from .errors import InputError
     from .scenario import load
 
     loaded = load(scenario, overrides or ())
-    findings = check_drive(loaded)
+    try:
+        findings = check_drive(loaded)
+    except (InputError, RuntimeError) as error:
+        raise InputError(f"{scenario}: {error}") from None
     print(loaded.title or str(scenario))
     for finding in findings:
         print(f"  {finding}")

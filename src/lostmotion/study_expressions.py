@@ -288,9 +288,11 @@ class _Reader:
                 raise ValueError(f"{here} must be {kind!r}; leave it out")
             return None
         term = self.read(node)
-        if kind in ("number", "index", "instant"):
+        if kind in ("share", "index", "instant"):
             if term.number is None or (kind == "index" and not isinstance(term.number, int)):
                 raise ValueError(f"{here} must be a {'whole ' if kind == 'index' else ''}number, written out")
+            if kind == "share" and not 0.0 <= term.number <= 1.0:
+                raise ValueError(f"{here} must lie between 0 and 1")
             self.note(kind, term.number)
         elif kind == "condition" and not (term.measure.boolean and term.measure.over_time):
             raise ValueError(f"{here} must be a comparison of variables over time, as in motor_power > 0")

@@ -17,9 +17,9 @@ from .study_measures import Measure, measure, one_of, plain, power, product, red
 REDUCTIONS = tuple(_core.reductions())
 """of a variable over time, as the core knows them"""
 
-Kind = Literal["series", "value", "of a run", "condition", "number", "index", "instant", "time", "nearest"]
-"""what a parameter takes: a variable over time; that or one value; one value for each run; a comparison; a written number; a
-written whole number; a written instant; the text 'time'; the text 'nearest'"""
+Kind = Literal["series", "value", "of a run", "condition", "share", "index", "instant", "time", "nearest"]
+"""what a parameter takes: a variable over time; that or one value; one value for each run; a comparison; a written number
+from 0 to 1; a written whole number; a written instant; the text 'time'; the text 'nearest'"""
 
 
 class Parameter(NamedTuple):
@@ -108,7 +108,7 @@ FUNCTIONS = {
     "final": Function((X,), lambda x: x.isel(time=-1), _same),
     "least": Function((X,), _reduced("least", lambda x: x.min("time")), _same),
     "largest": Function((X,), _reduced("largest", lambda x: x.max("time")), _same),
-    "dead_time": Function((X, Parameter("share", "number", needed=False)), _dead_time, _seconds),
+    "dead_time": Function((X, Parameter("share", "share", needed=False)), _dead_time, _seconds),
     "tracking_error": Function(  # root mean square of the distance from a reference
         (X, Parameter("reference", "value")),
         lambda x, reference: _rms(x - reference),
@@ -130,7 +130,7 @@ METHODS = {
     "median": _reduction(lambda x: x.median("time")),
     "std": _reduction(lambda x: x.std("time")),
     "var": _reduction(lambda x: x.var("time"), lambda x: reduced(x, 2)),
-    "quantile": Function((X, Parameter("q", "number"), TIME), _quantile, lambda x, q: reduced(x)),  # noqa: ARG005
+    "quantile": Function((X, Parameter("q", "share"), TIME), _quantile, lambda x, q: reduced(x)),  # noqa: ARG005
     "integrate": Function(
         (X, Parameter("coord", "time", needed=False)),
         lambda x: x.integrate("time"),

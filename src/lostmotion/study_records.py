@@ -77,6 +77,8 @@ def check_names(table: str, names: Any) -> None:
     ValueError
         One is not; the message says what may have been meant.
     """
+    if not isinstance(names, list | tuple):
+        raise ValueError(f"has values = {names!r}; it must be a list of names")
     for name in names:
         if not isinstance(name, str):
             raise ValueError(f"has the value {name!r}, which is no name of a {table}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from .drive_check import RULES
 from .quantities import Part
@@ -23,6 +23,13 @@ class Bound(Part):
 
     min: float | str | None = None
     max: float | str | None = None
+
+    @field_validator("min", "max", mode="before")
+    @classmethod
+    def _no_boolean(cls, value: Any) -> Any:
+        if isinstance(value, bool):
+            raise ValueError(f"{str(value).lower()} is no number")
+        return value
 
     @model_validator(mode="after")
     def _says_something(self) -> Self:

@@ -47,8 +47,10 @@ def in_si(value: Any, unit: str | None) -> Any:
     Raises
     ------
     ValueError
-        A string is no number with a unit, or has the unit of something else.
+        A string is no number with a unit, or has the unit of something else; or a value is true or false.
     """
+    if isinstance(value, bool):
+        raise ValueError(f"{str(value).lower()} is no number")
     if isinstance(value, str):
         return si_number(value) if unit is None else to_si(value, unit)
     if isinstance(value, list | tuple):
