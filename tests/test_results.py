@@ -88,6 +88,16 @@ def test_a_result_can_be_written_by_xarray_itself(result: xr.Dataset, tmp_path: 
         xr.testing.assert_identical(lm.switchings_of(back), lm.switchings_of(result))
 
 
+@pytest.mark.parametrize("ending", [".nc", ".csv", ".parquet"])
+def test_a_periodic_motion_which_has_no_switchings_is_saved_too(small: Path, tmp_path: Path, ending: str) -> None:
+    scenario = lm.load(small)
+    motion = lm.periodic_motion(scenario.drive(), scenario.command)
+    lm.save(motion, tmp_path / f"m{ending}")
+    back = lm.open_result(tmp_path / f"m{ending}")
+    assert back.attrs["period"] == motion.attrs["period"]
+    xr.testing.assert_equal(back["twist"].drop_vars("time"), motion["twist"].drop_vars("time"))
+
+
 def test_what_is_no_result_has_no_switchings() -> None:
     with pytest.raises(ValueError, match="has no switchings; give a result of simulate"):
         lm.switchings_of(xr.Dataset())

@@ -235,26 +235,35 @@ def open_result(path: str | Path) -> xarray.Dataset:
 
 
 def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
-    """The result, and its switchings in a group of their own."""
+    """The result, and its switchings, if it has any, in a group of their own; periodic motions have none."""
     plain = dataset.drop_attrs(deep=False).assign_attrs({k: v for k, v in dataset.attrs.items() if k != SWITCHINGS})
     with io.BytesIO() as memory:  # the library's own writer leaves a half-open file behind when the disk is full
         plain.to_netcdf(memory, engine="h5netcdf", mode="w")
-        switchings_of(dataset).to_netcdf(memory, engine="h5netcdf", mode="a", group=SWITCHINGS)
+        if SWITCHINGS in dataset.attrs:
+            switchings_of(dataset).to_netcdf(memory, engine="h5netcdf", mode="a", group=SWITCHINGS)
         path.write_bytes(memory.getvalue())
 
 
 def _read_netcdf(path: Path) -> xarray.Dataset:
+    import h5netcdf
     import xarray as xr
 
-    with xr.open_dataset(path, engine="h5netcdf", group=SWITCHINGS) as opened:
-        switchings = packed_again({str(name): v for name, v in opened.load().items()})
     with xr.open_dataset(path, engine="h5netcdf") as opened:
-        return opened.load().assign_attrs({SWITCHINGS: switchings})
+        result = opened.load()
+    with h5netcdf.File(path) as file:
+        has_group = SWITCHINGS in file.groups
+    if not has_group:
+        return result
+    with xr.open_dataset(path, engine="h5netcdf", group=SWITCHINGS) as opened:
+        columns = {str(name): v for name, v in opened.load().items()}
+    return result.assign_attrs({SWITCHINGS: packed_again(columns)})
 
 
 def _header(dataset: xarray.Dataset) -> str:
     """All but the samples, as JSON: attributes, and the switchings by columns."""
     attributes = {k: v for k, v in dataset.attrs.items() if k != SWITCHINGS}
+    if SWITCHINGS not in dataset.attrs:
+        return json.dumps({"attributes": attributes})
     columns = {str(name): v.values.tolist() for name, v in switchings_of(dataset).items()}
     return json.dumps({"attributes": attributes, SWITCHINGS: columns})
 
@@ -265,7 +274,8 @@ def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Datase
         time = columns.pop("time")
     except (json.JSONDecodeError, KeyError):
         raise InputError(f"{path}: is no result of lostmotion; its header or its time column is missing") from None
-    return _dataset(time, columns, meta["attributes"] | {SWITCHINGS: packed_again(meta[SWITCHINGS])})
+    switchings = {SWITCHINGS: packed_again(meta[SWITCHINGS])} if SWITCHINGS in meta else {}
+    return _dataset(time, columns, meta["attributes"] | switchings)
 
 
 def _columns(dataset: xarray.Dataset) -> dict[str, Any]:
