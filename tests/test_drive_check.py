@@ -216,6 +216,12 @@ def test_the_page_on_the_drive_check_names_every_rule():
         assert f"`{rule}`" in page
 
 
+def test_leaving_the_data_of_the_loss_map_is_found():
+    path = ROOT / "scenarios" / "paper-2dof-nl-large.toml"
+    assert by_rule(lm.load(path))["loss_map"].verdict == "ok"
+    assert by_rule(lm.load(path, {"load.torque": 100.0}))["loss_map"].verdict == "warning"
+
+
 def test_every_rule_is_tried_and_names_its_source():
     assert set(OTHERWISE) | {"loss_map"} == set(RULES)
     for finding in check_drive(move()):

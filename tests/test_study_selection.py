@@ -52,6 +52,18 @@ def test_what_fits_is_what_a_check_of_each_drive_by_itself_finds(selection: tupl
     assert [c.values["energy"] for c in fitting] == sorted(c.values["energy"] for c in fitting)
 
 
+def test_a_slow_study_shows_progress_within_a_chunk(tmp_path: Path):
+    text = (
+        EXAMPLE.read_text().replace('base = "..', f'base = "{ROOT}').replace("ratio = [40, 130]", "ratio = [40, 100]")
+    )
+    (tmp_path / "s.toml").write_text(text)
+    study = lm.load_study(tmp_path / "s.toml")
+    seen: list[int] = []
+    lm.study(study, tmp_path / "rows", progress=seen.append)
+    assert 20 < study.total < 40
+    assert seen == [0, 20, study.total]
+
+
 def test_the_command_line_shows_the_selection(selection: tuple[lm.Study, Path]):
     _, directory = selection
     done = CliRunner().invoke(app, ["study", "show", str(directory), "--best", "energy:largest"])

@@ -100,9 +100,15 @@ def check_drive(scenario: Scenario) -> tuple[Finding, ...]:
         _lost_motion(scenario),
         *_holding(scenario, result),
     ]
-    if "warning" in result.attrs:
-        findings.append(Finding("loss_map", "loss map", "used outside its data", "warning", result.attrs["warning"]))
+    if scenario.gearbox.losses.kind == "map":
+        findings.append(_loss_map(result))
     return tuple(findings)
+
+
+def _loss_map(result: xarray.Dataset) -> Finding:
+    if "warning" in result.attrs:
+        return Finding("loss_map", "loss map", "used outside its data", "warning", result.attrs["warning"])
+    return Finding("loss_map", "loss map", "used within its data", "ok")
 
 
 def _finely_sampled(scenario: Scenario) -> xarray.Dataset:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 SLOPES = "gearbox.stiffness.slopes"
 DERIVED = frozenset(v.name for v in VARIABLES if v.derived)
+SLOW_RUNS = 20  # in a piece of those that are made one by one
 MOST_NUMBERS = 2**23  # of samples that are held at once: 64 megabytes
 
 
@@ -44,12 +45,18 @@ def compute_chunk(text: str, first: int, last: int, threads: int = 1) -> bytes:
 
 
 def pieces(study: Study, first: int, last: int) -> list[tuple[int, int]]:
-    """The parts of a chunk, so that the samples of each can be held at once; most chunks are one piece."""
-    needed = _needed(study)
-    if not needed or (_core_can(study) and _reductions(study)):
+    """The parts of a chunk, so that the samples of each can be held at once, and that slow ones show progress.
+
+    Most chunks that the core can make are one piece.
+    """
+    needed, fast = _needed(study), _core_can(study)
+    if fast and (not needed or _reductions(study)):
         return [(first, last)]
+    if not needed:
+        return [(a, min(a + SLOW_RUNS, last)) for a in range(first, last, SLOW_RUNS)]
     arrays = len(CHANNEL_NAMES) if needed & DERIVED else len(needed)
     size = max(1, MOST_NUMBERS // (arrays * study.scenario.simulation.samples))
+    size = size if fast else min(size, SLOW_RUNS)
     return [(a, min(a + size, last)) for a in range(first, last, size)]
 
 
