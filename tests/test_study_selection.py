@@ -50,6 +50,8 @@ def test_what_fits_is_what_a_check_of_each_drive_by_itself_finds(selection: tupl
     assert 1 < len(fitting) < len(ranked) - sum(NOT_RUN in c.violated for c in ranked)
     assert ranked[: len(fitting)] == fitting
     assert [c.values["energy"] for c in fitting] == sorted(c.values["energy"] for c in fitting)
+    nearness = [99 if NOT_RUN in c.violated else len(c.violated) for c in ranked]
+    assert nearness == sorted(nearness)
 
 
 def test_a_slow_study_shows_progress_within_a_chunk(tmp_path: Path):

@@ -401,7 +401,7 @@ def check(
         print(f"  {finding}")
     warnings, unknown = (sum(f.verdict == verdict for f in findings) for verdict in ("warning", "unknown"))
     counted = "No warnings." if warnings == 0 else f"{warnings} warning{'s' if warnings > 1 else ''}."
-    print(f"{counted} {unknown} not judged: no limit is given." if unknown else counted)
+    print(f"{counted} {unknown} not judged (?)." if unknown else counted)
 
 
 @app.command()

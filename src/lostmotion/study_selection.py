@@ -54,7 +54,8 @@ class Price:
 
 
 def candidates(table: pa.Table, study: Study) -> list[Candidate]:
-    """The runs of a study that selects: those that fit first, each part from the best to the worst.
+    """The runs of a study that selects: first those that fit, then those that violate one limit, two, ..., each from the best to
+    the worst, and last those that cannot be run.
 
     Raises
     ------
@@ -69,7 +70,7 @@ def candidates(table: pa.Table, study: Study) -> list[Candidate]:
         for column, b in select.limits.items()
     }
     found = [_candidate(row, study, select, bounds) for row in table.to_pylist()]
-    return sorted(found, key=lambda c: (not c.fits, _rank(c, select), c.run))
+    return sorted(found, key=lambda c: (NOT_RUN in c.violated, len(c.violated), _rank(c, select), c.run))
 
 
 def _rank(candidate: Candidate, select: Selection) -> tuple[float, ...]:
