@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .study_file import Study
-from .study_select import Selection
+from .study_select import SHARES, USE, Selection
 from .study_table import unit_of
 
 if TYPE_CHECKING:
@@ -31,6 +31,8 @@ class Candidate:
     """rules of the drive check that have no limit to compare with"""
     values: dict[str, float]
     """of the objectives"""
+    tightest: str = ""
+    """the rule of the drive check whose limit is used most, and its share"""
 
     @property
     def fits(self) -> bool:
@@ -97,7 +99,10 @@ def _candidate(
         if math.isnan(value):
             violated.append(column)
             why.append(f"{column} has no value")
-    return Candidate(row["run"], name, tuple(violated), "; ".join(why), row.get("not judged", ""), values)
+    uses = {rule: use for rule in SHARES if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
+    most = max(uses, key=lambda rule: uses[rule], default="")
+    tightest = f"{most} {100.0 * uses[most]:.0f} %" if most else ""
+    return Candidate(row["run"], name, tuple(violated), "; ".join(why), row.get("not judged", ""), values, tightest)
 
 
 def prices(ranked: list[Candidate], select: Selection) -> list[Price]:

@@ -58,9 +58,9 @@ def _selection_csv(table: pa.Table, study: Study, ranked: list[Candidate], front
     for rank, c in enumerate(ranked, 1):
         own = by_run[c.run]
         said = ["yes" if c.fits else "no", "yes" if c.run in on_front else "no"]
-        limits = [" ".join(c.violated), c.why, c.not_judged]
+        limits = [c.tightest, " ".join(c.violated), c.why, c.not_judged]
         rows.append([rank, c.run, *said, *limits, *(own[name] for name in names)])
-    header = ["rank", "run", "fits", "Pareto front", "violated", "why", "not judged"]
+    header = ["rank", "run", "fits", "Pareto front", "tightest limit", "violated", "why", "not judged"]
     return table_csv([*header, *(labelled(table, name) for name in names)], rows)
 
 
@@ -78,6 +78,7 @@ def _ranking(table: pa.Table, ranked: list[Candidate], front: list[Candidate], s
     for c in fitting[:MOST]:
         values = "".join(f"{v:.5g}".rjust(w) for v, w in zip(c.values.values(), columns, strict=True))
         notes = ["Pareto front"] if len(select.objectives) > 1 and c.run in on_front else []
+        notes += [f"tightest: {c.tightest}"] if c.tightest else []
         notes += [f"not judged: {c.not_judged}"] if c.not_judged else []
         lines.append(f"  {c.name.ljust(width)}{values}" + (f"  ({'; '.join(notes)})" if notes else ""))
     if len(fitting) > MOST:
