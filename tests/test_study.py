@@ -481,6 +481,8 @@ peak = "peak(load_speed)"
         ("values = [1, 2]", "values = [true]", "load.inertia: true is no number$"),
         ("values = [1, 2]", "grid = [1, 2, 2.5]", "key vary.0.grid.2: 2.5 must be a whole number$"),
         ("values = [1, 2]", "values = [1, inf]", "key vary.0.values.1: inf must be a finite number"),
+        ("values = [1, 2]", "grid = [1, 2, 1000000000]", "grid needs 1 to 1000000 values, not 1000000000"),
+        ("values = [1, 2]", "grid = [1, 2, 0]", "grid needs 1 to 1000000 values, not 0"),
         ("[[vary]]", "[vary]", "key vary: must be a list$"),
         ("[keep]", "[[keep]]", "key keep: must be a table$"),
         ('"peak(load_speed)"', "3", "key keep.peak: 3 must be a text in quotes$"),

@@ -15,6 +15,7 @@ from .signals import Signal
 from .study_records import CONDITIONS, TABLE_OF, check_names, names_that_fit
 from .study_units import in_si, unit_of_key
 
+MOST_LEVELS = 1_000_000  # of one parameter
 WAYS = ("values", "grid", "uniform", "log_uniform", "normal", "triangular")
 
 
@@ -82,8 +83,8 @@ class Vary(Part):
             raise ValueError(f"of {self.title}: {pair[0]} must be below {pair[1]}")
         if self.log_uniform is not None and self.log_uniform[0] <= 0.0:
             raise ValueError(f"of {self.title}: log_uniform needs positive bounds")
-        if self.grid is not None and self.grid[2] < 1:
-            raise ValueError(f"of {self.title}: grid needs at least one value")
+        if self.grid is not None and not 1 <= self.grid[2] <= MOST_LEVELS:
+            raise ValueError(f"of {self.title}: grid needs 1 to {MOST_LEVELS} values, not {self.grid[2]}")
         if self.values is not None and not self.values:
             raise ValueError(f"of {self.title}: values is empty")
         if self.triangular is not None and not self.triangular[0] <= self.triangular[1] <= self.triangular[2]:
