@@ -114,6 +114,25 @@ def test_holding_a_load_heats_even_at_rest():
     assert "at rest" in str(at_rest)
 
 
+def test_the_reversal_of_a_sine_is_no_rest():
+    """Where the speed passes zero the torque is largest; a run that ends there must not be taken to hold it for good."""
+    sine = {"sines": [{"amplitude": 0.5, "frequency": 2.0, "phase": math.pi / 2.0}]}
+    cycle = duty_cycle(lm.simulate(move(1.0, command=sine)), None)  # ends at zero speed, at the largest torque
+    assert cycle.holding_torque is None
+    assert cycle.duration == pytest.approx(1.0)
+    assert cycle.rms_motor_torque() == pytest.approx(0.5 / math.sqrt(2.0), rel=1e-3)
+    # Nor is a shaft that sticks at each reversal, while the torque on it rises.
+    small = duty_cycle(lm.simulate(lm.load(ROOT / "scenarios" / "paper-2dof-nl-small.toml")), None)
+    assert small.duration == 2.0
+
+
+def test_waiting_before_the_move_is_no_part_of_the_cycle():
+    later = {"steps": [{"height": h, "time": t + 3.0} for h, t in ((0.5, 0.0), (-1.0, 0.1), (0.5, 0.2))]}
+    now, then = by_rule(move(0.25)), by_rule(move(3.25, command=later))
+    for rule in ("motor_torque", "winding_temperature", "average_input_speed"):
+        assert then[rule].use == pytest.approx(now[rule].use, rel=0.02)
+
+
 def test_a_cycle_that_does_not_fit_the_run_is_refused():
     with pytest.raises(lm.InputError, match=r"task.cycle: 0.1 s is shorter than the motion of 0\.2"):
         check_drive(move(**{"task.cycle": 0.1}))

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import xarray
 
 STANDSTILL = 1e-3  # below this share of its largest speed the motor is taken to stand still
+SHORTEST = 0.01  # of the time in motion; a shorter standstill is no rest
+STEADY = 0.01  # of the largest motor torque, within which it does not change at rest
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,9 @@ class DutyCycle:
 def duty_cycle(result: xarray.Dataset, period: float | None) -> DutyCycle:
     """The duty cycle of a run.
 
+    A standstill at its beginning or end is rest if it is no mere reversal of the motion: if it is not too short, and the torque
+    of the motor does not change.
+
     Parameters
     ----------
     result
@@ -93,18 +98,22 @@ def duty_cycle(result: xarray.Dataset, period: float | None) -> DutyCycle:
     InputError
         The motion does not fit into the period, or is not at its end where a pause would begin.
     """
+    time, torque = result["time"].values, result["motor_torque"].values
     speed = np.abs(result["motor_speed"].values)
     turning = np.flatnonzero(speed > STANDSTILL * speed.max())
-    last = len(speed) - 1
-    first, end = (max(turning[0] - 1, 0), min(turning[-1] + 1, last)) if len(turning) else (0, last)
-    part = slice(first, end + 1)
-    rests = not len(turning) or turning[-1] < last
+    first, last = (turning[0], turning[-1]) if len(turning) else (0, len(speed) - 1)
+    shortest = SHORTEST * (time[last] - time[first])
+    steady = STEADY * np.abs(torque).max()
+    before, after = first // 2 + 1, (last + len(speed)) // 2  # halves of the standstills, those far from the motion
+    waits = time[first] - time[0] > shortest and np.ptp(torque[:before]) <= steady
+    rests = not len(turning) or (time[-1] - time[last] > shortest and np.ptp(torque[after:]) <= steady)
+    part = slice(max(first - 1, 0) if waits else 0, last + 2 if rests else len(speed))
     found = DutyCycle(
-        result["time"].values[part],
+        time[part],
         speed[part],
         result["output_torque"].values[part],
-        result["motor_torque"].values[part],
-        float(result["motor_torque"][-1]) if rests else None,
+        torque[part],
+        float(torque[-1]) if rests else None,
         period,
     )
     if period is None or not found.moves:
