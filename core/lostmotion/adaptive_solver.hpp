@@ -106,8 +106,8 @@ class AdaptiveSolver {
         return status_of(system_.start(cache_, now_, key_));
     }
 
-    // observer.step(regime, memory, dense step, whether it is the last), observer.switching(...); the inputs at any time
-    // through `input_at`. A step holds up to its end, the last one there, too.
+    // observer.step(regime, memory, dense step, whether it is the last), observer.switching(...); the inputs at any
+    // time through `input_at`. A step holds up to its end, the last one there, too.
     template <class Observer>
     Status advance(double t_end, Observer& observer) {
         t_end_ = t_end;
@@ -280,8 +280,7 @@ class AdaptiveSolver {
     // What the tolerance allows for in a form.
     double solution_error(const LinearForm& form, const State& x) const {
         double error = 0.0;
-        for (int k = 0; k < n_states; ++k)
-            error += tolerance_ * std::fabs(form.c[k]) * (scale_[k] + std::fabs(x[k]));
+        for (int k = 0; k < n_states; ++k) error += tolerance_ * std::fabs(form.c[k]) * (scale_[k] + std::fabs(x[k]));
         return error;
     }
 

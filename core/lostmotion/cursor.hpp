@@ -15,10 +15,8 @@ class Cursor {
  public:
     explicit Cursor(const InputState& input) : input_(input) {}
 
-    // On a regime, at a state; the inputs are those of the instant already. carry: whether the rate is to be carried on
-    // under constant inputs. rate: if it is known better than from x.
-    void place(Propagator& propagator, const Column& constant, const State& x, bool carry,
-               const State* rate = nullptr) {
+    // On a regime, at a state; the inputs are those of the instant already. rate: if it is known better than from x.
+    void place(Propagator& propagator, const Column& constant, const State& x, const State* rate = nullptr) {
         propagator_ = &propagator;
         constant_ = &constant;
         carries_rate_ = false;
@@ -29,7 +27,7 @@ class Cursor {
         } else {
             arrive(load(x));
         }
-        carries_rate_ = input_.constant() && (rate != nullptr || (carry && driven()));
+        carries_rate_ = input_.constant() && (rate != nullptr || driven());
     }
     bool carries_rate() const { return carries_rate_; }
     // From now on nothing moves but the load angle.

@@ -128,9 +128,8 @@ class ExactSolver {
             if (!entry.propagator.ready()) entry.prepare(turns_, scale_);
             Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
                                     now_.x};
-            begin_->place(entry.propagator, segment.constant, now_.x, entry.n_twist_speeds > 0,
-                          course_.rate_known ? &course_.rate : nullptr);
-            if (begin_->input().constant() && has_settled(begin_->rate())) begin_->settle();
+            begin_->place(entry.propagator, segment.constant, now_.x, course_.rate_known ? &course_.rate : nullptr);
+            if (begin_->input().constant() && has_settled(entry.regime, begin_->rate())) begin_->settle();
             if (!(time_ < knot_)) knot_ = next_knot(signals_, time_);
             const double limit = std::min(t_end, knot_);
             const Guard* fired = nullptr;
@@ -174,9 +173,11 @@ class ExactSolver {
         see_inputs(begin_->input(), time_, now_);
     }
 
-    bool has_settled(const State& rate) const {
-        for (int k = 0; k < n_coupled; ++k)
+    bool has_settled(const Regime& regime, const State& rate) const {
+        for (int k = 0; k < n_coupled; ++k) {
+            if (k == load_speed && regime.at_rest[twist_contact]) continue;  // it follows the input
             if (!(std::fabs(rate[k]) <= settled * scale_[k])) return false;
+        }
         return true;
     }
     // After a change of the inputs: if the regime goes on, the rate jumps by no more than what they bring.
@@ -260,13 +261,13 @@ class ExactSolver {
                 return Status::interrupted;
             if (count % 64 == 0) cursor->anchor(time_);
             const State& rate = cursor->rate();
-            if (constant_inputs && has_settled(rate)) {
+            if (constant_inputs && has_settled(e.regime, rate)) {
                 now_.x = cursor->x();
                 if (time_ == segment.begin) {
                     now_.x[load_angle] += rate[load_angle] * (limit - time_);
                     time_ = limit;
                 }
-                keep_course(*cursor);
+                keep_course(e, *cursor);
                 for (int k = 0; k < n_coupled; ++k) course_.rate[k] = 0.0;
                 course_.rate_known = true;
                 return Status::done;
@@ -307,11 +308,17 @@ class ExactSolver {
         }
         now_.x = cursor->x();
         last_level_ = level;
-        keep_course(*cursor);
+        keep_course(e, *cursor);
         return Status::done;
     }
 
-    void keep_course(const Cursor& at) {
+    // At the end of a stretch that no guard ends.
+    void keep_course(const typename Cache::Entry& e, const Cursor& at) {
+        // Carried on for long, the speeds that a stuck twist ties together drift apart by rounding.
+        if constexpr (requires(std::array<bool, n_contacts> at_rest) { system_.stop(now_.x, at_rest); }) {
+            std::array<bool, n_contacts> at_rest = e.regime.at_rest;
+            if (at.carries_rate() && at_rest[twist_contact]) system_.stop(now_.x, at_rest);
+        }
         course_.rate = at.rate();
         course_.rate_known = at.carries_rate();
         course_.input = at.input().values();

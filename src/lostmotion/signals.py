@@ -5,6 +5,7 @@ from __future__ import annotations
 import bisect
 import itertools
 import math
+from collections import deque
 from functools import lru_cache
 from typing import Annotated, Any, Generic, Self, TypeVar
 
@@ -142,9 +143,16 @@ class Signal(Part, Generic[V]):
         pieces = [part.knots() for part in (*self.steps, *self.ramps, self.chirp, self.samples) if part is not None]
         mean = float(self.mean)  # type: ignore[arg-type]
         knots = []
+        waiting = deque(sorted(pieces, key=lambda piece: piece[0][0]))
+        active: list[list[Knot]] = []
+        final = 0.0  # sum of the pieces that are past their last knot and constant from there on
         for time in sorted({0.0, *(t for piece in pieces for t, _, _ in piece)}):
-            here = [_at(piece, time) for piece in pieces]
-            knots.append((time, mean + sum(value for value, _ in here), sum(slope for _, slope in here)))
+            while waiting and waiting[0][0][0] <= time:
+                active.append(waiting.popleft())
+            here = [_at(piece, time) for piece in active]
+            knots.append((time, mean + sum((value for value, _ in here), final), sum(slope for _, slope in here)))
+            final += sum(value for piece, (value, _) in zip(active, here, strict=True) if time >= piece[-1][0])
+            active = [piece for piece in active if time < piece[-1][0]]
         return knots
 
     def core(self) -> _core.Signal:
