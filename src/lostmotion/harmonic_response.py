@@ -10,7 +10,7 @@ import numpy as np
 
 from .linear_analysis import _control
 from .parts import Drive
-from .scenario import Initial
+from .scenario import Initial, Scenario, drive_of, mean_inputs
 from .shooting import MAX_PERIODS, SAMPLES_PER_PERIOD, floquet_multipliers, is_stable, reason_of, respond
 from .signals import CommandSignal, TorqueSignal
 from .variables import CHANNEL_NAMES
@@ -25,13 +25,13 @@ Source = Literal["command", "load_torque"]
 
 
 def frequency_response(
-    drive: Drive,
+    drive: Drive | Scenario,
     frequencies: Sequence[float],
     amplitudes: Sequence[float] | float,
     *,
     source: Source = "command",
-    mean_command: float = 0.0,
-    mean_load_torque: float = 0.0,
+    mean_command: float | None = None,
+    mean_load_torque: float | None = None,
     harmonics: int = 8,
     refine: float | None = None,
     threads: int | None = None,
@@ -45,12 +45,16 @@ def frequency_response(
 
     Parameters
     ----------
+    drive
+        A drive, or a scenario, of which the drive and the constant parts of command and load torque are taken.
     frequencies
         [Hz].
     amplitudes
         Of the input: E_CA [-], or [N·m] for a load torque.
     source
         ``"command"`` or ``"load_torque"``; the other one is constant.
+    mean_command, mean_load_torque
+        Constant parts of E_C [-] and M_Z [N·m]; left out, those of the scenario, or 0.
     harmonics
         How many to keep.
     refine
@@ -80,6 +84,8 @@ def frequency_response(
         raise ValueError("amplitudes must be positive; give at least one")
     if source not in ("command", "load_torque"):
         raise ValueError(f"source {source!r} is not known; it must be command or load_torque")
+    means = mean_inputs(drive, mean_command, mean_load_torque)
+    drive = drive_of(drive)
 
     def compute(new: Sequence[float]) -> xarray.Dataset:
         seen = 0
@@ -91,11 +97,7 @@ def frequency_response(
                     progress()
             seen = done
 
-        points = [
-            (*_signals(source, a, f, mean_command, mean_load_torque), 1.0 / f, Initial())
-            for a in amplitudes
-            for f in new
-        ]
+        points = [(*_signals(source, a, f, *means), 1.0 / f, Initial()) for a in amplitudes for f in new]
         r = respond(
             drive,
             points,
@@ -228,8 +230,17 @@ def _labelled(
     )
 
 
-def characteristics(response: xarray.Dataset, drive: Drive, output: str = "load_speed") -> xarray.Dataset:
+def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: str = "load_speed") -> xarray.Dataset:
     """Bandwidth and phase crossover as functions of amplitude, with the dead zone of the drive.
+
+    Parameters
+    ----------
+    response
+        From `frequency_response`.
+    drive
+        The drive, or its scenario.
+    output
+        The result variable that is looked at.
 
     Returns
     -------
@@ -251,7 +262,8 @@ def characteristics(response: xarray.Dataset, drive: Drive, output: str = "load_
             phase = np.degrees(np.unwrap(np.angle(curve)))
         bandwidth.append(_falls_through(x, gain, -20.0 * math.log10(THREE_DECIBELS)))
         crossover.append(_falls_through(x, phase, -180.0))
-    forward, backward = (drive.core().smallest_command(0.0, 0.0, s) for s in (+1, -1))
+    core = drive_of(drive).core()
+    forward, backward = (core.smallest_command(0.0, 0.0, s) for s in (+1, -1))
     return xr.Dataset(
         {
             "bandwidth": ("amplitude", bandwidth, {"units": "Hz", "long_name": "-3 dB against the lowest frequency"}),
@@ -271,12 +283,12 @@ def _falls_through(x: np.ndarray, y: np.ndarray, level: float) -> float:
 
 
 def bandwidth(
-    drive: Drive,
+    drive: Drive | Scenario,
     amplitude: float,
     *,
     output: str = "load_speed",
-    mean_command: float = 0.0,
-    mean_load_torque: float = 0.0,
+    mean_command: float | None = None,
+    mean_load_torque: float | None = None,
     lowest: float = 0.1,
     highest: float = 1000.0,
 ) -> float:
@@ -287,8 +299,12 @@ def bandwidth(
 
     Parameters
     ----------
+    drive
+        A drive, or a scenario, of which the drive and the constant parts of command and load torque are taken.
     amplitude
         Of the command, E_CA [-].
+    mean_command, mean_load_torque
+        Constant parts of E_C [-] and M_Z [N·m]; left out, those of the scenario, or 0.
     lowest, highest
         [Hz]. Where the gain has not fallen at the highest, the bandwidth is NaN.
 
@@ -304,9 +320,11 @@ def bandwidth(
     if not amplitude > 0.0:
         raise ValueError(f"no bandwidth: the amplitude {amplitude:g} of the command must be positive")
     channel = CHANNEL_NAMES.index(output)
+    means = mean_inputs(drive, mean_command, mean_load_torque)
+    drive = drive_of(drive)
 
     def gain(frequency: float) -> float:
-        point = (*_signals("command", amplitude, frequency, mean_command, mean_load_torque), 1.0 / frequency, Initial())
+        point = (*_signals("command", amplitude, frequency, *means), 1.0 / frequency, Initial())
         r = respond(drive, [point], harmonics=1, keep_table=False, max_periods=MAX_PERIODS, threads=1, progress=None)
         if reason := reason_of(r, 0):
             raise RuntimeError(f"no bandwidth: at {frequency:.4g} Hz {reason}")

@@ -11,7 +11,7 @@ import numpy as np
 from . import _core
 from .parts import ConstantEfficiency, Drive
 from .run import start_state
-from .scenario import Initial
+from .scenario import Initial, Scenario, drive_of
 from .variables import CONTACTS, STATES
 
 if TYPE_CHECKING:
@@ -43,6 +43,14 @@ class LinearModel:
     states: tuple[str, ...] = STATES
     inputs: tuple[str, ...] = INPUTS
     outputs: tuple[str, ...] = OUTPUTS
+
+    def __repr__(self) -> str:
+        modes = ", ".join(
+            f"{name} {mode:+d}" if mode else f"{name} stuck" for name, mode in self.contacts.items() if mode != 2
+        )
+        return (
+            f"LinearModel({len(self.states)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs; {modes})"
+        )
 
     def response(self, frequency: Any, output: str = "load_speed", source: str = "command") -> np.ndarray:
         """F(y)/F(u) at frequencies [Hz], complex."""
@@ -114,7 +122,7 @@ def _pairs(values: np.ndarray) -> list[tuple[float, float]]:
 
 
 def linearize(
-    drive: Drive,
+    drive: Drive | Scenario,
     state: Initial | None = None,
     *,
     command: float = 0.0,
@@ -141,7 +149,7 @@ def linearize(
     """
     state = state or Initial()
     rates, outputs, modes = _core.linearization(
-        drive.core(),
+        drive_of(drive).core(),
         start_state(state),
         state.hysteresis_capacity,
         [command, load_torque],
@@ -176,7 +184,7 @@ class RigidConstants:
 
 
 def rigid_constants(
-    drive: Drive, *, motor_time_constant: float | None = None, time_constant: float | None = None
+    drive: Drive | Scenario, *, motor_time_constant: float | None = None, time_constant: float | None = None
 ) -> RigidConstants:
     """Constants of (8) to (11); two of them may be given instead of computed.
 
@@ -185,6 +193,7 @@ def rigid_constants(
     ValueError
         The drive has no DC motor, or no constant efficiency.
     """
+    drive = drive_of(drive)
     m, g, load = drive.motor, drive.gearbox, drive.load
     if m.rated_speed is None or m.electrical_time_constant is None or m.armature_voltage_constant is None:
         raise ValueError("the closed form needs a DC motor")

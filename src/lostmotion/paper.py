@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from importlib.resources import as_file, files
 
 from .linear_analysis import RigidConstants, rigid_constants
 from .scenario import Scenario, load
@@ -32,9 +31,7 @@ def paper_scenario(model: str, amplitude: str) -> Scenario:
     """
     if model not in MODELS or amplitude not in AMPLITUDES:
         raise ValueError(f"there is no run {model!r}, {amplitude!r}; models: {MODELS}, amplitudes: {tuple(AMPLITUDES)}")
-    name = f"paper-{model.lower().replace('-', '', 1)}-{amplitude}.toml"
-    with as_file(files("lostmotion") / "scenarios") as directory:
-        return load(directory / name)
+    return load(f"paper-{model.lower().replace('-', '', 1)}-{amplitude}")
 
 
 @dataclass(frozen=True)

@@ -82,6 +82,13 @@ class Motor(Part):
                 raise ValueError("has a voltage_limit, which also needs rated_voltage")
         return self
 
+    def __repr__(self) -> str:
+        if self.rated_speed is None:
+            rated = f"torque source, rated {self.rated_torque:.4g} N·m"
+        else:
+            rated = f"dc, {self.rated_torque:.4g} N·m at {_rpm(self.rated_speed)}"
+        return f"Motor({rated}, rotor {self.rotor_inertia:.4g} kg·m²)"
+
     @property
     def no_load_speed(self) -> float:
         """Speed [rad/s] at command 1 without any load or friction, by (2)."""
@@ -262,6 +269,11 @@ class Gearbox(Part):
     note: str = ""
     """what a reader of the results must know, such as that a loss table is a stand-in"""
 
+    def __repr__(self) -> str:
+        laws = f"stiffness {self.stiffness.kind}, losses {self.losses.kind}"
+        rated = f"{self.rated_output_torque:.4g} N·m at {_rpm(self.rated_input_speed)}"
+        return f"Gearbox({self.ratio:g}:1, {rated}, {laws})"
+
     @model_validator(mode="after")
     def _hysteresis_needs_compliance(self) -> Self:
         if self.hysteresis is not None and self.hysteresis.efficiency < 1.0 and isinstance(self.stiffness, Rigid):
@@ -271,6 +283,9 @@ class Gearbox(Part):
 
 class Load(Part):
     """The driven body (3b)."""
+
+    def __repr__(self) -> str:
+        return f"Load({self.inertia:.4g} kg·m²)"
 
     inertia: Annotated[Inertia, Positive]
     """J_Z"""
@@ -287,6 +302,9 @@ class Drive(Part):
     gearbox: Gearbox
     load: Load
 
+    def __repr__(self) -> str:
+        return f"Drive({self.motor!r}, {self.gearbox!r}, {self.load!r})"
+
     @model_validator(mode="after")
     def _can_be_simulated(self) -> Self:
         if self.motor.rotor_inertia + self.gearbox.inertia <= 0.0:
@@ -301,6 +319,10 @@ class Drive(Part):
     def core(self) -> _core.Drive:
         """The solver's drive; the last ones are kept for equal parts."""
         return _core_drive(self)
+
+
+def _rpm(speed: float) -> str:
+    return f"{speed * 30.0 / math.pi:.4g} rpm"
 
 
 def _plain(part: Any, *names: str) -> dict[str, float]:

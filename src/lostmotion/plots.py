@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from .results import scenario_of
 from .variables import VARIABLES
 
 if TYPE_CHECKING:
@@ -24,23 +26,43 @@ STYLES: dict[str, dict[str, Any]] = {
 }
 COMMAND_STYLE: dict[str, Any] = {"color": "0.45", "linestyle": ":", "linewidth": 1.3}
 
-mpl.rcParams.update(
-    {
-        "figure.constrained_layout.use": True,
-        "figure.dpi": 110,
-        "savefig.dpi": 150,
-        "font.size": 9.5,
-        "axes.grid": True,
-        "grid.color": "0.9",
-        "grid.linewidth": 0.7,
-        "axes.axisbelow": True,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "legend.frameon": False,
-        "svg.hashsalt": "lostmotion",
-        "svg.fonttype": "path",
-    }
-)
+LOOKS: Any = {
+    "figure.constrained_layout.use": True,
+    "figure.dpi": 110,
+    "savefig.dpi": 150,
+    "font.size": 9.5,
+    "axes.grid": True,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "svg.hashsalt": "lostmotion",
+    "svg.fonttype": "path",
+}
+
+
+# Decorates what makes or draws figures; the looks of the user's own figures stay as they are.
+in_our_looks = mpl.rc_context(LOOKS)
+
+
+class Picture(Figure):
+    """A figure that is drawn in the looks of this package, and shown by notebooks."""
+
+    @in_our_looks
+    def draw(self, renderer: Any) -> None:
+        super().draw(renderer)
+
+    @in_our_looks
+    def savefig(self, fname: Any, **options: Any) -> None:
+        super().savefig(fname, **options)
+
+    def _repr_png_(self) -> bytes:
+        png = io.BytesIO()
+        self.savefig(png, format="png", dpi=self.dpi)
+        return png.getvalue()
+
 
 LABELS = {v.name: v for v in VARIABLES}
 
@@ -88,15 +110,37 @@ class Panel:
     log_y: bool = False
 
 
+MOST_POINTS = 10_000  # of a curve that is drawn; more than twice the pixels across any figure
+
+
+def thinned(x: Any, y: Any, most: int = MOST_POINTS) -> tuple[Any, Any]:
+    """Points of a curve that look the same: of each run of neighbours the first and the extremes of both coordinates."""
+    n = len(y)
+    if n <= most:
+        return x, y
+    x, y = np.asarray(x), np.asarray(y)
+    width = -(-n * 5 // most)
+    whole = n // width * width
+    firsts = np.arange(0, whole, width)
+    kept: list[Any] = [firsts, np.arange(whole, n), [n - 1]]
+    for values in (x, y):
+        rows = values[:whole].reshape(-1, width)
+        for extreme, fill in ((np.argmin, np.inf), (np.argmax, -np.inf)):
+            kept.append(firsts + extreme(np.where(np.isnan(rows), fill, rows), axis=1))
+    index: Any = np.unique(np.concatenate(kept))
+    return x[index], y[index]
+
+
+@in_our_looks
 def draw(panels: Iterable[Panel], columns: int, size: tuple[float, float], note: str = "") -> Figure:
     """Panels in rows of `columns`, `size` [inch] in all; `note` stands below."""
     panels = list(panels)
-    figure = Figure(figsize=size)
+    figure = Picture(figsize=size)
     rows = -(-len(panels) // columns)
     for k, panel in enumerate(panels):
         axes = figure.add_subplot(rows, columns, k + 1)
         for curve in panel.curves:
-            axes.plot(curve.x, curve.y, label=curve.shown, **curve.style)
+            axes.plot(*thinned(curve.x, curve.y), label=curve.shown, **curve.style)
         if panel.log_x:
             axes.set_xscale("log")
         if panel.log_y and any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves):
@@ -174,14 +218,15 @@ def overview(result: xarray.Dataset) -> Figure:
 
 
 def _ratio(result: xarray.Dataset) -> float:
-    import json
+    if "gear_ratio" in result.attrs:  # a periodic motion, which knows its drive only
+        return float(result.attrs["gear_ratio"])
+    return scenario_of(result).gearbox.ratio
 
-    return float(json.loads(result.attrs["scenario"])["gearbox"]["ratio"])
 
-
+@in_our_looks
 def loss_map(speeds: Any, loads: Any, values: Any, note: str = "") -> Figure:
     """Figure 5: the loss coefficient as a surface and as curves. values[load, speed], driving side only."""
-    figure = Figure(figsize=(10.0, 4.2))
+    figure = Picture(figsize=(10.0, 4.2))
     surface: Any = figure.add_subplot(1, 2, 1, projection="3d")
     v, mu = np.meshgrid(speeds, loads)
     surface.plot_surface(v, mu, values, cmap="cividis", edgecolor="0.25", linewidth=0.4, alpha=0.95)
@@ -200,9 +245,10 @@ def loss_map(speeds: Any, loads: Any, values: Any, note: str = "") -> Figure:
     return figure
 
 
+@in_our_looks
 def amplitude_maps(frequency: Any, amplitude: Any, maps: Mapping[str, tuple[str, Any]], amplitude_label: str) -> Figure:
     """Contours over frequency [Hz] and amplitude: maps[title] = (label of the values, values[amplitude, frequency])."""
-    figure = Figure(figsize=(10.0, 3.4 * -(-len(maps) // 2)))
+    figure = Picture(figsize=(10.0, 3.4 * -(-len(maps) // 2)))
     for k, (title, (label, values)) in enumerate(maps.items()):
         axes = figure.add_subplot(-(-len(maps) // 2), 2, k + 1)
         shown = np.ma.masked_invalid(values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 
@@ -53,6 +53,35 @@ class Part(BaseModel):
     """Immutable; unknown keys, NaN and infinity are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
+
+    def __repr_args__(self) -> Iterator[tuple[str, Any]]:
+        """What differs from its default; of long lists the ends."""
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            if value != field.default:
+                yield name, abridged(value)
+
+    def _repr_html_(self) -> str:
+        """All values with their units, for notebooks."""
+        from .notebook import table
+
+        return table(self)
+
+
+class _Abridged(str):
+    """Text that stands for itself in a representation."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def abridged(value: Any, longest: int = 6) -> Any:
+    """The value; a long list as text with its ends and its length."""
+    if not isinstance(value, tuple) or len(value) <= longest:
+        return value
+    return _Abridged(f"({value[0]!r}, {value[1]!r}, ..., {value[-1]!r}; {len(value)} entries)")
 
 
 def unit_in_schema(node: Mapping[str, Any]) -> str | None:

@@ -7,6 +7,7 @@ import difflib
 import json
 import tomllib
 from collections.abc import Iterable, Mapping
+from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -94,6 +95,10 @@ class Scenario(Part):
         load = Load(**{name: getattr(self.load, name) for name in Load.model_fields})
         return Drive(motor=self.motor, gearbox=self.gearbox, load=load)
 
+    def __repr__(self) -> str:
+        title = f"{self.title!r}, " if self.title else ""
+        return f"Scenario({title}{self.drive()!r}, {self.simulation.duration:.4g} s, {self.simulation.samples} samples)"
+
     def replace(self, **changes: Any) -> Scenario:
         """The same scenario with changes by dotted key, such as ``**{"command.amplitude": 0.1}``, checked anew."""
         data = self.model_dump()
@@ -110,13 +115,62 @@ class Scenario(Part):
         return cls(**json.loads(text))
 
 
+def drive_of(what: Scenario | Drive) -> Drive:
+    """The drive of a scenario, or a drive as it is.
+
+    Raises
+    ------
+    TypeError
+        It is neither.
+    """
+    if isinstance(what, Drive):
+        return what
+    if isinstance(what, Scenario):
+        return what.drive()
+    raise TypeError(f"{what!r:.60} is no drive; give a Drive, or a Scenario such as load(path) returns")
+
+
+def mean_inputs(
+    what: Scenario | Drive, command: float | None = None, load_torque: float | None = None
+) -> tuple[float, float]:
+    """Constant parts of E_C [-] and M_Z [N·m]: as given, else those of the scenario, else 0."""
+    known = (what.command.mean, what.load.torque.mean) if isinstance(what, Scenario) else (0.0, 0.0)
+    return known[0] if command is None else command, known[1] if load_torque is None else load_torque
+
+
+def shipped_scenarios() -> dict[str, Path]:
+    """The scenarios that come with the package: name -> file."""
+    directory = files("lostmotion") / "scenarios"
+    return {f.name.removesuffix(".toml"): Path(str(f)) for f in sorted(directory.iterdir(), key=lambda f: f.name)}
+
+
+def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
+    """The file that is meant: a path relative to `directory`, or the name of a shipped scenario.
+
+    Raises
+    ------
+    InputError
+        It is neither; the message names what is near.
+    """
+    path = directory / name
+    if path.suffix or len(Path(name).parts) != 1 or path.exists():
+        return path
+    shipped = shipped_scenarios()
+    if str(name) in shipped:
+        return shipped[str(name)]
+    near = difflib.get_close_matches(str(name), shipped, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"the scenarios that come with the package are {', '.join(shipped)}"
+    raise InputError(f"{name}: there is no such file (.toml) and no such scenario; {hint}")
+
+
 def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
     """Read a scenario file.
 
     Parameters
     ----------
     path
-        TOML file. Its key `base` may name another scenario file (relative to it) that this one changes.
+        TOML file, or the name of a scenario that comes with the package, such as ``"paper-2dof-nl-small"``. The key
+        `base` of a file may name another one (relative to it, or shipped) that this one changes.
     overrides
         ``{"command.amplitude": 0.1}`` or ``["command.amplitude=0.1"]``, as by ``--set``.
 
@@ -125,8 +179,18 @@ def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) ->
     InputError
         With one line that names the file, the key, the value and the remedy.
     """
-    path = Path(path)
-    data = _read(path, ())
+    path = find_scenario(path)
+    return changed(_read(path, ()), overrides, path)
+
+
+def changed(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str], path: Path) -> Scenario:
+    """The scenario of the contents of a file, with changes by dotted key.
+
+    Raises
+    ------
+    InputError
+        With one line that names the file, the key, the value and the remedy.
+    """
     items = overrides.items() if isinstance(overrides, Mapping) else [_parse_override(text) for text in overrides]
     for key, value in items:
         try:
@@ -177,7 +241,7 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
     base = data.pop("base")
     if not isinstance(base, str):
         raise InputError(f"{path}: key base: {base!r} must be the name of a scenario file")
-    return _merge(_read(path.parent / base, (*including, path.resolve())), data)
+    return _merge(_read(find_scenario(base, path.parent), (*including, path.resolve())), data)
 
 
 def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...]) -> None:

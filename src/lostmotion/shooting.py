@@ -12,7 +12,7 @@ from . import _core
 from .parts import Drive
 from .results import add_derived
 from .run import start_state
-from .scenario import Initial
+from .scenario import Initial, Scenario, drive_of
 from .signals import CommandSignal, TorqueSignal
 from .variables import CHANNEL_NAMES, STATES, VARIABLES
 
@@ -97,9 +97,9 @@ def _period(*signals: CommandSignal | TorqueSignal) -> float:
 
 
 def periodic_motion(
-    drive: Drive,
-    command: CommandSignal | float = 0.0,
-    load_torque: TorqueSignal | float = 0.0,
+    drive: Drive | Scenario,
+    command: CommandSignal | float | None = None,
+    load_torque: TorqueSignal | float | None = None,
     *,
     multiple: int = 1,
     start: Initial | None = None,
@@ -112,12 +112,15 @@ def periodic_motion(
 
     Parameters
     ----------
+    drive
+        A drive, or a scenario.
     command, load_torque
-        Constants, or signals of mean and sines with a common period.
+        E_C [-] and M_Z [N·m]: constants, or signals of mean and sines with a common period; left out, those of the
+        scenario, or 0.
     multiple
         The motion may repeat after this many periods of the inputs (sub-harmonics).
     start
-        From where; at rest if left out. Coexisting motions are reached from different ones.
+        From where; the initial state of the scenario, or rest, if left out. Coexisting motions are reached from different ones.
 
     Returns
     -------
@@ -125,7 +128,7 @@ def periodic_motion(
         The result variables over one period, and the ``jacobian`` of the map over it. Attributes: ``residual`` (largest change of a state over the period / its
         largest magnitude), ``drift`` of the load angle [rad], ``multipliers_real`` and ``multipliers_imag`` (Floquet),
         ``stable``, ``smooth`` (the multipliers are exact: no switching grazes), ``periods`` followed, ``newton_steps``,
-        ``start_<state>``, ``period`` [s].
+        ``start_<state>``, ``period`` [s], ``gear_ratio``.
 
     Raises
     ------
@@ -134,8 +137,13 @@ def periodic_motion(
     """
     import xarray as xr
 
-    command = command if isinstance(command, CommandSignal) else CommandSignal(mean=command)
-    load_torque = load_torque if isinstance(load_torque, TorqueSignal) else TorqueSignal(mean=load_torque)
+    if isinstance(drive, Scenario):
+        command = drive.command if command is None else command
+        load_torque = drive.load.torque if load_torque is None else load_torque
+        start = start or drive.initial
+    drive = drive_of(drive)
+    command = command if isinstance(command, CommandSignal) else CommandSignal(mean=command or 0.0)
+    load_torque = load_torque if isinstance(load_torque, TorqueSignal) else TorqueSignal(mean=load_torque or 0.0)
     if multiple < 1:
         raise ValueError(f"multiple {multiple} must be 1 or more")
     period = multiple * _period(command, load_torque)
@@ -167,6 +175,7 @@ def periodic_motion(
         },
         attrs={
             "period": period,
+            "gear_ratio": drive.gearbox.ratio,
             "residual": float(r["residual"][0]),
             "drift": float(r["drift"][0]),
             "multipliers_real": multipliers.real.tolist(),
@@ -187,9 +196,9 @@ def is_stable(multipliers: np.ndarray) -> bool:
 
 
 def periodic_motions(
-    drive: Drive,
-    command: CommandSignal | float = 0.0,
-    load_torque: TorqueSignal | float = 0.0,
+    drive: Drive | Scenario,
+    command: CommandSignal | float | None = None,
+    load_torque: TorqueSignal | float | None = None,
     *,
     starts: Iterable[Initial],
     multiples: Iterable[int] = (1,),
@@ -206,7 +215,7 @@ def periodic_motions(
                 motion = periodic_motion(drive, command, load_torque, multiple=multiple, start=start)
             except RuntimeError:
                 continue
-            if not any(_same(drive, motion, other) for other in found):
+            if not any(_same(drive_of(drive), motion, other) for other in found):
                 found.append(motion)
     return found
 

@@ -147,6 +147,10 @@ class Signal(Part, Generic[V]):
             knots.append((time, mean + sum(value for value, _ in here), sum(slope for _, slope in here)))
         return knots
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # The classes of the parts are generic, and as such have no name by which they could be pickled.
+        return type(self).model_validate, (self.model_dump(exclude_unset=True),)
+
     def core(self) -> _core.Signal:
         """The solver's signal; made once for equal signals."""
         return _core_signal(self)

@@ -14,7 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from .errors import InputError
 from .quantities import Part
-from .scenario import Scenario, load
+from .scenario import Scenario, find_scenario, load
 from .study_expressions import Expression, read_expression
 from .study_units import in_si, unit_of_key
 from .toml_files import read_toml
@@ -323,7 +323,7 @@ def load_study(path: str | Path) -> Study:
     changes = data.pop("set", {})
     if not isinstance(changes, dict):
         raise InputError(f'{path}: key set: must be a table, such as set = {{ "load.inertia" = 2 }}')
-    scenario = load(path.parent / base, changes)
+    scenario = load(find_scenario(base, path.parent), changes)
     try:
         return Study(scenario=scenario, **data)
     except ValidationError as error:

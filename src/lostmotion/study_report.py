@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from .errors import InputError
 from .pages import save_figure, table_csv, write_text
-from .plots import STYLES  # with them come the settings of all figures
+from .plots import STYLES, Picture, in_our_looks
 from .study_engine import study_of
 from .study_file import Study
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    from matplotlib.figure import Figure
 
 INK, ACCENT = STYLES["2-DOF-NL"]["color"], STYLES["2-DOF-L"]["color"]
 
@@ -103,9 +103,10 @@ def best_runs(table: pa.Table, name: str, count: int = 10, *, largest: bool = Fa
 def _grid(count: int, width: float = 3.3, height: float = 2.6) -> tuple[Figure, int, int]:
     columns = min(3, count)
     rows = -(-count // columns)
-    return Figure(figsize=(max(4.5, width * columns), height * rows)), rows, columns
+    return Picture(figsize=(max(4.5, width * columns), height * rows)), rows, columns
 
 
+@in_our_looks
 def distributions(table: pa.Table, study: Study) -> Figure:
     """A histogram of each kept value, with its 5, 50 and 95 %."""
     figure, rows, columns = _grid(len(study.keep))
@@ -120,6 +121,7 @@ def distributions(table: pa.Table, study: Study) -> Figure:
     return figure
 
 
+@in_our_looks
 def bars(values: dict[str, dict[str, Any]], label: str) -> Figure:
     """Horizontal bars by parameter for each kept value, the longest on top (tornado); pairs as two bars."""
     figure, rows, columns = _grid(len(values), 3.8, 0.7 + 0.35 * max(len(v) for v in values.values()) + 0.9)
@@ -141,11 +143,12 @@ def bars(values: dict[str, dict[str, Any]], label: str) -> Figure:
     return figure
 
 
+@in_our_looks
 def scatter(table: pa.Table, study: Study, most: int = 6) -> Figure:
     """Kept values over parameters, at most six of each and 5000 points."""
     keep, vary = list(study.keep)[:most], [v.title for v in study.vary][:most]
     some = table.take(np.linspace(0, table.num_rows - 1, min(table.num_rows, 5000)).astype(int))
-    figure = Figure(figsize=(max(4.5, 2.6 * len(vary)), 2.3 * len(keep)))
+    figure = Picture(figsize=(max(4.5, 2.6 * len(vary)), 2.3 * len(keep)))
     for r, name in enumerate(keep):
         for c, parameter in enumerate(vary):
             axes = figure.add_subplot(len(keep), len(vary), r * len(vary) + c + 1)
