@@ -482,7 +482,7 @@ def test_command_line(tmp_path: Path):
     assert "schaeffler-rt1-h-14-100" not in listed.output
     shown = run(app, ["catalogue", "nord-sk1si50-60"])
     assert "static efficiency" in shown.output
-    assert "A run also needs: inertia, stiffness." in shown.output
+    assert "Not complete: a simulation also needs inertia, stiffness." in shown.output
     template = tmp_path / "own.toml"
     assert run(app, ["catalogue", "new", "-o", str(template)]).exit_code == 0
     out = tmp_path / "sheet"

@@ -36,8 +36,10 @@ ROOMS = [
     {"shooting"},
     {"harmonic_response"},
     {"paper"},
+    {"panels"},
     {"plots"},
     {"pages"},
+    {"sheet_rows", "grids"},
     {"rig_sheet"},
     {"study_units", "study_expressions"},
     {"study_file"},
@@ -149,5 +151,5 @@ def test_examples_run(path: Path, tmp_path: Path) -> None:
 
 def test_help_names_every_command() -> None:
     done = subprocess.run([sys.executable, "-m", "lostmotion", "--help"], capture_output=True, text=True, check=True)
-    for command in ("reproduce", "run", "response", "rig", "catalogue", "drive", "study", "schema"):
+    for command in ("reproduce", "run", "response", "rig", "catalogue", "scenarios", "drive", "study", "schema"):
         assert f"  {command} " in done.stdout

@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .terminal import fail, progress, workers, writing
+from .terminal import busy, fail, progress, try_directory, try_file, workers, writing
+
+PICTURES = (".png", ".svg", ".pdf")
 
 app = typer.Typer(
     name="lostmotion",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly.",
@@ -25,11 +28,11 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point: known errors end in one line and exit code 1, Ctrl-C in 130."""
-    from .errors import InputError
+    from .errors import InputError, MissingLibraryError
 
     try:
         app()
-    except InputError as error:
+    except (InputError, MissingLibraryError) as error:
         fail(str(error))
     except KeyboardInterrupt:
         fail("interrupted; nothing was written", 130)
@@ -41,20 +44,82 @@ def main() -> None:
         fail(" ".join(str(error).split()))
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(version("lostmotion"))
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly."""
+
+
+# --- what several commands share ---
+
+
+def _files(incomplete: str) -> Iterator[str]:
+    """Names of files and directories, for the completion of the shell."""
+    for path in sorted(Path().glob(f"{incomplete}*")):
+        yield f"{path}/" if path.is_dir() else str(path)
+
+
+def complete_scenario(incomplete: str) -> list[str]:
+    """Shipped scenarios and files."""
+    from importlib.resources import files
+
+    names = sorted(f.name.removesuffix(".toml") for f in (files("lostmotion") / "scenarios").iterdir())
+    return [*(n for n in names if n.startswith(incomplete)), *_files(incomplete)]
+
+
+def complete_gearbox(incomplete: str) -> list[str]:
+    """Gearboxes of the catalogue and files."""
+    from .data_sheet import GearboxSheet
+    from .records import catalogue as records
+
+    names = [r.name for r in records() if isinstance(r, GearboxSheet)]
+    return [*(n for n in names if n.startswith(incomplete)), *_files(incomplete)]
+
+
+SourceArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="Scenario file (.toml), name of a shipped scenario, or saved result (.nc, .csv, .parquet), which is run again.",
+        autocompletion=complete_scenario,
+    ),
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help='Change a value, e.g. --set command.amplitude=0.1 or "load.inertia=1 kg*m^2".',
+    ),
+]
+
+
 @app.command()
 def reproduce(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
         "out"
     ),
 ) -> None:
-    """Reproduce the paper: figures, data and a report.
+    """Reproduce the paper "Simplified dynamic model of the transmission": figures, data and a report.
 
-    Writes PNG, SVG and CSV for each of the figures 5 and 9 to 18, the constants as constants.csv, and report.html, which needs nothing beside it.
+    Writes PNG, SVG and CSV for each of the figures 5 and 9 to 18, the constants as constants.csv, and report.html, a single
+    self-contained page.
     """
-    if output.exists() and not output.is_dir():
-        from .errors import InputError
+    from .errors import need
 
-        raise InputError(f"{output}: is a file; -o names a directory")
+    try_directory(output)
+    need("jinja2", "The report", "report")
     from .reproduce import WORK
     from .reproduce import reproduce as work
 
@@ -65,15 +130,8 @@ def reproduce(
 
 @app.command()
 def run(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="Scenario file.")],
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help='Change a value, e.g. --set command.amplitude=0.1 or "load.inertia=1 kg*m^2".',
-        ),
-    ] = None,
+    scenario: SourceArgument,
+    overrides: Overrides = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE", help="Result file: .nc, .csv or .parquet.")
     ] = None,
@@ -90,32 +148,36 @@ def run(
 
     \b
     lostmotion run drive.toml
-    lostmotion run drive.toml --set command.amplitude=0.1 -o result.nc --plot result.png
-    lostmotion run drive.toml --explain 0.25
+    lostmotion run paper-2dof-nl-small --plot small.png
+    lostmotion run drive.toml --set command.amplitude=0.1 -o result.csv --plot result.png
+    lostmotion run result.csv --explain 0.25
     """
     from .errors import InputError
     from .results import check_output, save, write_whole
-    from .scenario import load
+    from .sources import load
 
     if output is not None:
-        check_output(output)
-    if plot is not None and plot.suffix not in (".png", ".svg", ".pdf"):
-        raise InputError(
-            f"{plot}: the ending {plot.suffix or '(none)'} is not known; it must be one of .png, .svg, .pdf"
-        )
+        try_file(check_output(output))
+    if plot is not None:
+        if plot.suffix not in PICTURES:
+            raise InputError(
+                f"{plot}: the ending {plot.suffix or '(none)'} is not known; it must be one of {', '.join(PICTURES)}"
+            )
+        try_file(plot)
     loaded = load(scenario, overrides or ())
     if explain is not None and not 0.0 <= explain <= loaded.simulation.duration:
         raise InputError(
             f"--explain {explain}: must lie between 0 and simulation.duration, {loaded.simulation.duration} s"
         )
-    from .run import simulate
+    from .run import run as work
 
     if solver not in ("exact", "dormand-prince"):
         raise InputError(f"--solver {solver}: must be exact or dormand-prince")
     if not tolerance > 0.0:
         raise InputError(f"--tolerance {tolerance}: must be greater than 0")
     try:
-        result = simulate(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
+        with busy("Simulating"):
+            result = work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
     except RuntimeError as error:
         raise InputError(f"{scenario}: {error}") from None
     from .run_sheet import summary
@@ -126,19 +188,20 @@ def run(
 
         print(explain_instant(loaded, explain))
     if output is not None:
-        save(result, output)
+        with busy("Writing"):
+            save(result.dataset(), output)
         print(f"Result written to {output}")
     if plot is not None:
-        from .plots import overview
+        with busy("Drawing"):
+            from .plots import overview
 
-        figure = overview(result)
-        write_whole(plot, figure.savefig)
+            write_whole(plot, overview(result.dataset()).savefig)
         print(f"Figure written to {plot}")
 
 
 @app.command()
 def response(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="Scenario file; only its drive counts.")],
+    scenario: SourceArgument,
     amplitudes: Annotated[
         str, typer.Option("--amplitudes", help="0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many).")
     ] = "0.02..1:6",
@@ -149,28 +212,27 @@ def response(
         float | None, typer.Option("--refine", metavar="DB", help="Add frequencies where a curve bends by more.")
     ] = None,
     compare: Annotated[
-        list[Path] | None,
-        typer.Option("--compare", metavar="OTHER.toml", help="Overlay the drive of another scenario."),
+        list[str] | None,
+        typer.Option("--compare", metavar="OTHER", help="Overlay the drive of another scenario."),
     ] = None,
-    overrides: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in `run`.")
-    ] = None,
+    overrides: Overrides = None,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
         "response"
     ),
 ) -> None:
-    """Frequency response over amplitude: each point from a motion that truly repeats, on all cores.
+    """Frequency response over amplitude: each point from a periodic motion, on all cores.
 
-    Writes Bode figures (bode.png, .svg, .csv), maps of gain, phase, efficiency and distortion over amplitude and
-    frequency (maps.png, .svg), and all numbers (response.csv, response.nc, characteristics.csv).
+    Of the scenario the drive and the constant parts of command and load torque are taken. Writes Bode figures (bode.png, .svg, .csv), maps of gain, phase, efficiency and distortion over amplitude and
+    frequency (maps.png, .svg), and all numbers (response.csv, characteristics.csv, and response.nc where NetCDF is
+    installed).
 
     \b
     lostmotion response drive.toml --amplitudes 0.025,1 --frequencies 0.1..100:60
     lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
     """
     from .errors import InputError
-    from .response_sheet import parse_grid
-    from .scenario import load
+    from .grids import parse_grid
+    from .sources import load
     from .variables import CHANNEL_NAMES
 
     wanted, grid = parse_grid(amplitudes, "amplitudes"), parse_grid(frequencies, "frequencies")
@@ -178,33 +240,23 @@ def response(
         raise InputError(f"--input {source}: must be command or load_torque")
     if variable not in CHANNEL_NAMES:
         raise InputError(f"--variable {variable}: must be one of {', '.join(CHANNEL_NAMES)}")
-    if output.exists() and not output.is_dir():
-        raise InputError(f"{output}: is a file; -o names a directory")
-    loaded = {scenario.stem: load(scenario, overrides or ())}
-    for path in compare or ():
-        loaded[path.stem] = load(path)
+    try_directory(output)
+    name = Path(scenario).stem
+    loaded = {name: load(scenario, overrides or ())} | {Path(other).stem: load(other) for other in compare or ()}
     from .harmonic_response import Source, frequency_response
-    from .response_sheet import write_response
 
     responses = {}
     with progress(len(loaded) * len(wanted) * len(grid), "Response") as step:
-        for name, s in loaded.items():
+        for title, s in loaded.items():
             kind: Source = "command" if source == "command" else "load_torque"
-            responses[name] = frequency_response(
-                s.drive(),
-                grid,
-                wanted,
-                source=kind,
-                mean_command=s.command.mean,
-                mean_load_torque=s.load.torque.mean,
-                refine=refine,
-                progress=step,
-            )
-    first = loaded[scenario.stem]
-    with writing(output):
+            responses[title] = frequency_response(s, grid, wanted, source=kind, refine=refine, progress=step)
+    first = loaded[name]
+    with writing(output), busy("Drawing"):
+        from .response_sheet import write_response
+
         figure, found = write_response(output, responses, first.drive(), variable)
-    result = responses[scenario.stem]
-    print(first.title or scenario.stem)
+    result = responses[name]
+    print(first.title or name)
     for a in found["amplitude"].values:
         band, cross = (float(found[k].sel(amplitude=a)) for k in ("bandwidth", "phase_crossover"))
         text = [f"-3 dB at {band:.4g} Hz" if math.isfinite(band) else "-3 dB outside the frequencies, or no motion"]
@@ -225,12 +277,19 @@ def response(
     if len(different) > 3:
         print(f"  {len(different) - 3} more reasons are in response.csv")
     print(f"Figures and tables are in {figure.parent}")
+    if not (output / "response.nc").exists():
+        print('response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"')
 
 
 @app.command()
 def rig(
     gearbox: Annotated[
-        str, typer.Argument(metavar="GEARBOX", help="Name in the catalogue, or a file with one record (.toml).")
+        str,
+        typer.Argument(
+            metavar="GEARBOX",
+            help="Name in the catalogue, or a file with one record (.toml).",
+            autocompletion=complete_gearbox,
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
         "rig"
@@ -249,17 +308,23 @@ def rig(
     lostmotion rig my-gearbox.toml -o sheet --set loss_factor=1.3
     """
     from .data_sheet import GearboxSheet
+    from .errors import need
     from .records import find
     from .scenario import gearbox_from_record
+
+    try_directory(output)
+    need("jinja2", "The page of the rig", "report")
 
     sheet = find(gearbox, "gearbox")
     assert isinstance(sheet, GearboxSheet)
     part, notes = gearbox_from_record(gearbox, overrides or ())
-    from .rig_sheet import summary_rows, write_sheet
-    from .test_rig import measure
+    from .test_rig import WORK, measure
 
-    report = measure(part, sheet, notes)
-    with writing(output):
+    with progress(WORK, "Measuring") as step:
+        report = measure(part, sheet, notes, step)
+    with writing(output), busy("Drawing"):
+        from .rig_sheet import summary_rows, write_sheet
+
         page = write_sheet(output, sheet.name, report, sheet, notes)
     print(sheet.title or sheet.name)
     for c in report.comparisons:
@@ -278,22 +343,29 @@ def catalogue(
     name: Annotated[
         str | None, typer.Argument(metavar="[NAME | new]", help="Show one record; `new`: a template for your own.")
     ] = None,
-    kind: Annotated[str | None, typer.Option("--kind", help="strain_wave, planetary, worm, motor, ...")] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option("--kind", help="gearbox, motor, or a kind of gearbox: strain_wave, planetary, worm, ..."),
+    ] = None,
     ratio: Annotated[str | None, typer.Option("--ratio", metavar="MIN..MAX", help="Gear ratio.")] = None,
     torque: Annotated[str | None, typer.Option("--torque", metavar="MIN..MAX", help="Rated torque [N·m].")] = None,
+    complete: Annotated[bool, typer.Option("--complete", help="Only records that can be simulated.")] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="With `new`: the file.")] = None,
 ) -> None:
     """List the components, show one with its sources and gaps, or start your own data sheet.
+
+    The list says of each record whether it is a gearbox or a motor, and what it lacks for a simulation.
 
     \b
     lostmotion catalogue --kind strain_wave --ratio 50..120 --torque 20..100
     lostmotion catalogue schaeffler-rt1-h-20-100
     lostmotion catalogue new -o my-gearbox.toml
+    lostmotion catalogue new --kind motor -o my-motor.toml
     """
     from .listing import list_records, record_text, template
 
     if name == "new":
-        text = template()
+        text = template(kind)
         if output is None:
             print(text, end="")
             return
@@ -307,7 +379,18 @@ def catalogue(
     elif name is not None:
         print(record_text(name))
     else:
-        print(list_records(kind, ratio, torque))
+        print(list_records(kind, ratio, torque, complete))
+
+
+@app.command()
+def scenarios() -> None:
+    """List the scenarios that come with the package; `run`, `response` and `drive check` take their names."""
+    from .scenario import load, shipped_scenarios
+
+    found = shipped_scenarios()
+    width = max(map(len, found))
+    for name in found:
+        print(f"{name:<{width}}  {load(name).title}")
 
 
 @app.command()
@@ -343,7 +426,9 @@ def study(
             raise InputError("study show: name the directory of a study, as in `lostmotion study show DIR`")
         from .study_report import best_runs, read_table, show
 
-        print("\n".join(show(shown)))
+        with busy("Drawing"):
+            lines = show(shown)
+        print("\n".join(lines))
         if best is not None:
             rows = best_runs(read_table(shown), best).to_pylist()
             print(f"Least {best}:")
@@ -359,6 +444,7 @@ def study(
 
     loaded = load_study(what)
     directory = output or Path(Path(what).stem)
+    try_directory(directory)
     with ExitStack() as stack:
         executor = stack.enter_context(workers(processes, scheduler)) if processes or scheduler else None
         report = stack.enter_context(progress(loaded.total, "Runs"))
@@ -376,18 +462,17 @@ app.add_typer(drive_app, name="drive")
 
 @drive_app.command()
 def check(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="Scenario file.")],
-    overrides: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in `run`.")
-    ] = None,
+    scenario: SourceArgument,
+    overrides: Overrides = None,
 ) -> None:
     """Torques, speeds, inertia ratio, resonance, dead zone, lost motion, holding and heat, in plain words."""
     from .drive_check import check_drive
-    from .scenario import load
+    from .sources import load
 
     loaded = load(scenario, overrides or ())
-    findings = check_drive(loaded)
-    print(loaded.title or str(scenario))
+    with busy("Checking"):
+        findings = check_drive(loaded)
+    print(loaded.title or scenario)
     for finding in findings:
         print(f"  {finding}")
     warnings = sum(f.verdict == "warning" for f in findings)
@@ -408,11 +493,3 @@ def schema() -> None:
     from .scenario import json_schema
 
     print(json.dumps(json_schema(), indent=2))
-
-
-@app.command()
-def version() -> None:
-    """Print the version."""
-    from importlib.metadata import version as installed
-
-    print(installed("lostmotion"))

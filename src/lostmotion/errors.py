@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
+from importlib.util import find_spec
 
 
 class InputError(ValueError):
@@ -14,13 +13,13 @@ class MissingLibraryError(ImportError):
     """A library that is not part of the plain installation. Its text is one line that says what to install."""
 
 
-def optional(module: str, purpose: str, extra: str) -> Any:
-    """A library that only some functions need.
+def need(module: str, purpose: str, extra: str) -> None:
+    """Check that a library is there which only some functions need.
 
     Parameters
     ----------
     module
-        What to import, such as ``"pyarrow"``.
+        What will be imported, such as ``"pyarrow"``.
     purpose
         What needs it, as the beginning of a sentence.
     extra
@@ -31,8 +30,5 @@ def optional(module: str, purpose: str, extra: str) -> Any:
     MissingLibraryError
         It is not installed.
     """
-    try:
-        return import_module(module)
-    except ModuleNotFoundError:
-        library = module.partition(".")[0]
-        raise MissingLibraryError(f'{purpose} needs {library}; install it: pip install "lostmotion[{extra}]"') from None
+    if find_spec(module) is None:
+        raise MissingLibraryError(f'{purpose} needs {module}; install it: pip install "lostmotion[{extra}]"')

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from .errors import need
 from .linear_analysis import _control
 from .parts import Drive
 from .scenario import Initial, Scenario, drive_of, mean_inputs
@@ -315,6 +316,7 @@ def bandwidth(
     RuntimeError
         A motion that repeats was not found, or the output does not move at the lowest frequency.
     """
+    need("scipy", "The bandwidth", "control")
     from scipy.optimize import brentq
 
     if not amplitude > 0.0:
@@ -348,7 +350,7 @@ def to_control(response: xarray.Dataset, amplitude: float, output: str = "load_s
 
     Raises
     ------
-    ImportError
+    MissingLibraryError
         python-control is not installed.
     KeyError
         The response has no such amplitude or output.

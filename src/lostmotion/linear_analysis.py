@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core
+from .errors import need
 from .parts import ConstantEfficiency, Drive
 from .run import start_state
 from .scenario import Initial, Scenario, drive_of
@@ -65,6 +66,7 @@ class LinearModel:
 
     def antiresonances(self, output: str = "load_speed", source: str = "command") -> list[tuple[float, float]]:
         """(frequency [Hz], damping ratio [-]) of each pair of complex transmission zeros, rising."""
+        need("scipy", "Finding transmission zeros", "control")
         import scipy.linalg
 
         b, c, d = self._pair(output, source)
@@ -86,7 +88,7 @@ class LinearModel:
 
         Raises
         ------
-        ImportError
+        MissingLibraryError
             python-control is not installed.
         """
         return _control().ss(
@@ -100,17 +102,23 @@ class LinearModel:
         )
 
     def to_scipy(self) -> scipy.signal.StateSpace:
-        """The same for scipy.signal."""
+        """The same for scipy.signal.
+
+        Raises
+        ------
+        MissingLibraryError
+            scipy is not installed.
+        """
+        need("scipy", "This conversion", "control")
         import scipy.signal
 
         return scipy.signal.StateSpace(self.A, self.B, self.C, self.D)
 
 
 def _control() -> Any:
-    try:
-        import control
-    except ImportError:
-        raise ImportError("this needs python-control: pip install lostmotion[control]") from None
+    need("control", "This conversion", "control")
+    import control
+
     return control
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-    from .plots import Panel
+    from .panels import Panel
 
 
 def save_figure(figure: Figure, directory: Path, name: str) -> bytes:

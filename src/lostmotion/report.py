@@ -6,8 +6,8 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from .pages import embed, render_page
+from .panels import scientific
 from .paper import AMPLITUDES, Constant
-from .plots import scientific
 
 if TYPE_CHECKING:
     from .reproduce import FigureSpec

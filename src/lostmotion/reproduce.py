@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import plots
 from .harmonic_response import frequency_response
 from .linear_analysis import rigid_constants
 from .pages import panels_csv, save_figure, table_csv, write_text
+from .panels import COMMAND_STYLE, STYLES, Curve, Panel, scientific
 from .paper import AMPLITUDES, MODELS, Constant, constants, paper_scenario
 from .parts import LossMap
-from .plots import COMMAND_STYLE, STYLES, Curve, Panel
 from .results import energy_of
 from .run import simulate
 
@@ -272,7 +271,7 @@ def _response_specs(results: Results) -> Iterator[FigureSpec]:
     worst = float(results.response["residual"].max())
     periodic = (
         f"{len(FREQUENCIES)} frequencies; each first harmonic comes from a motion whose states repeat within "
-        f"{plots.scientific(worst)} of their magnitude from one period to the next."
+        f"{scientific(worst)} of their magnitude from one period to the next."
     )
     yield FigureSpec(
         "17",
@@ -319,6 +318,8 @@ def _stand_in_table() -> tuple[Any, Any, Any]:
 
 def draw(spec: FigureSpec) -> Figure:
     """The figure of a spec."""
+    from . import plots
+
     note = STAND_IN if spec.stand_in else ""
     if spec.number == "05":
         return plots.loss_map(*_stand_in_table(), note=note)

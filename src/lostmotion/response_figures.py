@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 
 from . import plots
-from .plots import Curve, Panel
+from .panels import LABELS, Curve, Panel
 
 if TYPE_CHECKING:
     import xarray
@@ -38,7 +38,7 @@ def bode(responses: Mapping[str, xarray.Dataset], output: str) -> list[Panel]:
             gain.append(Curve(label, f, np.abs(values), style, legend))
             phase.append(Curve(label, f, np.degrees(np.unwrap(np.angle(values))), style, legend))
     source = first.attrs["source"]
-    unit = plots.LABELS[output].unit.replace("*", "·")
+    unit = LABELS[output].unit.replace("*", "·")
     title = f"{output.replace('_', ' ')} / {source.replace('_', ' ')} by amplitude [{UNITS[source]}]"
     return [
         Panel(title, "frequency [Hz]", f"gain [{unit} / {UNITS[source]}]", tuple(gain), log_x=True, log_y=True),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import InputError
 from .harmonic_response import characteristics
 from .pages import panels_csv, save_figure, table_csv, write_text
 from .parts import Drive
@@ -17,29 +17,6 @@ from .results import write_bytes
 
 if TYPE_CHECKING:
     import xarray
-
-
-def parse_grid(text: str, option: str) -> list[float]:
-    """Values from ``0.1,1,10`` or, with equal ratios, ``0.1..100:60`` (first, last, how many).
-
-    Raises
-    ------
-    InputError
-        The text is neither, or not positive.
-    """
-    problem = f"--{option} {text}: must be numbers such as 0.1,1,10 or a range such as 0.1..100:60"
-    try:
-        if ".." not in text:
-            values = [float(x) for x in text.split(",")]
-        else:
-            bounds, _, count = text.partition(":")
-            low, high = (float(x) for x in bounds.split(".."))
-            values = np.geomspace(low, high, int(count)).tolist() if int(count) > 1 else [low]
-    except ValueError:
-        raise InputError(problem) from None
-    if not all(np.isfinite(values)) or min(values) <= 0.0:
-        raise InputError(f"{problem}, all of them above 0")
-    return values
 
 
 def for_file(response: xarray.Dataset) -> xarray.Dataset:
@@ -85,7 +62,8 @@ def write_response(
     if response.sizes["amplitude"] > 1 and response.sizes["frequency"] > 1:
         save_figure(maps_figure(response, output), directory, "maps")
     write_text(directory / "response.csv", points_csv(response, output))
-    write_bytes(directory / "response.nc", bytes(for_file(response).to_netcdf(engine="h5netcdf")))
+    if find_spec("h5netcdf") is not None:
+        write_bytes(directory / "response.nc", bytes(for_file(response).to_netcdf(engine="h5netcdf")))
     found = characteristics(response, drive, output)
     rows = zip(
         found["amplitude"].values.tolist(),

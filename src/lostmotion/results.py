@@ -6,6 +6,7 @@ import json
 import os
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import InputError
+from .errors import InputError, need
 from .scenario import Scenario
 from .variables import CHANNEL_NAMES, CONTACTS, STATES, VARIABLES
 
@@ -48,8 +49,27 @@ def installed_version() -> str:
     return version("lostmotion")
 
 
-def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) -> xarray.Dataset:
-    """Label what the solver returned."""
+@dataclass(frozen=True)
+class RawResult:
+    """A result as plain arrays. A dataset is made only where one is wanted: importing its library takes half a second."""
+
+    time: np.ndarray
+    values: dict[str, np.ndarray]
+    """of the result variables"""
+    switchings: np.ndarray
+    """one row each, as the solver returned them"""
+    attrs: dict[str, Any]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.time if name == "time" else self.values[name]
+
+    def dataset(self) -> xarray.Dataset:
+        """The labelled dataset."""
+        return _dataset(self.time, self.values, _switching_variables(self.switchings), self.attrs)
+
+
+def raw_result(scenario: Scenario, result: Any, solver: str, *, ledger: bool) -> RawResult:
+    """What the solver returned, with all that belongs to it."""
     table, switchings, count, energy, state, capacity, left_data_at, steps = result
     data = dict(zip(CHANNEL_NAMES, table, strict=True))
     add_derived(data, scenario.gearbox.ratio)
@@ -72,7 +92,7 @@ def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) 
         )
     if scenario.gearbox.note:
         attributes["note"] = scenario.gearbox.note
-    return _dataset(time, data, _switching_variables(switchings), attributes)
+    return RawResult(time, data, switchings, attributes)
 
 
 def _dataset(time: Any, data: dict[str, Any], switchings: dict[str, Any], attributes: dict[str, Any]) -> xarray.Dataset:
@@ -153,7 +173,7 @@ def scenario_of(dataset: xarray.Dataset) -> Scenario:
     return Scenario.from_json(dataset.attrs["scenario"])
 
 
-def energy_of(dataset: xarray.Dataset) -> dict[str, float]:
+def energy_of(dataset: xarray.Dataset | RawResult) -> dict[str, float]:
     """Energy ledger of a run [J].
 
     `source` is what the motor gave to the shaft; `input_damper`, `motor_friction`, `gear_losses`, `hysteresis`,
@@ -231,7 +251,15 @@ def check_output(path: str | Path) -> Path:
         raise InputError(f"{path}: is a directory; name a file")
     if not path.parent.is_dir():
         raise InputError(f"{path}: its directory does not exist; make it first")
+    _need_library(path)
     return path
+
+
+def _need_library(path: Path) -> None:
+    if path.suffix == ".nc":
+        need("h5netcdf", f"{path}: a NetCDF file", "netcdf")
+    elif path.suffix == ".parquet":
+        need("pyarrow", f"{path}: a Parquet file", "study")
 
 
 def save(dataset: xarray.Dataset, path: str | Path) -> None:
@@ -263,6 +291,7 @@ def open_result(path: str | Path) -> xarray.Dataset:
         )
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; check the name")
+    _need_library(path)
     try:
         return readers[path.suffix](path)
     except InputError:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
 from .parts import Drive
-from .results import make_dataset
+from .results import RawResult, raw_result
 from .scenario import Initial, LoadTable, Scenario, SimulationTable
 from .signals import CommandSignal, TorqueSignal
 
@@ -74,6 +74,13 @@ def simulate(
         sample_interval=sample_interval,
         initial=initial,
     )
+    return run(scenario, solver=solver, relative_tolerance=relative_tolerance, energy=energy).dataset()
+
+
+def run(
+    scenario: Scenario, *, solver: SolverName = "exact", relative_tolerance: float = 1e-8, energy: bool = True
+) -> RawResult:
+    """As `simulate`, of a scenario, with the result as plain arrays."""
     if solver not in ("exact", "dormand-prince"):
         raise ValueError(f'solver {solver!r} is not known; it must be "exact" or "dormand-prince"')
     if relative_tolerance <= 0.0:
@@ -90,7 +97,7 @@ def simulate(
         MAX_SWITCHINGS,
     )
     how = "exact" if exact else f"dormand-prince, relative tolerance {relative_tolerance:g}"
-    return make_dataset(scenario, result, how, ledger=energy and exact)
+    return raw_result(scenario, result, how, ledger=energy and exact)
 
 
 def as_scenario(

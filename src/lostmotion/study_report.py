@@ -9,7 +9,8 @@ import numpy as np
 
 from .errors import InputError
 from .pages import save_figure, table_csv, write_text
-from .plots import STYLES, Picture, in_our_looks
+from .panels import STYLES
+from .plots import Picture, in_our_looks
 from .study_engine import study_of
 from .study_file import Study
 

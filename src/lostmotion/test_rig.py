@@ -7,9 +7,9 @@ figures 6 to 8 of the paper.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from .signals import CommandSignal, Samples, TorqueSignal
 
 if TYPE_CHECKING:
     import xarray
+
+T = TypeVar("T")
 
 FLYWHEEL = 1e9  # [kg m2] on the input: keeps its speed, or stands still, whatever the gearbox does
 RIG_FREQUENCY = 20.0  # [Hz] of the load on the stiffest piece of the curve, damped critically
@@ -136,13 +138,19 @@ class TestRig:
         driving = T_2 / (self.gearbox.ratio * T_1)
         return driving if load > 0.0 else max(0.0, 1.0 / driving)
 
-    def efficiency_map(self, speeds: Iterable[float], loads: Iterable[float]) -> xarray.Dataset:
-        """Efficiency and loss torque over input speed [rad/s] and relative load."""
-        import xarray as xr
-
+    def efficiency_map(
+        self, speeds: Iterable[float], loads: Iterable[float], progress: Callable[[], None] = lambda: None
+    ) -> xarray.Dataset:
+        """Efficiency and loss torque over input speed [rad/s] and relative load; `progress` is called for each load."""
         g = self.gearbox
         speeds, loads = list(speeds), list(loads)
-        pairs = np.array([[self.steady(n, mu) for n in speeds] for mu in loads])
+        rows = []
+        for mu in loads:
+            rows.append([self.steady(n, mu) for n in speeds])
+            progress()
+        import xarray as xr
+
+        pairs = np.array(rows)
         T_1, T_2 = pairs[..., 0], pairs[..., 1]
         return xr.Dataset(
             {
@@ -282,7 +290,19 @@ class RigReport:
     comparisons: tuple[Comparison, ...] = field(default=())
 
 
-def measure(gearbox: Gearbox, sheet: GearboxSheet | None = None, notes: Iterable[str] = ()) -> RigReport:
+# What the rig measures beside its comparisons: parts of rated speed, and relative loads.
+SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
+LOADS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5)
+LOOPS = (1.0, 0.6, 0.3)
+WORK = len(LOADS) + len(LOOPS) + 6  # how often `measure` reports progress
+
+
+def measure(
+    gearbox: Gearbox,
+    sheet: GearboxSheet | None = None,
+    notes: Iterable[str] = (),
+    progress: Callable[[], None] = lambda: None,
+) -> RigReport:
     """Puts a gearbox through all measurements.
 
     Parameters
@@ -291,21 +311,27 @@ def measure(gearbox: Gearbox, sheet: GearboxSheet | None = None, notes: Iterable
         Figures to compare with.
     notes
         Of the loss map's making; a contradiction among the figures is pointed out beside them.
+    progress
+        Called `WORK` times.
     """
     rig = TestRig(gearbox)
     T_2R, n_1R = gearbox.rated_output_torque, gearbox.rated_input_speed
-    speeds = n_1R * np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0])
-    loads = [0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5]
+    speeds = n_1R * np.array(SPEEDS)
+
+    def done(measured: T) -> T:
+        progress()
+        return measured
+
     return RigReport(
         gearbox=gearbox,
-        map=rig.efficiency_map(speeds, loads),
-        no_load=(speeds, np.array([rig.no_load_torque(n) for n in speeds])),
-        virgin=rig.virgin_curve(1.2 * T_2R),
-        loops=tuple(rig.loop(share * T_2R) for share in (1.0, 0.6, 0.3)),
-        starting_torque=rig.starting_torque(),
-        backdriving_torque=rig.backdriving_torque(),
-        lost_motion=rig.lost_motion(),
-        comparisons=() if sheet is None else tuple(_compare(rig, sheet, tuple(notes))),
+        map=rig.efficiency_map(speeds, LOADS, progress),
+        no_load=(speeds, done(np.array([rig.no_load_torque(n) for n in speeds]))),
+        virgin=done(rig.virgin_curve(1.2 * T_2R)),
+        loops=tuple(done(rig.loop(share * T_2R)) for share in LOOPS),
+        starting_torque=done(rig.starting_torque()),
+        backdriving_torque=done(rig.backdriving_torque()),
+        lost_motion=done(rig.lost_motion()),
+        comparisons=done(() if sheet is None else tuple(_compare(rig, sheet, tuple(notes)))),
     )
 
 
