@@ -297,10 +297,8 @@ def started(study: Path, directory: Path, parts: int) -> subprocess.Popen:
     """A study in a process of its own, once it has written some parts."""
     command = [sys.executable, "-m", "lostmotion", "study", str(study), "-o", str(directory)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    limit = time.monotonic() + 60.0
-    while len(list(directory.glob("part-*.parquet"))) < parts:
+    while len(list(directory.glob("part-*.parquet"))) < parts:  # however long a busy machine takes
         assert process.poll() is None, process.stderr.read() if process.stderr else ""
-        assert time.monotonic() < limit
         time.sleep(0.01)
     return process
 
@@ -310,7 +308,7 @@ def test_killed_and_started_again_it_goes_on_where_it_was(long_study: Path, tmp_
     directory = tmp_path / "killed"
     process = started(long_study, directory, 2)
     os.kill(process.pid, how)
-    _, error = process.communicate(timeout=60)
+    _, error = process.communicate()
     if how == signal.SIGINT:
         assert process.returncode == 130
         assert "goes on with it" in error

@@ -10,6 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .errors import need
 from .results import write_bytes
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ def embed(png: bytes, title: str, caption: Markup | str, anchor: str) -> Markup:
 
 def render_page(template: str, **context: Any) -> str:
     """An HTML page from a template of the package; values are escaped, names that are missing raise."""
+    need("jinja2", "A page", "report")
     import jinja2
 
     def source(name: str) -> str:

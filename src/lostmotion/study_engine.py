@@ -8,7 +8,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExec
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError
+from .errors import InputError, need
 from .results import write_bytes
 from .study_chunk import as_parquet, compute_chunk, parsed, pieces, run_piece, tabulate
 from .study_file import CHUNK, Study, from_json, to_json
@@ -51,6 +51,8 @@ def study(
     InputError
         The directory holds another study, or cannot be written; what is there stays.
     """
+    need("pyarrow", "A study", "study")
+    need("scipy", "A study", "study")
     directory = Path(directory)
     text = to_json(what)
     _prepare(directory, text)

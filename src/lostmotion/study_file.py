@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
-from .errors import InputError
+from .errors import InputError, need
 from .quantities import Part
 from .scenario import Scenario, find_scenario, load
 from .study_expressions import Expression, read_expression
@@ -273,10 +273,8 @@ def _open(u: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=2)
 def _saltelli(p: int, base: int, seed: int) -> np.ndarray:
-    try:
-        from SALib.sample import sobol
-    except ImportError:
-        raise InputError("design saltelli needs SALib: pip install lostmotion[study]") from None
+    need("SALib", "The design saltelli", "study")
+    from SALib.sample import sobol
 
     problem = {"num_vars": p, "names": [str(k) for k in range(p)], "bounds": [[0.0, 1.0]] * p}
     return np.asarray(sobol.sample(problem, base, calc_second_order=True, seed=seed))

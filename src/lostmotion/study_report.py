@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import InputError
+from .errors import InputError, need
 from .pages import save_figure, table_csv, write_text
 from .panels import STYLES
 from .plots import Picture, in_our_looks
@@ -164,6 +164,8 @@ def scatter(table: pa.Table, study: Study, most: int = 6) -> Figure:
 
 def show(directory: Path) -> list[str]:
     """Writes figures and statistics.csv beside the data; returns what to print."""
+    need("pyarrow", "Showing a study", "study")
+    need("scipy", "Showing a study", "study")
     study, table = study_of(directory), read_table(directory)
     rows = statistics(table, study)
     header = ["", "mean", "deviation", "least", "5 %", "50 %", "95 %", "largest"]
