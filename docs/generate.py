@@ -1,11 +1,17 @@
-"""Writes the pages of the documentation that are made from the code: the scenario reference and the variables."""
+"""Writes the pages of the documentation that are made from the code: scenario reference, variables, commands, gallery."""
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from typer.main import get_command
+
+import lostmotion as lm
 from lostmotion import signals
+from lostmotion.cli import app
 from lostmotion.quantities import unit_in_schema
 from lostmotion.scenario import json_schema
 from lostmotion.variables import VARIABLES
@@ -108,7 +114,102 @@ def variables() -> str:
     return "\n".join(lines)
 
 
+def commands() -> str:
+    """The reference of the command line, from the commands themselves."""
+    lines = [
+        "# Command line",
+        "",
+        "Every command takes `-h` or `--help`. The exit code is 0 only if all went well; errors are one line on the standard error.",
+        "`lostmotion --install-completion` installs the completion of commands, options, scenarios and gearboxes for your shell.",
+        "",
+    ]
+    for name, command in _commands_of(get_command(app), "lostmotion"):
+        lines += _command_section(name, command)
+    return "\n".join(lines)
+
+
+def _commands_of(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from _commands_of(command, f"{prefix} {name}")
+        else:
+            yield f"{prefix} {name}", command
+
+
+def _command_section(name: str, command: Any) -> list[str]:
+    text, _, examples = inspect.cleandoc(command.help or "").partition("\b\n")
+    arguments = [p for p in command.params if p.param_type_name == "argument"]
+    options = [p for p in command.params if p.param_type_name == "option" and "--help" not in p.opts]
+    usage = " ".join([name, *["[OPTIONS]"] * bool(options), *(p.metavar for p in arguments)])
+    lines = [f"## `{name}`", "", text.strip(), "", "```text", usage, "```", ""]
+    if examples:
+        lines += ["For example:", "", "```sh", examples.strip(), "```", ""]
+    rows = [(f"`{p.metavar}`", "", p.help) for p in arguments]
+    for p in options:
+        value = f" {p.metavar}" if p.metavar else ""
+        default = "" if p.default in (None, False) else f"`{p.default}`"
+        rows.append((", ".join(f"`{o}{value}`" for o in p.opts), default, p.help))
+    if rows:
+        lines += ["| argument, option | default | meaning |", "|---|---|---|"]
+        lines += [f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in rows]
+    return [*lines, ""]
+
+
+def gallery(pictures: Path) -> str:
+    """A page with a figure of every shipped scenario; the figures go into the directory `pictures`."""
+    lines = [
+        "# Gallery of scenarios",
+        "",
+        "These scenarios come with the package. Each can be run by its name, changed with `--set`, and named as the `base` of",
+        "a file of your own. Those called paper-... are the runs of [the paper](../citing.md#the-paper).",
+        "",
+    ]
+    for name, path in lm.shipped_scenarios().items():
+        scenario = lm.load(name)
+        lm.simulate(scenario).lm.plot().savefig(pictures / f"{name}.png", dpi=80, metadata={"Software": None})
+        lines += [
+            f"## {name}",
+            "",
+            f"**{scenario.title}.** {introduction(path)}",
+            "",
+            f"![{scenario.title}]({name}.png)",
+            "",
+        ]
+        lines += ["```sh", f"lostmotion run {name} --plot {name}.png", "```", ""]
+        lines += [
+            "<details><summary>The file</summary>",
+            "",
+            "```toml",
+            path.read_text(encoding="utf-8").strip(),
+            "```",
+        ]
+        lines += ["", "</details>", ""]
+    return "\n".join(lines)
+
+
+def introduction(path: Path) -> str:
+    """The first comment of a scenario file."""
+    block: list[str] = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if line.startswith("#"):
+            block.append(line.lstrip("# "))
+        elif block:
+            break
+    return " ".join(block)
+
+
+def generate(out: Path = OUT) -> None:
+    """All pages into a directory, made if missing."""
+    out.mkdir(exist_ok=True)
+    pages = {
+        "scenario": scenario_reference(),
+        "variables": variables(),
+        "commands": commands(),
+        "gallery": gallery(out),
+    }
+    for name, text in pages.items():
+        (out / f"{name}.md").write_text(text, encoding="utf-8")
+
+
 if __name__ == "__main__":
-    OUT.mkdir(exist_ok=True)
-    (OUT / "scenario.md").write_text(scenario_reference(), encoding="utf-8")
-    (OUT / "variables.md").write_text(variables(), encoding="utf-8")
+    generate()

@@ -137,7 +137,7 @@ def test_a_result_knows_its_scenario_summary_and_energy() -> None:
     result = lm.simulate(SMALL)
     assert result.lm.scenario == SMALL
     assert result.lm.energy == lm.energy_of(result)
-    assert "switchings" in result.lm.summary()
+    assert " events, solver exact" in result.lm.summary()
 
 
 def test_long_curves_are_drawn_from_few_points_that_keep_every_peak() -> None:

@@ -141,8 +141,12 @@ def run(
     explain: Annotated[
         float | None, typer.Option("--explain", metavar="TIME", help="Say what each contact holds at this instant [s].")
     ] = None,
-    solver: Annotated[str, typer.Option("--solver", help="exact, or dormand-prince as a second opinion.")] = "exact",
-    tolerance: Annotated[float, typer.Option("--tolerance", help="Relative tolerance of dormand-prince.")] = 1e-8,
+    solver: Annotated[
+        str, typer.Option("--solver", metavar="NAME", help="exact, or dormand-prince as a second opinion.")
+    ] = "exact",
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", metavar="VALUE", help="Relative tolerance of dormand-prince.")
+    ] = 1e-8,
 ) -> None:
     """Run a scenario: print, save, draw, explain.
 
@@ -203,11 +207,20 @@ def run(
 def response(
     scenario: SourceArgument,
     amplitudes: Annotated[
-        str, typer.Option("--amplitudes", help="0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many).")
+        str,
+        typer.Option(
+            "--amplitudes", metavar="LIST", help="0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many)."
+        ),
     ] = "0.02..1:6",
-    frequencies: Annotated[str, typer.Option("--frequencies", help="[Hz], as the amplitudes.")] = "0.1..100:60",
-    source: Annotated[str, typer.Option("--input", help="command or load_torque: what is a sine.")] = "command",
-    variable: Annotated[str, typer.Option("--variable", help="Which variable's response to draw.")] = "load_speed",
+    frequencies: Annotated[
+        str, typer.Option("--frequencies", metavar="LIST", help="[Hz], as the amplitudes.")
+    ] = "0.1..100:60",
+    source: Annotated[
+        str, typer.Option("--input", metavar="NAME", help="command or load_torque: what is a sine.")
+    ] = "command",
+    variable: Annotated[
+        str, typer.Option("--variable", metavar="NAME", help="Which variable's response to draw.")
+    ] = "load_speed",
     refine: Annotated[
         float | None, typer.Option("--refine", metavar="DB", help="Add frequencies where a curve bends by more.")
     ] = None,
@@ -345,7 +358,9 @@ def catalogue(
     ] = None,
     kind: Annotated[
         str | None,
-        typer.Option("--kind", help="gearbox, motor, or a kind of gearbox: strain_wave, planetary, worm, ..."),
+        typer.Option(
+            "--kind", metavar="KIND", help="gearbox, motor, or a kind of gearbox: strain_wave, planetary, worm, ..."
+        ),
     ] = None,
     ratio: Annotated[str | None, typer.Option("--ratio", metavar="MIN..MAX", help="Gear ratio.")] = None,
     torque: Annotated[str | None, typer.Option("--torque", metavar="MIN..MAX", help="Rated torque [N·m].")] = None,
@@ -402,8 +417,12 @@ def study(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="Directory; by default the file's name.")
     ] = None,
-    threads: Annotated[int | None, typer.Option("--threads", help="In the core; all cores by default.")] = None,
-    processes: Annotated[int | None, typer.Option("--processes", help="Worker processes in place of threads.")] = None,
+    threads: Annotated[
+        int | None, typer.Option("--threads", metavar="N", help="In the core; all cores by default.")
+    ] = None,
+    processes: Annotated[
+        int | None, typer.Option("--processes", metavar="N", help="Worker processes in place of threads.")
+    ] = None,
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler of a cluster.")
     ] = None,

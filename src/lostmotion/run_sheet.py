@@ -24,7 +24,7 @@ def summary(result: xarray.Dataset | RawResult) -> str:
     stuck = float(np.mean(np.asarray(result["input_contact"]) == 0))
     lines = [
         result.attrs["title"] or "(no title)",
-        f"  {last('time'):g} s, {result.attrs['switching_count']} switchings, solver {result.attrs['solver']}",
+        f"  {last('time'):g} s, {result.attrs['switching_count']} events, solver {result.attrs['solver']}",
         f"  at the end: motor {last('motor_speed'):.6g} rad/s, load {last('load_speed'):.6g} rad/s "
         f"at {last('load_angle'):.6g} rad, twist {1e3 * last('twist'):.4g} mrad",
         f"  largest: motor torque {largest('motor_torque'):.4g} N·m, output torque "
