@@ -1,4 +1,4 @@
-"""Why is it stuck? What holds each contact, and what would free it."""
+"""Why a drive is stuck: what holds each contact, and what would free it."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class ContactState:
     """One dry contact at one instant. Torques [N·m] at the contact: input shaft at the input, the others at the output."""
 
     name: str
-    mode: int  # -1 slips backward, 0 stuck, +1 slips forward
+    mode: int  # -1 slips in reverse, 0 stuck, +1 slips forward
     speed: float  # [rad/s]
     torque: float  # held, or while slipping taken
     capacity_forward: float  # it holds torques up to this before it slips forward
-    capacity_backward: float  # and down to minus this before it slips backward
+    capacity_backward: float  # and down to minus this before it slips in reverse
 
     @property
     def to_free_forward(self) -> float:
@@ -33,7 +33,7 @@ class ContactState:
 
     @property
     def to_free_backward(self) -> float:
-        """Torque [N·m], backward, that is missing until it slips backward."""
+        """Torque [N·m], backward, that is missing until it slips in reverse."""
         return self.capacity_backward + self.torque
 
     def __str__(self) -> str:
@@ -45,7 +45,7 @@ class ContactState:
         return (
             f"{self.name}: stuck, holds {self.torque:.4g} N·m of +{self.capacity_forward:.4g} / "
             f"-{self.capacity_backward:.4g} N·m; {self.to_free_forward:.4g} N·m more frees it forward, "
-            f"{self.to_free_backward:.4g} N·m the other way backward"
+            f"{self.to_free_backward:.4g} N·m in reverse"
         )
 
 
@@ -76,7 +76,7 @@ class Explanation:
 
 
 def explain(what: Scenario | Simulation, time: float | None = None) -> Explanation:
-    """What the contacts of a drive do at one instant.
+    """The state of the contacts of a drive at one instant.
 
     Parameters
     ----------

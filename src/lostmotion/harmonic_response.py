@@ -1,4 +1,4 @@
-"""Frequency response from motions that repeat: harmonics, distortion, efficiency, stability, bandwidth."""
+"""Frequency response from periodic motions: harmonics, distortion, efficiency, stability, bandwidth."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def frequency_response(
 ) -> xarray.Dataset:
     """Response by harmonic linearisation (describing functions): harmonics of all outputs over one sinusoidal input.
 
-    Each point comes from a motion that repeats, found by shooting. Points do not know of each other; the result is the
-    same for any number of threads.
+    Each point is a periodic motion, found by shooting. Points are independent of each other; the result is the same
+    for any number of threads.
 
     Parameters
     ----------
@@ -295,8 +295,8 @@ def bandwidth(
 ) -> float:
     """Frequency [Hz] at which the gain from the command first falls 3 dB below that at the lowest frequency.
 
-    Gains come from motions that repeat, as in `frequency_response`; they are looked at half an octave apart, and the
-    fall is then located between two of them.
+    Gains come from periodic motions, as in `frequency_response`. They are computed half an octave apart, and the fall is
+    then located between two of them.
 
     Parameters
     ----------
@@ -314,7 +314,7 @@ def bandwidth(
     ValueError
         The amplitude is not positive.
     RuntimeError
-        A motion that repeats was not found, or the output does not move at the lowest frequency.
+        No periodic motion was found, or the output does not move at the lowest frequency.
     """
     need("scipy", "The bandwidth", "control")
     from scipy.optimize import brentq

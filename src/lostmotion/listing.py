@@ -1,4 +1,4 @@
-"""The catalogue as text: a list, one record with sources and gaps, a template for one's own."""
+"""The catalogue as text: a list, one record with sources and gaps, a template for your own."""
 
 from __future__ import annotations
 

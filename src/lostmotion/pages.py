@@ -1,4 +1,4 @@
-"""What commands leave behind: figures as PNG and SVG, their data as CSV, and HTML pages that need nothing beside them."""
+"""What commands write: figures as PNG and SVG, their data as CSV, and self-contained HTML pages."""
 
 from __future__ import annotations
 

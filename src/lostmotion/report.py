@@ -1,4 +1,4 @@
-"""The report of `lostmotion reproduce`: one HTML file that needs nothing beside it."""
+"""The report of `lostmotion reproduce`: one self-contained HTML file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The paper, complete: its figures 5 and 9 to 18, their data, its constants, and a report that tells the story."""
+"""The paper reproduced: its figures 5 and 9 to 18, their data, its constants, and a report."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def figure_specs(results: Results) -> list[FigureSpec]:
         FigureSpec(
             "12",
             "Load speed and output torque, detail",
-            "The reversal of figure 11 enlarged: the load coasts on within the soft zone while the motor stands.",
+            "The reversal of figure 11 enlarged: the load swings on within the zone of low stiffness while the motor stands still.",
             speed_and_load(x_range=(1.4, 1.7)),
         ),
         FigureSpec(
@@ -216,7 +216,7 @@ def figure_specs(results: Results) -> list[FigureSpec]:
         FigureSpec(
             "14",
             "Normalised hysteresis loop",
-            "Relative torque over twist / 3 mrad, the twist at about rated torque. The soft zone in the middle, the "
+            "Relative torque over twist / 3 mrad, the twist at about rated torque. The zone of low stiffness in the middle, the "
             "two branches apart by the hysteresis set at the last turning point.",
             tuple(
                 _pairs(

@@ -1,4 +1,4 @@
-"""What `lostmotion response` leaves behind: Bode figures, maps over amplitude and frequency, tables."""
+"""What `lostmotion response` writes: Bode figures, maps over amplitude and frequency, tables."""
 
 from __future__ import annotations
 

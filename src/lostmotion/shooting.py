@@ -56,7 +56,7 @@ def respond(
     threads: int | None,
     progress: Callable[[int], None] | None,
 ) -> dict[str, Any]:
-    """Motions that repeat, one for each (command, load torque, period [s], start): arrays of the core, a row a point."""
+    """Periodic motions, one for each (command, load torque, period [s], start): arrays of the core, a row a point."""
     core = [(c.core(), t.core(), period, start_state(s), s.hysteresis_capacity) for c, t, period, s in points]
     return _core.respond(
         drive.core(),
@@ -105,7 +105,7 @@ def periodic_motion(
     start: Initial | None = None,
     max_periods: int = MAX_PERIODS,
 ) -> xarray.Dataset:
-    """A motion that repeats with the inputs, by shooting.
+    """A periodic motion under periodic inputs, by shooting.
 
     Newton's method on the map over one period, with its exact Jacobian; it is entered after a few periods from `start`,
     and where it does not converge, the transient is followed further. The load angle is neutral: it may drift.

@@ -22,10 +22,10 @@ def study(
     executor: Executor | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Path:
-    """Run a study, or go on with it, into a directory of Parquet files.
+    """Run a study, or resume it, into a directory of Parquet files.
 
     Runs are computed and written in chunks; a chunk that is written is whole. Interrupted at any instant and called again, it
-    goes on with the chunks that are missing, so no run is lost and none is there twice. Rows depend on the study alone, not on
+    computes the chunks that are missing, so no run is lost and none is there twice. Rows depend on the study alone, not on
     threads, workers or interruptions.
 
     Parameters
