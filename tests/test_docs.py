@@ -154,3 +154,38 @@ def test_generated_pages_name_every_key_and_variable() -> None:
         assert f"| `{key}` |" in reference
     for variable in lm.VARIABLES:
         assert f"| `{variable.name}` |" in generate.variables()
+
+
+# Phrases of our own, and what is written in their place.
+PLAIN_WORDS = {
+    r"go(es)? on where": "resume",
+    r"hand-?over": "export",
+    r"what matters": "selected results",
+    r"rises? without end": "thermal runaway",
+    r"the other way backward": "in reverse",
+    r"truth value": "Boolean",
+    r"\ba look tests|between two looks": "each check covers",
+    r"\bsoft (mesh|zone)": "mesh compliance, low stiffness",
+    r"\bone's own": "your own",
+    r"nothing beside": "self-contained",
+    r"in plain words": "",
+    r"\b[Mm]akers?\b": "manufacturer",
+}
+
+
+@pytest.mark.parametrize("wrong", PLAIN_WORDS)
+def test_the_prose_uses_the_words_of_the_field(wrong: str) -> None:
+    package = ROOT / "src" / "lostmotion"
+    files = [
+        *ROOT.glob("*.md"),
+        *(ROOT / "docs").glob("*.md"),
+        *package.glob("*.py"),
+        *package.glob("*.jinja"),
+        *package.glob("*.toml"),
+    ]
+    key = r"""[`"]maker[`"]|\bmaker ?[=:]|\.maker\b|status: maker"""  # a key of data sheets, and a status of their sources
+    for path in files:
+        if path.name in ("theory.md", "verification.md"):
+            continue
+        for line in re.sub(key, "", path.read_text()).splitlines():
+            assert not re.search(wrong, line), f"{path.name}: {line.strip()} ({PLAIN_WORDS[wrong]})"

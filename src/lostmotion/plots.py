@@ -67,10 +67,11 @@ def thinned(x: Any, y: Any, most: int = MOST_POINTS) -> tuple[Any, Any]:
     whole = n // width * width
     firsts = np.arange(0, whole, width)
     kept: list[Any] = [firsts, np.arange(whole, n), [n - 1]]
-    for values in (x, y):
+    for values in (y,) if np.all(x[1:] >= x[:-1]) else (x, y):
         rows = values[:whole].reshape(-1, width)
+        gaps = bool(np.isnan(rows.min()))
         for extreme, fill in ((np.argmin, np.inf), (np.argmax, -np.inf)):
-            kept.append(firsts + extreme(np.where(np.isnan(rows), fill, rows), axis=1))
+            kept.append(firsts + extreme(np.where(np.isnan(rows), fill, rows) if gaps else rows, axis=1))
     index: Any = np.unique(np.concatenate(kept))
     return x[index], y[index]
 
