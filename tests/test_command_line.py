@@ -66,6 +66,37 @@ def test_an_unknown_name_is_told_with_the_nearest(tmp_path: Path) -> None:
         lm.load("xyz")
 
 
+def test_a_directory_does_not_hide_a_shipped_scenario_and_its_file_name_leads_to_it(
+    tmp_path: Path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path(SMALL).mkdir()
+    assert lm.load(SMALL) == lm.load(SCENARIOS[0].parent / f"{SMALL}.toml")
+    with pytest.raises(
+        lm.InputError, match=f"{SMALL}.toml: there is no such file; the shipped scenario is called {SMALL}"
+    ):
+        lm.load(f"{SMALL}.toml")
+    Path("folder").mkdir()
+    with pytest.raises(lm.InputError, match="folder: is a directory"):
+        lm.load("folder")
+
+
+def test_a_file_that_is_no_result_of_a_run_is_refused(tmp_path: Path) -> None:
+    response = lm.frequency_response(lm.load(SMALL), [1.0], 0.1)[["efficiency", "drift"]]
+    response.to_netcdf(tmp_path / "response.nc", engine="h5netcdf")
+    (tmp_path / "table.csv").write_text("a,b\n1,2\n")
+    for name, words in (
+        ("response.nc", "carries no scenario"),
+        ("table.csv", "no result"),
+        ("none.csv", "no such file"),
+    ):
+        done = lostmotion("run", name, cwd=tmp_path)
+        assert done.returncode == 1
+        assert done.stderr.startswith(f"lostmotion: {name}: ")
+        assert words in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+
+
 @pytest.mark.parametrize("ending", ["csv", "nc", "parquet"])
 def test_a_saved_result_is_run_again_as_it_was(tmp_path: Path, ending: str) -> None:
     first, second = tmp_path / f"first.{ending}", tmp_path / f"second.{ending}"
@@ -229,6 +260,7 @@ def test_short_help_version_and_completion() -> None:
         ("lostmotion run paper-2dof-nl-", ["paper-2dof-nl-large", "paper-2dof-nl-small"]),
         ("lostmotion rig schaeffler-rt1-h-2", ["schaeffler-rt1-h-20-100", "schaeffler-rt1-h-25-100"]),
         ("lostmotion run my", ["my-drive.toml"]),
+        ("lostmotion run /usr/li", ["/usr/lib/"]),
     ],
 )
 def test_the_shell_completes_scenarios_gearboxes_and_files(tmp_path: Path, typed: str, expected: list[str]) -> None:

@@ -92,6 +92,7 @@ def test_representations_are_short_and_name_the_drive() -> None:
     long = lm.CommandSignal(samples={"times": range(1000), "values": range(1000)})
     assert len(repr(long)) < 200
     assert "1000 entries" in repr(long)
+    assert "values=(6 x 7 numbers)" in repr(SMALL.gearbox.losses)
     simulation = lm.Simulation(SMALL)
     simulation.advance(0.25, 0.1)
     assert repr(simulation).endswith("at 0.25 s)")
@@ -122,6 +123,8 @@ def test_a_result_draws_the_figures_of_the_command_line() -> None:
     assert len(response.lm.plot_maps().axes) >= 4
     motion = lm.periodic_motion(SMALL)
     assert np.array_equal(motion.lm.plot().axes[0].lines[0].get_ydata(), motion["command"])
+    with pytest.raises(ValueError, match="lacks twist, which the figure of a run shows"):
+        result.drop_vars("twist").lm.plot()
     with pytest.raises(ValueError, match="no figure of it"):
         lm.TestRig(SMALL.gearbox).efficiency_map([100.0], [0.5]).lm.plot()
 
@@ -195,6 +198,7 @@ def test_several_variables_come_as_an_array_and_a_wrong_name_is_told() -> None:
     simulation.advance(0.3, 0.5)
     pair = simulation["load_speed", "efficiency"]
     assert pair.tolist() == [simulation["load_speed"], simulation["efficiency"]]
+    assert simulation[["load_speed", "efficiency"]].tolist() == pair.tolist()
     with pytest.raises(KeyError, match="'load_sped' is no variable; the variables are command, "):
         simulation["load_sped"]
 

@@ -44,9 +44,12 @@ class ResultAccessor:
 
         if "response" in self._dataset:
             return response_figures.bode_figure({"": self._dataset}, output)
-        if "time" in self._dataset.dims and "load_speed" in self._dataset:
-            return plots.overview(self._dataset)
-        raise ValueError("this dataset is neither a run nor a frequency response; there is no figure of it")
+        lacking = [name for name in plots.OVERVIEW if name not in self._dataset]
+        if len(lacking) == len(plots.OVERVIEW):
+            raise ValueError("this dataset is neither a run nor a frequency response; there is no figure of it")
+        if lacking:
+            raise ValueError(f"this dataset lacks {', '.join(lacking)}, which the figure of a run shows")
+        return plots.overview(self._dataset)
 
     def plot_maps(self, output: str = "load_speed") -> Figure:
         """Gain, phase, efficiency and distortion of a frequency response over amplitude and frequency.

@@ -66,8 +66,10 @@ def common(
 
 def _files(incomplete: str) -> Iterator[str]:
     """Names of files and directories, for the completion of the shell."""
-    for path in sorted(Path().glob(f"{incomplete}*")):
-        yield f"{path}/" if path.is_dir() else str(path)
+    from glob import escape, glob
+
+    for name in sorted(glob(f"{escape(incomplete)}*")):
+        yield f"{name}/" if Path(name).is_dir() else name
 
 
 def complete_scenario(incomplete: str) -> list[str]:

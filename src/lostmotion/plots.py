@@ -118,6 +118,21 @@ def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tupl
     return low - margin, high + margin
 
 
+# The result variables that the overview shows.
+OVERVIEW = (
+    "command",
+    "motor_torque",
+    "motor_speed",
+    "load_speed",
+    "input_torque",
+    "output_torque",
+    "load_torque",
+    "twist",
+    "input_contact",
+    "twist_contact",
+)
+
+
 def overview(result: xarray.Dataset) -> Figure:
     """A run at a glance: command and motor, speeds, torques, twist and contacts."""
     t = result["time"].values

@@ -153,11 +153,17 @@ def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
         It is neither; the message names what is near.
     """
     path = directory / name
-    if path.suffix or len(Path(name).parts) != 1 or path.exists():
+    shipped = shipped_scenarios() if len(Path(name).parts) == 1 else {}
+    if path.is_file() or not shipped:
         return path
-    shipped = shipped_scenarios()
     if str(name) in shipped:
         return shipped[str(name)]
+    if Path(name).stem in shipped and not path.exists():
+        raise InputError(
+            f"{path}: there is no such file; the shipped scenario is called {Path(name).stem}, without ending"
+        )
+    if path.suffix or path.exists():
+        return path
     near = difflib.get_close_matches(str(name), shipped, n=1)
     hint = f"did you mean {near[0]}?" if near else f"the scenarios that come with the package are {', '.join(shipped)}"
     raise InputError(f"{name}: there is no such file (.toml) and no such scenario; {hint}")

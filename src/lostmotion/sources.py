@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from . import scenario
-from .results import FORMATS, open_result, scenario_of
+from .errors import InputError
+from .results import FORMATS, open_result
 from .scenario import Scenario, changed
 
 
@@ -31,4 +33,7 @@ def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) 
     path = Path(source)
     if path.suffix not in FORMATS:
         return scenario.load(source, overrides)
-    return changed(scenario_of(open_result(path)).model_dump(exclude_none=True), overrides, path)
+    result = open_result(path)
+    if "scenario" not in result.attrs:
+        raise InputError(f"{path}: is no result of a run; it carries no scenario that could be run again")
+    return changed(json.loads(result.attrs["scenario"]), overrides, path)

@@ -118,8 +118,8 @@ class Simulation:
     @overload
     def __getitem__(self, name: str) -> float: ...
     @overload
-    def __getitem__(self, name: tuple[str, ...]) -> np.ndarray: ...
-    def __getitem__(self, name: str | tuple[str, ...]) -> float | np.ndarray:
+    def __getitem__(self, name: tuple[str, ...] | list[str]) -> np.ndarray: ...
+    def __getitem__(self, name: str | tuple[str, ...] | list[str]) -> float | np.ndarray:
         """Value of a result variable now (SI), with the inputs at their last values; of several, as an array.
 
         Raises
@@ -128,7 +128,7 @@ class Simulation:
             There is no such variable.
         """
         values = self._core.read()
-        if isinstance(name, tuple):
+        if isinstance(name, tuple | list):
             return np.array([self._value(one, values) for one in name])
         channel = _CHANNEL.get(name)
         return values[channel] if channel is not None else self._value(name, values)
