@@ -80,7 +80,7 @@ BROKEN = [
     ("time where an angle belongs", '"0.6 mrad"', '"0.6 ms"', ["gearbox.stiffness.breaks[0]", "rad"]),
     ("unit on a pure number", "armature_voltage_constant = 3.1169", 'armature_voltage_constant = "3 V"', ["armature_voltage_constant"]),
     ("unit on the command", "amplitude = 1.0", 'amplitude = "1 V"', ["command.amplitude"]),
-    ("truth value", "ratio = 90", "ratio = true", ["gearbox.ratio", "truth value"]),
+    ("Boolean", "ratio = 90", "ratio = true", ["gearbox.ratio", "Boolean"]),
     ("list for a number", "ratio = 90", "ratio = [90]", ["gearbox.ratio"]),
     ("table for a number", "ratio = 90", "ratio = { value = 90 }", ["gearbox.ratio"]),
     ("key in the table of another", "[gearbox.hysteresis]\nefficiency", "hysteresis", ["gearbox.stiffness.hysteresis"]),

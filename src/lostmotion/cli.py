@@ -432,7 +432,7 @@ def study(
         str | None, typer.Option("--best", metavar="COLUMN", help="With `show`: the ten least of it.")
     ] = None,
 ) -> None:
-    """Many runs: vary parameters, keep what matters, go on where an interruption left off.
+    """Many runs: vary parameters, store selected results, resume after an interruption.
 
     Writes a directory of Parquet files, one row a run, that pandas, DuckDB and polars open directly.
 
@@ -473,8 +473,8 @@ def study(
             with writing(directory, "; what is written stays"):
                 work(loaded, directory, threads=threads, executor=executor, progress=report)
         except KeyboardInterrupt:
-            fail(f"interrupted; what is in {directory} stays, and the same command goes on with it", 130)
-    print(f"{loaded.total} runs are in {directory}; `lostmotion study show {directory}` looks at them")
+            fail(f"interrupted; what is in {directory} stays, and the same command resumes it", 130)
+    print(f"{loaded.total} runs are in {directory}; `lostmotion study show {directory}` shows them")
 
 
 drive_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Check a drive against its task.")
@@ -486,7 +486,7 @@ def check(
     scenario: SourceArgument,
     overrides: Overrides = None,
 ) -> None:
-    """Torques, speeds, inertia ratio, resonance, dead zone, lost motion, holding and heat, in plain words."""
+    """Torques, speeds, inertia ratio, resonance, dead zone, lost motion, holding and heat."""
     from .drive_check import check_drive
     from .sources import load
 

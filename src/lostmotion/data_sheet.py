@@ -1,4 +1,4 @@
-"""Data sheets: what makers print of gearboxes and motors, with units, sources and gaps."""
+"""Data sheets: what manufacturers print of gearboxes and motors, with units, sources and gaps."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Source(Part):
     figures: tuple[str, ...]
     """keys of the record that it covers"""
     status: Literal["maker", "transcription", "inferred"]
-    """read in the maker's own text, in somebody's transcription of it, or concluded from other figures"""
+    """read in the manufacturer's own text, in somebody's transcription of it, or concluded from other figures"""
     text: str
 
 
@@ -105,7 +105,7 @@ class LossFigures(Part):
     efficiency: tuple[EfficiencyPoint, ...] = ()
     """while the motor drives"""
     load_correction: tuple[tuple[Annotated[Number, Positive], Annotated[Number, Positive]], ...] = ()
-    """(load, factor on the efficiency at rated load), for makers who print one efficiency and a curve of factors"""
+    """(load, factor on the efficiency at rated load), for manufacturers who print one efficiency and a curve of factors"""
     backdrive_efficiency: tuple[EfficiencyPoint, ...] = ()
     """while the load drives"""
     no_load_torque: tuple[NoLoadPoint, ...] = ()
@@ -171,7 +171,7 @@ class LossFigures(Part):
 
 
 class StiffnessFigures(Part):
-    """Torsional stiffness in pieces, as makers print it: K1 up to torque T1, K2 up to T2, K3 beyond."""
+    """Torsional stiffness in pieces, as manufacturers print it: K1 up to torque T1, K2 up to T2, K3 beyond."""
 
     slopes: tuple[Annotated[Stiffness, Positive], ...] = Field(min_length=1)
     """K1, K2, ..."""
@@ -208,7 +208,7 @@ class Record(Part):
     """lower-case letters, digits, dots and dashes"""
     maker: str = ""
     title: str = ""
-    """as the maker calls it"""
+    """as the manufacturer calls it"""
     note: str = ""
     """what a reader of results must know"""
     sources: tuple[Source, ...] = ()
@@ -235,7 +235,7 @@ class Record(Part):
 
     def where(self, figure: str) -> str:
         """Where one would read a figure that is missing."""
-        return next((gap.where for gap in self.gaps if gap.figure == figure), "the maker's data sheet")
+        return next((gap.where for gap in self.gaps if gap.figure == figure), "the manufacturer's data sheet")
 
 
 class GearboxSheet(Record):
@@ -371,7 +371,7 @@ class MotorSheet(Record):
     def motor(self, voltage_limit: float | None = None) -> Motor:
         """Parameters of eq. (2).
 
-        The rated point and the stall torque of the sheet are kept. So no-load speed is a result; makers' figures are
+        The rated point and the stall torque of the sheet are kept. So no-load speed is a result; manufacturers' figures are
         often not consistent with each other, and `no_load_speed_of_model` says by how much.
         """
         missing = self.missing()

@@ -1,4 +1,4 @@
-"""Does the drive fit its task? Loads, speeds, resonance, dead zone, lost motion, holding and heat, in plain words."""
+"""Does the drive fit its task? Loads, speeds, resonance, dead zone, lost motion, holding and heat."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ def _heat(scenario: Scenario, result: xarray.Dataset) -> Finding:
         return _within("motor torque, rms", torque, limit, "N·m", "continuous torque")
     cold = limits.thermal_resistance * limits.resistance * (torque / limits.torque_constant) ** 2
     if cold * COPPER >= 1.0:
-        return Finding("winding temperature", "rises without end", "warning", "the current is far too large to last")
+        return Finding("winding temperature", "thermal runaway", "warning", "the current is far too large to last")
     hot = AMBIENT + cold / (1.0 - COPPER * cold)
     reserve = limits.max_winding_temperature - hot
     value = f"{hot:.0f} °C of {limits.max_winding_temperature:.0f} °C in the long run, at {AMBIENT:.0f} °C outside"

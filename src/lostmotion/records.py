@@ -47,7 +47,7 @@ def catalogue() -> tuple[GearboxSheet | MotorSheet, ...]:
 
 
 def read_sheets(path: Path) -> list[GearboxSheet | MotorSheet]:
-    """The records of a file of one's own.
+    """The records of a sheet file.
 
     Raises
     ------

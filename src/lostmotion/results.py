@@ -115,7 +115,7 @@ def _dataset(time: Any, data: dict[str, Any], switchings: dict[str, Any], attrib
 
 @cache
 def _contact_index() -> Any:
-    """The same in every result, and dear to make."""
+    """The same in every result, and slow to make."""
     import xarray as xr
 
     return xr.indexes.PandasIndex(CONTACTS, "contact")

@@ -83,7 +83,7 @@ def _reductions(study: Study) -> dict[str, tuple[str, str]]:
 
 
 def _needed(study: Study) -> frozenset[str]:
-    """The result variables that the study looks at."""
+    """The result variables that the study uses."""
     return frozenset(_used(study) | set(study.trajectories.variables if study.trajectories else ()))
 
 

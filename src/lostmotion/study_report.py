@@ -1,4 +1,4 @@
-"""What a study shows: statistics, distributions, what matters, Sobol indices, scatter, the best designs."""
+"""The report of a study: statistics, distributions, correlations, Sobol indices, scatter, the best designs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Virtual test rig: what makers measure of a gearbox, measured on the simulated one.
+"""Virtual test rig: what manufacturers measure of a gearbox, measured on the simulated one.
 
 Nothing here reads the loss map or the torsion curve back; every figure comes out of a simulated run, as on the rigs of
 figures 6 to 8 of the paper.
@@ -32,7 +32,7 @@ LOST_MOTION_LOAD = 0.03  # of rated torque, where lost motion is read
 
 
 class RigError(ValueError):
-    """A measurement did not come to an end."""
+    """A measurement did not settle."""
 
 
 @dataclass(frozen=True)
@@ -222,7 +222,7 @@ class TestRig:
     # --- (d): breaking loose ---
 
     def starting_torque(self, load: float = 0.0) -> float:
-        """Input torque [N·m] that starts the gearbox against a relative load, by a slow ramp."""
+        """Input torque [N·m] that sets the gearbox in motion against a relative load, by a slow ramp."""
         g = self.gearbox
         against = load * g.rated_output_torque
         begin, most = against / g.ratio, (1.0 + 4.0 * load) * g.rated_output_torque / g.ratio
@@ -238,7 +238,7 @@ class TestRig:
         return begin + most * self._break_away(result)[0] / RAMP
 
     def backdriving_torque(self) -> float | None:
-        """Output torque [N·m] that starts the gearbox with a free input, by a slow ramp; None: it holds 3 times rated torque."""
+        """Output torque [N·m] that sets the gearbox in motion with a free input, by a slow ramp; None: it holds three times its rated torque."""
         g = self.gearbox
         result = simulate(
             self._braked(),
@@ -273,7 +273,7 @@ class TestRig:
 
 @dataclass(frozen=True)
 class RigReport:
-    """All that the rig measured of one gearbox."""
+    """All measurements of one gearbox."""
 
     gearbox: Gearbox
     map: xarray.Dataset
@@ -303,7 +303,7 @@ def measure(
     notes: Iterable[str] = (),
     progress: Callable[[], None] = lambda: None,
 ) -> RigReport:
-    """Puts a gearbox through all measurements.
+    """Measure all figures of a gearbox.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ class Unit:
             if isinstance(value, str):
                 return to_si(value, self.unit)
             if isinstance(value, bool):
-                raise ValueError(f"is a truth value; it must be a number in {self.unit or '1'}")
+                raise ValueError(f"is a Boolean; it must be a number in {self.unit or '1'}")
             return value
 
         return core_schema.no_info_before_validator_function(read, handler(source))
