@@ -106,9 +106,10 @@ def variables() -> str:
     lines += [f"| `{v.name}` | {v.symbol} | {v.unit.replace('*', '·')} | {v.meaning} |" for v in VARIABLES]
     lines += [
         "",
-        "Over the dimension `switching` stand the switching instants, what ended the regime, the modes of the contacts before and after",
-        "(over the coordinate `contact`), and the left and right limit of the output torque. Attributes: `scenario` (all values, can be run again), `energy`,",
-        "`end_state`, `solver`, `switching_count`, and, where they apply, `note` and `warning`.",
+        "`lm.switchings_of(result)` gives the switchings as a dataset of their own: instants, what ended the regime, the modes of the",
+        "contacts before and after, and the left and right limit of the output torque; in a NetCDF file they are the group `switchings`.",
+        "Attributes: `scenario` (all values, can be run again), `energy`, `end_state`, `solver`, `switching_count`, and, where they apply,",
+        "`note` and `warning`.",
         "",
     ]
     return "\n".join(lines)

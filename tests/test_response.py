@@ -92,7 +92,7 @@ def test_two_mass_resonance_and_antiresonance():
 
 
 def test_linearisation_holds_where_the_input_sticks():
-    model = lm.linearize(NONLINEAR)  # at rest, command 0
+    model = lm.linearize(NONLINEAR, lm.Initial())  # at rest, command 0
     assert model.contacts["input_contact"] == 0
     assert np.all(model.A[1] == 0.0)  # the rotor does not move
     moving = lm.linearize(NONLINEAR, lm.Initial(motor_speed=100.0, load_speed=100.0 / 90.0, twist=2e-3), command=0.4)
@@ -103,7 +103,7 @@ def test_linearisation_holds_where_the_input_sticks():
     start = lm.Initial(motor_speed=100.0, load_speed=1.2, twist=2e-3, hysteresis_capacity=1.0)
     model = lm.linearize(NONLINEAR, start, command=0.4)
     run = lm.simulate(NONLINEAR, command=0.4, initial=start, duration=2e-4, sample_interval=2e-4)
-    assert run.sizes["switching"] == 0
+    assert lm.switchings_of(run).sizes["switching"] == 0
     n = len(STATES)
     whole = np.zeros((n + 1, n + 1))
     whole[:n, :n] = model.A
@@ -112,6 +112,38 @@ def test_linearisation_holds_where_the_input_sticks():
     end = scipy.linalg.expm(whole * 2e-4) @ x0
     for k, name in enumerate(STATES):
         assert float(run[name][-1]) == pytest.approx(end[k], rel=1e-11, abs=1e-14)
+
+
+def test_without_an_operating_point_only_a_drive_of_one_regime_is_linearized():
+    with pytest.raises(lm.InputError, match=r"\(dry friction, a loss map, hysteresis, a torsion curve of .*give one"):
+        lm.linearize(NONLINEAR)
+    with pytest.raises(lm.InputError, match="depends on the operating point"):
+        lm.linearize(NONLINEAR, command=0.4)
+    linear = frictionless("2-DOF-L")
+    moving = lm.Initial(motor_speed=-70.0, load_speed=2.0, twist=-3e-3)
+    assert np.array_equal(lm.linearize(linear).A, lm.linearize(linear, moving, command=0.4).A)
+    # Each of these alone makes the model depend on the operating point: here, and there, it is another.
+    for key, value in {
+        "motor.friction_torque": 0.1,
+        "load.friction_torque": 0.1,
+        "gearbox.stiffness": {"kind": "curve", "slopes": [2e4], "backlash": 1e-3},
+        "gearbox.hysteresis": {"efficiency": 0.9},
+        "motor.voltage_limit": 90.0,
+    }.items():
+        scenario = lm.Scenario(
+            motor=linear.motor.model_copy(update={"rated_voltage": 90.0}),
+            gearbox=linear.gearbox,
+            load=linear.load.model_dump(),
+            simulation={"duration": 1.0, "sample_interval": 0.1},
+        )
+        drive = scenario.replace(**{key: value}).drive()
+        with pytest.raises(lm.InputError, match="depends on the operating point"):
+            lm.linearize(drive)
+        here = lm.linearize(drive, lm.Initial())
+        there = lm.linearize(drive, moving, command=2.0)
+        assert not (np.array_equal(here.A, there.A) and np.array_equal(here.B, there.B)), key
+    assert "twist contact is stuck" in str(lm.linearize(NONLINEAR, lm.Initial()))
+    assert "motor_speed -70" in str(lm.linearize(linear, moving))
 
 
 def test_scipy_and_control_get_the_same_model():

@@ -56,6 +56,53 @@ def test_other_programs_read_the_files(result: xr.Dataset, tmp_path: Path) -> No
     assert parquet["twist"].to_numpy() == pytest.approx(result["twist"].values, abs=0.0)
 
 
+def test_a_data_frame_has_one_row_for_each_sample_and_one_for_each_switching(result: xr.Dataset) -> None:
+    frame = result.to_dataframe()
+    assert list(frame.columns) == [v.name for v in VARIABLES]
+    assert len(frame) == result.sizes["time"] == 2001
+    assert len(lm.switchings_of(result).to_dataframe()) == result.attrs["switching_count"]
+
+
+@pytest.mark.parametrize("ending", [".nc", ".csv", ".parquet"])
+def test_a_run_without_any_switching_is_saved_as_one_with(tmp_path: Path, ending: str, small: Path) -> None:
+    short = lm.load(small, {"simulation.duration": 1e-5, "simulation.sample_interval": 1e-5})
+    quiet = lm.simulate(short.replace(**{"command.amplitude": 0.0}))
+    assert lm.switchings_of(quiet).sizes["switching"] == 0
+    lm.save(quiet, tmp_path / f"r{ending}")
+    xr.testing.assert_identical(lm.open_result(tmp_path / f"r{ending}"), quiet)
+
+
+def test_switchings_are_a_group_of_the_netcdf_file(result: xr.Dataset, tmp_path: Path) -> None:
+    import h5netcdf
+
+    lm.save(result, tmp_path / "r.nc")
+    with h5netcdf.File(tmp_path / "r.nc") as file:
+        assert set(file.dimensions) == {"time"}
+        assert file.groups["switchings"].dimensions["switching"].size == result.attrs["switching_count"]
+        assert file.groups["switchings"]["instant"].attrs["units"] == "s"
+
+
+def test_a_result_can_be_written_by_xarray_itself(result: xr.Dataset, tmp_path: Path) -> None:
+    result.to_netcdf(tmp_path / "r.nc", engine="h5netcdf")
+    with xr.open_dataset(tmp_path / "r.nc", engine="h5netcdf") as back:
+        xr.testing.assert_identical(lm.switchings_of(back), lm.switchings_of(result))
+
+
+@pytest.mark.parametrize("ending", [".nc", ".csv", ".parquet"])
+def test_a_periodic_motion_which_has_no_switchings_is_saved_too(small: Path, tmp_path: Path, ending: str) -> None:
+    scenario = lm.load(small)
+    motion = lm.periodic_motion(scenario.drive(), scenario.command)
+    lm.save(motion, tmp_path / f"m{ending}")
+    back = lm.open_result(tmp_path / f"m{ending}")
+    assert back.attrs["period"] == motion.attrs["period"]
+    xr.testing.assert_equal(back["twist"].drop_vars("time"), motion["twist"].drop_vars("time"))
+
+
+def test_what_is_no_result_has_no_switchings() -> None:
+    with pytest.raises(ValueError, match="has no switchings; give a result of simulate"):
+        lm.switchings_of(xr.Dataset())
+
+
 def test_energy_balance_closes_to_rounding(result: xr.Dataset) -> None:
     ledger = lm.energy_of(result)
     assert abs(ledger["residual"]) < 1e-9 * ledger["turned_over"]
@@ -67,13 +114,13 @@ def test_energy_balance_closes_to_rounding(result: xr.Dataset) -> None:
 
 def test_switchings_carry_both_limits_of_the_output_torque(result: xr.Dataset) -> None:
     # At a turning point of the twist the hysteresis torque jumps; elsewhere the output torque is continuous.
-    jump = np.abs(result["switching_output_torque_after"] - result["switching_output_torque_before"]).values
-    changes = result["switching_contacts_before"] != result["switching_contacts_after"]
-    twist_changes = changes.sel(contact="twist_contact").values
+    switchings = lm.switchings_of(result)
+    jump = np.abs(switchings["output_torque_after"] - switchings["output_torque_before"]).values
+    twist_changes = (switchings["twist_contact_before"] != switchings["twist_contact_after"]).values
     assert jump[twist_changes].max() > 0.01
     assert np.all(jump[~twist_changes] < 1e-9)
-    assert np.all(np.diff(result["switching_time"].values) >= 0.0)
-    assert result.sizes["switching"] == result.attrs["switching_count"]
+    assert np.all(np.diff(switchings["instant"].values) >= 0.0)
+    assert switchings.sizes["switching"] == result.attrs["switching_count"]
 
 
 def test_samples_at_a_jump_are_right_limits(large: Path) -> None:

@@ -149,3 +149,14 @@ def test_scenarios_of_the_package_are_those_of_the_repository() -> None:
 
     packaged = {p.name: p.read_text() for p in files("lostmotion").joinpath("scenarios").iterdir()}
     assert packaged == {p.name: p.read_text() for p in SCENARIOS}
+
+
+def test_an_override_reaches_an_entry_of_a_list() -> None:
+    path = ROOT / "scenarios" / "overrunning-load.toml"  # its command is one ramp
+    assert lm.load(path, ["command.ramps.0.rise=-0.2"]).command.ramps[0].rise == -0.2
+    changed = lm.load(path).replace(**{"command.ramps.0.rise": 0.3, "gearbox.stiffness.slopes.1": 3e4})
+    assert changed.command.ramps[0].rise == 0.3
+    assert changed.gearbox.stiffness.slopes == (2650.0, 3e4, 26500.0)
+    for key in ("command.ramps.1.rise", "command.ramps.-1.rise", "command.ramps.first.rise"):
+        with pytest.raises(lm.InputError, match=rf"--set {key}: .*numbered from 0"):
+            lm.load(path, [f"{key}=1"])

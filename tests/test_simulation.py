@@ -39,8 +39,9 @@ def test_both_solvers_agree_on_every_scenario(path: Path) -> None:
 def test_the_lossy_rigid_gear_switches_at_the_closed_form_instants() -> None:
     path = next(p for p in SCENARIOS if p.stem == "lossy-rigid-gear")
     result = lm.simulate(lm.load(path))
-    changes = result["switching_contacts_before"] != result["switching_contacts_after"]
-    instants = result["switching_time"].values[changes.sel(contact="input_contact").values]
+    switchings = lm.switchings_of(result)
+    changes = switchings["input_contact_before"] != switchings["input_contact_after"]
+    instants = switchings["instant"].values[changes.values]
     expected = [0.0804771339, 0.1995199008, 0.3713427780, 0.4645394616]
     assert instants == pytest.approx(expected, abs=1e-9)
     assert float(result["load_speed"][-1]) == pytest.approx(-0.01626192938, abs=1e-10)
@@ -198,7 +199,7 @@ def test_memory_does_not_grow_with_the_duration(small: Path) -> None:
             scenario = lm.load({str(small)!r}, {{"simulation.duration": duration, "simulation.sample_interval": duration / 100}})
             result = lm.simulate(scenario)
             peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-        print(peaks[2] - peaks[1], result.attrs["switching_count"], result.sizes["switching"])
+        print(peaks[2] - peaks[1], result.attrs["switching_count"], lm.switchings_of(result).sizes["switching"])
     """)
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     grown, count, kept = map(int, done.stdout.split())

@@ -25,8 +25,9 @@ from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
 from lostmotion.study_chunk import _core_can, pieces, run_piece, scenario_of_run
+from lostmotion.study_design import CHUNK
 from lostmotion.study_expressions import FUNCTIONS, REDUCTIONS
-from lostmotion.study_file import CHUNK, Study
+from lostmotion.study_file import Study
 from lostmotion.study_report import best_runs, influence, read_table, sobol_indices
 from lostmotion.variables import CHANNEL_NAMES
 
@@ -424,13 +425,16 @@ def test_show_and_best_from_the_command_line(tmp_path: Path):
     shown = CliRunner().invoke(app, ["study", "show", str(out), "--best", "stuck_share"])
     assert shown.exit_code == 0, shown.output
     assert "256 of 256 runs, 0 failed" in shown.output
-    assert {p.name for p in (out / "show").iterdir()} >= {
+    assert {p.name for p in (tmp_path / "t-figures").iterdir()} >= {
         "statistics.csv",
         "distributions.png",
         "tornado.png",
         "scatter.png",
     }
+    import pandas as pd
+
     table = read_table(out)
+    assert len(pd.read_parquet(out)) == table.num_rows == 256  # nothing but data among the data
     best = best_runs(table, "stuck_share", 3)["stuck_share"].to_pylist()
     assert best == sorted(table["stuck_share"].to_pylist())[:3]
 
@@ -466,9 +470,21 @@ peak = "peak(load_speed)"
         ("peak(load_speed)", "peak(load_speed", "cannot be read"),
         ("peak(load_speed)", "energy.gear_loss", "energy.gear_loss is none"),
         ("peak(load_speed)", "load_speed.__class__", "must not use"),
+        ("peak(load_speed)", "load_speed", r"reduce it, as in peak\(load_speed\)"),
+        ("peak(load_speed)", "load_speed.isel(time=2001)", "sample that a run of 2001 does not have"),
+        ("peak(load_speed)", "load_speed.sel(time=2.5)", "instant outside the 2.0 s"),
         ('peak = "peak', 'run = "peak', "a name that is taken"),
         ("[keep]", "[kept]", "kept"),
         ("values = [1, 2]", "values = [1, 2]\nvalue = 3", "not known"),
+        ("values = [1, 2]", "values = [true]", "load.inertia: true is no number$"),
+        ("values = [1, 2]", "grid = [1, 2, 2.5]", "key vary.0.grid.2: 2.5 must be a whole number$"),
+        ("values = [1, 2]", "values = [1, inf]", "key vary.0.values.1: inf must be a finite number"),
+        ("values = [1, 2]", "grid = [1, 2, 1000000000]", "grid needs 1 to 1000000 values, not 1000000000"),
+        ("values = [1, 2]", "grid = [1, 2, 0]", "grid needs 1 to 1000000 values, not 0"),
+        ("[[vary]]", "[vary]", "key vary: must be a list$"),
+        ("[keep]", "[[keep]]", "key keep: must be a table$"),
+        ('"peak(load_speed)"', "3", "key keep.peak: 3 must be a text in quotes$"),
+        ('design = "list"', 'design = "lists"', "'lists' must be one of 'grid', 'list'"),
     ],
 )
 def test_a_bad_study_ends_in_one_clear_line(tmp_path: Path, old: str, new: str, match: str):
@@ -478,11 +494,6 @@ def test_a_bad_study_ends_in_one_clear_line(tmp_path: Path, old: str, new: str, 
     with pytest.raises(InputError, match=match) as caught:
         lm.load_study(path)
     assert "\n" not in str(caught.value)
-
-
-def test_an_expression_that_keeps_time_is_refused(tmp_path: Path):
-    with pytest.raises(InputError, match=r"reduce it, as in peak\(load_speed\)"):
-        lm.study(make(runs=2, keep={"x": "load_speed"}), tmp_path / "s")
 
 
 def test_memory_does_not_grow_with_the_length_of_a_study(tmp_path: Path):

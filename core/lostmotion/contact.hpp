@@ -200,7 +200,7 @@ class SwitchedDrive {
         modes[c] = static_cast<std::int8_t>(event.fired->neighbour);
         Event slipping{event.at_rest, event.T_2};
         slipping.at_rest[c] = false;
-        return settle(cache, now, modes, slipping, key) == Found::yes;
+        return !at_its_limit(modes) && settle(cache, now, modes, slipping, key) == Found::yes;
     }
 
     // Tries the combinations of modes. If the guards that start on zero leave none, the motion is too small beside its
@@ -233,23 +233,36 @@ class SwitchedDrive {
         return found;
     }
 
-    // Those with most contacts stuck first.
+    // Two speeds that are kept at zero keep the third; so do input and load that a stuck twist turns together, if they
+    // are to slip against each other. Then a contact that "slips" does not move: it gives all that it can, and the
+    // output torque, which everything at rest leaves open, follows from that.
+    static bool at_its_limit(const Modes& modes) {
+        const auto [input, slip, bearing] = modes;
+        if (input == absent || slip == absent || bearing == absent) return false;
+        const int stuck = (input == 0) + (slip == 0) + (bearing == 0);
+        return stuck == 2 || (slip == 0 && input * bearing < 0);
+    }
+
+    // Those with most contacts stuck first. While everything stands the output torque stays as it was, and gives way
+    // only if neither that nor a motion is consistent.
     template <class Cache>
     Found search(Cache& cache, Instant& now, const Choices& choices, const std::array<int, n_contacts>& n,
                  const Event& event, RegimeKey& key) const {
         const Memory before = now.memory;  // all that a trial may change
         Found worst = Found::inconsistent;
-        for (int slips = 0; slips <= n_contacts; ++slips)
-            for (int a = 0; a < n[0]; ++a)
-                for (int b = 0; b < n[1]; ++b)
-                    for (int c = 0; c < n[2]; ++c) {
-                        const Modes modes{choices[0][a], choices[1][b], choices[2][c]};
-                        if ((modes[0] != 0) + (modes[1] != 0) + (modes[2] != 0) != slips) continue;
-                        now.memory = before;
-                        const Found found = settle(cache, now, modes, event, key);
-                        if (found == Found::yes) return found;
-                        if (found == Found::outside) worst = found;
-                    }
+        for (const bool limit : {false, true})
+            for (int slips = 0; slips <= n_contacts; ++slips)
+                for (int a = 0; a < n[0]; ++a)
+                    for (int b = 0; b < n[1]; ++b)
+                        for (int c = 0; c < n[2]; ++c) {
+                            const Modes modes{choices[0][a], choices[1][b], choices[2][c]};
+                            if ((modes[0] != 0) + (modes[1] != 0) + (modes[2] != 0) != slips) continue;
+                            if (at_its_limit(modes) != limit) continue;
+                            now.memory = before;
+                            const Found found = settle(cache, now, modes, event, key);
+                            if (found == Found::yes) return found;
+                            if (found == Found::outside) worst = found;
+                        }
         return worst;
     }
 

@@ -10,6 +10,9 @@ from lostmotion.panels import STYLES, Curve, Panel
 from lostmotion.paper import AMPLITUDES, MODELS, paper_scenario
 from lostmotion.records import find
 from lostmotion.rig_sheet import panels
+from lostmotion.study_selection import candidates, pareto_front
+from lostmotion.study_selection_report import pareto_figure
+from lostmotion.study_table import read_table
 from lostmotion.test_rig import measure
 
 HERE = Path(__file__).parent
@@ -41,6 +44,16 @@ def tutorial() -> None:
     rig.savefig(HERE / "rig.png", dpi=80, metadata={"Software": None})
 
 
+def selection() -> None:
+    study = lm.load_study(HERE.parents[1] / "examples" / "select-gearbox.toml")
+    with tempfile.TemporaryDirectory() as directory:
+        table = read_table(lm.study(study, Path(directory) / "selection"))
+    ranked = candidates(table, study)
+    figure = pareto_figure(table, ranked, pareto_front(ranked, study.select), study.select)
+    figure.savefig(HERE / "selection.png", dpi=110, metadata={"Software": None})
+
+
 if __name__ == "__main__":
     why()
     tutorial()
+    selection()

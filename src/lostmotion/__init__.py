@@ -67,6 +67,7 @@ if TYPE_CHECKING:
     from .study_engine import study as study
     from .study_file import Study as Study
     from .study_file import load_study as load_study
+    from .switchings import switchings_of as switchings_of
     from .test_rig import Comparison as Comparison
     from .test_rig import Loop as Loop
     from .test_rig import RigReport as RigReport
@@ -110,11 +111,12 @@ _HOMES = {
     "stepping": ("Simulation", "SimulationState"),
     "study_engine": ("study",),
     "study_file": ("Study", "load_study"),
+    "switchings": ("switchings_of",),
     "test_rig": ("Comparison", "Loop", "RigReport", "TestRig", "measure"),
     "variables": ("VARIABLES", "Variable"),
 }
 # Modules whose functions return datasets: with them comes `result.lm`.
-_WITH_DATASETS = ("harmonic_response", "results", "run", "shooting", "test_rig")
+_WITH_DATASETS = ("harmonic_response", "results", "run", "shooting", "switchings", "test_rig")
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = ["__version__", *_HOME_OF]  # noqa: PLE0604

@@ -429,7 +429,10 @@ def study(
         str | None, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler of a cluster.")
     ] = None,
     best: Annotated[
-        str | None, typer.Option("--best", metavar="COLUMN", help="With `show`: the ten least of it.")
+        str | None,
+        typer.Option(
+            "--best", metavar="COLUMN[:largest]", help="With `show`: the ten runs with the least, or largest."
+        ),
     ] = None,
 ) -> None:
     """Many runs: vary parameters, store selected results, resume after an interruption.
@@ -445,16 +448,12 @@ def study(
     if what == "show":
         if shown is None:
             raise InputError("study show: name the directory of a study, as in `lostmotion study show DIR`")
-        from .study_report import best_runs, read_table, show
+        from .study_report import best_lines, show
 
+        found = best_lines(shown, best) if best is not None else []
         with busy("Drawing"):
             lines = show(shown)
-        print("\n".join(lines))
-        if best is not None:
-            rows = best_runs(read_table(shown), best).to_pylist()
-            print(f"Least {best}:")
-            for row in rows:
-                print("  " + ", ".join(f"{k} {v:.6g}" for k, v in row.items() if isinstance(v, int | float)))
+        print("\n".join([*lines, *found]))
         return
     if shown is not None:
         raise InputError(f"study {what} {shown}: too many names; the directory is given by -o")
@@ -486,18 +485,29 @@ def check(
     scenario: SourceArgument,
     overrides: Overrides = None,
 ) -> None:
-    """Torques, speeds, inertia ratio, resonance, dead zone, lost motion, holding and heat."""
+    """Torques, speeds, voltage, current, heat, inertia ratio, resonance, dead zone, lost motion and holding.
+
+    Each point names its rule and the source of the rule. The table [task] of the scenario gives the duty cycle and requirements.
+
+    \b
+    lostmotion drive check drive.toml --set task.cycle="2 s"
+    """
     from .drive_check import check_drive
+    from .errors import InputError
     from .sources import load
 
     loaded = load(scenario, overrides or ())
-    with busy("Checking"):
-        findings = check_drive(loaded)
+    try:
+        with busy("Checking"):
+            findings = check_drive(loaded)
+    except (InputError, RuntimeError) as error:
+        raise InputError(f"{scenario}: {error}") from None
     print(loaded.title or scenario)
     for finding in findings:
         print(f"  {finding}")
-    warnings = sum(f.verdict == "warning" for f in findings)
-    print("No warnings." if warnings == 0 else f"{warnings} warning{'s' if warnings > 1 else ''}.")
+    warnings, unknown = (sum(f.verdict == verdict for f in findings) for verdict in ("warning", "unknown"))
+    counted = "No warnings." if warnings == 0 else f"{warnings} warning{'s' if warnings > 1 else ''}."
+    print(f"{counted} {unknown} not judged (?)." if unknown else counted)
 
 
 @app.command()

@@ -252,6 +252,8 @@ class GearboxSheet(Record):
     """repeated, as in acceleration"""
     momentary_output_torque: Annotated[Torque, Positive] | None = None
     """in an emergency stop"""
+    average_input_speed: Annotated[Speed, Positive] | None = None
+    """for the mean over a duty cycle"""
     max_input_speed: Annotated[Speed, Positive] | None = None
     inertia: Annotated[Inertia, NotNegative] | None = None
     """on the input shaft"""
@@ -322,6 +324,7 @@ class GearboxSheet(Record):
             average_output_torque=self.average_output_torque,
             peak_output_torque=self.peak_output_torque,
             momentary_output_torque=self.momentary_output_torque,
+            average_input_speed=self.average_input_speed,
             max_input_speed=self.max_input_speed,
         )
 

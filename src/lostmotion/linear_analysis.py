@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core
-from .errors import need
-from .parts import ConstantEfficiency, Drive
+from .errors import InputError, need
+from .parts import ConstantEfficiency, Drive, Rigid
 from .run import start_state
 from .scenario import Initial, Scenario, drive_of
 from .variables import CONTACTS, STATES
@@ -41,17 +41,24 @@ class LinearModel:
     """c, constant part of the outputs"""
     contacts: dict[str, int]
     """modes of the contacts: -1, 0 stuck, +1; 2: the drive has none"""
+    state: Initial
+    """operating point (SI)"""
+    command: float
+    """at the operating point [-]"""
+    load_torque: float
+    """at the operating point [N·m]"""
     states: tuple[str, ...] = STATES
     inputs: tuple[str, ...] = INPUTS
     outputs: tuple[str, ...] = OUTPUTS
 
     def __repr__(self) -> str:
-        modes = ", ".join(
-            f"{name} {mode:+d}" if mode else f"{name} stuck" for name, mode in self.contacts.items() if mode != 2
-        )
-        return (
-            f"LinearModel({len(self.states)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs; {modes})"
-        )
+        """Which operating point and regime it is."""
+        words = {-1: "slips in reverse", 0: "is stuck", 1: "slips forward"}
+        modes = [f"{c.replace('_', ' ')} {words[m]}" for c, m in self.contacts.items() if m in words]
+        point = {name: getattr(self.state, name) for name in (*STATES, "hysteresis_capacity")}
+        point |= {"command": self.command, "load_torque": self.load_torque}
+        moved = ", ".join(f"{name} {value:.6g}" for name, value in point.items() if value != 0.0)
+        return f"linear model at {moved or 'rest, command 0'}: {', '.join(modes) or 'no contact'}"
 
     def response(self, frequency: Any, output: str = "load_speed", source: str = "command") -> np.ndarray:
         """F(y)/F(u) at frequencies [Hz], complex."""
@@ -146,18 +153,29 @@ def linearize(
     Parameters
     ----------
     state
-        SI; at rest if left out.
+        The operating point in SI, such as ``Initial(motor_speed=100.0, load_speed=1.1, twist=2e-3)``, ``Initial()`` for rest, or
+        the end of a run, ``Initial(**json.loads(result.attrs["end_state"]))``. May be left out only for a drive that has one
+        regime, which is the same everywhere.
     command, load_torque
         Inputs [-], [N·m] at this instant, and their rates [1/s], [N·m/s].
 
     Raises
     ------
+    InputError
+        The state is missing, and the drive has several regimes.
     SolverError
         The state has no continuation.
     """
-    state = state or Initial()
+    drive = drive_of(drive)
+    if state is None:
+        if regimes := _why_several_regimes(drive):
+            raise InputError(
+                f"linearize: the linear model of this drive depends on the operating point ({regimes}); give one, such as "
+                "Initial(motor_speed=100, load_speed=1, twist=2e-3) [SI], or Initial() for the drive at rest"
+            )
+        state = Initial()
     rates, outputs, modes = _core.linearization(
-        drive_of(drive).core(),
+        drive.core(),
         start_state(state),
         state.hysteresis_capacity,
         [command, load_torque],
@@ -168,7 +186,21 @@ def linearize(
     C, D, offset = np.eye(len(OUTPUTS), n), np.zeros((len(OUTPUTS), 2)), np.zeros(len(OUTPUTS))
     for row, values in zip((0, n, n + 1), outputs, strict=True):
         C[row], D[row], offset[row] = values[:n], values[n : n + 2], values[-1]
-    return LinearModel(A, B, C, D, rates[:, -1], offset, dict(zip(CONTACTS, modes, strict=True)))
+    contacts = dict(zip(CONTACTS, modes, strict=True))
+    return LinearModel(A, B, C, D, rates[:, -1], offset, contacts, state, command, load_torque)
+
+
+def _why_several_regimes(drive: Drive) -> str:
+    """What gives a drive more than one regime; empty if it has one."""
+    m, g = drive.motor, drive.gearbox
+    reasons = {
+        "dry friction": m.friction_torque > 0.0 or drive.load.friction_torque > 0.0,
+        "a loss map": not isinstance(g.losses, ConstantEfficiency),
+        "hysteresis": g.hysteresis is not None and g.hysteresis.efficiency < 1.0,
+        "a torsion curve of several pieces": not isinstance(g.stiffness, Rigid) and len(g.stiffness.pieces()[1]) > 1,
+        "a voltage limit": m.voltage_limit is not None,
+    }
+    return ", ".join(reason for reason, holds in reasons.items() if holds)
 
 
 @dataclass(frozen=True)

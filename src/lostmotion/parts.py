@@ -12,6 +12,7 @@ from pydantic import Field, field_validator, model_validator
 from . import _core
 from .quantities import (
     Angle,
+    Current,
     Inertia,
     Limit,
     NotNegative,
@@ -44,6 +45,10 @@ class MotorLimits(Part):
     thermal_resistance: Annotated[ThermalResistance, Positive] | None = None
     """winding to ambient"""
     max_winding_temperature: Temperature | None = None
+    max_voltage: Annotated[Voltage, Positive] | None = None
+    """of the amplifier of a torque source; of a DC motor `voltage_limit` says it"""
+    max_current: Annotated[Current, Positive] | None = None
+    """the smaller of those of motor and amplifier"""
 
 
 class Motor(Part):
@@ -246,6 +251,8 @@ class GearboxLimits(Part):
     """repeated, as in acceleration"""
     momentary_output_torque: Annotated[Torque, Positive] | None = None
     """in an emergency stop"""
+    average_input_speed: Annotated[Speed, Positive] | None = None
+    """for the mean over a duty cycle; left out, the rated speed stands in for it"""
     max_input_speed: Annotated[Speed, Positive] | None = None
 
 

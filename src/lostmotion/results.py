@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import tempfile
@@ -16,13 +17,12 @@ import numpy as np
 
 from .errors import InputError, need
 from .scenario import Scenario
-from .variables import CHANNEL_NAMES, CONTACTS, STATES, VARIABLES
+from .switchings import ATTRIBUTE as SWITCHINGS
+from .switchings import packed, packed_again, switchings_of
+from .variables import CHANNEL_NAMES, STATES, VARIABLES
 
 if TYPE_CHECKING:
     import xarray
-
-# What ended a regime, in the order of Guard::Kind (core/lostmotion/regime.hpp); last: an input jumped.
-CAUSES = ("came to rest", "broke away", "torsion piece", "loss cell", "loss cell", "voltage limit", "", "input changed")
 
 # Entries of the energy ledger, in the order of the core's (core/lostmotion/energy.hpp).
 ENERGY = (
@@ -56,8 +56,6 @@ class RawResult:
     time: np.ndarray
     values: dict[str, np.ndarray]
     """of the result variables"""
-    switchings: np.ndarray
-    """one row each, as the solver returned them"""
     attrs: dict[str, Any]
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -65,7 +63,7 @@ class RawResult:
 
     def dataset(self) -> xarray.Dataset:
         """The labelled dataset."""
-        return _dataset(self.time, self.values, _switching_variables(self.switchings), self.attrs)
+        return _dataset(self.time, self.values, self.attrs)
 
 
 def raw_result(scenario: Scenario, result: Any, solver: str, *, ledger: bool) -> RawResult:
@@ -82,6 +80,7 @@ def raw_result(scenario: Scenario, result: Any, solver: str, *, ledger: bool) ->
         "switching_count": int(count),
         "end_state": json.dumps(dict(zip(STATES, state, strict=True)) | {"hysteresis_capacity": capacity}),
         "steps": int(steps),
+        SWITCHINGS: packed(switchings),
     }
     if ledger:
         attributes["energy"] = json.dumps(dict(zip(ENERGY, energy, strict=True)))
@@ -92,10 +91,10 @@ def raw_result(scenario: Scenario, result: Any, solver: str, *, ledger: bool) ->
         )
     if scenario.gearbox.note:
         attributes["note"] = scenario.gearbox.note
-    return RawResult(time, data, switchings, attributes)
+    return RawResult(time, data, attributes)
 
 
-def _dataset(time: Any, data: dict[str, Any], switchings: dict[str, Any], attributes: dict[str, Any]) -> xarray.Dataset:
+def _dataset(time: Any, data: dict[str, Any], attributes: dict[str, Any]) -> xarray.Dataset:
     import xarray as xr
 
     variables = {
@@ -104,21 +103,10 @@ def _dataset(time: Any, data: dict[str, Any], switchings: dict[str, Any], attrib
         if v.name in data
     }
     coordinates = xr.Coordinates(
-        {
-            "time": ("time", time, {"units": "s", "long_name": "time"}),
-            "contact": ("contact", list(CONTACTS), {"long_name": "dry contact"}),
-        },
-        indexes={"time": xr.indexes.PandasIndex(time, "time"), "contact": _contact_index()},
+        {"time": ("time", time, {"units": "s", "long_name": "time"})},
+        indexes={"time": xr.indexes.PandasIndex(time, "time")},
     )
-    return xr.Dataset(variables | switchings, coords=coordinates, attrs=attributes)
-
-
-@cache
-def _contact_index() -> Any:
-    """The same in every result, and slow to make."""
-    import xarray as xr
-
-    return xr.indexes.PandasIndex(CONTACTS, "contact")
+    return xr.Dataset(variables, coords=coordinates, attrs=attributes)
 
 
 def add_derived(data: dict[str, Any], ratio: Any) -> None:
@@ -137,35 +125,6 @@ def gear_efficiency(data: dict[str, Any], ratio: Any) -> Any:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         eta = np.where(driving >= 0.0, driving / fed_in, np.where(fed_in < 0.0, fed_in / driving, 0.0))
     return np.where(data["motor_speed"] == 0.0, np.nan, eta)
-
-
-def _switching_variables(table: Any) -> dict[str, Any]:
-    rows = table if len(table) else np.zeros((0, 11))
-    kind = rows[:, 1].astype(np.int8)
-    out: dict[str, Any] = {
-        "switching_time": ("switching", rows[:, 0].copy(), {"units": "s", "long_name": "instant of switching"}),
-        "switching_cause": (
-            "switching",
-            kind,
-            {"long_name": "what ended the regime", "flag_values": list(range(-1, 6)), "flag_meanings": _flags()},
-        ),
-    }
-    for when, side, modes, torque in (("before", "left", 3, 9), ("after", "right", 6, 10)):
-        out[f"switching_contacts_{when}"] = (
-            ("switching", "contact"),
-            rows[:, modes : modes + 3].astype(np.int8),
-            {"long_name": f"modes of the contacts {when} the switching; 2: there is none"},
-        )
-        out[f"switching_output_torque_{when}"] = (
-            "switching",
-            rows[:, torque].copy(),
-            {"units": "N*m", "long_name": f"output torque, {side} limit"},
-        )
-    return out
-
-
-def _flags() -> str:
-    return " ".join(CAUSES[k].replace(" ", "_") for k in range(-1, 6))
 
 
 def scenario_of(dataset: xarray.Dataset) -> Scenario:
@@ -303,25 +262,37 @@ def open_result(path: str | Path) -> xarray.Dataset:
 
 
 def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
-    # By way of memory: the library's own writer leaves a half-open file behind when the disk is full.
-    path.write_bytes(dataset.to_netcdf(engine="h5netcdf"))
+    """The result, and its switchings, if it has any, in a group of their own; periodic motions have none."""
+    plain = dataset.drop_attrs(deep=False).assign_attrs({k: v for k, v in dataset.attrs.items() if k != SWITCHINGS})
+    with io.BytesIO() as memory:  # the library's own writer leaves a half-open file behind when the disk is full
+        plain.to_netcdf(memory, engine="h5netcdf", mode="w")
+        if SWITCHINGS in dataset.attrs:
+            switchings_of(dataset).to_netcdf(memory, engine="h5netcdf", mode="a", group=SWITCHINGS)
+        path.write_bytes(memory.getvalue())
 
 
 def _read_netcdf(path: Path) -> xarray.Dataset:
+    import h5netcdf
     import xarray as xr
 
     with xr.open_dataset(path, engine="h5netcdf") as opened:
-        return opened.load()
+        result = opened.load()
+    with h5netcdf.File(path) as file:
+        has_group = SWITCHINGS in file.groups
+    if not has_group:
+        return result
+    with xr.open_dataset(path, engine="h5netcdf", group=SWITCHINGS) as opened:
+        columns = {str(name): v for name, v in opened.load().items()}
+    return result.assign_attrs({SWITCHINGS: packed_again(columns)})
 
 
 def _header(dataset: xarray.Dataset) -> str:
-    """All but the samples, as JSON: attributes, and the switchings with theirs."""
-    switchings = {
-        str(name): {"dims": v.dims, "values": v.values.ravel().tolist(), "type": str(v.dtype), "attributes": v.attrs}
-        for name, v in dataset.variables.items()
-        if "switching" in v.dims
-    }
-    return json.dumps({"attributes": dataset.attrs, "switchings": switchings})
+    """All but the samples, as JSON: attributes, and the switchings by columns."""
+    attributes = {k: v for k, v in dataset.attrs.items() if k != SWITCHINGS}
+    if SWITCHINGS not in dataset.attrs:
+        return json.dumps({"attributes": attributes})
+    columns = {str(name): v.values.tolist() for name, v in switchings_of(dataset).items()}
+    return json.dumps({"attributes": attributes, SWITCHINGS: columns})
 
 
 def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Dataset:
@@ -330,12 +301,8 @@ def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Datase
         time = columns.pop("time")
     except (json.JSONDecodeError, KeyError):
         raise InputError(f"{path}: is no result of lostmotion; its header or its time column is missing") from None
-    switchings = {}
-    for name, v in meta["switchings"].items():
-        shape = [len(CONTACTS) if dim == "contact" else -1 for dim in v["dims"]]
-        values = np.asarray(v["values"], dtype=v["type"]).reshape(shape)
-        switchings[name] = (v["dims"], values, v["attributes"])
-    return _dataset(time, columns, switchings, meta["attributes"])
+    switchings = {SWITCHINGS: packed_again(meta[SWITCHINGS])} if SWITCHINGS in meta else {}
+    return _dataset(time, columns, meta["attributes"] | switchings)
 
 
 def _columns(dataset: xarray.Dataset) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import csv
 import difflib
 import json
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -18,6 +18,7 @@ from .parts import Drive, Gearbox, Load, Motor, Rigid
 from .quantities import Angle, NotNegative, Part, Positive, Speed, Time, Torque
 from .records import Conditions, gearbox_table, motor
 from .signals import CommandSignal, TorqueSignal
+from .task import Task
 from .toml_files import read_toml
 
 MAX_SAMPLES = 100_000_000
@@ -72,6 +73,7 @@ class Scenario(Part):
     gearbox: Gearbox
     load: LoadTable
     initial: Initial = Initial()
+    task: Task = Task()
     simulation: SimulationTable
 
     @model_validator(mode="after")
@@ -186,16 +188,43 @@ def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) ->
         With one line that names the file, the key, the value and the remedy.
     """
     path = find_scenario(path)
-    return changed(_read(path, ()), overrides, path)
+    return changed(read_tables(path, overrides), path)
 
 
-def changed(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str], path: Path) -> Scenario:
-    """The scenario of the contents of a file, with changes by dotted key.
+def changed(tables: dict[str, Any], path: Path) -> Scenario:
+    """The scenario of the tables of a file, whose name stands in messages.
 
     Raises
     ------
     InputError
         With one line that names the file, the key, the value and the remedy.
+    """
+    try:
+        return from_tables(tables)
+    except ValidationError as error:
+        raise InputError(f"{path}: {describe(error)}") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def read_tables(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> dict[str, Any]:
+    """The tables of a scenario file with those of its `base` and the overrides, records still as `from`.
+
+    Raises
+    ------
+    InputError
+    """
+    data = _read(find_scenario(path), ())
+    override(data, overrides)
+    return data
+
+
+def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str]) -> None:
+    """Changes tables by dotted key.
+
+    Raises
+    ------
+    InputError
     """
     items = overrides.items() if isinstance(overrides, Mapping) else [_parse_override(text) for text in overrides]
     for key, value in items:
@@ -203,13 +232,19 @@ def changed(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str], 
             _set(data, key, value)
         except KeyError as error:
             raise InputError(f"--set {key}: {error.args[0]}") from None
-    try:
-        _use_records(data)
-        return Scenario(**data)
-    except ValidationError as error:
-        raise InputError(f"{path}: {describe(error)}") from None
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+
+
+def from_tables(tables: Mapping[str, Any]) -> Scenario:
+    """The scenario of such tables.
+
+    Raises
+    ------
+    InputError, pydantic.ValidationError
+        A record is unknown or lacks what a run needs; a value cannot be used.
+    """
+    data = dict(tables)
+    _use_records(data)
+    return Scenario(**data)
 
 
 def json_schema() -> dict[str, Any]:
@@ -354,16 +389,36 @@ def _set(data: dict[str, Any], key: str, value: Any) -> None:
         return
     if tables and isinstance(data.get(tables[0]), str):
         data[tables[0]] = {"from": data[tables[0]]}
+    node: Any = data
     for table in tables:
-        inner = data.setdefault(table, {})
+        place: Any = list_index(node, table) if isinstance(node, list) else table
+        inner = node[place] if isinstance(node, list) else node.setdefault(place, {})
         if table == "torque" and not isinstance(inner, dict):
-            inner = data[table] = {"mean": inner}
+            inner = node[place] = {"mean": inner}
         if inner is None:
-            inner = data[table] = {}
-        if not isinstance(inner, dict):
+            inner = node[place] = {}
+        if isinstance(inner, tuple):
+            inner = node[place] = list(inner)
+        if not isinstance(inner, dict | list):
             raise KeyError(f"{table} is the value {inner!r}, not a table; it has no {name}")
-        data = inner
-    data[name] = value
+        node = inner
+    node[list_index(node, name) if isinstance(node, list) else name] = value
+
+
+def list_index(entries: Sequence[Any], part: str) -> int:
+    """The index that a part of a dotted key names, such as 0 in ``command.ramps.0.rise``.
+
+    Raises
+    ------
+    KeyError
+        There is no such entry.
+    """
+    if not (part.isascii() and part.isdigit()):
+        raise KeyError(f"{part!r} is no index; entries of a list are numbered from 0")
+    if int(part) >= len(entries):
+        count = f"{len(entries)} entr{'y' if len(entries) == 1 else 'ies'}"
+        raise KeyError(f"there is no entry {part}; the list has {count}, numbered from 0")
+    return int(part)
 
 
 def describe(error: ValidationError) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 from . import scenario
 from .errors import InputError
 from .results import FORMATS, open_result
-from .scenario import Scenario, changed
+from .scenario import Scenario, changed, override
 
 
 def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
@@ -36,4 +36,6 @@ def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) 
     result = open_result(path)
     if "scenario" not in result.attrs:
         raise InputError(f"{path}: is no result of a run; it carries no scenario that could be run again")
-    return changed(json.loads(result.attrs["scenario"]), overrides, path)
+    tables = json.loads(result.attrs["scenario"])
+    override(tables, overrides)
+    return changed(tables, path)

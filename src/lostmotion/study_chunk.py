@@ -19,8 +19,11 @@ from .parts import Rigid
 from .results import ENERGY, add_derived, installed_version
 from .run import core_inputs, simulate
 from .scenario import Scenario, describe
-from .study_expressions import REDUCTIONS
-from .study_file import Study, base_value, from_json
+from .study_check import COLUMNS, check_columns
+from .study_file import Study, from_json
+from .study_functions import REDUCTIONS
+from .study_select import SHARES, USE
+from .study_vary import base_value
 from .variables import CHANNEL_NAMES, VARIABLES
 
 if TYPE_CHECKING:
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
 
 SLOPES = "gearbox.stiffness.slopes"
 DERIVED = frozenset(v.name for v in VARIABLES if v.derived)
+SLOW_RUNS = 20  # in a piece of those that are made one by one
 MOST_NUMBERS = 2**23  # of samples that are held at once: 64 megabytes
 
 
@@ -41,12 +45,18 @@ def compute_chunk(text: str, first: int, last: int, threads: int = 1) -> bytes:
 
 
 def pieces(study: Study, first: int, last: int) -> list[tuple[int, int]]:
-    """The parts of a chunk, so that the samples of each can be held at once; most chunks are one piece."""
-    needed = _needed(study)
-    if not needed or (_core_can(study) and _reductions(study)):
+    """The parts of a chunk, so that the samples of each can be held at once, and that slow ones show progress.
+
+    Most chunks that the core can make are one piece.
+    """
+    needed, fast = _needed(study), _core_can(study)
+    if fast and (not needed or _reductions(study)):
         return [(first, last)]
+    if not needed:
+        return [(a, min(a + SLOW_RUNS, last)) for a in range(first, last, SLOW_RUNS)]
     arrays = len(CHANNEL_NAMES) if needed & DERIVED else len(needed)
     size = max(1, MOST_NUMBERS // (arrays * study.scenario.simulation.samples))
+    size = size if fast else min(size, SLOW_RUNS)
     return [(a, min(a + size, last)) for a in range(first, last, size)]
 
 
@@ -60,7 +70,8 @@ def parsed(text: str) -> Study:
 def _units(text: str) -> dict[str, str]:
     """Units of the columns; empty where an expression's cannot be told."""
     study = parsed(text)
-    units = {v.title: v.unit for v in study.vary} | {n: e.unit for n, e in study.expressions.items()}
+    units = {v.title: v.unit for v in study.vary if v.names is None} | {n: e.unit for n, e in study.expressions.items()}
+    units |= {f"{USE}{rule}": "1" for rule in SHARES}
     of = {v.name: v.unit for v in VARIABLES}
     return units | {f"{n} over time": of[n] for n in (study.trajectories.variables if study.trajectories else ())}
 
@@ -102,7 +113,8 @@ def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads
 
     columns: dict[str, Any] = {"run": pa.array(np.arange(first, last))}
     for k, v in enumerate(study.vary):
-        columns[v.title] = pa.array(runs.parameters[:, k])
+        numbers = runs.parameters[:, k]
+        columns[v.title] = pa.array(numbers if v.names is None else [v.value(x) for x in numbers])
     data = {} if runs.kept else _derived(study, runs, _needed(study))
     names = _names(study, data, runs, threads)
     kept_values = runs.kept | {
@@ -115,6 +127,7 @@ def tabulate(study: Study, text: str, first: int, last: int, runs: Runs, threads
         for name in study.trajectories.variables:
             kept = data[name][:, :: study.trajectories.every]
             columns[f"{name} over time"] = pa.array([None if b else row for b, row in zip(bad, kept, strict=True)])
+    columns |= {name: pa.array(values) for name, values in runs.checks.items()}
     columns["switchings"] = pa.array(runs.switchings.astype(np.int64))
     columns["error"] = pa.array(runs.errors)
     units = _units(text)
@@ -135,12 +148,13 @@ def as_parquet(text: str, tables: list[pa.Table]) -> bytes:
 
 class Runs(SimpleNamespace):
     """Of a piece: parameters (runs x parameters), samples (variable -> runs x samples), what the core has made of them instead
-    (column -> runs), energy (entry -> runs), switchings, errors, ratio (runs)."""
+    (column -> runs), energy (entry -> runs), columns of the drive check, switchings, errors, ratio (runs)."""
 
     parameters: np.ndarray
     samples: dict[str, np.ndarray]
     kept: dict[str, np.ndarray]
     energy: dict[str, np.ndarray]
+    checks: dict[str, list[float | str]]
     switchings: np.ndarray
     errors: list[str]
     ratio: np.ndarray
@@ -186,7 +200,7 @@ def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) 
     }
     names["time"] = xr.DataArray(instants["time"], instants)
     if _asks_for(study, "energy"):
-        names["energy"] = SimpleNamespace(**{k: each_run(v) for k, v in runs.energy.items()})
+        names["energy"] = {k: each_run(v) for k, v in runs.energy.items()}
     if _asks_for(study, "ideal_speed"):
         names["ideal_speed"] = names["command"] * each_run(_ideal_speeds(study, runs))
     names["bandwidth"] = lambda amplitude=None: each_run(_bandwidths(study, runs, amplitude, threads))
@@ -200,10 +214,10 @@ def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
         return scenario.motor.no_load_speed / scenario.gearbox.ratio
 
     keys = {key for v in study.vary for key in v.all_keys}
-    if not any(key.startswith("motor.") or key == "gearbox.ratio" for key in keys):
+    if not any(key.startswith("motor") or key in ("gearbox.ratio", "gearbox", "gearbox.from") for key in keys):
         return np.full(len(runs.errors), of(study.scenario))
     rows = zip(runs.parameters, runs.errors, strict=True)
-    return np.array([math.nan if error else of(_changed(study, row)) for row, error in rows])
+    return np.array([math.nan if error else of(study.scenario_at(row)) for row, error in rows])
 
 
 def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.ndarray:
@@ -216,7 +230,7 @@ def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.nd
     def find(k: int) -> float:
         if runs.errors[k]:
             return math.nan
-        scenario = _changed(study, runs.parameters[k])
+        scenario = study.scenario_at(runs.parameters[k])
         try:
             return bandwidth(
                 scenario.drive(),
@@ -232,28 +246,9 @@ def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.nd
         return np.array(list(pool.map(find, range(len(runs.errors)))))
 
 
-def _changes(study: Study, row: np.ndarray) -> dict[str, Any]:
-    """Dotted keys and values of one run."""
-    out: dict[str, Any] = {}
-    for v, value in zip(study.vary, row, strict=True):
-        for key in v.all_keys:
-            base = base_value(study.scenario, key)
-            if not v.relative:
-                out[key] = float(value)
-            elif isinstance(base, tuple | list):
-                out[key] = [float(value) * x for x in base]
-            else:
-                out[key] = float(value) * float(base)
-    return out
-
-
-def _changed(study: Study, row: np.ndarray) -> Scenario:
-    return study.scenario.replace(**_changes(study, row))
-
-
 def scenario_of_run(study: Study, run: int) -> Scenario:
     """The scenario of one run, by its number."""
-    return _changed(study, study.parameters(run, run + 1)[0])
+    return study.scenario_at(study.parameters(run, run + 1)[0])
 
 
 def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energy: bool) -> Runs:
@@ -264,14 +259,16 @@ def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energ
         samples={c: np.full((n, samples), np.nan) for c in channels},
         kept={},
         energy={e: np.full(n, np.nan) for e in ENERGY},
+        checks={name: [empty] * n for name, empty in COLUMNS.items()} if _checks(study) else {},
         switchings=np.zeros(n),
         errors=[""] * n,
         ratio=np.full(n, study.scenario.gearbox.ratio),
     )
     for k, row in enumerate(parameters):
         try:
-            scenario = _changed(study, row)
+            scenario = study.scenario_at(row)
             result = simulate(scenario, energy=energy)
+            checks = check_columns(scenario) if _checks(study) else {}
         except (ValidationError, RuntimeError, ValueError) as error:
             runs.errors[k] = describe(error) if isinstance(error, ValidationError) else str(error)
             continue
@@ -280,6 +277,8 @@ def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energ
         if energy:
             for e, value in json.loads(result.attrs["energy"]).items():
                 runs.energy[e][k] = value
+        for name, value in checks.items():
+            runs.checks[name][k] = value
         runs.switchings[k] = result.attrs["switching_count"]
         runs.ratio[k] = scenario.gearbox.ratio
     return runs
@@ -290,8 +289,15 @@ def _fields() -> dict[str, int]:
     return {key: k for k, key in enumerate(_core.batch_fields())}
 
 
+def _checks(study: Study) -> bool:
+    """Whether each run goes through the drive check."""
+    return study.select is not None and study.select.drive_check
+
+
 def _core_can(study: Study) -> bool:
-    """Whether all that varies is a plain number of the core."""
+    """Whether all that varies is a plain number of the core, and the runs are all that is wanted."""
+    if _checks(study):
+        return False
     s = study.scenario
     rigid = isinstance(s.gearbox.stiffness, Rigid)
     for v in study.vary:
@@ -357,6 +363,7 @@ def _in_the_core(
         samples={} if reductions else {c: spread(made[:, k]) for k, c in enumerate(channels)},
         kept={name: spread(made[:, k]) for k, name in enumerate(reductions)},
         energy={e: spread(totals[:, 5 + k]) for k, e in enumerate(ENERGY)},
+        checks={},
         switchings=np.nan_to_num(spread(totals[:, 3])),
         errors=errors,
         ratio=np.full(n, s.gearbox.ratio) if ratio is None else ratio,
@@ -372,12 +379,12 @@ def _out_of_range(study: Study, parameters: np.ndarray) -> list[str]:
     errors = [""] * len(parameters)
     low, high = parameters.min(axis=0), parameters.max(axis=0)
     try:
-        _changed(study, low)
-        _changed(study, high)
+        study.scenario_at(low)
+        study.scenario_at(high)
     except ValidationError:
         for k, row in enumerate(parameters):
             try:
-                _changed(study, row)
+                study.scenario_at(row)
             except ValidationError as error:
                 errors[k] = describe(error)
     return errors

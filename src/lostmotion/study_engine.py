@@ -11,7 +11,8 @@ from typing import Any
 from .errors import InputError, need
 from .results import write_bytes
 from .study_chunk import as_parquet, compute_chunk, parsed, pieces, run_piece, tabulate
-from .study_file import CHUNK, Study, from_json, to_json
+from .study_design import CHUNK
+from .study_file import Study, from_json, to_json
 
 
 def study(
@@ -39,7 +40,7 @@ def study(
     executor
         Any `concurrent.futures.Executor`, such as a process pool or that of a Dask client.
     progress
-        Called with the number of runs done.
+        Called with the number of runs done; of slow studies without executor also within a chunk, before it is written.
 
     Returns
     -------
@@ -58,9 +59,9 @@ def study(
     _prepare(directory, text)
     missing = [(first, last) for first, last in _chunks(what) if not _part(directory, first).exists()]
     done = what.total - sum(last - first for first, last in missing)
-    report = progress or _silent
+    report = _rising(progress or _silent)
     report(done)
-    for first, last, content in _compute(text, missing, threads or os.cpu_count() or 1, executor):
+    for first, last, content in _compute(text, missing, threads or os.cpu_count() or 1, executor, report, done):
         write_bytes(_part(directory, first), content)
         done += last - first
         report(done)
@@ -69,6 +70,18 @@ def study(
 
 def _silent(done: int) -> None:
     """No progress wanted."""
+
+
+def _rising(progress: Callable[[int], None]) -> Callable[[int], None]:
+    """The same, told of the furthest only: a chunk is simulated while the one before it is being written."""
+    furthest = 0
+
+    def report(done: int) -> None:
+        nonlocal furthest
+        furthest = max(furthest, done)
+        progress(furthest)
+
+    return report
 
 
 def _chunks(study: Study) -> Iterator[tuple[int, int]]:
@@ -98,10 +111,15 @@ def _prepare(directory: Path, text: str) -> None:
 
 
 def _compute(
-    text: str, missing: list[tuple[int, int]], threads: int, executor: Executor | None
+    text: str,
+    missing: list[tuple[int, int]],
+    threads: int,
+    executor: Executor | None,
+    report: Callable[[int], None],
+    done: int,
 ) -> Iterator[tuple[int, int, bytes]]:
     if executor is None:
-        yield from _compute_here(text, missing, threads)
+        yield from _compute_here(text, missing, threads, report, done)
         return
     # A few chunks more than there are workers, so that memory does not grow with the study.
     waiting: dict[Future[bytes], tuple[int, int]] = {}
@@ -123,7 +141,9 @@ def _compute(
             future.cancel()
 
 
-def _compute_here(text: str, missing: list[tuple[int, int]], threads: int) -> Iterator[tuple[int, int, bytes]]:
+def _compute_here(
+    text: str, missing: list[tuple[int, int]], threads: int, report: Callable[[int], None], done: int
+) -> Iterator[tuple[int, int, bytes]]:
     """While a piece is simulated, the one before it is made into a table beside it."""
     study = parsed(text)
     before: tuple[int, int, Future[bytes]] | None = None
@@ -136,6 +156,9 @@ def _compute_here(text: str, missing: list[tuple[int, int]], threads: int) -> It
                     if tables:
                         tables[-1].result()
                     tables.append(beside.submit(tabulate, study, text, a, b, runs, threads))
+                    done += b - a
+                    if b < last:
+                        report(done)
             except BaseException:  # interrupted; what is simulated is not lost
                 if before is not None:
                     yield before[0], before[1], before[2].result()

@@ -2,129 +2,29 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
-import warnings
-from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
-from .errors import InputError, need
+from .errors import InputError
 from .quantities import Part
-from .scenario import Scenario, find_scenario, load
+from .scenario import Scenario, find_scenario, load, read_tables
+from .study_design import unit_cube
 from .study_expressions import Expression, read_expression
-from .study_units import in_si, unit_of_key
+from .study_records import CONDITIONS, TABLE_OF, with_records
+from .study_select import SHARES, USE, Selection, check_bounds
+from .study_vary import Vary, base_value, check_key, scaled
 from .toml_files import read_toml
 from .variables import VARIABLES
 
-CHUNK = 500  # runs that are computed, and written, as one
 MAX_RUNS = 100_000_000
-
-
-WAYS = ("values", "grid", "uniform", "log_uniform", "normal", "triangular")
-
-
-class Normal(Part):
-    """Normal distribution."""
-
-    mean: float
-    deviation: Annotated[float, Field(gt=0.0)]
-
-
-class Vary(Part):
-    """One parameter, or several that go together. Values are SI, or strings with a unit of what the key measures."""
-
-    key: str = ""
-    """dotted key of the scenario, such as load.inertia"""
-    keys: tuple[str, ...] = ()
-    """several keys that all get the value"""
-    name: str = ""
-    """column in the result; the first key if left out"""
-    relative: bool = False
-    """the value multiplies what the base scenario has (of a list, each entry)"""
-    values: tuple[float, ...] | None = None
-    """as they are; in a random design each is as likely"""
-    grid: tuple[float, float, int] | None = None
-    """first, last, how many"""
-    uniform: tuple[float, float] | None = None
-    log_uniform: tuple[float, float] | None = None
-    normal: Normal | None = None
-    triangular: tuple[float, float, float] | None = None
-    """least, most likely, largest"""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_units(cls, data: Any) -> Any:
-        if not isinstance(data, dict):
-            return data
-        key = data.get("key") or next(iter(data.get("keys") or ()), "")
-        unit = "" if data.get("relative") else unit_of_key(str(key))
-        try:
-            return data | {way: in_si(data[way], unit) for way in WAYS if way in data}
-        except ValueError as error:
-            raise ValueError(f"of {key}: {error}") from None
-
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
-        ways = [w for w in WAYS if getattr(self, w) is not None]
-        if bool(self.key) == bool(self.keys):
-            raise ValueError("needs key or keys, one of the two")
-        if len(ways) != 1:
-            raise ValueError(f"of {self.title}: needs one of values, grid, uniform, log_uniform, normal, triangular")
-        pair = self.uniform or self.log_uniform
-        if pair is not None and not pair[0] < pair[1]:
-            raise ValueError(f"of {self.title}: {pair[0]} must be below {pair[1]}")
-        if self.log_uniform is not None and self.log_uniform[0] <= 0.0:
-            raise ValueError(f"of {self.title}: log_uniform needs positive bounds")
-        if self.grid is not None and self.grid[2] < 1:
-            raise ValueError(f"of {self.title}: grid needs at least one value")
-        if self.values is not None and not self.values:
-            raise ValueError(f"of {self.title}: values is empty")
-        if self.triangular is not None and not self.triangular[0] <= self.triangular[1] <= self.triangular[2]:
-            raise ValueError(f"of {self.title}: triangular must rise")
-        return self
-
-    @property
-    def all_keys(self) -> tuple[str, ...]:
-        return self.keys or (self.key,)
-
-    @property
-    def title(self) -> str:
-        return self.name or self.all_keys[0]
-
-    @property
-    def unit(self) -> str:
-        """Of the values."""
-        return (unit_of_key(self.all_keys[0]) if not self.relative else None) or "1"
-
-    def levels(self) -> np.ndarray | None:
-        """Values of a grid or list; None for a distribution."""
-        if self.values is not None:
-            return np.array(self.values)
-        return None if self.grid is None else np.linspace(self.grid[0], self.grid[1], self.grid[2])
-
-    def quantile(self, u: np.ndarray) -> np.ndarray:
-        """Values at probabilities 0 < u < 1."""
-        import scipy.stats as st
-
-        levels = self.levels()
-        if levels is not None:
-            out: Any = levels[np.minimum((u * len(levels)).astype(int), len(levels) - 1)]
-        elif self.uniform is not None:
-            out = self.uniform[0] + u * (self.uniform[1] - self.uniform[0])
-        elif self.log_uniform is not None:
-            a, b = (math.log(x) for x in self.log_uniform)
-            out = np.exp(a + u * (b - a))
-        elif self.normal is not None:
-            out = st.norm.ppf(u, self.normal.mean, self.normal.deviation)
-        else:
-            assert self.triangular is not None
-            low, mode, high = self.triangular
-            out = st.triang.ppf(u, (mode - low) / (high - low), low, high - low) if high > low else np.full_like(u, low)
-        return np.asarray(out, dtype=float)
+MOST_BASES = 100  # with other records, that are kept
+OWN_COLUMNS = ("run", "error", "switchings", "violated", "why", "not judged")
 
 
 class Trajectories(Part):
@@ -149,6 +49,8 @@ class Study(Part):
     title: str = ""
     scenario: Scenario
     """the base, with all values"""
+    written: dict[str, Any] = Field(default={})
+    """the base as its file has it, with `from` where it names a record; empty if made in Python"""
     design: Literal["grid", "list", "latin_hypercube", "sobol", "random", "saltelli"] = "grid"
     """grid: every combination; list: the first value of each, then the second, ...; saltelli: for Sobol indices"""
     runs: Annotated[int, Field(ge=1, le=MAX_RUNS)] | None = None
@@ -158,24 +60,48 @@ class Study(Part):
     keep: dict[str, str] = Field(min_length=1)
     """column = expression of the result variables, such as peak(load_speed) or energy.gear_losses"""
     trajectories: Trajectories | None = None
+    select: Selection | None = None
+    """which runs fit the task, and which of these are best"""
+
+    _bases: dict[tuple[Any, ...], Scenario] = PrivateAttr(default_factory=dict)
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
+        self._check_names()
+        self._check_keys()
+        self._check_design()
+        for name, text in self.keep.items():
+            try:
+                self._check_kept(read_expression(text))
+            except ValueError as error:
+                raise ValueError(f"keep.{name}: {error}") from None
+        if self.select is not None:
+            self._check_selection(self.select)
+        return self
+
+    def _check_names(self) -> None:
         titles = [v.title for v in self.vary]
         keys = [k for v in self.vary for k in v.all_keys]
         for name, values in (("name", titles), ("key", keys)):
             twice = [x for x in values if values.count(x) > 1]
             if twice:
                 raise ValueError(f"has the {name} {twice[0]} twice in vary")
+        for table in ("gearbox", "motor"):
+            if table in keys and f"{table}.from" in keys:
+                raise ValueError(f"has {table} and {table}.from in vary, which are the same; keep one")
+        for key in keys:
+            if key.split(".", maxsplit=1)[0] == "simulation":
+                raise ValueError(f"varies {key}; all runs must have the same samples")
+        for name in self.keep:
+            if name in {*titles, *OWN_COLUMNS} or name.startswith(USE):
+                raise ValueError(f"keeps {name!r}, a name that is taken; choose another")
+
+    def _check_design(self) -> None:
         for v in self.vary:
             if v.levels() is None and self.design in ("grid", "list"):
                 raise ValueError(
                     f"has design {self.design}, for which {v.title} needs values or grid, not a distribution"
                 )
-            for key in v.all_keys:
-                if key.split(".", maxsplit=1)[0] == "simulation":
-                    raise ValueError(f"varies {key}; all runs must have the same samples")
-                base_value(self.scenario, key)
         if self.design in ("grid", "list"):
             if self.runs is not None:
                 raise ValueError(f"has runs, but with design {self.design} their number follows; leave it out")
@@ -185,20 +111,90 @@ class Study(Part):
             raise ValueError("has design list, but vary has lists of different lengths")
         if self.design == "saltelli" and self.runs is not None and self.runs & (self.runs - 1):
             raise ValueError(f"has runs = {self.runs}; saltelli needs a power of two")
-        for name, text in self.keep.items():
-            if name in {*titles, "run", "error", "switchings"}:
-                raise ValueError(f"keeps {name!r}, a name that is taken; choose another")
-            try:
-                expression = read_expression(text)
-            except ValueError as error:
-                raise ValueError(f"keep.{name}: {error}") from None
-            if "ideal_speed" in expression.names and self.scenario.motor.kind != "dc":
-                raise ValueError(
-                    f"keep.{name}: ideal_speed needs a motor of kind dc; a torque source has no speed of its own"
-                )
         if self.total > MAX_RUNS:
             raise ValueError(f"has {self.total} runs, more than {MAX_RUNS}")
-        return self
+
+    def _check_kept(self, expression: Expression) -> None:
+        table = self.scenario.simulation
+        if any(not -table.samples <= k < table.samples for k in expression.indices):
+            raise ValueError(f"{expression.text!r} looks at a sample that a run of {table.samples} does not have")
+        if any(not 0.0 <= t <= table.duration for t in expression.instants):
+            raise ValueError(f"{expression.text!r} looks at an instant outside the {table.duration} s of a run")
+        motor_varies = any(TABLE_OF.get(key) == "motor" for v in self.vary for key in v.all_keys)
+        if "ideal_speed" in expression.names and self.scenario.motor.kind != "dc" and not motor_varies:
+            raise ValueError("ideal_speed needs a motor of kind dc; a torque source has no speed of its own")
+
+    def _check_keys(self) -> None:
+        """Sees that the keys are there to be varied: in the base, or where records vary, with one that can be run."""
+        scenario = self.scenario
+        named = [v for v in self.vary if v.names is not None]
+        if named:
+            for names in itertools.islice(itertools.product(*(v.names or () for v in named)), 1000):
+                try:
+                    changes = {v.all_keys[0]: name for v, name in zip(named, names, strict=True)}
+                    scenario = with_records(self.tables, changes)
+                    break
+                except ValueError:
+                    continue
+        from_record = isinstance(self.tables.get("gearbox"), str) or "from" in self.tables.get("gearbox", {})
+        for v in self.vary:
+            for key in v.all_keys:
+                if key in TABLE_OF:
+                    continue
+                if key in CONDITIONS and not (
+                    from_record or any(TABLE_OF.get(n.all_keys[0]) == "gearbox" for n in named)
+                ):
+                    raise ValueError(
+                        f"varies {key}, which belongs beside `from`, but the gearbox of the base scenario is written out; "
+                        "name a record there, or vary gearbox too"
+                    )
+                check_key(scenario, key, relative=v.relative)
+
+    def _check_selection(self, select: Selection) -> None:
+        numbers = {v.title: v.unit for v in self.vary if v.names is None}
+        units = numbers | {name: e.unit for name, e in self.expressions.items()}
+        if select.drive_check:
+            units |= {f"{USE}{rule}": "1" for rule in SHARES}
+        for column in select.named():
+            if column not in units:
+                raise ValueError(f"select: {column!r} is no column of numbers; they are {', '.join(units)}")
+        check_bounds(select, units)
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """The base as tables of a scenario file."""
+        return self.written or self.scenario.model_dump()
+
+    def scenario_at(self, row: np.ndarray) -> Scenario:
+        """The scenario of one run, by its row of `parameters`.
+
+        Raises
+        ------
+        InputError, pydantic.ValidationError
+            There is no such scenario.
+        """
+        values = {key: (v, v.value(number)) for v, number in zip(self.vary, row, strict=True) for key in v.all_keys}
+        records = {key: value for key, (_, value) in values.items() if key in TABLE_OF or key in CONDITIONS}
+        base = self._with_records(records) if records else self.scenario
+        changes = {
+            key: scaled(base_value(base, key), float(value)) if v.relative else value
+            for key, (v, value) in values.items()
+            if key not in records
+        }
+        return base.replace(**changes) if changes else base
+
+    def _with_records(self, records: dict[str, Any]) -> Scenario:
+        """The base with other records; the last ones are kept, since other parameters may vary beside them."""
+        key = tuple(sorted(records.items()))
+        found = self._bases.get(key)
+        if found is None:
+            # The names first, so that the conditions find them.
+            order = sorted(records, key=lambda k: k not in TABLE_OF)
+            found = with_records(self.tables, {k: records[k] for k in order})
+            if len(self._bases) >= MOST_BASES:
+                self._bases.clear()
+            self._bases[key] = found
+        return found
 
     @property
     def expressions(self) -> dict[str, Expression]:
@@ -231,78 +227,11 @@ class Study(Part):
             return out
         if self.design == "list":
             return np.stack([v.levels()[first:last] for v in self.vary], axis=1)  # type: ignore[index]
-        u = self._unit_cube(first, last)
+        u = unit_cube(self.design, len(self.vary), self.total, self.seed, first, last)
         return np.stack([v.quantile(u[:, k]) for k, v in enumerate(self.vary)], axis=1)
-
-    def _unit_cube(self, first: int, last: int) -> np.ndarray:
-        from scipy.stats import qmc
-
-        p = len(self.vary)
-        if self.design == "sobol":
-            sampler = qmc.Sobol(p, scramble=True, rng=np.random.default_rng(self.seed))
-            if first:
-                sampler.fast_forward(first)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # a part need not be a power of two
-                return _open(sampler.random(last - first))
-        if self.design == "saltelli":
-            return _open(_saltelli(p, self.runs or 1, self.seed)[first:last])
-        if self.design == "random":
-            # Each chunk has its own stream, so that any part can be made without those before it.
-            chunks = range(first // CHUNK, (last - 1) // CHUNK + 1)
-            rows = np.concatenate([np.random.default_rng([self.seed, c]).random((CHUNK, p)) for c in chunks])
-            begin = first - chunks[0] * CHUNK
-            return _open(rows[begin : begin + last - first])
-        return _open(_latin_hypercube(p, self.total, self.seed)[first:last])
-
-
-@lru_cache(maxsize=2)  # one part after the other is asked for
-def _latin_hypercube(p: int, n: int, seed: int) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    out = np.empty((n, p))
-    for k in range(p):
-        strata, inside = rng.permutation(n), rng.random(n)
-        out[:, k] = (strata + inside) / n
-    return out
-
-
-def _open(u: np.ndarray) -> np.ndarray:
-    """Within 0 and 1, both excluded."""
-    return np.asarray(np.clip(u, 1e-12, 1.0 - 1e-12))
-
-
-@lru_cache(maxsize=2)
-def _saltelli(p: int, base: int, seed: int) -> np.ndarray:
-    need("SALib", "The design saltelli", "study")
-    from SALib.sample import sobol
-
-    problem = {"num_vars": p, "names": [str(k) for k in range(p)], "bounds": [[0.0, 1.0]] * p}
-    return np.asarray(sobol.sample(problem, base, calc_second_order=True, seed=seed))
 
 
 # --- reading ---
-
-
-def base_value(scenario: Scenario, key: str) -> Any:
-    """What the base scenario has under a dotted key.
-
-    Raises
-    ------
-    ValueError
-        There is nothing of that name.
-    """
-    node: Any = scenario
-    for part in key.split("."):
-        node = (
-            node.get(part) if isinstance(node, dict) else getattr(node, part, None) if hasattr(node, part) else _Missing
-        )
-        if node is _Missing:
-            raise ValueError(f"varies {key}, which the base scenario does not know ({part})")
-    return node
-
-
-class _Missing:
-    """Stands for a key that is not there."""
 
 
 def load_study(path: str | Path) -> Study:
@@ -321,20 +250,63 @@ def load_study(path: str | Path) -> Study:
     changes = data.pop("set", {})
     if not isinstance(changes, dict):
         raise InputError(f'{path}: key set: must be a table, such as set = {{ "load.inertia" = 2 }}')
-    scenario = load(find_scenario(base, path.parent), changes)
+    where = find_scenario(base, path.parent)
+    scenario, written = load(where, changes), read_tables(where, changes)
+    for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:
+        _find_sheets(entry, path.parent)
     try:
-        return Study(scenario=scenario, **data)
+        return Study(scenario=scenario, written=written, **data)
     except ValidationError as error:
-        # A misspelt key is the cause of the missing one.
-        first = min(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
-        key = ".".join(str(k) for k in first["loc"])
-        plain = {
-            "extra_forbidden": "is not known; see the page on studies for the keys",
-            "missing": "is missing; add it",
-        }
-        text = str(first["ctx"]["error"]) if first["type"] == "value_error" else plain.get(first["type"], first["msg"])
-        more = "" if len(error.errors()) == 1 else f" (and {len(error.errors()) - 1} more)"
-        raise InputError(f"{path}: {f'key {key}: ' if key else 'the study '}{text}{more}") from None
+        raise InputError(f"{path}: {_describe(error)}") from None
+
+
+# What a failed check of the schema says, by its type.
+PLAIN = {
+    "extra_forbidden": "is not known; see the page on studies for the keys",
+    "missing": "is missing; add it",
+    "tuple_type": "must be a list",
+    "too_short": "must not be empty",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "string_type": "must be a text in quotes",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "int_type": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "finite_number": "must be a finite number",
+}
+
+
+def _describe(error: ValidationError) -> str:
+    """One line for a study that fails its schema: the key, the value and what would be right."""
+    # A list is also called too short if its entries have failed.
+    problems = [p for p in error.errors() if not (p["type"] == "too_short" and p["input"])]
+    # A misspelt key is the cause of the missing one.
+    first = min(problems, key=lambda problem: problem["type"] != "extra_forbidden")
+    kind, value = first["type"], first["input"]
+    loc = [part for part in first["loc"] if part not in ("float", "str")]  # which of two types was tried is no key
+    key = ".".join(str(part) for part in loc)
+    shown = "" if kind in ("extra_forbidden", "missing") or isinstance(value, dict | list | tuple) else f"{value!r} "
+    if kind == "value_error":
+        text = str(first["ctx"]["error"])
+    elif kind == "literal_error":
+        text = f"{shown}must be one of {first['ctx']['expected']}"
+    else:
+        text = shown + PLAIN.get(kind, first["msg"].replace("Input should", "must"))
+    more = "" if len(problems) == 1 else f" (and {len(problems) - 1} more)"
+    return f"{f'key {key}: ' if key else 'the study '}{text}{more}"
+
+
+def _find_sheets(entry: Any, directory: Path) -> None:
+    """Files of data sheets (.toml) among the values are relative to the study file."""
+    if isinstance(entry, dict) and entry.get("key") in TABLE_OF and isinstance(entry.get("values"), list):
+        entry["values"] = [
+            str((directory / name).resolve()) if isinstance(name, str) and name.endswith(".toml") else name
+            for name in entry["values"]
+        ]
 
 
 def from_json(text: str) -> Study:

@@ -13,32 +13,26 @@ from .panels import STYLES
 from .plots import Picture, in_our_looks
 from .study_engine import study_of
 from .study_file import Study
+from .study_selection_report import show_selection
+from .study_table import labelled, read_table
+from .study_vary import Vary
 
 if TYPE_CHECKING:
     import pyarrow as pa
     from matplotlib.figure import Figure
 
+MOST_LABELS = 20  # names along an axis
 INK, ACCENT = STYLES["2-DOF-NL"]["color"], STYLES["2-DOF-L"]["color"]
 
 
-def read_table(directory: Path) -> pa.Table:
-    """All rows that are there, in the order of the runs."""
-    import pyarrow.dataset as ds
-
-    files = sorted(str(p) for p in directory.glob("part-*.parquet"))
-    if not files:
-        raise InputError(f"{directory}: holds no runs yet; run the study first")
-    return ds.dataset(files, format="parquet").to_table().sort_by("run")
-
-
-def labelled(table: pa.Table, name: str) -> str:
-    """A column's name with its unit."""
-    unit = (table.schema.field(name).metadata or {}).get(b"units", b"1").decode()
-    return name if unit == "1" else f"{name} [{unit}]"
+def figures_of(directory: Path) -> Path:
+    """Where the figures go: not among the data, all of which readers of Parquet directories try to read."""
+    whole = directory.resolve()
+    return whole.with_name(f"{whole.name}-figures")
 
 
 def statistics(table: pa.Table, study: Study) -> list[list[Any]]:
-    """Name, mean, deviation, least, 5 %, 50 %, 95 %, largest of each kept value."""
+    """Name, mean, standard deviation, least, 5 %, 50 %, 95 %, largest of each kept value."""
     rows = []
     for name in study.keep:
         x = _finite(table, name)
@@ -55,15 +49,20 @@ def _finite(table: pa.Table, name: str) -> np.ndarray:
     return np.asarray(x[np.isfinite(x)])
 
 
+def _with_order(study: Study) -> list[Vary]:
+    """The parameters whose values are numbers; names have no order."""
+    return [v for v in study.vary if v.names is None]
+
+
 def influence(table: pa.Table, study: Study) -> dict[str, dict[str, float]]:
-    """Spearman's rank correlation of each kept value with each parameter."""
+    """Spearman's rank correlation of each kept value with each parameter that is a number."""
     from scipy.stats import spearmanr
 
     out: dict[str, dict[str, float]] = {}
     for name in study.keep:
         y = table[name].to_numpy()
         out[name] = {}
-        for v in study.vary:
+        for v in _with_order(study):
             x = table[v.title].to_numpy()
             good = np.isfinite(y)
             varies = good.sum() > 2 and np.ptp(x[good]) > 0.0 and np.ptp(y[good]) > 0.0
@@ -93,10 +92,37 @@ def sobol_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[fl
     return out
 
 
+def best_lines(directory: Path, text: str) -> list[str]:
+    """The ten best runs as text, for ``COLUMN``, ``COLUMN:least`` or ``COLUMN:largest``.
+
+    Raises
+    ------
+    InputError
+        There is no such column, or direction.
+    """
+    table = read_table(directory)
+    name, colon, direction = text.rpartition(":")
+    if not colon or text in table.column_names:
+        name, direction = text, "least"
+    if direction not in ("least", "largest"):
+        raise InputError(f"--best {text}: the direction must be least or largest, as in {name}:largest")
+    rows = best_runs(table, name, largest=direction == "largest").to_pylist()
+    plain = ["run", *(v.title for v in study_of(directory).vary), *study_of(directory).keep, "switchings"]
+    shown = [", ".join(f"{c} {_short(row[c])}" for c in plain) for row in rows]
+    return [f"{direction.capitalize()} {labelled(table, name)}:", *(f"  {line}" for line in shown)]
+
+
+def _short(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, int | float) else str(value)
+
+
 def best_runs(table: pa.Table, name: str, count: int = 10, *, largest: bool = False) -> pa.Table:
     """The rows with the least (or largest) values of a column."""
-    if name not in table.column_names:
-        raise InputError(f"--best {name}: there is no such column; they are {', '.join(table.column_names)}")
+    import pyarrow as pa
+
+    numbers = [f.name for f in table.schema if pa.types.is_floating(f.type) or pa.types.is_integer(f.type)]
+    if name not in numbers:
+        raise InputError(f"--best {name}: there is no such column of numbers; they are {', '.join(numbers)}")
     good = table.filter(np.isfinite(table[name].to_numpy()))
     return good.sort_by([(name, "descending" if largest else "ascending")]).slice(0, count)
 
@@ -147,39 +173,45 @@ def bars(values: dict[str, dict[str, Any]], label: str) -> Figure:
 @in_our_looks
 def scatter(table: pa.Table, study: Study, most: int = 6) -> Figure:
     """Kept values over parameters, at most six of each and 5000 points."""
-    keep, vary = list(study.keep)[:most], [v.title for v in study.vary][:most]
+    keep, vary = list(study.keep)[:most], study.vary[:most]
     some = table.take(np.linspace(0, table.num_rows - 1, min(table.num_rows, 5000)).astype(int))
     figure = Picture(figsize=(max(4.5, 2.6 * len(vary)), 2.3 * len(keep)))
     for r, name in enumerate(keep):
-        for c, parameter in enumerate(vary):
+        for c, v in enumerate(vary):
             axes = figure.add_subplot(len(keep), len(vary), r * len(vary) + c + 1)
-            axes.plot(some[parameter].to_numpy(), some[name].to_numpy(), ".", markersize=2.5, color=INK, alpha=0.5)
+            x = some[v.title].to_pylist()
+            places = [v.names.index(value) for value in x] if v.names is not None else x
+            axes.plot(places, some[name].to_numpy(), ".", markersize=2.5, color=INK, alpha=0.5)
             axes.tick_params(labelsize=7)
+            if v.names is not None:
+                few = len(v.names) <= MOST_LABELS and r == len(keep) - 1
+                axes.set_xticks(range(len(v.names)), v.names if few else [""] * len(v.names), rotation=90, fontsize=6)
             if r == len(keep) - 1:
-                axes.set_xlabel(labelled(table, parameter), fontsize=8)
+                axes.set_xlabel(labelled(table, v.title), fontsize=8)
             if c == 0:
                 axes.set_ylabel(labelled(table, name), fontsize=8)
     return figure
 
 
 def show(directory: Path) -> list[str]:
-    """Writes figures and statistics.csv beside the data; returns what to print."""
+    """Writes figures and statistics.csv into a directory beside that of the data; returns what to print."""
     need("pyarrow", "Showing a study", "study")
     need("scipy", "Showing a study", "study")
     study, table = study_of(directory), read_table(directory)
     rows = statistics(table, study)
-    header = ["", "mean", "deviation", "least", "5 %", "50 %", "95 %", "largest"]
+    header = ["", "mean", "std. dev.", "least", "5 %", "50 %", "95 %", "largest"]
     failed = [e for e in table["error"].to_pylist() if e]
     lines = [study.title or str(directory), f"  {table.num_rows} of {study.total} runs, {len(failed)} failed"]
     lines += [f"    {failed.count(e)} x {e}" for e in list(dict.fromkeys(failed))[:5]]
     width = max(len(r[0]) for r in rows) + 2
     lines.append("  " + header[0].ljust(width) + "".join(h.rjust(12) for h in header[1:]))
     lines += ["  " + r[0].ljust(width) + "".join(f"{x:12.5g}" for x in r[1:]) for r in rows]
-    view = directory / "show"
+    view = figures_of(directory)
     view.mkdir(exist_ok=True)
     write_text(view / "statistics.csv", table_csv(["value", *header[1:]], rows))
     save_figure(distributions(table, study), view, "distributions")
-    save_figure(bars(influence(table, study), "rank correlation [-]"), view, "tornado")
+    if _with_order(study):
+        save_figure(bars(influence(table, study), "rank correlation [-]"), view, "tornado")
     save_figure(scatter(table, study), view, "scatter")
     if study.design == "saltelli" and table.num_rows == study.total and not failed:
         indices = sobol_indices(table, study)
@@ -187,5 +219,7 @@ def show(directory: Path) -> list[str]:
         for name, by_parameter in indices.items():
             shares = ", ".join(f"{p} {s1:.3f} ({st:.3f})" for p, (s1, st) in by_parameter.items())
             lines.append(f"  Sobol indices of {name}, first order (total): {shares}")
+    if study.select is not None:
+        lines += show_selection(table, study, view)
     lines.append(f"Figures and statistics are in {view}")
     return lines

@@ -7,13 +7,13 @@ from functools import cache
 from typing import Any
 
 from .quantities import unit_in_schema
-from .scenario import Scenario
+from .scenario import json_schema
 from .units import si_number, to_si
 
 
 @cache
 def _schema() -> dict[str, Any]:
-    return Scenario.model_json_schema()
+    return json_schema()
 
 
 def _options(node: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -33,12 +33,11 @@ def unit_of_key(key: str) -> str | None:
     """SI unit of a dotted key of the scenario; empty for a plain number, None if it is no quantity or not known."""
     nodes = [_schema()]
     for part in key.split("."):
-        nodes = [
-            option
+        inner = [
+            node["items"] if part.isdigit() and "items" in node else node.get("properties", {}).get(part)
             for node in nodes
-            if part in node.get("properties", {})
-            for option in _options(node["properties"][part])
         ]
+        nodes = [option for node in inner if node is not None for option in _options(node)]
     return next((unit for node in nodes if (unit := unit_in_schema(node)) is not None), None)
 
 
@@ -48,8 +47,10 @@ def in_si(value: Any, unit: str | None) -> Any:
     Raises
     ------
     ValueError
-        A string is no number with a unit, or has the unit of something else.
+        A string is no number with a unit, or has the unit of something else; or a value is true or false.
     """
+    if isinstance(value, bool):
+        raise ValueError(f"{str(value).lower()} is no number")
     if isinstance(value, str):
         return si_number(value) if unit is None else to_si(value, unit)
     if isinstance(value, list | tuple):

@@ -18,6 +18,7 @@ from .parts import Drive, Gearbox, Load, Motor, Rigid
 from .run import simulate
 from .scenario import Initial
 from .signals import CommandSignal, Samples, TorqueSignal
+from .switchings import switchings_of
 
 if TYPE_CHECKING:
     import xarray
@@ -262,13 +263,13 @@ class TestRig:
     @staticmethod
     def _break_away(result: xarray.Dataset) -> tuple[float, float]:
         """(instant [s], output torque [N·m]) at which the input shaft first starts to turn."""
-        before = result["switching_contacts_before"].sel(contact="input_contact").values
-        after = result["switching_contacts_after"].sel(contact="input_contact").values
-        events = np.flatnonzero((before == 0) & (after != 0))
+        switchings = switchings_of(result)
+        freed = (switchings["input_contact_before"] == 0) & (switchings["input_contact_after"] != 0)
+        events = np.flatnonzero(freed.values)
         if len(events) == 0:
             raise RigError("the input shaft never started to turn")
         k = events[0]
-        return float(result["switching_time"][k]), float(result["switching_output_torque_before"][k])
+        return float(switchings["instant"][k]), float(switchings["output_torque_before"][k])
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,90 @@
+"""The switchings of a run: a dataset of their own, which travels with the result as one of its attributes."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .variables import CONTACTS
+
+if TYPE_CHECKING:
+    import xarray
+
+# What ended a regime, in the order of Guard::Kind (core/lostmotion/regime.hpp); last: an input jumped.
+CAUSES = ("came to rest", "broke away", "torsion piece", "loss cell", "loss cell", "voltage limit", "", "input changed")
+
+ATTRIBUTE = "switchings"
+# Columns of the core's table (bindings/convert.hpp). Left out is the contact, which means nothing for most causes.
+COLUMNS = (0, 1, 3, 4, 5, 6, 7, 8, 9, 10)
+NAMES = (
+    "instant",
+    "cause",
+    *(f"{contact}_{when}" for when in ("before", "after") for contact in CONTACTS),
+    "output_torque_before",
+    "output_torque_after",
+)
+
+
+def packed(table: Any) -> str:
+    """The core's table of switchings as text, as an attribute can hold it: all bits of its numbers."""
+    rows = np.asarray(table, dtype="<f8")
+    return _text(rows[:, COLUMNS] if len(rows) else rows)
+
+
+def packed_again(columns: Mapping[str, Any]) -> str:
+    """The same from the columns of `switchings_of`."""
+    return _text(np.stack([np.asarray(columns[name], dtype="<f8") for name in NAMES], axis=1))
+
+
+def _text(rows: np.ndarray) -> str:
+    return base64.b64encode(rows.tobytes()).decode()
+
+
+def switchings_of(result: xarray.Dataset) -> xarray.Dataset:
+    """The switchings of a run, one entry each along the dimension ``switching``.
+
+    Parameters
+    ----------
+    result
+        From `simulate` or `open_result`.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``instant`` [s]; ``cause``, what ended the regime (its attributes name the flags); for each contact its mode before and
+        after (``input_contact_before``, ...; 2: there is none); ``output_torque_before`` and ``output_torque_after`` [N·m],
+        the left and right limit. Of a long run the first 100,000; ``switching_count`` of the result counts all.
+
+    Raises
+    ------
+    ValueError
+        The dataset is no result of `simulate`.
+    """
+    import xarray as xr
+
+    if ATTRIBUTE not in result.attrs:
+        raise ValueError(
+            "this dataset has no switchings; give a result of simulate or open_result, attributes included"
+        )
+    rows = np.frombuffer(base64.b64decode(result.attrs[ATTRIBUTE]), dtype="<f8").reshape(-1, len(NAMES))
+    variables = {}
+    for name, values in zip(NAMES, rows.T, strict=True):
+        own = values.copy() if name.startswith(("instant", "output")) else values.astype(np.int8)
+        variables[name] = ("switching", own, _about(name))
+    return xr.Dataset(variables)
+
+
+def _about(name: str) -> dict[str, Any]:
+    if name == "instant":
+        return {"units": "s", "long_name": "instant of switching"}
+    if name == "cause":
+        flags = range(-1, len(CAUSES) - 2)
+        meanings = " ".join(CAUSES[k].replace(" ", "_") for k in flags)
+        return {"long_name": "what ended the regime", "flag_values": list(flags), "flag_meanings": meanings}
+    what, _, when = name.rpartition("_")
+    if what == "output_torque":
+        return {"units": "N*m", "long_name": f"output torque, {'left' if when == 'before' else 'right'} limit"}
+    return {"long_name": f"mode of the {what.replace('_', ' ')} {when} the switching; 2: there is none"}

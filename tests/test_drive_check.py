@@ -1,0 +1,271 @@
+"""The drive check: duty cycle and means, heat, holding, and that no verdict is the same for every drive."""
+
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import lostmotion as lm
+from conftest import ROOT, SCENARIOS
+from lostmotion.cli import app
+from lostmotion.drive_check import RULES, Finding, check_drive
+from lostmotion.duty_cycle import DutyCycle, duty_cycle
+from lostmotion.holding import holding
+from lostmotion.scenario import from_tables
+
+RPM = math.pi / 30.0
+
+
+def by_rule(scenario: lm.Scenario) -> dict[str, Finding]:
+    return {f.rule: f for f in check_drive(scenario)}
+
+
+def move(duration: float = 0.25, **changes) -> lm.Scenario:
+    """A torque source that accelerates a load for 0.1 s and brakes it for 0.1 s with 0.5 N·m; then all is at rest."""
+    torque = {"steps": [{"height": 0.5}, {"height": -1.0, "time": 0.1}, {"height": 0.5, "time": 0.2}]}
+    scenario = lm.Scenario(
+        command=torque,
+        motor={
+            "kind": "torque_source",
+            "rotor_inertia": 1e-4,
+            "rated_torque": 1.0,
+            "limits": {
+                "continuous_torque": 0.6,
+                "torque_constant": 0.05,
+                "resistance": 0.2,
+                "thermal_resistance": 5.0,
+                "max_winding_temperature": 155.0,
+                "max_speed": 1000.0,
+                "max_voltage": 48.0,
+                "max_current": 12.0,
+            },
+        },
+        gearbox={
+            "ratio": 50.0,
+            "rated_input_speed": 300.0,
+            "rated_output_torque": 20.0,
+            "stiffness": {"kind": "rigid"},
+            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
+            "limits": {"peak_output_torque": 40.0, "max_input_speed": 600.0},
+        },
+        load={"inertia": 0.25},
+        task={"max_lost_motion": 1e-3},
+        simulation={"duration": duration, "sample_interval": 1e-3},
+    )
+    return scenario.replace(**changes)
+
+
+# --- duty cycle ---
+
+
+def test_means_are_those_of_the_maker_s_worked_example():
+    """Harmonic Drive, CSF & CSG catalogue, selection example: 319 N·m and 12 rpm (at the output)."""
+    pattern = [(0.3, 7.0, 400.0), (3.0, 14.0, 320.0), (0.4, 7.0, -200.0)]  # s, rpm, N·m; then a pause of 0.2 s
+    ends = np.cumsum([0.0] + [t for t, _, _ in pattern])
+    time = np.repeat(ends, 2)[1:-1]
+    speed, torque = (np.repeat([p[k] for p in pattern], 2) for k in (1, 2))
+    cycle = DutyCycle(time, speed * RPM, torque, torque, 0.0, 3.9)
+    assert cycle.mean_output_torque() == pytest.approx(319.0, abs=1.0)
+    assert cycle.mean_input_speed() / RPM == pytest.approx(12.0, abs=0.05)
+
+
+def test_heat_and_loads_do_not_depend_on_how_long_the_run_rests_afterwards():
+    short, long, longest = (by_rule(move(duration)) for duration in (0.25, 20.0, 50_000.0))
+    assert longest["motor_torque"].use == pytest.approx(short["motor_torque"].use, rel=0.02)
+    assert longest["peak_output_torque"].use == pytest.approx(short["peak_output_torque"].use, rel=1e-3)
+    for rule in ("motor_torque", "winding_temperature", "average_output_torque", "average_input_speed"):
+        assert long[rule].use == pytest.approx(short[rule].use, rel=0.02), rule
+        assert long[rule].verdict == short[rule].verdict
+        assert "of 0.2" in short[rule].value
+        assert "repeated without a pause" in short[rule].value
+    # 0.5 N·m throughout: 10 A, 20 W at 25 °C, times 5 K/W; R rises with 0.393 %/K.
+    assert short["motor_torque"].use == pytest.approx(0.5 / 0.6, rel=0.01)
+    rise = 100.0 / (1.0 - 0.00393 * 100.0)
+    assert short["winding_temperature"].use == pytest.approx(rise / 130.0, rel=0.02)
+    assert short["winding_temperature"].verdict == "warning"
+
+
+def test_the_cycle_of_the_task_brings_the_pause():
+    for duration in (0.25, 5.0):
+        found = by_rule(move(duration, **{"task.cycle": 0.8}))
+        assert found["motor_torque"].use == pytest.approx(0.5 * math.sqrt(0.2 / 0.8) / 0.6, rel=0.01)
+        rise = 25.0 / (1.0 - 0.00393 * 25.0)
+        assert found["winding_temperature"].use == pytest.approx(rise / 130.0, rel=0.02)
+        assert found["winding_temperature"].verdict == "ok"
+        assert "every 0.8 s" in found["winding_temperature"].value
+        # Speed is a triangle of 0.2 s; the mean torque of the gearbox does not know of pauses.
+        top = 0.5 * 0.1 / (1e-4 + 0.25 / 50.0**2)
+        assert found["average_input_speed"].use == pytest.approx(0.5 * top * 0.2 / 0.8 / 300.0, rel=0.01)
+        assert found["average_output_torque"].use == pytest.approx(0.25 * top / 50.0 / 0.1 / 20.0, rel=0.01)
+
+
+def test_holding_a_load_heats_even_at_rest():
+    """A vertical axis: 0.3 N·m hold it before and after the move; no pause cools the motor below that."""
+    scenario = move(
+        1.0,
+        **{"command.mean": 0.3, "load.torque": 15.0, "task.hold_without_power": False, "motor.friction_torque": 1e-3},
+    )
+    cycle = duty_cycle(lm.simulate(scenario), 100.0)
+    assert cycle.rms_motor_torque() == pytest.approx(0.3, rel=0.01)
+    at_rest = duty_cycle(lm.simulate(move(1.0, command=0.0)), None)
+    assert not at_rest.moves
+    assert at_rest.rms_motor_torque() == at_rest.mean_output_torque() == 0.0
+    assert "at rest" in str(at_rest)
+
+
+def test_the_reversal_of_a_sine_is_no_rest():
+    """Where the speed passes zero the torque is largest; a run that ends there must not be taken to hold it for good."""
+    sine = {"sines": [{"amplitude": 0.5, "frequency": 2.0, "phase": math.pi / 2.0}]}
+    cycle = duty_cycle(lm.simulate(move(1.0, command=sine)), None)  # ends at zero speed, at the largest torque
+    assert cycle.holding_torque is None
+    assert cycle.duration == pytest.approx(1.0)
+    assert cycle.rms_motor_torque() == pytest.approx(0.5 / math.sqrt(2.0), rel=1e-3)
+    # Nor is a shaft that sticks at each reversal, while the torque on it rises.
+    small = duty_cycle(lm.simulate(lm.load(ROOT / "scenarios" / "paper-2dof-nl-small.toml")), None)
+    assert small.duration == 2.0
+
+
+def test_waiting_before_the_move_is_no_part_of_the_cycle():
+    later = {"steps": [{"height": h, "time": t + 3.0} for h, t in ((0.5, 0.0), (-1.0, 0.1), (0.5, 0.2))]}
+    now, then = by_rule(move(0.25)), by_rule(move(3.25, command=later))
+    for rule in ("motor_torque", "winding_temperature", "average_input_speed"):
+        assert then[rule].use == pytest.approx(now[rule].use, rel=0.02)
+
+
+def test_a_cycle_that_does_not_fit_the_run_is_refused():
+    with pytest.raises(lm.InputError, match=r"task.cycle: 0.1 s is shorter than the motion of 0\.2"):
+        check_drive(move(**{"task.cycle": 0.1}))
+    with pytest.raises(lm.InputError, match="still turns at its end; lengthen simulation"):
+        check_drive(move(0.15, **{"task.cycle": 1.0}))
+
+
+# --- holding ---
+
+
+def vertical(**changes) -> lm.Scenario:
+    path = ROOT / "scenarios" / "overrunning-load.toml"
+    return lm.load(path, {"command": 0.0, "simulation.duration": 4.0}).replace(**changes)
+
+
+def test_a_falling_axis_is_called_so():
+    scenario = vertical()
+    truth = float(lm.simulate(scenario)["load_speed"][-1])
+    assert truth < -0.3
+    finding = by_rule(scenario)["holding"]
+    assert finding.verdict == "warning"
+    assert f"drives the load at {truth:.3g} rad/s" in finding.value
+    assert by_rule(vertical(**{"task.hold_without_power": False}))["holding"].verdict == "ok"
+    assert by_rule(vertical(**{"load.torque": 1.0}))["holding"].verdict == "ok"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_torque_that_is_held_at_rest_is_that_of_all_friction(sign: float):
+    """Rigid gear without losses: bearings of motor and load hold T_10 i + T_L, at rest as in motion."""
+    changes = {"motor.friction_torque": 0.02, "load.friction_torque": 0.5, "task.hold_without_power": True}
+    limit = 0.02 * 50.0 + 0.5
+    for share, holds in ((0.98, True), (1.02, False)):
+        found = holding(move(**changes, command=0.0), sign * share * limit, 0.0)
+        assert found.holds is holds
+        assert (found.from_rest == 0.0) is holds
+        assert holds or math.copysign(1.0, found.from_rest) == -sign  # the load follows its torque
+
+
+@pytest.mark.parametrize(
+    ("name", "speed", "verdict"),
+    [("nord-sk1si50-30", 0.0, "ok"), ("nord-sk1si50-30", 3.6, "warning"), ("motovario-sw050-100", 3.6, "ok")],
+)
+def test_a_worm_gear_that_locks_at_rest_may_not_stop_a_moving_load(name: str, speed: float, verdict: str):
+    """Static efficiencies 0.36 and 0.23: both lock at rest. Efficiency e in motion makes 2 - 1/e in reverse: 0.46 and below 0."""
+    ratio = float(name.rsplit("-", 1)[1])
+    stiffness = {"kind": "linear", "stiffness": 5e3}
+    tables = move().model_dump(exclude_none=True) | {
+        "command": 0.0,
+        "gearbox": {"from": name, "rated_output_torque": 60.0, "inertia": 1e-4, "stiffness": stiffness},
+        "load": {"inertia": 5.0, "torque": 30.0},
+        "initial": {"motor_speed": -speed * ratio, "load_speed": -speed},
+    }
+    finding = by_rule(from_tables(tables))["holding"]
+    assert finding.verdict == verdict
+    assert finding.value.startswith("at rest only" if verdict == "warning" else "the load stays at rest")
+    assert ("ever faster" in finding.value) is (verdict == "warning")
+
+
+def test_a_load_that_slows_down_for_long_is_not_said_to_go_on():
+    # 0.1 N·m too much friction against 250 kg m2 on the shaft: it takes minutes to stop.
+    changes = {"command": 0.0, "load.inertia": 250.0, "load.friction_torque": 10.1, "load.torque": 10.0}
+    found = holding(move(**changes), 10.0, 0.2)
+    assert found.holds
+    assert not holding(move(**changes), 10.3, 0.2).holds
+
+
+# --- all rules ---
+
+OTHERWISE = {
+    "average_output_torque": {"gearbox.rated_output_torque": 1.0},
+    "peak_output_torque": {"gearbox.limits.peak_output_torque": 1.0},
+    "average_input_speed": {"gearbox.rated_input_speed": 50.0},
+    "max_input_speed": {"gearbox.limits.max_input_speed": 50.0},
+    "max_motor_speed": {"motor.limits.max_speed": 50.0},
+    "motor_torque": {"motor.limits.continuous_torque": 0.4},
+    "winding_temperature": {"motor.limits.max_winding_temperature": 200.0},
+    "voltage": {"motor.limits.max_voltage": 5.0},
+    "current": {"motor.limits.max_current": 9.0},
+    "inertia_ratio": {"load.inertia": 5.0},
+    "resonance": {"command.sines": [{"amplitude": 0.01, "frequency": 60.0}]},
+    "dead_zone": {"motor.friction_torque": 0.3},
+    "lost_motion": {"gearbox.stiffness": {"kind": "curve", "slopes": [2e4], "backlash": 2e-3}},
+    "holding": {"load.torque": 0.1},
+}
+
+
+@pytest.mark.parametrize("rule", OTHERWISE)
+def test_no_verdict_is_the_same_for_every_drive(rule: str):
+    base = {"gearbox.stiffness": {"kind": "linear", "stiffness": 2e4}} if rule == "resonance" else {}
+    first, second = (by_rule(s)[rule] for s in (move(**base), move(**base, **OTHERWISE[rule])))
+    assert {first.verdict, second.verdict} == {"ok", "warning"}
+    if first.use is not None and second.use is not None:
+        assert (first.use > 1.0) == (first.verdict == "warning")
+        assert (second.use > 1.0) == (second.verdict == "warning")
+
+
+def test_the_page_on_the_drive_check_names_every_rule():
+    page = (ROOT / "docs" / "drive-check.md").read_text()
+    for rule in RULES:
+        assert f"`{rule}`" in page
+
+
+def test_leaving_the_data_of_the_loss_map_is_found():
+    path = ROOT / "scenarios" / "paper-2dof-nl-large.toml"
+    assert by_rule(lm.load(path))["loss_map"].verdict == "ok"
+    assert by_rule(lm.load(path, {"load.torque": 100.0}))["loss_map"].verdict == "warning"
+
+
+def test_every_rule_is_tried_and_names_its_source():
+    assert set(OTHERWISE) | {"loss_map"} == set(RULES)
+    for finding in check_drive(move()):
+        assert finding.source
+        assert f"[{finding.source}]" in str(finding)
+
+
+def test_voltage_and_current_are_those_of_the_motor_equation():
+    found = by_rule(move())
+    top = 0.5 * 0.1 / (1e-4 + 0.25 / 50.0**2)
+    assert found["voltage"].use == pytest.approx((0.2 * 10.0 + 0.05 * top) / 48.0, rel=0.01)
+    assert found["current"].use == pytest.approx(10.0 / 12.0)
+    dc = lm.load(ROOT / "scenarios" / "voltage-limited-start.toml")
+    assert by_rule(dc)["voltage"].verdict == "warning"  # its amplifier ends before its command does
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
+def test_every_scenario_can_be_checked(path):
+    findings = check_drive(lm.load(path))
+    assert {f.rule for f in findings} >= {"average_output_torque", "motor_torque", "holding", "lost_motion", "voltage"}
+
+
+def test_the_command_line_says_what_is_wrong():
+    path = ROOT / "scenarios" / "overrunning-load.toml"
+    done = CliRunner().invoke(app, ["drive", "check", str(path)])
+    assert done.exit_code == 0
+    assert "WARNING  holding 20 N·m with command 0: the load torque drives the load" in done.output
+    assert "No warnings" not in done.output

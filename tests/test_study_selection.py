@@ -1,0 +1,216 @@
+"""Which gearbox is best for a task: what fits, why the others do not, what each limit costs, the Pareto front."""
+
+import csv
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import lostmotion as lm
+from conftest import ROOT
+from lostmotion.cli import app
+from lostmotion.drive_check import check_drive
+from lostmotion.study_chunk import scenario_of_run
+from lostmotion.study_report import best_lines
+from lostmotion.study_select import Selection
+from lostmotion.study_selection import NOT_RUN, Candidate, candidates, pareto_front, prices
+from lostmotion.study_table import read_table
+
+EXAMPLE = ROOT / "examples" / "select-gearbox.toml"
+
+
+@pytest.fixture(scope="module")
+def selection(tmp_path_factory: pytest.TempPathFactory) -> tuple[lm.Study, Path]:
+    directory = tmp_path_factory.mktemp("selection") / "rows"
+    study = lm.load_study(EXAMPLE)
+    return study, lm.study(study, directory)
+
+
+def test_what_fits_is_what_a_check_of_each_drive_by_itself_finds(selection: tuple[lm.Study, Path]):
+    study, directory = selection
+    ranked = candidates(read_table(directory), study)
+    assert sorted(c.run for c in ranked) == list(range(study.total))
+    for c in ranked:
+        try:
+            scenario = scenario_of_run(study, c.run)
+        except lm.InputError as error:
+            assert c.violated == (NOT_RUN,)
+            assert c.why == str(error)
+            continue
+        result = lm.simulate(scenario)
+        wrong = {f.rule for f in check_drive(scenario) if f.verdict == "warning"}
+        if float(result["load_angle"].max() - result["load_angle"].min()) < math.radians(45.0):
+            wrong.add("travel")
+        assert set(c.violated) == wrong, c.name
+        assert c.values["energy"] == lm.energy_of(result)["source"]
+        most = max((f for f in check_drive(scenario) if f.use is not None), key=lambda f: f.use)
+        assert c.tightest == f"{most.rule} {100.0 * most.use:.0f} %"
+    fitting = [c for c in ranked if c.fits]
+    assert 1 < len(fitting) < len(ranked) - sum(NOT_RUN in c.violated for c in ranked)
+    assert ranked[: len(fitting)] == fitting
+    assert [c.values["energy"] for c in fitting] == sorted(c.values["energy"] for c in fitting)
+    nearness = [99 if NOT_RUN in c.violated else len(c.violated) for c in ranked]
+    assert nearness == sorted(nearness)
+
+
+def test_a_slow_study_shows_progress_within_a_chunk(tmp_path: Path):
+    text = (
+        EXAMPLE.read_text().replace('base = "..', f'base = "{ROOT}').replace("ratio = [40, 130]", "ratio = [40, 100]")
+    )
+    (tmp_path / "s.toml").write_text(text)
+    study = lm.load_study(tmp_path / "s.toml")
+    seen: list[int] = []
+    lm.study(study, tmp_path / "rows", progress=seen.append)
+    assert 20 < study.total < 40
+    assert seen == [0, 20, study.total]
+
+
+def test_the_command_line_shows_the_selection(selection: tuple[lm.Study, Path]):
+    _, directory = selection
+    done = CliRunner().invoke(app, ["study", "show", str(directory), "--best", "energy:largest"])
+    assert done.exit_code == 0, done.output
+    for text in (
+        "Selection: ",
+        " fit, ",
+        "Pareto front",
+        "What each limit costs:",
+        "best without it",
+        "Largest energy [J]",
+    ):
+        assert text in done.output
+    figures = directory.with_name("rows-figures")
+    assert {"selection.csv", "limits.csv", "pareto.png", "pareto.svg"} <= {p.name for p in figures.iterdir()}
+    assert {p.suffix for p in directory.iterdir()} == {".parquet", ".json"}
+    with (figures / "selection.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [int(r["rank"]) for r in rows] == list(range(1, len(rows) + 1))
+    assert all(r["why"] for r in rows if r["fits"] == "no")
+    assert not any(r["why"] for r in rows if r["fits"] == "yes")
+    assert {r["gearbox"] for r in rows} == set(lm.load_study(EXAMPLE).vary[0].names)
+
+
+def made(*rows: tuple[str, str, float, float]) -> list[Candidate]:
+    return [
+        Candidate(
+            k,
+            name,
+            (NOT_RUN,) if violated == NOT_RUN else tuple(violated.split()),
+            violated,
+            "",
+            {"cost": cost, "speed": speed},
+        )
+        for k, (name, violated, cost, speed) in enumerate(rows)
+    ]
+
+
+SELECT = Selection(objectives={"cost": "least", "speed": "largest"})
+
+
+def test_a_limit_costs_what_the_best_without_it_would_save():
+    ranked = made(
+        ("a", "", 10.0, 1.0),
+        ("b", "", 12.0, 5.0),
+        ("c", "torque", 6.0, 1.0),
+        ("d", "torque", 11.0, 9.0),
+        ("e", "torque heat", 1.0, 9.0),
+        ("f", "noise", 20.0, 9.0),
+        ("g", NOT_RUN, math.nan, math.nan),
+    )
+    found = {p.limit: p for p in prices(ranked, SELECT)}
+    assert list(found) == ["torque", "heat", "noise"]
+    torque = found["torque"]
+    assert (torque.excludes, torque.alone, torque.best.name) == (3, 2, "c")
+    assert torque.gain == pytest.approx(0.4)
+    assert (found["heat"].excludes, found["heat"].alone, found["heat"].best.name) == (1, 0, "a")
+    assert found["heat"].gain == found["noise"].gain == 0.0
+    nothing = {p.limit: p for p in prices(made(("c", "torque", 6.0, 1.0), ("e", "torque heat", 1.0, 9.0)), SELECT)}
+    assert nothing["torque"].best.name == "c"
+    assert math.isnan(nothing["torque"].gain)
+    assert nothing["heat"].best is None
+
+
+def test_the_front_is_what_a_comparison_of_all_pairs_leaves():
+    rng = np.random.default_rng(5)
+    rows = [(str(k), "" if rng.random() < 0.7 else "x", *np.round(rng.random(2), 1)) for k in range(60)]
+    ranked = made(*rows)
+    left = {c.run for c in ranked if c.fits}
+    for a, b in itertools.permutations([c for c in ranked if c.fits], 2):
+        better = a.values["cost"] <= b.values["cost"] and a.values["speed"] >= b.values["speed"]
+        if better and (a.values != b.values):
+            left.discard(b.run)
+    assert {c.run for c in pareto_front(ranked, SELECT)} == left
+    assert 0 < len(left) < 42
+
+
+def test_directions_and_limits_of_a_selection(tmp_path: Path):
+    text = (ROOT / "examples" / "tolerance.toml").read_text().replace("runs = 256", "runs = 16")
+    text = text.replace('base = "..', f'base = "{ROOT}')
+    text += (
+        '\n[select]\nobjectives = { peak_load_speed = "largest" }\ndrive_check = false\n'
+        'limits = { stuck_share = { max = "40 percent" }, "load.inertia" = { min = "1.7 kg*m^2", max = 2.4 } }\n'
+    )
+    (tmp_path / "s.toml").write_text(text)
+    study = lm.load_study(tmp_path / "s.toml")
+    table = read_table(lm.study(study, tmp_path / "rows"))
+    rows = table.to_pylist()
+    assert "violated" not in table.column_names
+    fits = [r for r in rows if r["stuck_share"] <= 0.4 and 1.7 <= r["load.inertia"] <= 2.4]
+    assert 0 < len(fits) < 16
+    ranked = candidates(table, study)
+    expected = sorted(fits, key=lambda r: -r["peak_load_speed"])
+    assert [c.run for c in ranked if c.fits] == [r["run"] for r in expected]
+    outside = next(c for c in ranked if c.violated == ("load.inertia",))
+    assert "load.inertia" in outside.why
+
+
+@pytest.mark.parametrize(
+    ("select", "match"),
+    [
+        ('objectives = { enery = "least" }', "'enery' is no column of numbers; they are .*energy"),
+        ('objectives = { gearbox = "least" }', "'gearbox' is no column of numbers"),
+        ('objectives = { energy = "smallest" }', "objectives"),
+        ("objectives = {}", "objectives"),
+        ("limits = {}", "objectives"),
+        ('objectives = { energy = "least" }\nlimits = { energy = {} }', "needs min or max"),
+        ('objectives = { energy = "least" }\nlimits = { energy = { max = "1 m" } }', "select.limits.energy"),
+        ('objectives = { energy = "least" }\nlimits = { energy = { min = 2, max = 1 } }', "min 2 is above max 1"),
+        ('objectives = { energy = "least" }\nlimits = { mass = { max = 1 } }', "'mass' is no column"),
+        ('objectives = { energy = "least" }\ncheck = true', "not known"),
+        ('objectives = { "use of voltage" = "least" }\ndrive_check = false', "'use of voltage' is no column"),
+    ],
+)
+def test_a_bad_selection_ends_in_one_clear_line(tmp_path: Path, select: str, match: str):
+    text = EXAMPLE.read_text().replace('base = "..', f'base = "{ROOT}')
+    path = tmp_path / "s.toml"
+    path.write_text(text[: text.index("[select]")] + "[select]\n" + select)
+    with pytest.raises(lm.InputError, match=match) as caught:
+        lm.load_study(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_name_of_the_drive_check_s_columns_is_taken(tmp_path: Path):
+    text = EXAMPLE.read_text().replace('base = "..', f'base = "{ROOT}').replace("travel", "why")
+    (tmp_path / "s.toml").write_text(text)
+    with pytest.raises(lm.InputError, match="keeps 'why', a name that is taken"):
+        lm.load_study(tmp_path / "s.toml")
+
+
+def test_best_takes_a_direction(selection: tuple[lm.Study, Path]):
+    study, directory = selection
+    energies = [e for e in read_table(directory)["energy"].to_pylist() if math.isfinite(e)]
+    for text, title, first in (
+        ("energy", "Least", min(energies)),
+        ("energy:least", "Least", min(energies)),
+        ("energy:largest", "Largest", max(energies)),
+    ):
+        lines = best_lines(directory, text)
+        assert lines[0] == f"{title} energy [J]:"
+        assert f"energy {first:.6g}" in lines[1]
+        assert study.vary[0].names[int(lines[1].split()[1].rstrip(","))] in lines[1]  # names are shown too
+    with pytest.raises(lm.InputError, match="direction must be least or largest, as in energy:largest"):
+        best_lines(directory, "energy:most")
+    with pytest.raises(lm.InputError, match="no such column of numbers"):
+        best_lines(directory, "gearbox")
