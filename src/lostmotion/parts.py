@@ -22,6 +22,7 @@ from .quantities import (
     Resistance,
     Speed,
     Stiffness,
+    Switch,
     Temperature,
     ThermalResistance,
     Time,
@@ -191,7 +192,7 @@ class LossMap(Part):
     """mu = T_2 sign(w_M)/T_2R, rising; positive where the motor drives"""
     values: tuple[tuple[Annotated[Number, NotNegative], ...], ...]
     """m_2B, one row for each load, one entry for each speed"""
-    mirrored: bool = False
+    mirrored: Switch = False
     """loads begin at 0 and hold for both directions of power flow"""
 
     @field_validator("speeds", "loads")

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .data_sheet import GearboxSheet
+from .errors import InputError
 from .parts import Drive, Gearbox, Load, Motor, Rigid
 from .run import simulate
 from .scenario import Initial
@@ -91,7 +92,7 @@ class TestRig:
 
     def __init__(self, gearbox: Gearbox) -> None:
         if isinstance(gearbox.stiffness, Rigid):
-            raise ValueError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
+            raise InputError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
         self.gearbox = gearbox
         self.breaks, self.slopes = gearbox.stiffness.pieces()
         k = max(self.slopes)
