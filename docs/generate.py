@@ -14,6 +14,7 @@ from lostmotion import signals
 from lostmotion.cli import app
 from lostmotion.quantities import unit_in_schema
 from lostmotion.scenario import json_schema
+from lostmotion.unit_grammar import PREFIXED, SPELLINGS
 from lostmotion.variables import VARIABLES
 
 OUT = Path(__file__).parent / "_generated"
@@ -91,13 +92,51 @@ def scenario_reference() -> str:
         "# Scenario files",
         "",
         'A scenario is a TOML file. Numbers are SI and radians; strings carry a unit, such as `"3300 rpm"`, `"0.6 mrad"` or',
-        '`"23 N*m/arcmin"`. An unknown key, a missing one, a wrong unit or a value out of range ends in one line that says so.',
+        '`"23 N*m/arcmin"` ([all units](#numbers-and-units)). An unknown key, a missing one, a wrong unit or a value out of range ends',
+        "in one line that names all of them.",
         'With `base = "other.toml"` a file only says what differs from another one. A signal (`command`, `load.torque`) is the',
         "sum of all its parts; a bare number is a constant. This page is made from the schema that `lostmotion schema` prints.",
         "",
     ]
     write_table("top level", schema, schema, lines, set())
+    lines += units()
     return "\n".join(lines).replace("[top level]", "top level")
+
+
+def units() -> list[str]:
+    """What a string may hold, with the units of the closed list."""
+    rows = [f"| `{symbol}` | {', '.join(f'`{p}{symbol}`' for p in p.split())} |" for symbol, (_, p) in PREFIXED.items()]
+    others = [" ".join(f"`{s}`" for s in spellings.split()) for spellings in SPELLINGS.values()]
+    return [
+        "## Numbers and units",
+        "",
+        "A string is one number and one unit. The number has a decimal point, no separators between thousands and no arithmetic:",
+        '`"1,2 kg*m^2"`, `"1 000 N*m"` and `"2**3 N*m"` are refused, and the message shows the right spelling. A unit is a product of',
+        "the symbols below, with `*`, `·`, a space or a hyphen between them, `/` for the next one alone, brackets, and powers as `^2`,",
+        "`**2`, `²` or `2`. What is usually written together may be: `Nm`, `mNm`, `Ncm`, `kgcm2`, `gcm2`, `ozin`, `lbft`, `Nms`.",
+        "",
+        "What a unit means depends on what the key measures:",
+        "",
+        "- A speed of rotation in `rpm`, `1/min`, `min^-1` or `rev/s` is in turns. `1/s` and `Hz` may mean turns or radians there, and are",
+        "  refused; a frequency in `rpm` or `rad/s` is refused as well.",
+        "- `lb` and `oz` are forces in a torque or a stiffness and masses in a moment of inertia; with `s^2`, as in `lb*in*s^2`, forces again.",
+        "  `kg` and `g` are always masses, `kgf` and `gf` forces.",
+        "- A stiffness needs its angle (`N*m/rad`, `N*m/arcmin`); in `N*m*s` the radian may be left out.",
+        "- In a product, `degC` is a difference of temperatures (`degC/W` is `K/W`); alone, a temperature.",
+        "- A plain number may be given in `%`.",
+        "",
+        "The same holds for data sheets, studies, `--set` and the constructors in Python.",
+        "",
+        "| unit | with prefixes |",
+        "|---|---|",
+        *rows,
+        "",
+        "Others: "
+        + "; ".join(others)
+        + "; `rpm` `krpm` `rps`. Case matters only where two units differ by it (`mNm`, `MNm`). "
+        "`u` may be written `µ`.",
+        "",
+    ]
 
 
 def variables() -> str:

@@ -18,8 +18,9 @@ PACKAGE = ROOT / "src" / "lostmotion"
 # analysis -> plots -> report -> command line.
 ROOMS = [
     {"_instruction_set", "errors"},
-    {"_core", "variables", "units"},
-    {"quantities", "notebook", "toml_files"},
+    {"_core", "variables", "unit_grammar", "validation"},
+    {"units"},
+    {"quantities", "notebook", "toml_files", "series_files"},
     {"signals", "parts", "task"},
     {"data_sheet"},
     {"loss_map_builder"},

@@ -51,7 +51,7 @@ def test_a_scenario_brings_its_constant_inputs_and_its_start_along() -> None:
 
 
 def test_what_is_no_drive_is_refused_in_plain_words() -> None:
-    with pytest.raises(TypeError, match=r"'drive.toml' is no drive; give a Drive, or a Scenario"):
+    with pytest.raises(lm.InputError, match=r"'drive.toml' is no drive; give a Drive, or a Scenario"):
         lm.bandwidth("drive.toml", 1.0)
 
 

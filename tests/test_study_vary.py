@@ -207,7 +207,7 @@ values = [1.0, 1.2]
         ('key = "gearbox.loss_factor"\nvalues = [1, 2]', "belongs beside `from`, but the gearbox of the base"),
         ('key = "gearbox"\nvalues = ["schaeffler-rt1-h-20-10"]', "did you mean schaeffler-rt1-h-20-100"),
         ('key = "gearbox"\nvalues = [1]', "which is no name of a gearbox"),
-        ('key = "gearbox"\nvalues = ["maxon-ec-i-52-606793"]', "not in the catalogue"),
+        ('key = "gearbox"\nvalues = ["maxon-ec-i-52-606793"]', "is a motor; a gearbox is wanted here"),
         ('key = "gearbox"\nvalues = ["none.toml"]', "no such file"),
         ('key = "gearbox"\nuniform = [0, 1]', "needs? .*values or catalogue"),
         ('key = "gearbox"\nrelative = true\nvalues = ["schaeffler-rt1-h-20-100"]', "a key of their own"),

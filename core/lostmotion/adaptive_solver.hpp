@@ -106,9 +106,11 @@ class AdaptiveSolver {
         return status_of(system_.start(cache_, now_, key_));
     }
 
-    // observer.step(regime, memory, dense step, inputs at any time through `input_at`), observer.switching(...)
+    // observer.step(regime, memory, dense step, whether it is the last), observer.switching(...); the inputs at any time
+    // through `input_at`. A step holds up to its end, the last one there, too.
     template <class Observer>
     Status advance(double t_end, Observer& observer) {
+        t_end_ = t_end;
         while (time_ < t_end) {
             const double knot = next_knot(signals_, time_);
             const Guard* fired = nullptr;
@@ -123,6 +125,11 @@ class AdaptiveSolver {
 
     std::array<double, n_inputs> input_at(double t) {
         input_.anchor(t);
+        return input_.values();
+    }
+    // The left limit, for the end of the last step.
+    std::array<double, n_inputs> input_before(double t) {
+        input_.anchor_left(t);
         return input_.values();
     }
 
@@ -213,7 +220,7 @@ class AdaptiveSolver {
                 return Status::done;
             }
             dense.end = last ? limit : end;
-            observer.step(r, now_.memory, dense, last);
+            observer.step(r, now_.memory, dense, last && limit >= t_end_);
             now_.x = x;
             time_ = dense.end;
             dense.k[0] = dense.k[DP::stages - 1];
@@ -233,6 +240,9 @@ class AdaptiveSolver {
         // A solution of finite accuracy may tremble about a guard that the exact one only approaches.
         double noise = rounding * magnitude(guard.form, dense.x, now_.memory, input_at(dense.begin));
         for (int k = 0; k < n_states; ++k) noise += noise_factor * std::fabs(guard.form.c[k]) * scale_[k];
+        // The speed of the twist is a small difference, and each of its zeros sets the hysteresis anew: one that the
+        // error of the solution may make is none.
+        if (guard.by_touch) noise += solution_error(guard.form, dense.x);
         double low = dense.begin;
         for (int k = 1; k <= looks; ++k) {
             double high = k == looks ? end : dense.begin + dense.length * k / looks;
@@ -258,15 +268,21 @@ class AdaptiveSolver {
     void find_touch(const Guard& guard, const Cubic& c, const DenseStep& dense, double& t_event,
                     const Guard*& crossed) {
         const double t = dense.begin + dense.length * c.lowest_at();
-        double near = 0.0;
-        for (int k = 0; k < n_states; ++k)
-            near += touch_factor * tolerance_ * std::fabs(guard.form.c[k]) * (scale_[k] + std::fabs(dense.x[k]));
+        const double near = touch_factor * solution_error(guard.form, dense.x);
         off_zero_ |= c.c0 > near;
         if (!off_zero_ || c.c3 <= near || t >= t_event ||
             std::fabs(evaluate(guard.form, dense(t), now_.memory, input_at(t))) > near)
             return;
         t_event = t;
         crossed = &guard;
+    }
+
+    // What the tolerance allows for in a form.
+    double solution_error(const LinearForm& form, const State& x) const {
+        double error = 0.0;
+        for (int k = 0; k < n_states; ++k)
+            error += tolerance_ * std::fabs(form.c[k]) * (scale_[k] + std::fabs(x[k]));
+        return error;
     }
 
     static constexpr double noise_factor = 1e-14;
@@ -282,7 +298,7 @@ class AdaptiveSolver {
     InputState input_;
 
     double longest_step_ = std::numeric_limits<double>::infinity();
-    double time_ = 0.0, step_ = 0.0;
+    double time_ = 0.0, step_ = 0.0, t_end_ = 0.0;
     Instant now_;
     RegimeKey key_;
     long steps_ = 0;

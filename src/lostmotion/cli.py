@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, NoReturn
 
 import typer
 
-from .terminal import busy, fail, progress, try_directory, try_file, workers, writing
+from .terminal import busy, count, fail, number, progress, try_directory, try_file, workers, writing
 
 PICTURES = (".png", ".svg", ".pdf")
+UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # of the parser that typer brings along
 
 app = typer.Typer(
     name="lostmotion",
@@ -31,9 +33,11 @@ def main() -> None:
     from .errors import InputError, MissingLibraryError
 
     try:
-        app()
+        code = app(standalone_mode=False)
     except (InputError, MissingLibraryError) as error:
         fail(str(error))
+    except UsageError as error:
+        _explain_usage(error)
     except KeyboardInterrupt:
         fail("interrupted; nothing was written", 130)
     except BrokenPipeError:
@@ -42,6 +46,21 @@ def main() -> None:
     except (RuntimeError, ValueError) as error:
         # What a solver or a check of a whole scenario reports is a result for the user; anything else is our defect.
         fail(" ".join(str(error).split()))
+    else:
+        if code == 130:  # typer turns Ctrl-C into this code
+            fail("interrupted; nothing was written", 130)
+        sys.exit(code)
+
+
+def _explain_usage(error: Any) -> NoReturn:
+    """One line for a command that cannot be read, and exit code 2; the help where a command has no arguments at all."""
+    text = str(error.format_message())
+    if "\n" in text:
+        print(text, file=sys.stderr)
+        sys.exit(2)
+    command = error.ctx.command_path if error.ctx else "lostmotion"
+    text = re.sub("^Invalid value for '([^']*)'", r"\1", text).rstrip(".")
+    fail(f"{text}; see `{command.replace('python -m ', '')} --help`", 2)
 
 
 def _print_version(wanted: bool) -> None:
@@ -141,14 +160,20 @@ def run(
         Path | None, typer.Option("--plot", metavar="FILE", help="Figure of the run: .png, .svg or .pdf.")
     ] = None,
     explain: Annotated[
-        float | None, typer.Option("--explain", metavar="TIME", help="Say what each contact holds at this instant [s].")
+        float | None,
+        typer.Option(
+            "--explain", metavar="TIME", parser=number("s"), help="Say what each contact holds at this instant [s]."
+        ),
     ] = None,
     solver: Annotated[
         str, typer.Option("--solver", metavar="NAME", help="exact, or dormand-prince as a second opinion.")
     ] = "exact",
     tolerance: Annotated[
-        float, typer.Option("--tolerance", metavar="VALUE", help="Relative tolerance of dormand-prince.")
-    ] = 1e-8,
+        float | None,
+        typer.Option(
+            "--tolerance", metavar="VALUE", parser=number(), help="Relative tolerance of dormand-prince (1e-8)."
+        ),
+    ] = None,
 ) -> None:
     """Run a scenario: print, save, draw, explain.
 
@@ -179,11 +204,15 @@ def run(
 
     if solver not in ("exact", "dormand-prince"):
         raise InputError(f"--solver {solver}: must be exact or dormand-prince")
-    if not tolerance > 0.0:
-        raise InputError(f"--tolerance {tolerance}: must be greater than 0")
+    if tolerance is not None and solver == "exact":
+        raise InputError(
+            f"--tolerance {tolerance:g}: the exact solver has none; leave it out, or add --solver dormand-prince"
+        )
+    if tolerance is not None and not tolerance > 0.0:
+        raise InputError(f"--tolerance {tolerance:g}: must be greater than 0")
     try:
         with busy("Simulating"):
-            result = work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
+            result = work(loaded, solver=solver, relative_tolerance=1e-8 if tolerance is None else tolerance)  # type: ignore[arg-type]
     except RuntimeError as error:
         raise InputError(f"{scenario}: {error}") from None
     from .run_sheet import summary
@@ -224,7 +253,8 @@ def response(
         str, typer.Option("--variable", metavar="NAME", help="Which variable's response to draw.")
     ] = "load_speed",
     refine: Annotated[
-        float | None, typer.Option("--refine", metavar="DB", help="Add frequencies where a curve bends by more.")
+        float | None,
+        typer.Option("--refine", metavar="DB", parser=number(), help="Add frequencies where a curve bends by more."),
     ] = None,
     compare: Annotated[
         list[str] | None,
@@ -420,10 +450,10 @@ def study(
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="Directory; by default the file's name.")
     ] = None,
     threads: Annotated[
-        int | None, typer.Option("--threads", metavar="N", help="In the core; all cores by default.")
+        int | None, typer.Option("--threads", metavar="N", parser=count, help="In the core; all cores by default.")
     ] = None,
     processes: Annotated[
-        int | None, typer.Option("--processes", metavar="N", help="Worker processes in place of threads.")
+        int | None, typer.Option("--processes", metavar="N", parser=count, help="Worker processes in place of threads.")
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler of a cluster.")

@@ -341,7 +341,7 @@ def _inertia(scenario: Scenario) -> Finding:
 
 
 def _resonances(scenario: Scenario) -> list[tuple[str, float, float]]:
-    """(piece, resonance, anti-resonance) [Hz] of the softest and the stiffest piece of the torsion curve."""
+    """(segment, resonance, anti-resonance) [Hz] of the softest and the stiffest segment of the torsion curve."""
     g = scenario.gearbox
     J_1 = g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia)
     slopes = [] if isinstance(g.stiffness, Rigid) else [k for k in g.stiffness.pieces()[1] if k > 0.0]
@@ -367,7 +367,7 @@ def _resonance(scenario: Scenario) -> list[Finding]:
         value = f"{f_r:.4g} Hz, anti-resonance {f_a:.4g} Hz"
         remark = f"the command has {near[0]:g} Hz" if near else ""
         verdict: Verdict = "warning" if near else "ok"
-        out.append(Finding("resonance", f"resonance on the {name} piece", value, verdict, remark))
+        out.append(Finding("resonance", f"resonance on the {name} segment", value, verdict, remark))
     return out
 
 

@@ -8,6 +8,9 @@ from importlib.util import find_spec
 class InputError(ValueError):
     """Input that cannot be used. Its text is one line: the file, the key, the value and the remedy."""
 
+    def __init__(self, text: str = "") -> None:
+        super().__init__("".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text))
+
 
 class MissingLibraryError(ImportError):
     """A library that is not part of the plain installation. Its text is one line that says what to install."""

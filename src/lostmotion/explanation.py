@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from . import _core
+from .errors import InputError
 from .parts import Drive
 from .run import core_inputs
 from .scenario import Scenario
@@ -93,16 +94,16 @@ def explain(what: Scenario | Simulation, time: float | None = None) -> Explanati
 
     Raises
     ------
-    ValueError
+    InputError
         The time is missing, or outside the scenario's duration.
     """
     if isinstance(what, Simulation):
         if time is not None:
-            raise ValueError("a simulation is explained at its present time; leave time out")
+            raise InputError("a simulation is explained at its present time; leave time out")
         values, contacts = what._core.explain()
         return _explanation(what.drive, what.time, values, contacts)
     if time is None or not 0.0 <= time <= what.simulation.duration:
-        raise ValueError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
+        raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     values, contacts = _core.explain_at(*core_inputs(what), time)
     return _explanation(what.drive(), time, values, contacts)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .errors import need
+from .errors import InputError, need
 from .linear_analysis import _control
 from .parts import Drive
 from .scenario import Initial, Scenario, drive_of, mean_inputs
@@ -80,11 +80,11 @@ def frequency_response(
     frequencies = sorted({float(f) for f in frequencies})
     amplitudes = [float(a) for a in ([amplitudes] if isinstance(amplitudes, int | float) else amplitudes)]
     if not frequencies or frequencies[0] <= 0.0:
-        raise ValueError("frequencies must be positive; give at least one")
+        raise InputError("frequencies must be positive; give at least one")
     if not amplitudes or min(amplitudes) <= 0.0:
-        raise ValueError("amplitudes must be positive; give at least one")
+        raise InputError("amplitudes must be positive; give at least one")
     if source not in ("command", "load_torque"):
-        raise ValueError(f"source {source!r} is not known; it must be command or load_torque")
+        raise InputError(f"source {source!r} is not known; it must be command or load_torque")
     means = mean_inputs(drive, mean_command, mean_load_torque)
     drive = drive_of(drive)
 
@@ -311,7 +311,7 @@ def bandwidth(
 
     Raises
     ------
-    ValueError
+    InputError
         The amplitude is not positive.
     RuntimeError
         No periodic motion was found, or the output does not move at the lowest frequency.
@@ -320,7 +320,7 @@ def bandwidth(
     from scipy.optimize import brentq
 
     if not amplitude > 0.0:
-        raise ValueError(f"no bandwidth: the amplitude {amplitude:g} of the command must be positive")
+        raise InputError(f"no bandwidth: the amplitude {amplitude:g} of the command must be positive")
     channel = CHANNEL_NAMES.index(output)
     means = mean_inputs(drive, mean_command, mean_load_torque)
     drive = drive_of(drive)

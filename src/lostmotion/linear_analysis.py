@@ -230,15 +230,15 @@ def rigid_constants(
 
     Raises
     ------
-    ValueError
+    InputError
         The drive has no DC motor, or no constant efficiency.
     """
     drive = drive_of(drive)
     m, g, load = drive.motor, drive.gearbox, drive.load
     if m.rated_speed is None or m.electrical_time_constant is None or m.armature_voltage_constant is None:
-        raise ValueError("the closed form needs a DC motor")
+        raise InputError("the closed form needs a DC motor")
     if not isinstance(g.losses, ConstantEfficiency):
-        raise ValueError("the closed form needs gearbox.losses of kind constant_efficiency")
+        raise InputError("the closed form needs gearbox.losses of kind constant_efficiency")
     reflect = 1.0 / (g.ratio**2 * g.losses.efficiency)
     J = m.rotor_inertia + g.inertia + load.inertia * reflect
     b = g.viscous_friction + load.viscous_friction * reflect

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from .errors import InputError
 from .linear_analysis import RigidConstants, rigid_constants
 from .scenario import Scenario, load
 
@@ -31,7 +32,7 @@ def paper_scenario(model: str, amplitude: str) -> Scenario:
         ``"large"`` (E_CA = 1.0275) or ``"small"`` (0.025).
     """
     if model not in MODELS or amplitude not in AMPLITUDES:
-        raise ValueError(f"there is no run {model!r}, {amplitude!r}; models: {MODELS}, amplitudes: {tuple(AMPLITUDES)}")
+        raise InputError(f"there is no run {model!r}, {amplitude!r}; models: {MODELS}, amplitudes: {tuple(AMPLITUDES)}")
     return load(f"paper-{model.lower().replace('-', '', 1)}-{amplitude}")
 
 

@@ -22,6 +22,7 @@ from .quantities import (
     Resistance,
     Speed,
     Stiffness,
+    Switch,
     Temperature,
     ThermalResistance,
     Time,
@@ -105,15 +106,15 @@ class Motor(Part):
 class TorsionCurve(Part):
     """Torque against twist (eq. 14): odd, continuous, piecewise linear.
 
-    `backlash` (total gap at the output) and `preload` change the given pieces: a gap of half the backlash comes
-    before the first, or the pieces below the preload torque drop out, as where two flanks are pressed together.
+    `backlash` (total gap at the output) and `preload` change the given segments: a gap of half the backlash comes
+    before the first, or the segments below the preload torque drop out, as where two flanks are pressed together.
     """
 
     kind: Literal["curve"] = "curve"
     slopes: tuple[Annotated[Stiffness, NotNegative], ...] = Field(min_length=1, max_length=MAX_PIECES)
-    """of the pieces, from twist 0 outwards"""
+    """of the segments, from twist 0 outwards"""
     breaks: tuple[Annotated[Angle, Positive], ...] = ()
-    """twists at which the slope changes; one fewer than slopes"""
+    """breakpoints: twists at which the slope changes; one fewer than slopes"""
     backlash: Annotated[Angle, NotNegative] = 0.0
     preload: Annotated[Torque, NotNegative] = 0.0
 
@@ -125,7 +126,7 @@ class TorsionCurve(Part):
             if b <= a:
                 raise ValueError(f"breaks must rise, but breaks[{k + 1}] = {b} follows {a}")
         if self.slopes[-1] <= 0.0:
-            raise ValueError("ends with slope 0; the last piece must carry torque")
+            raise ValueError("ends with slope 0; the last segment must carry torque")
         if self.backlash > 0.0 and self.preload > 0.0:
             raise ValueError("has backlash and preload; a preload removes the backlash, so give only one")
         return self
@@ -198,7 +199,7 @@ class LossMap(Part):
     """mu = T_2 sign(w_M)/T_2R, rising; positive where the motor drives"""
     values: tuple[tuple[Annotated[Number, NotNegative], ...], ...]
     """m_2B, one row for each load, one entry for each speed"""
-    mirrored: bool = False
+    mirrored: Switch = False
     """loads begin at 0 and hold for both directions of power flow"""
 
     @field_validator("speeds", "loads")

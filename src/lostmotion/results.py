@@ -141,7 +141,7 @@ def energy_of(dataset: xarray.Dataset | RawResult) -> dict[str, float]:
     of the magnitudes of all flows.
     """
     if "energy" not in dataset.attrs:
-        raise ValueError("this result has no energy ledger; simulate with the exact solver and energy=True")
+        raise InputError("this result has no energy ledger; simulate with the exact solver and energy=True")
     ledger: dict[str, float] = json.loads(dataset.attrs["energy"])
     return ledger
 

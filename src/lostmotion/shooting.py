@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core
+from .errors import InputError
 from .parts import Drive
 from .results import add_derived
 from .run import start_state
@@ -76,24 +77,24 @@ def _period(*signals: CommandSignal | TorqueSignal) -> float:
 
     Raises
     ------
-    ValueError
+    InputError
         They have none.
     """
     frequencies = []
     for s in signals:
         if s.steps or s.ramps or s.chirp is not None or s.samples is not None:
-            raise ValueError(
+            raise InputError(
                 "a periodic motion needs signals of mean and sines only; leave out steps, ramps, chirp, samples"
             )
         frequencies += [f for _, f, _ in s.sine_list()]
     if not frequencies:
-        raise ValueError("a periodic motion needs at least one sine in command or load torque, or a period")
+        raise InputError("a periodic motion needs at least one sine in command or load torque, or a period")
     base = min(frequencies)
     for parts in range(1, 101):
         shares = [parts * f / base for f in frequencies]
         if all(abs(q - round(q)) <= 1e-9 * q for q in shares):
             return parts / base
-    raise ValueError(f"the frequencies {sorted(set(frequencies))} Hz have no common period within 100 of the slowest")
+    raise InputError(f"the frequencies {sorted(set(frequencies))} Hz have no common period within 100 of the slowest")
 
 
 def periodic_motion(
@@ -145,7 +146,7 @@ def periodic_motion(
     command = command if isinstance(command, CommandSignal) else CommandSignal(mean=command or 0.0)
     load_torque = load_torque if isinstance(load_torque, TorqueSignal) else TorqueSignal(mean=load_torque or 0.0)
     if multiple < 1:
-        raise ValueError(f"multiple {multiple} must be 1 or more")
+        raise InputError(f"multiple {multiple} must be 1 or more")
     period = multiple * _period(command, load_torque)
     r = respond(
         drive,

@@ -37,5 +37,5 @@ def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) 
     if "scenario" not in result.attrs:
         raise InputError(f"{path}: is no result of a run; it carries no scenario that could be run again")
     tables = json.loads(result.attrs["scenario"])
-    override(tables, overrides)
+    override(tables, overrides, path)
     return changed(tables, path)

@@ -10,6 +10,7 @@ from typing import Any, overload
 import numpy as np
 
 from . import _core
+from .errors import InputError
 from .parts import Drive
 from .run import start_state
 from .scenario import Initial, Scenario, drive_of
@@ -49,7 +50,7 @@ class Simulation:
 
     def __init__(self, drive: Drive | Scenario, *, step: float = 1e-3, initial: Initial | None = None) -> None:
         if not step > 0.0:
-            raise ValueError(f"step {step} must be greater than 0 s")
+            raise InputError(f"step {step} must be greater than 0 s")
         if initial is None:
             initial = drive.initial if isinstance(drive, Scenario) else Initial()
         self._drive = drive_of(drive)
@@ -102,7 +103,7 @@ class Simulation:
 
         Raises
         ------
-        ValueError
+        InputError
             The interval is not positive, or a value is not finite.
         SolverError
             The motion has no continuation. The state stays as it was.
@@ -110,7 +111,7 @@ class Simulation:
         c0, c1 = command if isinstance(command, tuple) else (command, command)
         m0, m1 = load_torque if isinstance(load_torque, tuple) else (load_torque, load_torque)
         if not (interval > 0.0 and c0 - c0 == 0.0 and c1 - c1 == 0.0 and m0 - m0 == 0.0 and m1 - m1 == 0.0):
-            raise ValueError(
+            raise InputError(
                 f"interval {interval} s must be positive, command {command} and load_torque {load_torque} finite"
             )
         self._core.advance(interval, c0, c1, m0, m1)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from .errors import InputError
 from .quantities import Part
@@ -170,7 +170,7 @@ class Study(Part):
 
         Raises
         ------
-        InputError, pydantic.ValidationError
+        InputError
             There is no such scenario.
         """
         values = {key: (v, v.value(number)) for v, number in zip(self.vary, row, strict=True) for key in v.all_keys}
@@ -256,48 +256,8 @@ def load_study(path: str | Path) -> Study:
         _find_sheets(entry, path.parent)
     try:
         return Study(scenario=scenario, written=written, **data)
-    except ValidationError as error:
-        raise InputError(f"{path}: {_describe(error)}") from None
-
-
-# What a failed check of the schema says, by its type.
-PLAIN = {
-    "extra_forbidden": "is not known; see the page on studies for the keys",
-    "missing": "is missing; add it",
-    "tuple_type": "must be a list",
-    "too_short": "must not be empty",
-    "dict_type": "must be a table",
-    "model_type": "must be a table",
-    "string_type": "must be a text in quotes",
-    "bool_type": "must be true or false",
-    "bool_parsing": "must be true or false",
-    "int_type": "must be a whole number",
-    "int_parsing": "must be a whole number",
-    "int_from_float": "must be a whole number",
-    "float_type": "must be a number",
-    "float_parsing": "must be a number",
-    "finite_number": "must be a finite number",
-}
-
-
-def _describe(error: ValidationError) -> str:
-    """One line for a study that fails its schema: the key, the value and what would be right."""
-    # A list is also called too short if its entries have failed.
-    problems = [p for p in error.errors() if not (p["type"] == "too_short" and p["input"])]
-    # A misspelt key is the cause of the missing one.
-    first = min(problems, key=lambda problem: problem["type"] != "extra_forbidden")
-    kind, value = first["type"], first["input"]
-    loc = [part for part in first["loc"] if part not in ("float", "str")]  # which of two types was tried is no key
-    key = ".".join(str(part) for part in loc)
-    shown = "" if kind in ("extra_forbidden", "missing") or isinstance(value, dict | list | tuple) else f"{value!r} "
-    if kind == "value_error":
-        text = str(first["ctx"]["error"])
-    elif kind == "literal_error":
-        text = f"{shown}must be one of {first['ctx']['expected']}"
-    else:
-        text = shown + PLAIN.get(kind, first["msg"].replace("Input should", "must"))
-    more = "" if len(problems) == 1 else f" (and {len(problems) - 1} more)"
-    return f"{f'key {key}: ' if key else 'the study '}{text}{more}"
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _find_sheets(entry: Any, directory: Path) -> None:

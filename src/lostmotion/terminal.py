@@ -5,10 +5,12 @@ from __future__ import annotations
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Protocol
+
+import typer
 
 from .errors import InputError, need
 
@@ -20,6 +22,28 @@ def fail(text: str, code: int = 1) -> NoReturn:
     """One line on stderr, and the end."""
     print(f"lostmotion: {text}", file=sys.stderr)
     sys.exit(code)
+
+
+def number(unit: str = "") -> Callable[[str], float]:
+    """Reads the value of an option: a bare number in `unit`, or one with a unit, as in a scenario."""
+
+    def read(text: str) -> float:
+        from .units import si_value
+        from .validation import shown
+
+        try:
+            return si_value(text, unit)
+        except ValueError as error:
+            raise typer.BadParameter(f"{shown(text)} {error}") from None
+
+    return read
+
+
+def count(text: str) -> int:
+    """Reads the value of an option that counts something."""
+    if not (text.isascii() and text.isdecimal() and int(text) > 0):
+        raise typer.BadParameter(f'"{text}" must be a whole number above 0')
+    return int(text)
 
 
 class Step(Protocol):

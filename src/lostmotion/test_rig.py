@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from .data_sheet import GearboxSheet
+from .errors import InputError
 from .parts import Drive, Gearbox, Load, Motor, Rigid
 from .run import simulate
 from .scenario import Initial
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 FLYWHEEL = 1e9  # [kg m2] on the input: keeps its speed, or stands still, whatever the gearbox does
-RIG_FREQUENCY = 20.0  # [Hz] of the load on the stiffest piece of the curve, damped critically
+RIG_FREQUENCY = 20.0  # [Hz] of the load on the stiffest segment of the curve, damped critically
 SETTLING = 4.0  # [s] until a steady state is read
 RAMP = 400.0  # [s] of a slow ramp
 LOST_MOTION_LOAD = 0.03  # of rated torque, where lost motion is read
@@ -93,7 +94,7 @@ class TestRig:
 
     def __init__(self, gearbox: Gearbox) -> None:
         if isinstance(gearbox.stiffness, Rigid):
-            raise ValueError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
+            raise InputError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
         self.gearbox = gearbox
         self.breaks, self.slopes = gearbox.stiffness.pieces()
         k = max(self.slopes)
@@ -202,7 +203,7 @@ class TestRig:
         return out
 
     def backlash(self, torque: float) -> float:
-        """Total gap [rad]: twice where the first loaded piece, taken up to `torque` [N·m], meets zero torque."""
+        """Total gap [rad]: twice where the first loaded segment, taken up to `torque` [N·m], meets zero torque."""
         twist, T = self.virgin_curve(torque)
         inside = (0.1 * torque < T) & (0.9 * torque > T)
         slope, offset = np.polyfit(twist[inside], T[inside], 1)
