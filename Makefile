@@ -17,7 +17,7 @@ test: lint test-core $(VENV)/built
 .PHONY: test-core
 test-core: $(VENV)/tools
 	echo '#include <doctest/doctest.h>' | c++ -E -x c++ - >/dev/null 2>&1 || { apt-get update -q && apt-get install -qy doctest-dev; }
-	$(BIN)/cmake -S . -B build/core -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_TESTS=ON >build/core.log
+	$(BIN)/cmake -S . -B build/core -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_TESTS=ON -DLOSTMOTION_WERROR=ON >build/core.log
 	$(BIN)/cmake --build build/core
 	$(BIN)/ctest --test-dir build/core --output-on-failure
 
@@ -25,12 +25,12 @@ bench: $(VENV)/built
 	$(BIN)/pip install -q --group bench
 	command -v valgrind >/dev/null || { apt-get update -q && apt-get install -qy valgrind; } || echo 'without valgrind'
 	echo '#include <cvode/cvode.h>' | c++ -E -x c++ - >/dev/null 2>&1 || { apt-get update -q && apt-get install -qy libsundials-dev; } || echo 'without SUNDIALS'
-	$(BIN)/cmake -S . -B build/bench -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_BENCHMARKS=ON >build/bench.log
+	$(BIN)/cmake -S . -B build/bench -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_BENCHMARKS=ON -DLOSTMOTION_WERROR=ON >build/bench.log
 	$(BIN)/cmake --build build/bench
 	$(BIN)/python benchmarks/bench.py build/bench
 
 docs: $(VENV)/built
-	$(BIN)/pip install -q --group docs
+	$(BIN)/pip install -q "lostmotion[docs]"
 	$(BIN)/python docs/generate.py
 	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build
 
@@ -53,13 +53,15 @@ format: $(VENV)/tools
 $(VENV)/tools: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { apt-get update -q && apt-get install -qy python3-venv && $(PYTHON) -m venv $(VENV); }
 	command -v c++ >/dev/null || { apt-get update -q && apt-get install -qy g++; }
+	@echo 'Installing tools and libraries into $(VENV); this takes a minute or two.'
 	$(BIN)/pip install -q --upgrade "pip>=25.1"
 	$(BIN)/pip install -q --group dev
 	mkdir -p build
 	touch $@
 
 $(VENV)/built: $(VENV)/tools $(SOURCES)
-	$(BIN)/pip install -q --no-build-isolation --editable .
+	@echo 'Compiling the core in up to three builds; this takes one to four minutes.'
+	$(BIN)/pip install -q --no-build-isolation --config-settings=cmake.define.LOSTMOTION_WERROR=ON --editable ".[all]"
 	touch $@
 
 clean:

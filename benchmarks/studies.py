@@ -107,4 +107,4 @@ def resume(study: lm.Study) -> str:
             shutil.copy(some / "part-000000.parquet", whole / f"part-{k:06d}.parquet")
         (whole / "_study.json").write_text(to_json(study))
         taken = 1e-3 * best(1, lambda: lm.study(study, whole))
-    return f"A study of 1,000,000 runs of which {parts - 1} of {parts} parts are there goes on, and is complete, in {taken:.2f} s."
+    return f"A study of 1,000,000 runs of which {parts - 1} of {parts} parts are there is resumed and complete in {taken:.2f} s."

@@ -19,6 +19,7 @@ autodoc_member_order = "bysource"
 autodoc_mock_imports: list[str] = []
 napoleon_numpy_docstring = True
 suppress_warnings = ["myst.header"]
+smartquotes = False  # commands are shown as they are typed
 html_math_renderer = "mathml"
 
 

@@ -1,13 +1,20 @@
-"""Writes the pages of the documentation that are made from the code: the scenario reference and the variables."""
+"""Writes the pages of the documentation that are made from the code: scenario reference, variables, commands, gallery."""
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from typer.main import get_command
+
+import lostmotion as lm
 from lostmotion import signals
+from lostmotion.cli import app
 from lostmotion.quantities import unit_in_schema
 from lostmotion.scenario import json_schema
+from lostmotion.unit_grammar import PREFIXED, SPELLINGS
 from lostmotion.variables import VARIABLES
 
 OUT = Path(__file__).parent / "_generated"
@@ -85,13 +92,51 @@ def scenario_reference() -> str:
         "# Scenario files",
         "",
         'A scenario is a TOML file. Numbers are SI and radians; strings carry a unit, such as `"3300 rpm"`, `"0.6 mrad"` or',
-        '`"23 N*m/arcmin"`. An unknown key, a missing one, a wrong unit or a value out of range ends in one line that says so.',
+        '`"23 N*m/arcmin"` ([all units](#numbers-and-units)). An unknown key, a missing one, a wrong unit or a value out of range ends',
+        "in one line that names all of them.",
         'With `base = "other.toml"` a file only says what differs from another one. A signal (`command`, `load.torque`) is the',
         "sum of all its parts; a bare number is a constant. This page is made from the schema that `lostmotion schema` prints.",
         "",
     ]
     write_table("top level", schema, schema, lines, set())
+    lines += units()
     return "\n".join(lines).replace("[top level]", "top level")
+
+
+def units() -> list[str]:
+    """What a string may hold, with the units of the closed list."""
+    rows = [f"| `{symbol}` | {', '.join(f'`{p}{symbol}`' for p in p.split())} |" for symbol, (_, p) in PREFIXED.items()]
+    others = [" ".join(f"`{s}`" for s in spellings.split()) for spellings in SPELLINGS.values()]
+    return [
+        "## Numbers and units",
+        "",
+        "A string is one number and one unit. The number has a decimal point, no separators between thousands and no arithmetic:",
+        '`"1,2 kg*m^2"`, `"1 000 N*m"` and `"2**3 N*m"` are refused, and the message shows the right spelling. A unit is a product of',
+        "the symbols below, with `*`, `·`, a space or a hyphen between them, `/` for the next one alone, brackets, and powers as `^2`,",
+        "`**2`, `²` or `2`. What is usually written together may be: `Nm`, `mNm`, `Ncm`, `kgcm2`, `gcm2`, `ozin`, `lbft`, `Nms`.",
+        "",
+        "What a unit means depends on what the key measures:",
+        "",
+        "- A speed of rotation in `rpm`, `1/min`, `min^-1` or `rev/s` is in turns. `1/s` and `Hz` may mean turns or radians there, and are",
+        "  refused; a frequency in `rpm` or `rad/s` is refused as well.",
+        "- `lb` and `oz` are forces in a torque or a stiffness and masses in a moment of inertia; with `s^2`, as in `lb*in*s^2`, forces again.",
+        "  `kg` and `g` are always masses, `kgf` and `gf` forces.",
+        "- A stiffness needs its angle (`N*m/rad`, `N*m/arcmin`); in `N*m*s` the radian may be left out.",
+        "- In a product, `degC` is a difference of temperatures (`degC/W` is `K/W`); alone, a temperature.",
+        "- A plain number may be given in `%`.",
+        "",
+        "The same holds for data sheets, studies, `--set` and the constructors in Python.",
+        "",
+        "| unit | with prefixes |",
+        "|---|---|",
+        *rows,
+        "",
+        "Others: "
+        + "; ".join(others)
+        + "; `rpm` `krpm` `rps`. Case matters only where two units differ by it (`mNm`, `MNm`). "
+        "`u` may be written `µ`.",
+        "",
+    ]
 
 
 def variables() -> str:
@@ -109,7 +154,102 @@ def variables() -> str:
     return "\n".join(lines)
 
 
+def commands() -> str:
+    """The reference of the command line, from the commands themselves."""
+    lines = [
+        "# Command line",
+        "",
+        "Every command takes `-h` or `--help`. The exit code is 0 only if all went well; errors are one line on the standard error.",
+        "`lostmotion --install-completion` installs the completion of commands, options, scenarios and gearboxes for your shell.",
+        "",
+    ]
+    for name, command in _commands_of(get_command(app), "lostmotion"):
+        lines += _command_section(name, command)
+    return "\n".join(lines)
+
+
+def _commands_of(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from _commands_of(command, f"{prefix} {name}")
+        else:
+            yield f"{prefix} {name}", command
+
+
+def _command_section(name: str, command: Any) -> list[str]:
+    text, _, examples = inspect.cleandoc(command.help or "").partition("\b\n")
+    arguments = [p for p in command.params if p.param_type_name == "argument"]
+    options = [p for p in command.params if p.param_type_name == "option" and "--help" not in p.opts]
+    usage = " ".join([name, *["[OPTIONS]"] * bool(options), *(p.metavar for p in arguments)])
+    lines = [f"## `{name}`", "", text.strip(), "", "```text", usage, "```", ""]
+    if examples:
+        lines += ["For example:", "", "```sh", examples.strip(), "```", ""]
+    rows = [(f"`{p.metavar}`", "", p.help) for p in arguments]
+    for p in options:
+        value = f" {p.metavar}" if p.metavar else ""
+        default = "" if p.default in (None, False) else f"`{p.default}`"
+        rows.append((", ".join(f"`{o}{value}`" for o in p.opts), default, p.help))
+    if rows:
+        lines += ["| argument, option | default | meaning |", "|---|---|---|"]
+        lines += [f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in rows]
+    return [*lines, ""]
+
+
+def gallery(pictures: Path) -> str:
+    """A page with a figure of every shipped scenario; the figures go into the directory `pictures`."""
+    lines = [
+        "# Gallery of scenarios",
+        "",
+        "These scenarios come with the package. Each can be run by its name, changed with `--set`, and named as the `base` of",
+        "a file of your own. Those called paper-... are the runs of [the paper](../citing.md#the-paper).",
+        "",
+    ]
+    for name, path in lm.shipped_scenarios().items():
+        scenario = lm.load(name)
+        lm.simulate(scenario).lm.plot().savefig(pictures / f"{name}.png", dpi=80, metadata={"Software": None})
+        lines += [
+            f"## {name}",
+            "",
+            f"**{scenario.title}.** {introduction(path)}",
+            "",
+            f"![{scenario.title}]({name}.png)",
+            "",
+        ]
+        lines += ["```sh", f"lostmotion run {name} --plot {name}.png", "```", ""]
+        lines += [
+            "<details><summary>The file</summary>",
+            "",
+            "```toml",
+            path.read_text(encoding="utf-8").strip(),
+            "```",
+        ]
+        lines += ["", "</details>", ""]
+    return "\n".join(lines)
+
+
+def introduction(path: Path) -> str:
+    """The first comment of a scenario file."""
+    block: list[str] = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if line.startswith("#"):
+            block.append(line.lstrip("# "))
+        elif block:
+            break
+    return " ".join(block)
+
+
+def generate(out: Path = OUT) -> None:
+    """All pages into a directory, made if missing."""
+    out.mkdir(exist_ok=True)
+    pages = {
+        "scenario": scenario_reference(),
+        "variables": variables(),
+        "commands": commands(),
+        "gallery": gallery(out),
+    }
+    for name, text in pages.items():
+        (out / f"{name}.md").write_text(text, encoding="utf-8")
+
+
 if __name__ == "__main__":
-    OUT.mkdir(exist_ok=True)
-    (OUT / "scenario.md").write_text(scenario_reference(), encoding="utf-8")
-    (OUT / "variables.md").write_text(variables(), encoding="utf-8")
+    generate()

@@ -1,10 +1,14 @@
 """Bad input ends in one line that names the file, the key and the remedy, and in exit code 1; nothing is left behind."""
 
+import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 import lostmotion as lm
 from lostmotion.scenario import Scenario
@@ -80,7 +84,7 @@ BROKEN = [
     ("time where an angle belongs", '"0.6 mrad"', '"0.6 ms"', ["gearbox.stiffness.breaks[0]", "rad"]),
     ("unit on a pure number", "armature_voltage_constant = 3.1169", 'armature_voltage_constant = "3 V"', ["armature_voltage_constant"]),
     ("unit on the command", "amplitude = 1.0", 'amplitude = "1 V"', ["command.amplitude"]),
-    ("truth value", "ratio = 90", "ratio = true", ["gearbox.ratio", "truth value"]),
+    ("Boolean", "ratio = 90", "ratio = true", ["gearbox.ratio", "Boolean"]),
     ("list for a number", "ratio = 90", "ratio = [90]", ["gearbox.ratio"]),
     ("table for a number", "ratio = 90", "ratio = { value = 90 }", ["gearbox.ratio"]),
     ("key in the table of another", "[gearbox.hysteresis]\nefficiency", "hysteresis", ["gearbox.stiffness.hysteresis"]),
@@ -150,6 +154,180 @@ def test_broken_scenario_is_refused_in_one_clear_line(tmp_path: Path, old: str, 
     assert str(tmp_path) in message
     for word in words:
         assert word in message
+    assert_plain(message)
+
+
+def assert_plain(message: str) -> None:
+    """Nothing of the language or of a library shows through."""
+    assert not re.search(
+        r"Input should|https?:|pydantic|\b(tuple|dict|float|int|str|bool|NoneType|model)\b|[TF]alse|True", message
+    )
+
+
+OVERRIDES = [
+    ("load.inertia=1,2 kg*m^2", 'key load.inertia: "1,2 kg*m^2" has a decimal comma; write "1.2 kg*m^2"'),
+    ("load.inertia=-2 kgcm2", 'key load.inertia: "-2 kgcm2" must be greater than 0'),  # as it was written
+    ("load.inertia=2026-01-01", "key load.inertia: 2026-01-01 must be a number"),
+    ("load.inertia=1e400", "key load.inertia: inf must be a finite number"),
+    ("load.inertia.x=1", "key load.inertia.x: load.inertia is the value 2.0, not a table"),
+    ("command.steps.0.height=1", "key command.steps.0: there is no entry 0; the list has 0 entries"),
+    ("command.steps=3", "key command.steps: 3 must be a list"),
+    ("command.steps=[3]", "key command.steps[0]: 3 must be a table with some of the keys height, time"),
+    ("gearbox.losses.mirrored=1", "key gearbox.losses.mirrored: 1 must be true or false"),
+    ("gearbox.losses.mirrored=yes", 'key gearbox.losses.mirrored: "yes" must be true or false'),
+    ("gearbox.losses.values=[[1, true]]", "key gearbox.losses.values[0][1]: true is a Boolean"),
+    ("gearbox.added_backlash=1", "key gearbox.added_backlash: acts on a record; give gearbox.from"),
+    ("title=5", "key title: 5 must be text"),
+    ("motor.kind=torque-source", 'did you mean "torque_source"?'),
+    ("motor.limits.max_winding_temperature=-300 degC", '"-300 degC" must be at least -273.15'),
+    ("command.chirp.points_per_period=true", "true must be a whole number"),
+    ("command=true", "key command: true must be a table"),
+    ("gearbox=maxon-ec-i-52-606793", "maxon-ec-i-52-606793 is a motor; a gearbox is wanted here"),
+]
+
+
+@pytest.mark.parametrize(("override", "sentence"), OVERRIDES, ids=[o for o, _ in OVERRIDES])
+def test_an_override_that_cannot_be_is_refused_as_it_was_written(tmp_path: Path, override: str, sentence: str) -> None:
+    (tmp_path / "good.toml").write_text(GOOD)
+    with pytest.raises(lm.InputError) as caught:
+        lm.load(tmp_path / "good.toml", [override])
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert_plain(str(caught.value))
+
+
+def test_all_missing_keys_are_named_at_once(tmp_path: Path) -> None:
+    (tmp_path / "empty.toml").write_text("")
+    with pytest.raises(lm.InputError, match="keys motor, gearbox, load, simulation: are missing"):
+        lm.load(tmp_path / "empty.toml")
+    (tmp_path / "some.toml").write_text(GOOD.replace("ratio = 90\n", "").replace("duration = 0.01\n", ""))
+    with pytest.raises(lm.InputError, match=r"keys gearbox\.ratio, simulation\.duration: are missing"):
+        lm.load(tmp_path / "some.toml")
+
+
+def test_all_that_is_wrong_is_named_at_once(tmp_path: Path) -> None:
+    text = GOOD.replace("ratio = 90", "ratio = -90").replace("[command]", "[comand]").replace("mirrored", "miror")
+    (tmp_path / "s.toml").write_text(text)
+    with pytest.raises(lm.InputError) as caught:
+        lm.load(tmp_path / "s.toml")
+    for words in ("comand: is not known; did you mean command", "losses.miror: is not known", "-90.0 must be greater"):
+        assert words in str(caught.value)
+
+
+PARTS = [
+    (lambda: lm.Motor(rotor_inertia="1,2 kg*m^2"), 'key rotor_inertia: "1,2 kg*m^2" has a decimal comma'),
+    (lm.Load, "key inertia: is missing; add it"),
+    (lambda: lm.Load(inertia=1, frction_torque=2), "key frction_torque: is not known; did you mean friction_torque?"),
+    (lambda: lm.Load(inertia=None), "key inertia: None must be a number in kg*m^2"),
+    (lambda: lm.Load(inertia=10**400), "is beyond the range of numbers"),
+    (lambda: lm.Load.model_validate({"inertia": -1}), "key inertia: -1.0 must be greater than 0"),
+    (lambda: lm.TorsionCurve(slopes=[1, 2]), "the torsion curve has 2 slopes and 0 breaks"),
+    (lambda: lm.TorsionCurve(slopes=5), "key slopes: 5 must be a list"),
+    (lambda: lm.CommandSignal(amplitude=3), "the command signal lacks frequency"),
+    (lambda: lm.GearboxSheet(name="x", kind="magic", ratio=3), 'key kind: "magic" must be one of "strain_wave"'),
+    (lambda: lm.GearboxSheet(name="My Gear", kind="other", ratio=3), "lower-case letters, digits, dots and dashes"),
+    (lambda: lm.gearbox("paper-gearbox", added_backlash="1,5 arcmin"), 'write "1.5 arcmin"'),
+    (lambda: lm.motor("paper-motor", voltage_limit="24 A"), 'key voltage_limit: "24 A" has the unit of something else'),
+]
+
+
+@pytest.mark.parametrize(("make", "sentence"), PARTS, ids=[s for _, s in PARTS])
+def test_constructors_refuse_in_the_words_of_the_command_line(make: Callable[[], object], sentence: str) -> None:
+    with pytest.raises(lm.InputError) as caught:
+        make()
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert_plain(str(caught.value).replace("None must", "must"))
+
+
+FUNCTIONS = [
+    (lambda s: lm.simulate(3), "3 must be a Scenario"),
+    (lambda s: lm.simulate(s, solver="euler"), "solver 'euler' is not known"),
+    (lambda s: lm.simulate(s.drive()), "needs duration and sample_interval"),
+    (lambda s: lm.simulate(s, duration="1,5 s"), 'key duration: "1,5 s" has a decimal comma; write "1.5 s"'),
+    (lambda s: lm.simulate(s, command="50 Hz"), 'key command.mean: "50 Hz" has the unit of something else'),
+    (lambda s: lm.explain(s, 99.0), "must lie between 0 and the duration"),
+    (lambda s: lm.Simulation(s.drive(), step=0.0), "must be greater than 0 s"),
+    (lambda s: lm.Simulation(s.drive()).advance(-1.0, 0.0), "must be positive"),
+    (lambda s: lm.frequency_response(s.drive(), [-1.0], [0.1]), "frequencies must be positive"),
+    (lambda s: lm.periodic_motion(s.drive(), command=0.1), "needs at least one sine"),
+    (lambda s: lm.build_loss_map(lm.GearboxSheet(name="x", kind="other", ratio=3)), "lacks rated_output_torque"),
+    (
+        lambda s: lm.TestRig(s.replace(**{"gearbox.stiffness": {"kind": "rigid"}, "gearbox.hysteresis": None}).gearbox),
+        "rigid",
+    ),
+    (lambda s: s.replace(**{"load.inertia": "1 000 kg*m^2"}), 'key load.inertia: "1 000 kg*m^2" has separators'),
+    (lambda s: s.replace(**{"load.inertja": 1}), "key load.inertja: is not known; did you mean inertia?"),
+    (lambda s: lm.Scenario.from_json('{"title": 3}'), "keys motor, gearbox, load, simulation: are missing"),
+]
+
+
+@pytest.mark.parametrize(("call", "sentence"), FUNCTIONS, ids=[s for _, s in FUNCTIONS])
+def test_functions_refuse_bad_input_with_the_same_error(
+    large: Path, call: Callable[[Scenario], object], sentence: str
+) -> None:
+    with pytest.raises(lm.InputError) as caught:
+        call(lm.load(large))
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_drive_that_cannot_be_says_so_once() -> None:
+    gearbox = lm.gearbox("paper-gearbox").model_copy(update={"inertia": 0.0})
+    motor = lm.Motor(kind="torque_source", rotor_inertia=0)
+    with pytest.raises(lm.InputError) as caught:
+        lm.Drive(motor=motor, gearbox=gearbox, load=lm.Load(inertia=1))
+    assert str(caught.value).startswith("the drive has no inertia on the input shaft; give")
+
+
+def test_a_part_that_was_made_cannot_be_changed() -> None:
+    load = lm.Load(inertia=1)
+    with pytest.raises(lm.InputError, match="the load is frozen"):
+        load.inertia = 2
+
+
+tables = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.dates(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=6,
+)
+KEYS = [
+    "command",
+    "command.steps",
+    "motor",
+    "motor.kind",
+    "motor.limits",
+    "gearbox.stiffness",
+    "gearbox.stiffness.kind",
+]
+KEYS += [
+    "gearbox.stiffness.slopes",
+    "gearbox.losses.values",
+    "gearbox.losses.mirrored",
+    "load",
+    "load.torque",
+    "initial",
+]
+KEYS += [
+    "gearbox",
+    "gearbox.from",
+    "gearbox.ratio",
+    "load.torque.samples",
+    "command.chirp",
+    "simulation.duration",
+    "title",
+]
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(key=st.sampled_from(KEYS), value=tables)
+def test_any_value_under_any_key_is_read_or_refused_in_one_plain_line(large: Path, key: str, value: object) -> None:
+    try:
+        lm.load(large, {key: value})
+    except lm.InputError as error:
+        message = str(error)
+        assert "\n" not in message
+        assert not re.search(r"Input should|https?:|pydantic|valid tuple", message)
 
 
 def test_an_input_shaft_without_inertia_is_refused(tmp_path: Path) -> None:
@@ -205,6 +383,11 @@ CALLS = [
     ("an explanation after the end", ["run", "good.toml", "--explain", "99"], ["--explain 99", "0.01"]),
     ("an unknown solver", ["run", "good.toml", "--solver", "euler"], ["euler", "exact"]),
     ("a tolerance of zero", ["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "0"], ["tolerance"]),
+    (
+        "a tolerance of the exact solver",
+        ["run", "good.toml", "--tolerance", "1e-9"],
+        ["--tolerance", "exact solver has none"],
+    ),
     ("a report into a file", ["reproduce", "-o", "good.toml"], ["good.toml", "directory"]),
     ("a run that leaves all bounds", ["run", "good.toml", "--set", "command.amplitude=1e12"], ["t ="]),
 ]
@@ -223,6 +406,40 @@ def test_bad_call_ends_in_one_line_and_exit_code_1(tmp_path: Path, arguments: li
     for word in words:
         assert word in done.stderr
     assert sorted(tmp_path.iterdir()) == before
+
+
+USAGE = [
+    (["run"], ["Missing argument", "lostmotion run --help"]),
+    (["rum", "good.toml"], ["rum", "lostmotion --help"]),
+    (["run", "good.toml", "--bogus"], ["--bogus"]),
+    (["run", "good.toml", "--explain", "0,005"], ['--explain: "0,005" has a decimal comma; write "0.005 s"']),
+    (["run", "good.toml", "--explain", "5 rpm"], ['--explain: "5 rpm" has the unit of something else']),
+    (
+        ["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "small"],
+        ['--tolerance: "small" is not one number'],
+    ),
+    (["study", "good.toml", "--threads", "two"], ['--threads: "two" must be a whole number above 0']),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), USAGE, ids=[" ".join(a) for a, _ in USAGE])
+def test_a_command_that_cannot_be_read_ends_in_one_line_and_exit_code_2(
+    tmp_path: Path, arguments: list[str], words: list[str]
+) -> None:
+    (tmp_path / "good.toml").write_text(GOOD)
+    done = lostmotion(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert_plain(done.stderr)
+    for word in words:
+        assert word in done.stderr
+
+
+def test_an_instant_may_be_given_with_its_unit(tmp_path: Path) -> None:
+    (tmp_path / "good.toml").write_text(GOOD)
+    bare = lostmotion("run", "good.toml", "--explain", "0.005", cwd=tmp_path)
+    assert bare.returncode == 0
+    assert bare.stdout == lostmotion("run", "good.toml", "--explain", "5 ms", cwd=tmp_path).stdout
 
 
 @pytest.mark.parametrize("ending", [".csv", ".nc", ".parquet"])

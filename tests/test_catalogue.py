@@ -18,6 +18,7 @@ from lostmotion.errors import InputError
 from lostmotion.loss_map_builder import build_loss_map
 from lostmotion.paper import paper_scenario
 from lostmotion.records import catalogue, find, gearbox_table, parse_sheets
+from lostmotion.scenario import gearbox_from_record
 from lostmotion.test_rig import Comparison, TestRig, _compare
 
 RPM = math.pi / 30.0
@@ -395,6 +396,9 @@ def test_a_bad_sheet_ends_in_one_clear_line(changes: dict, match: str):
 def test_files_that_are_no_sheets(tmp_path: Path):
     for text, match in (
         ("gearbox = 3", "double brackets"),
+        ("gearbox = [3]", "double brackets"),
+        ("source = 3\n[[gearbox]]\nname = 'x'", "key source: 3 must be tables"),
+        ("[[gearbox]]\nname = 'x'\ngap = 'y'", 'gearbox x: key gap: "y" must be tables'),
         ("", "no record"),
         ("gearboks = []", "did you mean gearbox"),
         ("[", "TOML"),
@@ -482,7 +486,7 @@ def test_command_line(tmp_path: Path):
     assert "schaeffler-rt1-h-14-100" not in listed.output
     shown = run(app, ["catalogue", "nord-sk1si50-60"])
     assert "static efficiency" in shown.output
-    assert "A run also needs: inertia, stiffness." in shown.output
+    assert "Not complete: a simulation also needs inertia, stiffness." in shown.output
     template = tmp_path / "own.toml"
     assert run(app, ["catalogue", "new", "-o", str(template)]).exit_code == 0
     out = tmp_path / "sheet"
@@ -498,7 +502,7 @@ def test_command_line(tmp_path: Path):
     }
     page = (out / "rig.html").read_text()
     assert "back-driving torque" in page
-    assert "ask the maker" in page
+    assert "ask the manufacturer" in page
     checked = run(app, ["drive", "check", str(ROOT / "scenarios" / "catalogue-robot-joint.toml")])
     assert checked.exit_code == 0
     assert "No warnings." in checked.output
@@ -508,7 +512,7 @@ def test_the_drive_check_finds_what_is_wrong():
     scenario = lm.load(ROOT / "scenarios" / "catalogue-robot-joint.toml")
     heavy = scenario.replace(**{"load.inertia": 60.0, "command.frequency": 3.0})
     wrong = {f.what for f in check_drive(heavy) if f.verdict == "warning"}
-    assert {"inertia of the load / of the motor side", "resonance on the softest piece"} <= wrong
+    assert {"inertia of the load / of the motor side", "resonance on the softest segment"} <= wrong
     weak = scenario.replace(**{"command.amplitude": 0.004})
     (zone,) = [f for f in check_drive(weak) if f.what == "dead zone"]
     assert zone.verdict == "warning"
@@ -532,3 +536,162 @@ def test_a_name_that_is_none_is_answered_with_near_ones():
 
 def test_difference_is_relative():
     assert Comparison("x", "1", 2.0, 2.1).difference == pytest.approx(0.05)
+
+
+# --- changes to what the catalogue has ---
+
+
+def own_sheet(tmp_path: Path, **changes) -> str:
+    """A sheet file of one's own, with a printed width of the torsion loop."""
+    record = sheet(name="own", backlash="1 arcmin", hysteresis_loss="2 arcmin", **changes)
+    given = {name: getattr(record, name) for name in record.model_fields_set}
+    lines = ["[[gearbox]]"]
+    for key in (
+        "name",
+        "kind",
+        "ratio",
+        "rated_output_torque",
+        "rated_input_speed",
+        "inertia",
+        "backlash",
+        "hysteresis_loss",
+    ):
+        lines.append(f"{key} = {given[key]!r}")
+    lines += [f"stiffness = {{ slopes = {list(record.stiffness.slopes)}, torques = {list(record.stiffness.torques)} }}"]
+    lines += ["losses = { efficiency = [{ input_speed = 200.0, efficiency = 0.77 }] }"]
+    path = tmp_path / "own.toml"
+    path.write_text("\n".join(lines))
+    return str(path)
+
+
+def test_wear_that_adds_backlash_leaves_the_hysteresis_as_it_was(tmp_path: Path):
+    name = own_sheet(tmp_path)
+    new = lm.gearbox(name)
+    # At half the printed width, 1 arcmin, the new gearbox carries h; (16) makes of it eta_H = 1 - 2 h/(T_R - h).
+    h = 1.6e4 * 0.5 * ARCMIN
+    assert new.hysteresis.efficiency == pytest.approx(1.0 - 2.0 * h / (52.0 - h), rel=1e-12)
+    for added in (1e-4, "1 arcmin", "6 arcmin"):
+        worn = lm.gearbox(name, added_backlash=added)
+        assert worn.hysteresis == new.hysteresis
+        assert worn.stiffness.backlash > new.stiffness.backlash
+        assert worn.stiffness.slopes == new.stiffness.slopes
+        assert worn.losses == new.losses
+    # On the rig, the loop of the worn one is wider by the added gap and by nothing else.
+    worn = lm.gearbox(name, added_backlash="6 arcmin")
+    wider = TestRig(worn).loop(52.0).width - TestRig(new).loop(52.0).width
+    assert wider / ARCMIN == pytest.approx(6.0, rel=1e-3)
+
+
+def test_a_change_takes_the_place_of_what_it_names_and_of_nothing_else(tmp_path: Path):
+    path = scenario_with(tmp_path, f'[gearbox]\nfrom = "{own_sheet(tmp_path)}"')
+    plain = lm.load(path).gearbox
+    data = plain.model_dump()
+    cases = {
+        "gearbox.stiffness.slopes=[1e4, '5 N*m/arcmin', 3e4]": {"slopes": (1e4, 5 / ARCMIN, 3e4)},
+        "gearbox.stiffness.backlash=3 arcmin": {"backlash": 3 * ARCMIN},
+    }
+    for override, change in cases.items():
+        changed = lm.load(path, [override]).gearbox.model_dump()
+        wanted = data["stiffness"] | change
+        assert changed["stiffness"].keys() == wanted.keys()
+        for key in ("slopes", "breaks", "backlash", "preload"):
+            assert changed["stiffness"][key] == pytest.approx(wanted[key], rel=1e-14)
+        assert {k: v for k, v in changed.items() if k != "stiffness"} == {
+            k: v for k, v in data.items() if k != "stiffness"
+        }
+    values = [[2 * x for x in row] for row in plain.losses.values]
+    changed = lm.load(path, [f"gearbox.losses.values={values}"]).gearbox
+    assert changed.losses.values == tuple(map(tuple, values))
+    assert changed.losses.speeds == plain.losses.speeds
+    assert changed.stiffness == plain.stiffness
+    limited = lm.load(path, ["gearbox.limits.peak_output_torque=99 Nm"]).gearbox.limits
+    assert limited == plain.limits.model_copy(update={"peak_output_torque": 99.0})
+
+
+def test_a_table_that_says_its_kind_takes_the_place_of_the_whole_one(tmp_path: Path):
+    path = scenario_with(tmp_path, f'[gearbox]\nfrom = "{own_sheet(tmp_path)}"')
+    plain = lm.load(path).gearbox
+    curve = lm.load(path, ['gearbox.stiffness={kind = "curve", slopes = [2e4]}']).gearbox
+    assert curve.stiffness == lm.TorsionCurve(slopes=(2e4,))  # without the record's backlash
+    linear = lm.load(path, ['gearbox.stiffness={kind = "linear", stiffness = "6 Nm/arcmin"}']).gearbox
+    assert linear.stiffness == lm.LinearStiffness(stiffness="6 Nm/arcmin")
+    assert curve.hysteresis == linear.hysteresis == plain.hysteresis
+    assert lm.load(path, ['gearbox.stiffness={kind = "rigid"}']).gearbox.hysteresis is None
+
+
+def test_the_order_of_changes_does_not_count(tmp_path: Path):
+    path = scenario_with(tmp_path, 'gearbox = "schaeffler-rt1-h-20-100"')
+    changes = ["gearbox.inertia=3 kgcm2", "gearbox.from=paper-gearbox", "gearbox.added_backlash=1 arcmin"]
+    one, other = lm.load(path, changes), lm.load(path, changes[::-1])
+    assert one == other
+    assert one.gearbox.inertia == pytest.approx(3e-4)
+    assert one.gearbox.ratio == 90
+    assert lm.load(path).replace(**dict(c.split("=") for c in changes)) == one
+
+
+def test_added_backlash_adds_to_a_changed_curve_too(tmp_path: Path):
+    path = scenario_with(tmp_path, f'[gearbox]\nfrom = "{own_sheet(tmp_path)}"')
+    both = lm.load(path, ["gearbox.stiffness.backlash=3 arcmin", "gearbox.added_backlash=1 arcmin"])
+    assert both.gearbox.stiffness.backlash == pytest.approx(4 * ARCMIN)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "match"),
+    [
+        (
+            ["gearbox.losses.efficiency=0.9", "gearbox.loss_factor=2"],
+            "gearbox.loss_factor: acts on the record's own losses",
+        ),
+        (
+            ['gearbox.losses={kind="constant_efficiency",efficiency=0.9}', "gearbox.temperature=40"],
+            "gearbox.temperature: acts",
+        ),
+        (['gearbox.stiffness={kind="linear",stiffness=1e4}', "gearbox.added_backlash=1e-3"], "needs a torsion curve"),
+        (["gearbox.stiffness.slopes=[1e4]"], "gearbox.stiffness: has 1 slopes and 2 breaks"),
+        (["gearbox.stiffness.slops=[1e4]"], "gearbox.stiffness.slops: is not known; did you mean slopes"),
+        (["gearbox.stiffness=5"], "gearbox.stiffness: 5 must be a table"),
+        (["gearbox.losfactor=2"], "gearbox.losfactor: is not known; did you mean loss_factor"),
+        (["gearbox.inertia=1,2 kgcm2"], 'has a decimal comma; write "1.2 kgcm2"'),
+        (["gearbox=maxon-ec-i-52-606793"], "is a motor; a gearbox is wanted here"),
+        (["motor=schaeffler-rt1-h-20-100"], "is a gearbox; a motor is wanted here"),
+    ],
+)
+def test_a_change_without_effect_or_sense_is_refused(tmp_path: Path, overrides: list[str], match: str):
+    path = scenario_with(tmp_path, f'[gearbox]\nfrom = "{own_sheet(tmp_path)}"')
+    with pytest.raises(InputError, match=match) as caught:
+        lm.load(path, overrides)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_a_change_closes_the_gap_of_a_motor(tmp_path: Path):
+    (tmp_path / "motor.toml").write_text(
+        '[[motor]]\nname = "m"\nrated_voltage = "24 V"\nrated_torque = "1 Nm"\nrated_speed = "3000 1/min"\nno_load_current = "0.1 A"\n'
+        'torque_constant = "0.05 Nm/A"\nresistance = "0.2 ohm"\ninductance = "0.2 mH"\n'
+    )
+    name = str(tmp_path / "motor.toml")
+    path = scenario_with(tmp_path, 'gearbox = "paper-gearbox"')
+    with pytest.raises(InputError, match=r"lacks rotor_inertia.*give motor\.rotor_inertia beside"):
+        lm.load(path, [f"motor.from={name}"])
+    filled = lm.load(path, [f"motor.from={name}", "motor.rotor_inertia=2 kgcm2", "motor.friction_torque=0.03"]).motor
+    assert filled.rotor_inertia == pytest.approx(2e-4)
+    assert filled.friction_torque == 0.03
+    assert filled.rated_torque == pytest.approx(1.0 + 0.05 * 0.1)  # of the record, with the friction of the record
+
+
+def test_the_rig_answers_in_its_own_words():
+    for arguments, words in (
+        (["maxon-ec-i-52-606793"], "maxon-ec-i-52-606793 is a motor; a gearbox is wanted here"),
+        (["paper-gearbox", "--set", "losfactor=2"], "losfactor: is not known; did you mean loss_factor?"),
+        (["paper-gearbox", "--set", "stiffness.slops=[2]"], "stiffness.slops: is not known; did you mean slopes?"),
+        (["paper-gearbox", "--set", "inertia=1 kg*m"], "inertia"),
+    ):
+        done = CliRunner().invoke(app, ["rig", *arguments])
+        assert isinstance(done.exception, InputError)
+        assert words in str(done.exception)
+        assert "simulation" not in str(done.exception)  # a key of scenarios
+
+
+def test_changed_parts_are_those_that_the_rig_measures(tmp_path: Path):
+    part, _ = gearbox_from_record("paper-gearbox", ["gearbox.ratio=80", "stiffness.slopes=[3e3, 2e4, 3e4]"])
+    assert part.ratio == 80
+    assert part.stiffness.slopes == (3e3, 2e4, 3e4)

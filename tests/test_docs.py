@@ -4,10 +4,14 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
+import pytest
+
 import lostmotion as lm
-from conftest import ROOT
+from conftest import ROOT, SCENARIOS
+from lostmotion.cli import app as lm_app
 
 
 def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
@@ -49,21 +53,72 @@ def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
 def test_the_readme_s_python_runs(tmp_path: Path) -> None:
     code = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
     assert code is not None
-    (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
     done = subprocess.run(
         [sys.executable, "-c", code.group(1)], cwd=tmp_path, check=True, capture_output=True, text=True
     )
     assert "stuck" in done.stdout
     assert (tmp_path / "small.nc").exists()
+    assert (tmp_path / "small.png").exists()
 
 
-def test_the_readme_s_commands_run(tmp_path: Path) -> None:
-    command = re.search(r"`lostmotion (run scenarios/[^`]*)`", (ROOT / "README.md").read_text())
-    assert command is not None
-    (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
-    words = command.group(1).split()
-    subprocess.run([sys.executable, "-m", "lostmotion", *words], cwd=tmp_path, check=True)
+def commands_in(page: str) -> list[str]:
+    """The commands of the shell in a page, without their comments."""
+    blocks = "\n".join(re.findall(r"```sh\n(.*?)```", (ROOT / page).read_text(), re.S))
+    return [line.split("  #")[0].strip() for line in re.findall(r"^lostmotion (.*)$", blocks, re.M)]
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
+def test_the_first_commands_run(tmp_path: Path, page: str) -> None:
+    commands = commands_in(page)
+    assert len(commands) == 3
+    printed = []
+    for command in commands:
+        words = [sys.executable, "-m", "lostmotion", *shlex.split(command)]
+        printed.append(subprocess.run(words, cwd=tmp_path, check=True, capture_output=True, text=True).stdout)
     assert (tmp_path / "run.png").exists()
+    assert (tmp_path / "rig" / "rig.html").exists()
+    for shown in re.findall(r"```text\n(.*?)```", (ROOT / page).read_text(), re.S):
+        for line in shown.strip().splitlines():
+            assert line.strip() == "..." or line in printed[0]
+
+
+def test_every_extra_is_explained_on_the_home_page() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    page = (ROOT / "docs" / "index.md").read_text()
+    assert set(re.findall(r"^\| `(\w+)` \|", page, re.M)) == set(extras) - {"all"}
+
+
+def test_the_paper_is_cited_in_full_where_it_is_meant() -> None:
+    for page in ("README.md", "docs/citing.md", "CITATION.cff", "src/lostmotion/report.html.jinja"):
+        text = " ".join((ROOT / page).read_text().replace(">", " ").split()).lower()
+        for word in ("simplified dynamic model of the transmission", "ft-ta3/103", "jevický"):
+            assert word in text, page
+    for page in (ROOT / "docs").glob("*.md"):
+        text = page.read_text()
+        if page.name not in ("theory.md", "verification.md") and re.search(r"\bthe paper", text, re.IGNORECASE):
+            assert "citing.md" in text or page.name == "citing.md", page.name
+
+
+def test_the_glossary_has_the_terms_that_the_pages_use() -> None:
+    glossary = (ROOT / "docs" / "glossary.md").read_text()
+    terms = [
+        t.lower()
+        for line in re.findall(r"^([A-Z].*)$", glossary.split("```{glossary}")[1], re.M)
+        for t in line.split(", ")
+    ]
+    assert len(terms) == len(set(terms)) > 20
+    for term in (
+        "backlash",
+        "event",
+        "lost motion",
+        "loss map",
+        "regime",
+        "segment",
+        "breakpoint",
+        "self-locking",
+        "twist",
+    ):
+        assert term in terms
 
 
 def test_generated_pages_name_every_key_and_variable() -> None:
@@ -72,6 +127,17 @@ def test_generated_pages_name_every_key_and_variable() -> None:
         import generate
     finally:
         sys.path.pop(0)
+    commands = generate.commands()
+    for name, command in generate._commands_of(generate.get_command(lm_app), "lostmotion"):
+        assert f"## `{name}`" in commands
+        section = commands.split(f"## `{name}`\n")[1].split("\n## ")[0]
+        for parameter in command.params:
+            for option in (
+                parameter.opts if parameter.param_type_name == "option" else [parameter.metavar.split(" ")[0]]
+            ):
+                assert option == "--help" or option in section
+    for path in SCENARIOS:
+        assert generate.introduction(path), f"{path} needs a comment below its title, for the gallery"
     reference = generate.scenario_reference()
     for table in (
         "command",
@@ -88,3 +154,38 @@ def test_generated_pages_name_every_key_and_variable() -> None:
         assert f"| `{key}` |" in reference
     for variable in lm.VARIABLES:
         assert f"| `{variable.name}` |" in generate.variables()
+
+
+# Phrases of our own, and what is written in their place.
+PLAIN_WORDS = {
+    r"go(es)? on where": "resume",
+    r"hand-?over": "export",
+    r"what matters": "selected results",
+    r"rises? without end": "thermal runaway",
+    r"the other way backward": "in reverse",
+    r"truth value": "Boolean",
+    r"\ba look tests|between two looks": "each check covers",
+    r"\bsoft (mesh|zone)": "mesh compliance, low stiffness",
+    r"\bone's own": "your own",
+    r"nothing beside": "self-contained",
+    r"in plain words": "",
+    r"\b[Mm]akers?\b": "manufacturer",
+}
+
+
+@pytest.mark.parametrize("wrong", PLAIN_WORDS)
+def test_the_prose_uses_the_words_of_the_field(wrong: str) -> None:
+    package = ROOT / "src" / "lostmotion"
+    files = [
+        *ROOT.glob("*.md"),
+        *(ROOT / "docs").glob("*.md"),
+        *package.glob("*.py"),
+        *package.glob("*.jinja"),
+        *package.glob("*.toml"),
+    ]
+    key = r"""[`"]maker[`"]|\bmaker ?[=:]|\.maker\b|status: maker"""  # a key of data sheets, and a status of their sources
+    for path in files:
+        if path.name in ("theory.md", "verification.md"):
+            continue
+        for line in re.sub(key, "", path.read_text()).splitlines():
+            assert not re.search(wrong, line), f"{path.name}: {line.strip()} ({PLAIN_WORDS[wrong]})"

@@ -18,8 +18,9 @@ PACKAGE = ROOT / "src" / "lostmotion"
 # analysis -> plots -> report -> command line.
 ROOMS = [
     {"_instruction_set", "errors"},
-    {"_core", "variables", "units"},
-    {"quantities", "toml_files"},
+    {"_core", "variables", "unit_grammar", "validation"},
+    {"units"},
+    {"quantities", "notebook", "toml_files", "series_files"},
     {"signals", "parts", "task"},
     {"data_sheet"},
     {"loss_map_builder"},
@@ -27,6 +28,7 @@ ROOMS = [
     {"scenario"},
     {"switchings"},
     {"results"},
+    {"sources"},
     {"run"},
     {"test_rig"},
     {"duty_cycle", "holding"},
@@ -37,8 +39,10 @@ ROOMS = [
     {"shooting"},
     {"harmonic_response"},
     {"paper"},
+    {"panels"},
     {"plots"},
     {"pages"},
+    {"sheet_rows", "grids"},
     {"rig_sheet"},
     {"study_units", "study_measures", "study_design"},
     {"study_functions"},
@@ -52,8 +56,10 @@ ROOMS = [
     {"study_selection_report"},
     {"study_report"},
     {"listing"},
+    {"response_figures"},
     {"response_sheet"},
     {"run_sheet", "terminal"},
+    {"accessor"},
     {"reproduce", "report"},
     {"cli"},
     {"__init__", "__main__"},
@@ -154,5 +160,5 @@ def test_examples_run(path: Path, tmp_path: Path) -> None:
 
 def test_help_names_every_command() -> None:
     done = subprocess.run([sys.executable, "-m", "lostmotion", "--help"], capture_output=True, text=True, check=True)
-    for command in ("reproduce", "run", "response", "rig", "catalogue", "drive", "study", "schema"):
+    for command in ("reproduce", "run", "response", "rig", "catalogue", "scenarios", "drive", "study", "schema"):
         assert f"  {command} " in done.stdout

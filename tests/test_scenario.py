@@ -126,6 +126,23 @@ def test_a_sampled_series_is_read_from_a_file(small: Path, tmp_path: Path) -> No
         (tmp_path / "points.csv").write_text(content)
         with pytest.raises(lm.InputError, match=r"command\.samples"):
             lm.load(path)
+    for content, words in (
+        ("0;0\n1;1\n", 'line 1: "0;0" must be two numbers with decimal points, separated by one comma'),
+        ("0,0\n1,2,3\n", 'line 2: "1,2,3" must be two numbers'),
+        ('0,0\n"0,5",1\n', 'line 2: "0,5" has a decimal comma; write "0.5"'),
+        ("0,0\n1_000,1\n", 'line 2: "1_000" has separators'),
+        ("time [min],value\n# why\n0,0\n1,x\n", 'line 4: "x" is not one number'),
+        ("time [rpm],value\n0,0\n", 'line 1: the unit of "time [rpm]" has the unit of something else'),
+        ("0,0\n1,nan\n", "values[1]: nan must be a finite number"),
+    ):
+        (tmp_path / "points.csv").write_text(content)
+        with pytest.raises(lm.InputError) as caught:
+            lm.load(path)
+        assert words in str(caught.value)
+        assert "command.samples" in str(caught.value)
+    (tmp_path / "points.csv").write_text("\ufefftime [ms],command [%]\r\n0,0\r\n500,2\r\n")
+    command = lm.load(path).command
+    assert (command.samples.times, command.samples.values) == ((0.0, 0.5), (0.0, 0.02))
     (tmp_path / "points.csv").unlink()
     with pytest.raises(lm.InputError, match=r"points\.csv.*cannot be read"):
         lm.load(path)
@@ -157,6 +174,6 @@ def test_an_override_reaches_an_entry_of_a_list() -> None:
     changed = lm.load(path).replace(**{"command.ramps.0.rise": 0.3, "gearbox.stiffness.slopes.1": 3e4})
     assert changed.command.ramps[0].rise == 0.3
     assert changed.gearbox.stiffness.slopes == (2650.0, 3e4, 26500.0)
-    for key in ("command.ramps.1.rise", "command.ramps.-1.rise", "command.ramps.first.rise"):
-        with pytest.raises(lm.InputError, match=rf"--set {key}: .*numbered from 0"):
-            lm.load(path, [f"{key}=1"])
+    for place in ("1", "-1", "first"):
+        with pytest.raises(lm.InputError, match=rf"key command.ramps.{place}: .*numbered from 0"):
+            lm.load(path, [f"command.ramps.{place}.rise=1"])

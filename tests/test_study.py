@@ -206,9 +206,9 @@ def test_parquet_opens_directly_with_study_and_parameters(tmp_path: Path):
 
 
 def test_values_with_the_unit_of_something_else_are_refused():
-    with pytest.raises(ValueError, match=r"of load.inertia: has the unit of something else \(N\).*kg\*m\^2"):
+    with pytest.raises(ValueError, match=r'of load.inertia: "1 N" has the unit of something else \(N\).*kg\*m\^2'):
         make(vary=[{"key": "load.inertia", "uniform": ["1 N", "2 N"]}])
-    with pytest.raises(ValueError, match=r"of gearbox.stiffness.slopes: has the unit of something else"):
+    with pytest.raises(ValueError, match=r"of gearbox.stiffness.slopes: .* has the unit of something else"):
         make(vary=[{"key": "gearbox.stiffness.slopes", "relative": True, "uniform": ["1 N*m/rad", "2 N*m/rad"]}])
     read = make(vary=[{"key": "motor.rated_speed", "triangular": ["3000 rpm", "3300 rpm", 400.0]}]).vary[0].triangular
     assert read == pytest.approx((3000 * math.pi / 30, 3300 * math.pi / 30, 400.0))
@@ -298,10 +298,8 @@ def started(study: Path, directory: Path, parts: int) -> subprocess.Popen:
     """A study in a process of its own, once it has written some parts."""
     command = [sys.executable, "-m", "lostmotion", "study", str(study), "-o", str(directory)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    limit = time.monotonic() + 60.0
-    while len(list(directory.glob("part-*.parquet"))) < parts:
+    while len(list(directory.glob("part-*.parquet"))) < parts:  # however long a busy machine takes
         assert process.poll() is None, process.stderr.read() if process.stderr else ""
-        assert time.monotonic() < limit
         time.sleep(0.01)
     return process
 
@@ -311,10 +309,10 @@ def test_killed_and_started_again_it_goes_on_where_it_was(long_study: Path, tmp_
     directory = tmp_path / "killed"
     process = started(long_study, directory, 2)
     os.kill(process.pid, how)
-    _, error = process.communicate(timeout=60)
+    _, error = process.communicate()
     if how == signal.SIGINT:
         assert process.returncode == 130
-        assert "goes on with it" in error
+        assert "resumes it" in error
     kept = {p.name: p.stat().st_mtime_ns for p in directory.glob("part-*.parquet")}
     assert 2 <= len(kept) < 12
     (directory / ".part-000011.parquet.x.parquet").write_bytes(b"half")  # what a kill in mid-write leaves
@@ -479,14 +477,14 @@ peak = "peak(load_speed)"
         ("[keep]", "[kept]", "kept"),
         ("values = [1, 2]", "values = [1, 2]\nvalue = 3", "not known"),
         ("values = [1, 2]", "values = [true]", "load.inertia: true is no number$"),
-        ("values = [1, 2]", "grid = [1, 2, 2.5]", "key vary.0.grid.2: 2.5 must be a whole number$"),
-        ("values = [1, 2]", "values = [1, inf]", "key vary.0.values.1: inf must be a finite number"),
+        ("values = [1, 2]", "grid = [1, 2, 2.5]", r"key vary\[0\]\.grid\[2\]: 2.5 must be a whole number$"),
+        ("values = [1, 2]", "values = [1, inf]", r"key vary\[0\]\.values\[1\]: inf must be a finite number"),
         ("values = [1, 2]", "grid = [1, 2, 1000000000]", "grid needs 1 to 1000000 values, not 1000000000"),
         ("values = [1, 2]", "grid = [1, 2, 0]", "grid needs 1 to 1000000 values, not 0"),
-        ("[[vary]]", "[vary]", "key vary: must be a list$"),
-        ("[keep]", "[[keep]]", "key keep: must be a table$"),
-        ('"peak(load_speed)"', "3", "key keep.peak: 3 must be a text in quotes$"),
-        ('design = "list"', 'design = "lists"', "'lists' must be one of 'grid', 'list'"),
+        ("[[vary]]", "[vary]", "key vary: .* must be a list, in square brackets$"),
+        ("[keep]", "[[keep]]", "key keep: .* must be a table$"),
+        ('"peak(load_speed)"', "3", "key keep.peak: 3 must be text, in quotes$"),
+        ('design = "list"', 'design = "lists"', '"lists" must be one of "grid", "list"'),
     ],
 )
 def test_a_bad_study_ends_in_one_clear_line(tmp_path: Path, old: str, new: str, match: str):

@@ -151,7 +151,7 @@ def test_a_record_with_gaps_is_a_row_that_says_what_it_lacks(tmp_path: Path):
 
 
 def test_a_sheet_of_one_s_own_stands_beside_the_study(tmp_path: Path):
-    sheet = (ROOT / "src" / "lostmotion" / "sheet-template.toml").read_text()
+    sheet = (ROOT / "src" / "lostmotion" / "gearbox-template.toml").read_text()
     (tmp_path / "own.toml").write_text(sheet)
     study = lm.load_study(write(tmp_path, f'[[vary]]\nkey = "gearbox"\nvalues = ["own.toml", "{GEARBOXES[0]}"]'))
     assert study.vary[0].names == (str(tmp_path / "own.toml"), GEARBOXES[0])
@@ -207,7 +207,7 @@ values = [1.0, 1.2]
         ('key = "gearbox.loss_factor"\nvalues = [1, 2]', "belongs beside `from`, but the gearbox of the base"),
         ('key = "gearbox"\nvalues = ["schaeffler-rt1-h-20-10"]', "did you mean schaeffler-rt1-h-20-100"),
         ('key = "gearbox"\nvalues = [1]', "which is no name of a gearbox"),
-        ('key = "gearbox"\nvalues = ["maxon-ec-i-52-606793"]', "not in the catalogue"),
+        ('key = "gearbox"\nvalues = ["maxon-ec-i-52-606793"]', "is a motor; a gearbox is wanted here"),
         ('key = "gearbox"\nvalues = ["none.toml"]', "no such file"),
         ('key = "gearbox"\nuniform = [0, 1]', "needs? .*values or catalogue"),
         ('key = "gearbox"\nrelative = true\nvalues = ["schaeffler-rt1-h-20-100"]', "a key of their own"),

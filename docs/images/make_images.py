@@ -6,8 +6,8 @@ from pathlib import Path
 
 import lostmotion as lm
 from lostmotion import plots
+from lostmotion.panels import STYLES, Curve, Panel
 from lostmotion.paper import AMPLITUDES, MODELS, paper_scenario
-from lostmotion.plots import STYLES, Curve, Panel
 from lostmotion.records import find
 from lostmotion.rig_sheet import panels
 from lostmotion.study_selection import candidates, pareto_front

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, NoReturn
 
 import typer
 
-from .terminal import fail, progress, workers, writing
+from .terminal import busy, count, fail, number, progress, try_directory, try_file, workers, writing
+
+PICTURES = (".png", ".svg", ".pdf")
+UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # of the parser that typer brings along
 
 app = typer.Typer(
     name="lostmotion",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly.",
@@ -25,12 +30,14 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point: known errors end in one line and exit code 1, Ctrl-C in 130."""
-    from .errors import InputError
+    from .errors import InputError, MissingLibraryError
 
     try:
-        app()
-    except InputError as error:
+        code = app(standalone_mode=False)
+    except (InputError, MissingLibraryError) as error:
         fail(str(error))
+    except UsageError as error:
+        _explain_usage(error)
     except KeyboardInterrupt:
         fail("interrupted; nothing was written", 130)
     except BrokenPipeError:
@@ -39,6 +46,84 @@ def main() -> None:
     except (RuntimeError, ValueError) as error:
         # What a solver or a check of a whole scenario reports is a result for the user; anything else is our defect.
         fail(" ".join(str(error).split()))
+    else:
+        if code == 130:  # typer turns Ctrl-C into this code
+            fail("interrupted; nothing was written", 130)
+        sys.exit(code)
+
+
+def _explain_usage(error: Any) -> NoReturn:
+    """One line for a command that cannot be read, and exit code 2; the help where a command has no arguments at all."""
+    text = str(error.format_message())
+    if "\n" in text:
+        print(text, file=sys.stderr)
+        sys.exit(2)
+    command = error.ctx.command_path if error.ctx else "lostmotion"
+    text = re.sub("^Invalid value for '([^']*)'", r"\1", text).rstrip(".")
+    fail(f"{text}; see `{command.replace('python -m ', '')} --help`", 2)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(version("lostmotion"))
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly."""
+
+
+# --- what several commands share ---
+
+
+def _files(incomplete: str) -> Iterator[str]:
+    """Names of files and directories, for the completion of the shell."""
+    from glob import escape, glob
+
+    for name in sorted(glob(f"{escape(incomplete)}*")):
+        yield f"{name}/" if Path(name).is_dir() else name
+
+
+def complete_scenario(incomplete: str) -> list[str]:
+    """Shipped scenarios and files."""
+    from importlib.resources import files
+
+    names = sorted(f.name.removesuffix(".toml") for f in (files("lostmotion") / "scenarios").iterdir())
+    return [*(n for n in names if n.startswith(incomplete)), *_files(incomplete)]
+
+
+def complete_gearbox(incomplete: str) -> list[str]:
+    """Gearboxes of the catalogue and files."""
+    from .data_sheet import GearboxSheet
+    from .records import catalogue as records
+
+    names = [r.name for r in records() if isinstance(r, GearboxSheet)]
+    return [*(n for n in names if n.startswith(incomplete)), *_files(incomplete)]
+
+
+SourceArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="Scenario file (.toml), name of a shipped scenario, or saved result (.nc, .csv, .parquet), which is run again.",
+        autocompletion=complete_scenario,
+    ),
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help='Change a value, e.g. --set command.amplitude=0.1 or "load.inertia=1 kg*m^2".',
+    ),
+]
 
 
 @app.command()
@@ -47,14 +132,15 @@ def reproduce(
         "out"
     ),
 ) -> None:
-    """Reproduce the paper: figures, data and a report.
+    """Reproduce the paper "Simplified dynamic model of the transmission": figures, data and a report.
 
-    Writes PNG, SVG and CSV for each of the figures 5 and 9 to 18, the constants as constants.csv, and report.html, which needs nothing beside it.
+    Writes PNG, SVG and CSV for each of the figures 5 and 9 to 18, the constants as constants.csv, and report.html, a single
+    self-contained page.
     """
-    if output.exists() and not output.is_dir():
-        from .errors import InputError
+    from .errors import need
 
-        raise InputError(f"{output}: is a file; -o names a directory")
+    try_directory(output)
+    need("jinja2", "The report", "report")
     from .reproduce import WORK
     from .reproduce import reproduce as work
 
@@ -65,15 +151,8 @@ def reproduce(
 
 @app.command()
 def run(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="Scenario file.")],
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help='Change a value, e.g. --set command.amplitude=0.1 or "load.inertia=1 kg*m^2".',
-        ),
-    ] = None,
+    scenario: SourceArgument,
+    overrides: Overrides = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE", help="Result file: .nc, .csv or .parquet.")
     ] = None,
@@ -81,41 +160,59 @@ def run(
         Path | None, typer.Option("--plot", metavar="FILE", help="Figure of the run: .png, .svg or .pdf.")
     ] = None,
     explain: Annotated[
-        float | None, typer.Option("--explain", metavar="TIME", help="Say what each contact holds at this instant [s].")
+        float | None,
+        typer.Option(
+            "--explain", metavar="TIME", parser=number("s"), help="Say what each contact holds at this instant [s]."
+        ),
     ] = None,
-    solver: Annotated[str, typer.Option("--solver", help="exact, or dormand-prince as a second opinion.")] = "exact",
-    tolerance: Annotated[float, typer.Option("--tolerance", help="Relative tolerance of dormand-prince.")] = 1e-8,
+    solver: Annotated[
+        str, typer.Option("--solver", metavar="NAME", help="exact, or dormand-prince as a second opinion.")
+    ] = "exact",
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance", metavar="VALUE", parser=number(), help="Relative tolerance of dormand-prince (1e-8)."
+        ),
+    ] = None,
 ) -> None:
     """Run a scenario: print, save, draw, explain.
 
     \b
     lostmotion run drive.toml
-    lostmotion run drive.toml --set command.amplitude=0.1 -o result.nc --plot result.png
-    lostmotion run drive.toml --explain 0.25
+    lostmotion run paper-2dof-nl-small --plot small.png
+    lostmotion run drive.toml --set command.amplitude=0.1 -o result.csv --plot result.png
+    lostmotion run result.csv --explain 0.25
     """
     from .errors import InputError
     from .results import check_output, save, write_whole
-    from .scenario import load
+    from .sources import load
 
     if output is not None:
-        check_output(output)
-    if plot is not None and plot.suffix not in (".png", ".svg", ".pdf"):
-        raise InputError(
-            f"{plot}: the ending {plot.suffix or '(none)'} is not known; it must be one of .png, .svg, .pdf"
-        )
+        try_file(check_output(output))
+    if plot is not None:
+        if plot.suffix not in PICTURES:
+            raise InputError(
+                f"{plot}: the ending {plot.suffix or '(none)'} is not known; it must be one of {', '.join(PICTURES)}"
+            )
+        try_file(plot)
     loaded = load(scenario, overrides or ())
     if explain is not None and not 0.0 <= explain <= loaded.simulation.duration:
         raise InputError(
             f"--explain {explain}: must lie between 0 and simulation.duration, {loaded.simulation.duration} s"
         )
-    from .run import simulate
+    from .run import run as work
 
     if solver not in ("exact", "dormand-prince"):
         raise InputError(f"--solver {solver}: must be exact or dormand-prince")
-    if not tolerance > 0.0:
-        raise InputError(f"--tolerance {tolerance}: must be greater than 0")
+    if tolerance is not None and solver == "exact":
+        raise InputError(
+            f"--tolerance {tolerance:g}: the exact solver has none; leave it out, or add --solver dormand-prince"
+        )
+    if tolerance is not None and not tolerance > 0.0:
+        raise InputError(f"--tolerance {tolerance:g}: must be greater than 0")
     try:
-        result = simulate(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
+        with busy("Simulating"):
+            result = work(loaded, solver=solver, relative_tolerance=1e-8 if tolerance is None else tolerance)  # type: ignore[arg-type]
     except RuntimeError as error:
         raise InputError(f"{scenario}: {error}") from None
     from .run_sheet import summary
@@ -126,51 +223,61 @@ def run(
 
         print(explain_instant(loaded, explain))
     if output is not None:
-        save(result, output)
+        with busy("Writing"):
+            save(result.dataset(), output)
         print(f"Result written to {output}")
     if plot is not None:
-        from .plots import overview
+        with busy("Drawing"):
+            from .plots import overview
 
-        figure = overview(result)
-        write_whole(plot, figure.savefig)
+            write_whole(plot, overview(result.dataset()).savefig)
         print(f"Figure written to {plot}")
 
 
 @app.command()
 def response(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="Scenario file; only its drive counts.")],
+    scenario: SourceArgument,
     amplitudes: Annotated[
-        str, typer.Option("--amplitudes", help="0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many).")
+        str,
+        typer.Option(
+            "--amplitudes", metavar="LIST", help="0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many)."
+        ),
     ] = "0.02..1:6",
-    frequencies: Annotated[str, typer.Option("--frequencies", help="[Hz], as the amplitudes.")] = "0.1..100:60",
-    source: Annotated[str, typer.Option("--input", help="command or load_torque: what is a sine.")] = "command",
-    variable: Annotated[str, typer.Option("--variable", help="Which variable's response to draw.")] = "load_speed",
+    frequencies: Annotated[
+        str, typer.Option("--frequencies", metavar="LIST", help="[Hz], as the amplitudes.")
+    ] = "0.1..100:60",
+    source: Annotated[
+        str, typer.Option("--input", metavar="NAME", help="command or load_torque: what is a sine.")
+    ] = "command",
+    variable: Annotated[
+        str, typer.Option("--variable", metavar="NAME", help="Which variable's response to draw.")
+    ] = "load_speed",
     refine: Annotated[
-        float | None, typer.Option("--refine", metavar="DB", help="Add frequencies where a curve bends by more.")
+        float | None,
+        typer.Option("--refine", metavar="DB", parser=number(), help="Add frequencies where a curve bends by more."),
     ] = None,
     compare: Annotated[
-        list[Path] | None,
-        typer.Option("--compare", metavar="OTHER.toml", help="Overlay the drive of another scenario."),
+        list[str] | None,
+        typer.Option("--compare", metavar="OTHER", help="Overlay the drive of another scenario."),
     ] = None,
-    overrides: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in `run`.")
-    ] = None,
+    overrides: Overrides = None,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
         "response"
     ),
 ) -> None:
-    """Frequency response over amplitude: each point from a motion that truly repeats, on all cores.
+    """Frequency response over amplitude: each point from a periodic motion, on all cores.
 
-    Writes Bode figures (bode.png, .svg, .csv), maps of gain, phase, efficiency and distortion over amplitude and
-    frequency (maps.png, .svg), and all numbers (response.csv, response.nc, characteristics.csv).
+    Of the scenario the drive and the constant parts of command and load torque are taken. Writes Bode figures (bode.png, .svg, .csv), maps of gain, phase, efficiency and distortion over amplitude and
+    frequency (maps.png, .svg), and all numbers (response.csv, characteristics.csv, and response.nc where NetCDF is
+    installed).
 
     \b
     lostmotion response drive.toml --amplitudes 0.025,1 --frequencies 0.1..100:60
     lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
     """
     from .errors import InputError
-    from .response_sheet import parse_grid
-    from .scenario import load
+    from .grids import parse_grid
+    from .sources import load
     from .variables import CHANNEL_NAMES
 
     wanted, grid = parse_grid(amplitudes, "amplitudes"), parse_grid(frequencies, "frequencies")
@@ -178,33 +285,23 @@ def response(
         raise InputError(f"--input {source}: must be command or load_torque")
     if variable not in CHANNEL_NAMES:
         raise InputError(f"--variable {variable}: must be one of {', '.join(CHANNEL_NAMES)}")
-    if output.exists() and not output.is_dir():
-        raise InputError(f"{output}: is a file; -o names a directory")
-    loaded = {scenario.stem: load(scenario, overrides or ())}
-    for path in compare or ():
-        loaded[path.stem] = load(path)
+    try_directory(output)
+    name = Path(scenario).stem
+    loaded = {name: load(scenario, overrides or ())} | {Path(other).stem: load(other) for other in compare or ()}
     from .harmonic_response import Source, frequency_response
-    from .response_sheet import write_response
 
     responses = {}
     with progress(len(loaded) * len(wanted) * len(grid), "Response") as step:
-        for name, s in loaded.items():
+        for title, s in loaded.items():
             kind: Source = "command" if source == "command" else "load_torque"
-            responses[name] = frequency_response(
-                s.drive(),
-                grid,
-                wanted,
-                source=kind,
-                mean_command=s.command.mean,
-                mean_load_torque=s.load.torque.mean,
-                refine=refine,
-                progress=step,
-            )
-    first = loaded[scenario.stem]
-    with writing(output):
+            responses[title] = frequency_response(s, grid, wanted, source=kind, refine=refine, progress=step)
+    first = loaded[name]
+    with writing(output), busy("Drawing"):
+        from .response_sheet import write_response
+
         figure, found = write_response(output, responses, first.drive(), variable)
-    result = responses[scenario.stem]
-    print(first.title or scenario.stem)
+    result = responses[name]
+    print(first.title or name)
     for a in found["amplitude"].values:
         band, cross = (float(found[k].sel(amplitude=a)) for k in ("bandwidth", "phase_crossover"))
         text = [f"-3 dB at {band:.4g} Hz" if math.isfinite(band) else "-3 dB outside the frequencies, or no motion"]
@@ -225,12 +322,19 @@ def response(
     if len(different) > 3:
         print(f"  {len(different) - 3} more reasons are in response.csv")
     print(f"Figures and tables are in {figure.parent}")
+    if not (output / "response.nc").exists():
+        print('response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"')
 
 
 @app.command()
 def rig(
     gearbox: Annotated[
-        str, typer.Argument(metavar="GEARBOX", help="Name in the catalogue, or a file with one record (.toml).")
+        str,
+        typer.Argument(
+            metavar="GEARBOX",
+            help="Name in the catalogue, or a file with one record (.toml).",
+            autocompletion=complete_gearbox,
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
         "rig"
@@ -249,17 +353,23 @@ def rig(
     lostmotion rig my-gearbox.toml -o sheet --set loss_factor=1.3
     """
     from .data_sheet import GearboxSheet
+    from .errors import need
     from .records import find
     from .scenario import gearbox_from_record
+
+    try_directory(output)
+    need("jinja2", "The page of the rig", "report")
 
     sheet = find(gearbox, "gearbox")
     assert isinstance(sheet, GearboxSheet)
     part, notes = gearbox_from_record(gearbox, overrides or ())
-    from .rig_sheet import summary_rows, write_sheet
-    from .test_rig import measure
+    from .test_rig import WORK, measure
 
-    report = measure(part, sheet, notes)
-    with writing(output):
+    with progress(WORK, "Measuring") as step:
+        report = measure(part, sheet, notes, step)
+    with writing(output), busy("Drawing"):
+        from .rig_sheet import summary_rows, write_sheet
+
         page = write_sheet(output, sheet.name, report, sheet, notes)
     print(sheet.title or sheet.name)
     for c in report.comparisons:
@@ -278,22 +388,31 @@ def catalogue(
     name: Annotated[
         str | None, typer.Argument(metavar="[NAME | new]", help="Show one record; `new`: a template for your own.")
     ] = None,
-    kind: Annotated[str | None, typer.Option("--kind", help="strain_wave, planetary, worm, motor, ...")] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            "--kind", metavar="KIND", help="gearbox, motor, or a kind of gearbox: strain_wave, planetary, worm, ..."
+        ),
+    ] = None,
     ratio: Annotated[str | None, typer.Option("--ratio", metavar="MIN..MAX", help="Gear ratio.")] = None,
     torque: Annotated[str | None, typer.Option("--torque", metavar="MIN..MAX", help="Rated torque [N·m].")] = None,
+    complete: Annotated[bool, typer.Option("--complete", help="Only records that can be simulated.")] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="With `new`: the file.")] = None,
 ) -> None:
     """List the components, show one with its sources and gaps, or start your own data sheet.
+
+    The list says of each record whether it is a gearbox or a motor, and what it lacks for a simulation.
 
     \b
     lostmotion catalogue --kind strain_wave --ratio 50..120 --torque 20..100
     lostmotion catalogue schaeffler-rt1-h-20-100
     lostmotion catalogue new -o my-gearbox.toml
+    lostmotion catalogue new --kind motor -o my-motor.toml
     """
     from .listing import list_records, record_text, template
 
     if name == "new":
-        text = template()
+        text = template(kind)
         if output is None:
             print(text, end="")
             return
@@ -307,7 +426,18 @@ def catalogue(
     elif name is not None:
         print(record_text(name))
     else:
-        print(list_records(kind, ratio, torque))
+        print(list_records(kind, ratio, torque, complete))
+
+
+@app.command()
+def scenarios() -> None:
+    """List the scenarios that come with the package; `run`, `response` and `drive check` take their names."""
+    from .scenario import load, shipped_scenarios
+
+    found = shipped_scenarios()
+    width = max(map(len, found))
+    for name in found:
+        print(f"{name:<{width}}  {load(name).title}")
 
 
 @app.command()
@@ -319,8 +449,12 @@ def study(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="Directory; by default the file's name.")
     ] = None,
-    threads: Annotated[int | None, typer.Option("--threads", help="In the core; all cores by default.")] = None,
-    processes: Annotated[int | None, typer.Option("--processes", help="Worker processes in place of threads.")] = None,
+    threads: Annotated[
+        int | None, typer.Option("--threads", metavar="N", parser=count, help="In the core; all cores by default.")
+    ] = None,
+    processes: Annotated[
+        int | None, typer.Option("--processes", metavar="N", parser=count, help="Worker processes in place of threads.")
+    ] = None,
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler of a cluster.")
     ] = None,
@@ -331,7 +465,7 @@ def study(
         ),
     ] = None,
 ) -> None:
-    """Many runs: vary parameters, keep what matters, go on where an interruption left off.
+    """Many runs: vary parameters, store selected results, resume after an interruption.
 
     Writes a directory of Parquet files, one row a run, that pandas, DuckDB and polars open directly.
 
@@ -347,7 +481,9 @@ def study(
         from .study_report import best_lines, show
 
         found = best_lines(shown, best) if best is not None else []
-        print("\n".join([*show(shown), *found]))
+        with busy("Drawing"):
+            lines = show(shown)
+        print("\n".join([*lines, *found]))
         return
     if shown is not None:
         raise InputError(f"study {what} {shown}: too many names; the directory is given by -o")
@@ -358,6 +494,7 @@ def study(
 
     loaded = load_study(what)
     directory = output or Path(Path(what).stem)
+    try_directory(directory)
     with ExitStack() as stack:
         executor = stack.enter_context(workers(processes, scheduler)) if processes or scheduler else None
         report = stack.enter_context(progress(loaded.total, "Runs"))
@@ -365,8 +502,8 @@ def study(
             with writing(directory, "; what is written stays"):
                 work(loaded, directory, threads=threads, executor=executor, progress=report)
         except KeyboardInterrupt:
-            fail(f"interrupted; what is in {directory} stays, and the same command goes on with it", 130)
-    print(f"{loaded.total} runs are in {directory}; `lostmotion study show {directory}` looks at them")
+            fail(f"interrupted; what is in {directory} stays, and the same command resumes it", 130)
+    print(f"{loaded.total} runs are in {directory}; `lostmotion study show {directory}` shows them")
 
 
 drive_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Check a drive against its task.")
@@ -375,10 +512,8 @@ app.add_typer(drive_app, name="drive")
 
 @drive_app.command()
 def check(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="Scenario file.")],
-    overrides: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in `run`.")
-    ] = None,
+    scenario: SourceArgument,
+    overrides: Overrides = None,
 ) -> None:
     """Torques, speeds, voltage, current, heat, inertia ratio, resonance, dead zone, lost motion and holding.
 
@@ -389,14 +524,15 @@ def check(
     """
     from .drive_check import check_drive
     from .errors import InputError
-    from .scenario import load
+    from .sources import load
 
     loaded = load(scenario, overrides or ())
     try:
-        findings = check_drive(loaded)
+        with busy("Checking"):
+            findings = check_drive(loaded)
     except (InputError, RuntimeError) as error:
         raise InputError(f"{scenario}: {error}") from None
-    print(loaded.title or str(scenario))
+    print(loaded.title or scenario)
     for finding in findings:
         print(f"  {finding}")
     warnings, unknown = (sum(f.verdict == verdict for f in findings) for verdict in ("warning", "unknown"))
@@ -418,11 +554,3 @@ def schema() -> None:
     from .scenario import json_schema
 
     print(json.dumps(json_schema(), indent=2))
-
-
-@app.command()
-def version() -> None:
-    """Print the version."""
-    from importlib.metadata import version as installed
-
-    print(installed("lostmotion"))

@@ -1,4 +1,4 @@
-"""Data sheets: what makers print of gearboxes and motors, with units, sources and gaps."""
+"""Data sheets: what manufacturers print of gearboxes and motors, with units, sources and gaps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from .parts import GearboxLimits, Hysteresis, LossMap, Motor, MotorLimits, TorsionCurve
+from .errors import InputError
+from .parts import GearboxLimits, Hysteresis, LinearStiffness, LossMap, Motor, MotorLimits, TorsionCurve
 from .quantities import (
     Angle,
     Current,
@@ -43,7 +44,7 @@ class Source(Part):
     figures: tuple[str, ...]
     """keys of the record that it covers"""
     status: Literal["maker", "transcription", "inferred"]
-    """read in the maker's own text, in somebody's transcription of it, or concluded from other figures"""
+    """read in the manufacturer's own text, in somebody's transcription of it, or concluded from other figures"""
     text: str
 
 
@@ -105,7 +106,7 @@ class LossFigures(Part):
     efficiency: tuple[EfficiencyPoint, ...] = ()
     """while the motor drives"""
     load_correction: tuple[tuple[Annotated[Number, Positive], Annotated[Number, Positive]], ...] = ()
-    """(load, factor on the efficiency at rated load), for makers who print one efficiency and a curve of factors"""
+    """(load, factor on the efficiency at rated load), for manufacturers who print one efficiency and a curve of factors"""
     backdrive_efficiency: tuple[EfficiencyPoint, ...] = ()
     """while the load drives"""
     no_load_torque: tuple[NoLoadPoint, ...] = ()
@@ -171,7 +172,7 @@ class LossFigures(Part):
 
 
 class StiffnessFigures(Part):
-    """Torsional stiffness in pieces, as makers print it: K1 up to torque T1, K2 up to T2, K3 beyond."""
+    """Torsional stiffness by segments, as manufacturers print it: K1 up to torque T1, K2 up to T2, K3 beyond."""
 
     slopes: tuple[Annotated[Stiffness, Positive], ...] = Field(min_length=1)
     """K1, K2, ..."""
@@ -208,7 +209,7 @@ class Record(Part):
     """lower-case letters, digits, dots and dashes"""
     maker: str = ""
     title: str = ""
-    """as the maker calls it"""
+    """as the manufacturer calls it"""
     note: str = ""
     """what a reader of results must know"""
     sources: tuple[Source, ...] = ()
@@ -235,7 +236,7 @@ class Record(Part):
 
     def where(self, figure: str) -> str:
         """Where one would read a figure that is missing."""
-        return next((gap.where for gap in self.gaps if gap.figure == figure), "the maker's data sheet")
+        return next((gap.where for gap in self.gaps if gap.figure == figure), "the manufacturer's data sheet")
 
 
 class GearboxSheet(Record):
@@ -289,16 +290,12 @@ class GearboxSheet(Record):
             out["losses"] = f"an efficiency or a loss table; see {self.where('losses.efficiency')}"
         return out
 
-    def torsion_curve(self, added_backlash: float = 0.0) -> TorsionCurve:
-        """The torsion curve, with the backlash as its first piece."""
+    def torsion_curve(self) -> TorsionCurve:
+        """The torsion curve, with the backlash as its first segment."""
         assert self.stiffness is not None
-        return TorsionCurve(
-            slopes=self.stiffness.slopes,
-            breaks=self.stiffness.breaks(),
-            backlash=(self.backlash or 0.0) + added_backlash,
-        )
+        return TorsionCurve(slopes=self.stiffness.slopes, breaks=self.stiffness.breaks(), backlash=self.backlash or 0.0)
 
-    def hysteresis(self, curve: TorsionCurve) -> Hysteresis | None:
+    def hysteresis(self, curve: TorsionCurve | LinearStiffness) -> Hysteresis | None:
         """eta_H of (16), from itself or from the width of the loop.
 
         On the loop that turns at rated torque T_R, P = T_R - h at the turning points and h = (1 - eta_H)/2 P; it
@@ -309,10 +306,10 @@ class GearboxSheet(Record):
         if self.hysteresis_loss is None:
             return None
         assert self.rated_output_torque is not None
-        h = curve.torque(0.5 * self.hysteresis_loss)
+        h = curve.core().torque(0.5 * self.hysteresis_loss)
         q = h / (self.rated_output_torque - h)
         if not 0.0 <= q < 0.5:
-            raise ValueError(
+            raise InputError(
                 f"{self.name}: has hysteresis_loss = {self.hysteresis_loss:.4g} rad, which with this stiffness means a loop of half of "
                 "the rated torque or more; check both figures and their units"
             )
@@ -371,16 +368,16 @@ class MotorSheet(Record):
         }
         return {key: f"see {self.where(key)}" for key, value in need.items() if not value}
 
-    def motor(self, voltage_limit: float | None = None) -> Motor:
+    def motor(self) -> Motor:
         """Parameters of eq. (2).
 
-        The rated point and the stall torque of the sheet are kept. So no-load speed is a result; makers' figures are
+        The rated point and the stall torque of the sheet are kept. So no-load speed is a result; manufacturers' figures are
         often not consistent with each other, and `no_load_speed_of_model` says by how much.
         """
         missing = self.missing()
         if missing:
             key, where = next(iter(missing.items()))
-            raise ValueError(f"{self.name}: lacks {key}; {where}")
+            raise InputError(f"{self.name}: lacks {key}; {where}")
         k_t, R = self.torque_constant, self.resistance
         T_10 = self.friction_torque
         if T_10 is None:
@@ -414,7 +411,6 @@ class MotorSheet(Record):
             rated_voltage=self.rated_voltage,
             electrical_time_constant=tau,
             armature_voltage_constant=k_N,
-            voltage_limit=voltage_limit,
             limits=MotorLimits(
                 continuous_torque=M_DR,
                 max_speed=self.max_speed,

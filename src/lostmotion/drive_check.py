@@ -39,7 +39,7 @@ RULES = {
     "winding_temperature": "maxon, Formulae Handbook, thermal behaviour; copper 0.39 %/K",
     "voltage": "voltage equation of the motor, u = R i + k w, without inductance",
     "current": "torque / torque constant",
-    "inertia_ratio": "rule of thumb of servo makers: at most 10",
+    "inertia_ratio": "rule of thumb of servo manufacturers: at most 10",
     "resonance": "two-mass oscillator; a command within a factor of 1.5",
     "dead_zone": "the run, and the commands that move the load from rest",
     "lost_motion": "virtual test rig; the limit is that of the task",
@@ -113,8 +113,6 @@ def _loss_map(result: xarray.Dataset) -> Finding:
 
 def _finely_sampled(scenario: Scenario) -> xarray.Dataset:
     """The run with samples so close that no peak is missed; of a very long one only the beginning, since long ones end in rest."""
-    import xarray as xr
-
     table = scenario.simulation
     fastest = max((f for _, f, _ in _resonances(scenario)), default=0.0)
     fine = min(table.sample_interval, table.duration / SAMPLES[0], 1.0 / (POINTS * fastest) if fastest else math.inf)
@@ -123,6 +121,8 @@ def _finely_sampled(scenario: Scenario) -> xarray.Dataset:
     begin = simulate(scenario, duration=fine * SAMPLES[1], sample_interval=fine, energy=False)
     whole = simulate(scenario, sample_interval=table.duration / SAMPLES[1], energy=False)
     rest = whole.isel(time=whole["time"] > begin["time"][-1])
+    import xarray as xr
+
     return xr.concat([begin, rest], "time", combine_attrs="override").assign_attrs(whole.attrs)
 
 
@@ -341,7 +341,7 @@ def _inertia(scenario: Scenario) -> Finding:
 
 
 def _resonances(scenario: Scenario) -> list[tuple[str, float, float]]:
-    """(piece, resonance, anti-resonance) [Hz] of the softest and the stiffest piece of the torsion curve."""
+    """(segment, resonance, anti-resonance) [Hz] of the softest and the stiffest segment of the torsion curve."""
     g = scenario.gearbox
     J_1 = g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia)
     slopes = [] if isinstance(g.stiffness, Rigid) else [k for k in g.stiffness.pieces()[1] if k > 0.0]
@@ -367,7 +367,7 @@ def _resonance(scenario: Scenario) -> list[Finding]:
         value = f"{f_r:.4g} Hz, anti-resonance {f_a:.4g} Hz"
         remark = f"the command has {near[0]:g} Hz" if near else ""
         verdict: Verdict = "warning" if near else "ok"
-        out.append(Finding("resonance", f"resonance on the {name} piece", value, verdict, remark))
+        out.append(Finding("resonance", f"resonance on the {name} segment", value, verdict, remark))
     return out
 
 

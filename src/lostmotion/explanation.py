@@ -1,4 +1,4 @@
-"""Why is it stuck? What holds each contact, and what would free it."""
+"""Why a drive is stuck: what holds each contact, and what would free it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from . import _core
+from .errors import InputError
 from .parts import Drive
 from .run import core_inputs
 from .scenario import Scenario
@@ -20,11 +21,11 @@ class ContactState:
     """One dry contact at one instant. Torques [N·m] at the contact: input shaft at the input, the others at the output."""
 
     name: str
-    mode: int  # -1 slips backward, 0 stuck, +1 slips forward
+    mode: int  # -1 slips in reverse, 0 stuck, +1 slips forward
     speed: float  # [rad/s]
     torque: float  # held, or while slipping taken
     capacity_forward: float  # it holds torques up to this before it slips forward
-    capacity_backward: float  # and down to minus this before it slips backward
+    capacity_backward: float  # and down to minus this before it slips in reverse
 
     @property
     def to_free_forward(self) -> float:
@@ -33,7 +34,7 @@ class ContactState:
 
     @property
     def to_free_backward(self) -> float:
-        """Torque [N·m], backward, that is missing until it slips backward."""
+        """Torque [N·m], backward, that is missing until it slips in reverse."""
         return self.capacity_backward + self.torque
 
     def __str__(self) -> str:
@@ -45,7 +46,7 @@ class ContactState:
         return (
             f"{self.name}: stuck, holds {self.torque:.4g} N·m of +{self.capacity_forward:.4g} / "
             f"-{self.capacity_backward:.4g} N·m; {self.to_free_forward:.4g} N·m more frees it forward, "
-            f"{self.to_free_backward:.4g} N·m the other way backward"
+            f"{self.to_free_backward:.4g} N·m in reverse"
         )
 
 
@@ -76,7 +77,7 @@ class Explanation:
 
 
 def explain(what: Scenario | Simulation, time: float | None = None) -> Explanation:
-    """What the contacts of a drive do at one instant.
+    """The state of the contacts of a drive at one instant.
 
     Parameters
     ----------
@@ -93,16 +94,16 @@ def explain(what: Scenario | Simulation, time: float | None = None) -> Explanati
 
     Raises
     ------
-    ValueError
+    InputError
         The time is missing, or outside the scenario's duration.
     """
     if isinstance(what, Simulation):
         if time is not None:
-            raise ValueError("a simulation is explained at its present time; leave time out")
+            raise InputError("a simulation is explained at its present time; leave time out")
         values, contacts = what._core.explain()
         return _explanation(what.drive, what.time, values, contacts)
     if time is None or not 0.0 <= time <= what.simulation.duration:
-        raise ValueError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
+        raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     values, contacts = _core.explain_at(*core_inputs(what), time)
     return _explanation(what.drive(), time, values, contacts)
 

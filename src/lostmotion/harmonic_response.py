@@ -1,4 +1,4 @@
-"""Frequency response from motions that repeat: harmonics, distortion, efficiency, stability, bandwidth."""
+"""Frequency response from periodic motions: harmonics, distortion, efficiency, stability, bandwidth."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from .errors import InputError, need
 from .linear_analysis import _control
 from .parts import Drive
-from .scenario import Initial
+from .scenario import Initial, Scenario, drive_of, mean_inputs
 from .shooting import MAX_PERIODS, SAMPLES_PER_PERIOD, floquet_multipliers, is_stable, reason_of, respond
 from .signals import CommandSignal, TorqueSignal
 from .variables import CHANNEL_NAMES
@@ -25,13 +26,13 @@ Source = Literal["command", "load_torque"]
 
 
 def frequency_response(
-    drive: Drive,
+    drive: Drive | Scenario,
     frequencies: Sequence[float],
     amplitudes: Sequence[float] | float,
     *,
     source: Source = "command",
-    mean_command: float = 0.0,
-    mean_load_torque: float = 0.0,
+    mean_command: float | None = None,
+    mean_load_torque: float | None = None,
     harmonics: int = 8,
     refine: float | None = None,
     threads: int | None = None,
@@ -40,17 +41,21 @@ def frequency_response(
 ) -> xarray.Dataset:
     """Response by harmonic linearisation (describing functions): harmonics of all outputs over one sinusoidal input.
 
-    Each point comes from a motion that repeats, found by shooting. Points do not know of each other; the result is the
-    same for any number of threads.
+    Each point is a periodic motion, found by shooting. Points are independent of each other; the result is the same
+    for any number of threads.
 
     Parameters
     ----------
+    drive
+        A drive, or a scenario, of which the drive and the constant parts of command and load torque are taken.
     frequencies
         [Hz].
     amplitudes
         Of the input: E_CA [-], or [N·m] for a load torque.
     source
         ``"command"`` or ``"load_torque"``; the other one is constant.
+    mean_command, mean_load_torque
+        Constant parts of E_C [-] and M_Z [N·m]; left out, those of the scenario, or 0.
     harmonics
         How many to keep.
     refine
@@ -75,11 +80,13 @@ def frequency_response(
     frequencies = sorted({float(f) for f in frequencies})
     amplitudes = [float(a) for a in ([amplitudes] if isinstance(amplitudes, int | float) else amplitudes)]
     if not frequencies or frequencies[0] <= 0.0:
-        raise ValueError("frequencies must be positive; give at least one")
+        raise InputError("frequencies must be positive; give at least one")
     if not amplitudes or min(amplitudes) <= 0.0:
-        raise ValueError("amplitudes must be positive; give at least one")
+        raise InputError("amplitudes must be positive; give at least one")
     if source not in ("command", "load_torque"):
-        raise ValueError(f"source {source!r} is not known; it must be command or load_torque")
+        raise InputError(f"source {source!r} is not known; it must be command or load_torque")
+    means = mean_inputs(drive, mean_command, mean_load_torque)
+    drive = drive_of(drive)
 
     def compute(new: Sequence[float]) -> xarray.Dataset:
         seen = 0
@@ -91,11 +98,7 @@ def frequency_response(
                     progress()
             seen = done
 
-        points = [
-            (*_signals(source, a, f, mean_command, mean_load_torque), 1.0 / f, Initial())
-            for a in amplitudes
-            for f in new
-        ]
+        points = [(*_signals(source, a, f, *means), 1.0 / f, Initial()) for a in amplitudes for f in new]
         r = respond(
             drive,
             points,
@@ -228,8 +231,17 @@ def _labelled(
     )
 
 
-def characteristics(response: xarray.Dataset, drive: Drive, output: str = "load_speed") -> xarray.Dataset:
+def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: str = "load_speed") -> xarray.Dataset:
     """Bandwidth and phase crossover as functions of amplitude, with the dead zone of the drive.
+
+    Parameters
+    ----------
+    response
+        From `frequency_response`.
+    drive
+        The drive, or its scenario.
+    output
+        The result variable that is looked at.
 
     Returns
     -------
@@ -251,7 +263,8 @@ def characteristics(response: xarray.Dataset, drive: Drive, output: str = "load_
             phase = np.degrees(np.unwrap(np.angle(curve)))
         bandwidth.append(_falls_through(x, gain, -20.0 * math.log10(THREE_DECIBELS)))
         crossover.append(_falls_through(x, phase, -180.0))
-    forward, backward = (drive.core().smallest_command(0.0, 0.0, s) for s in (+1, -1))
+    core = drive_of(drive).core()
+    forward, backward = (core.smallest_command(0.0, 0.0, s) for s in (+1, -1))
     return xr.Dataset(
         {
             "bandwidth": ("amplitude", bandwidth, {"units": "Hz", "long_name": "-3 dB against the lowest frequency"}),
@@ -271,42 +284,49 @@ def _falls_through(x: np.ndarray, y: np.ndarray, level: float) -> float:
 
 
 def bandwidth(
-    drive: Drive,
+    drive: Drive | Scenario,
     amplitude: float,
     *,
     output: str = "load_speed",
-    mean_command: float = 0.0,
-    mean_load_torque: float = 0.0,
+    mean_command: float | None = None,
+    mean_load_torque: float | None = None,
     lowest: float = 0.1,
     highest: float = 1000.0,
 ) -> float:
     """Frequency [Hz] at which the gain from the command first falls 3 dB below that at the lowest frequency.
 
-    Gains come from motions that repeat, as in `frequency_response`; they are looked at half an octave apart, and the
-    fall is then located between two of them.
+    Gains come from periodic motions, as in `frequency_response`. They are computed half an octave apart, and the fall is
+    then located between two of them.
 
     Parameters
     ----------
+    drive
+        A drive, or a scenario, of which the drive and the constant parts of command and load torque are taken.
     amplitude
         Of the command, E_CA [-].
+    mean_command, mean_load_torque
+        Constant parts of E_C [-] and M_Z [N·m]; left out, those of the scenario, or 0.
     lowest, highest
         [Hz]. Where the gain has not fallen at the highest, the bandwidth is NaN.
 
     Raises
     ------
-    ValueError
+    InputError
         The amplitude is not positive.
     RuntimeError
-        A motion that repeats was not found, or the output does not move at the lowest frequency.
+        No periodic motion was found, or the output does not move at the lowest frequency.
     """
+    need("scipy", "The bandwidth", "control")
     from scipy.optimize import brentq
 
     if not amplitude > 0.0:
-        raise ValueError(f"no bandwidth: the amplitude {amplitude:g} of the command must be positive")
+        raise InputError(f"no bandwidth: the amplitude {amplitude:g} of the command must be positive")
     channel = CHANNEL_NAMES.index(output)
+    means = mean_inputs(drive, mean_command, mean_load_torque)
+    drive = drive_of(drive)
 
     def gain(frequency: float) -> float:
-        point = (*_signals("command", amplitude, frequency, mean_command, mean_load_torque), 1.0 / frequency, Initial())
+        point = (*_signals("command", amplitude, frequency, *means), 1.0 / frequency, Initial())
         r = respond(drive, [point], harmonics=1, keep_table=False, max_periods=MAX_PERIODS, threads=1, progress=None)
         if reason := reason_of(r, 0):
             raise RuntimeError(f"no bandwidth: at {frequency:.4g} Hz {reason}")
@@ -330,7 +350,7 @@ def to_control(response: xarray.Dataset, amplitude: float, output: str = "load_s
 
     Raises
     ------
-    ImportError
+    MissingLibraryError
         python-control is not installed.
     KeyError
         The response has no such amplitude or output.

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core
-from .errors import InputError
+from .errors import InputError, need
 from .parts import ConstantEfficiency, Drive, Rigid
 from .run import start_state
-from .scenario import Initial
+from .scenario import Initial, Scenario, drive_of
 from .variables import CONTACTS, STATES
 
 if TYPE_CHECKING:
@@ -51,9 +51,9 @@ class LinearModel:
     inputs: tuple[str, ...] = INPUTS
     outputs: tuple[str, ...] = OUTPUTS
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         """Which operating point and regime it is."""
-        words = {-1: "slips backward", 0: "is stuck", 1: "slips forward"}
+        words = {-1: "slips in reverse", 0: "is stuck", 1: "slips forward"}
         modes = [f"{c.replace('_', ' ')} {words[m]}" for c, m in self.contacts.items() if m in words]
         point = {name: getattr(self.state, name) for name in (*STATES, "hysteresis_capacity")}
         point |= {"command": self.command, "load_torque": self.load_torque}
@@ -73,6 +73,7 @@ class LinearModel:
 
     def antiresonances(self, output: str = "load_speed", source: str = "command") -> list[tuple[float, float]]:
         """(frequency [Hz], damping ratio [-]) of each pair of complex transmission zeros, rising."""
+        need("scipy", "Finding transmission zeros", "control")
         import scipy.linalg
 
         b, c, d = self._pair(output, source)
@@ -94,7 +95,7 @@ class LinearModel:
 
         Raises
         ------
-        ImportError
+        MissingLibraryError
             python-control is not installed.
         """
         return _control().ss(
@@ -108,17 +109,23 @@ class LinearModel:
         )
 
     def to_scipy(self) -> scipy.signal.StateSpace:
-        """The same for scipy.signal."""
+        """The same for scipy.signal.
+
+        Raises
+        ------
+        MissingLibraryError
+            scipy is not installed.
+        """
+        need("scipy", "This conversion", "control")
         import scipy.signal
 
         return scipy.signal.StateSpace(self.A, self.B, self.C, self.D)
 
 
 def _control() -> Any:
-    try:
-        import control
-    except ImportError:
-        raise ImportError("this needs python-control: pip install lostmotion[control]") from None
+    need("control", "This conversion", "control")
+    import control
+
     return control
 
 
@@ -130,7 +137,7 @@ def _pairs(values: np.ndarray) -> list[tuple[float, float]]:
 
 
 def linearize(
-    drive: Drive,
+    drive: Drive | Scenario,
     state: Initial | None = None,
     *,
     command: float = 0.0,
@@ -159,6 +166,7 @@ def linearize(
     SolverError
         The state has no continuation.
     """
+    drive = drive_of(drive)
     if state is None:
         if regimes := _why_several_regimes(drive):
             raise InputError(
@@ -216,20 +224,21 @@ class RigidConstants:
 
 
 def rigid_constants(
-    drive: Drive, *, motor_time_constant: float | None = None, time_constant: float | None = None
+    drive: Drive | Scenario, *, motor_time_constant: float | None = None, time_constant: float | None = None
 ) -> RigidConstants:
     """Constants of (8) to (11); two of them may be given instead of computed.
 
     Raises
     ------
-    ValueError
+    InputError
         The drive has no DC motor, or no constant efficiency.
     """
+    drive = drive_of(drive)
     m, g, load = drive.motor, drive.gearbox, drive.load
     if m.rated_speed is None or m.electrical_time_constant is None or m.armature_voltage_constant is None:
-        raise ValueError("the closed form needs a DC motor")
+        raise InputError("the closed form needs a DC motor")
     if not isinstance(g.losses, ConstantEfficiency):
-        raise ValueError("the closed form needs gearbox.losses of kind constant_efficiency")
+        raise InputError("the closed form needs gearbox.losses of kind constant_efficiency")
     reflect = 1.0 / (g.ratio**2 * g.losses.efficiency)
     J = m.rotor_inertia + g.inertia + load.inertia * reflect
     b = g.viscous_friction + load.viscous_friction * reflect

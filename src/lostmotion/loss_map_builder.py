@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from .data_sheet import EfficiencyPoint, GearboxSheet, LossFigures
+from .errors import InputError
 from .parts import LossMap
 
 # Where no figure at all says what an unloaded gearbox loses: this share of the loss at rated load.
@@ -52,18 +53,18 @@ def build_loss_map(sheet: GearboxSheet, *, temperature: float | None = None, los
 
     Raises
     ------
-    ValueError
+    InputError
         The figures do not suffice, or contradict each other beyond repair; the message names both.
     """
     if loss_factor <= 0.0:
-        raise ValueError(f"loss_factor {loss_factor} must be greater than 0")
+        raise InputError(f"loss_factor {loss_factor} must be greater than 0")
     figures = sheet.losses
     for key, what in sheet.missing().items():
         if key.startswith("rated_"):
-            raise ValueError(f"{sheet.name}: lacks {key}; {what}")
+            raise InputError(f"{sheet.name}: lacks {key}; {what}")
     if figures.table is not None:
         if temperature not in (None, figures.temperature):
-            raise ValueError(
+            raise InputError(
                 f"{sheet.name}: has a whole loss table, which holds for {figures.temperature:g} °C; leave temperature out"
             )
         speeds, loads, values = figures.table.whole()
@@ -71,7 +72,7 @@ def build_loss_map(sheet: GearboxSheet, *, temperature: float | None = None, los
         losses = LossMap(speeds=tuple(speeds), loads=tuple(loads), values=tuple(map(tuple, scaled)))
         return BuiltMap(losses, tuple(tuple("given table" for _ in speeds) for _ in loads))
     if figures.empty:
-        raise ValueError(
+        raise InputError(
             f"{sheet.name}: lacks an efficiency, without which no loss map can be made; see "
             f"{sheet.where('losses.efficiency')}"
         )
@@ -149,7 +150,7 @@ class _Builder:
     def _of_one_temperature(self, points: tuple[EfficiencyPoint, ...]) -> tuple[EfficiencyPoint, ...]:
         temperatures = {self._at(p.temperature) for p in points}
         if len(temperatures) > 1:
-            raise ValueError(
+            raise InputError(
                 f"{self.sheet.name}: has efficiencies at several temperatures {sorted(temperatures)} °C; give those of "
                 "one temperature, and no_load_torque at several"
             )
@@ -216,7 +217,7 @@ class _Builder:
             factor = self._viscosity_factor(self.sheet.losses, known[0], temperature)
             return {v: factor * m for v, m in sorted(self.curves[known[0]].items())}
         if not known[0] <= temperature <= known[-1]:
-            raise ValueError(
+            raise InputError(
                 f"{self.sheet.name}: has no_load_torque from {known[0]:g} to {known[-1]:g} °C, not at {temperature:g} °C; "
                 "choose a temperature between, or add figures"
             )
@@ -230,7 +231,7 @@ class _Builder:
         if wanted == reference:
             return 1.0
         if figures.lubricant is None:
-            raise ValueError(
+            raise InputError(
                 f"{self.sheet.name}: has figures for {reference:g} °C only; for {wanted:g} °C it also needs losses.lubricant "
                 "(viscosity_40, viscosity_100) or no_load_torque at several temperatures"
             )

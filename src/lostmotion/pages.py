@@ -1,4 +1,4 @@
-"""What commands leave behind: figures as PNG and SVG, their data as CSV, and HTML pages that need nothing beside them."""
+"""What commands write: figures as PNG and SVG, their data as CSV, and self-contained HTML pages."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .errors import need
 from .results import write_bytes
 
 if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-    from .plots import Panel
+    from .panels import Panel
 
 
 def save_figure(figure: Figure, directory: Path, name: str) -> bytes:
@@ -71,6 +72,7 @@ def embed(png: bytes, title: str, caption: Markup | str, anchor: str) -> Markup:
 
 def render_page(template: str, **context: Any) -> str:
     """An HTML page from a template of the package; values are escaped, names that are missing raise."""
+    need("jinja2", "A page", "report")
     import jinja2
 
     def source(name: str) -> str:

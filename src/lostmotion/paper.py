@@ -1,15 +1,16 @@
 """The published drive that the project starts from: its scenarios and its constants, printed and recomputed.
 
-Source: a paper on the transmission of a passive optoelectronic rangefinder ("Simplified dynamic model of the
-transmission"); equations and figures are numbered as there.
+Source: "Simplified dynamic model of the transmission", on the transmission of a passive optoelectronic rangefinder, written
+within grant project FT-TA3/103 of the Ministry of Industry and Trade of the Czech Republic; a continuation of Čech and
+Jevický (2005). Equations and figures are numbered as there. docs/citing.md says what else is known of it.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from importlib.resources import as_file, files
 
+from .errors import InputError
 from .linear_analysis import RigidConstants, rigid_constants
 from .scenario import Scenario, load
 
@@ -31,10 +32,8 @@ def paper_scenario(model: str, amplitude: str) -> Scenario:
         ``"large"`` (E_CA = 1.0275) or ``"small"`` (0.025).
     """
     if model not in MODELS or amplitude not in AMPLITUDES:
-        raise ValueError(f"there is no run {model!r}, {amplitude!r}; models: {MODELS}, amplitudes: {tuple(AMPLITUDES)}")
-    name = f"paper-{model.lower().replace('-', '', 1)}-{amplitude}.toml"
-    with as_file(files("lostmotion") / "scenarios") as directory:
-        return load(directory / name)
+        raise InputError(f"there is no run {model!r}, {amplitude!r}; models: {MODELS}, amplitudes: {tuple(AMPLITUDES)}")
+    return load(f"paper-{model.lower().replace('-', '', 1)}-{amplitude}")
 
 
 @dataclass(frozen=True)

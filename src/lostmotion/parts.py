@@ -22,6 +22,7 @@ from .quantities import (
     Resistance,
     Speed,
     Stiffness,
+    Switch,
     Temperature,
     ThermalResistance,
     Time,
@@ -87,6 +88,13 @@ class Motor(Part):
                 raise ValueError("has a voltage_limit, which also needs rated_voltage")
         return self
 
+    def __repr__(self) -> str:
+        if self.rated_speed is None:
+            rated = f"torque source, rated {self.rated_torque:.4g} N·m"
+        else:
+            rated = f"dc, {self.rated_torque:.4g} N·m at {_rpm(self.rated_speed)}"
+        return f"Motor({rated}, rotor {self.rotor_inertia:.4g} kg·m²)"
+
     @property
     def no_load_speed(self) -> float:
         """Speed [rad/s] at command 1 without any load or friction, by (2)."""
@@ -98,15 +106,15 @@ class Motor(Part):
 class TorsionCurve(Part):
     """Torque against twist (eq. 14): odd, continuous, piecewise linear.
 
-    `backlash` (total gap at the output) and `preload` change the given pieces: a gap of half the backlash comes
-    before the first, or the pieces below the preload torque drop out, as where two flanks are pressed together.
+    `backlash` (total gap at the output) and `preload` change the given segments: a gap of half the backlash comes
+    before the first, or the segments below the preload torque drop out, as where two flanks are pressed together.
     """
 
     kind: Literal["curve"] = "curve"
     slopes: tuple[Annotated[Stiffness, NotNegative], ...] = Field(min_length=1, max_length=MAX_PIECES)
-    """of the pieces, from twist 0 outwards"""
+    """of the segments, from twist 0 outwards"""
     breaks: tuple[Annotated[Angle, Positive], ...] = ()
-    """twists at which the slope changes; one fewer than slopes"""
+    """breakpoints: twists at which the slope changes; one fewer than slopes"""
     backlash: Annotated[Angle, NotNegative] = 0.0
     preload: Annotated[Torque, NotNegative] = 0.0
 
@@ -118,7 +126,7 @@ class TorsionCurve(Part):
             if b <= a:
                 raise ValueError(f"breaks must rise, but breaks[{k + 1}] = {b} follows {a}")
         if self.slopes[-1] <= 0.0:
-            raise ValueError("ends with slope 0; the last piece must carry torque")
+            raise ValueError("ends with slope 0; the last segment must carry torque")
         if self.backlash > 0.0 and self.preload > 0.0:
             raise ValueError("has backlash and preload; a preload removes the backlash, so give only one")
         return self
@@ -191,7 +199,7 @@ class LossMap(Part):
     """mu = T_2 sign(w_M)/T_2R, rising; positive where the motor drives"""
     values: tuple[tuple[Annotated[Number, NotNegative], ...], ...]
     """m_2B, one row for each load, one entry for each speed"""
-    mirrored: bool = False
+    mirrored: Switch = False
     """loads begin at 0 and hold for both directions of power flow"""
 
     @field_validator("speeds", "loads")
@@ -269,6 +277,11 @@ class Gearbox(Part):
     note: str = ""
     """what a reader of the results must know, such as that a loss table is a stand-in"""
 
+    def __repr__(self) -> str:
+        laws = f"stiffness {self.stiffness.kind}, losses {self.losses.kind}"
+        rated = f"{self.rated_output_torque:.4g} N·m at {_rpm(self.rated_input_speed)}"
+        return f"Gearbox({self.ratio:g}:1, {rated}, {laws})"
+
     @model_validator(mode="after")
     def _hysteresis_needs_compliance(self) -> Self:
         if self.hysteresis is not None and self.hysteresis.efficiency < 1.0 and isinstance(self.stiffness, Rigid):
@@ -278,6 +291,9 @@ class Gearbox(Part):
 
 class Load(Part):
     """The driven body (3b)."""
+
+    def __repr__(self) -> str:
+        return f"Load({self.inertia:.4g} kg·m²)"
 
     inertia: Annotated[Inertia, Positive]
     """J_Z"""
@@ -294,6 +310,9 @@ class Drive(Part):
     gearbox: Gearbox
     load: Load
 
+    def __repr__(self) -> str:
+        return f"Drive({self.motor!r}, {self.gearbox!r}, {self.load!r})"
+
     @model_validator(mode="after")
     def _can_be_simulated(self) -> Self:
         if self.motor.rotor_inertia + self.gearbox.inertia <= 0.0:
@@ -308,6 +327,10 @@ class Drive(Part):
     def core(self) -> _core.Drive:
         """The solver's drive; the last ones are kept for equal parts."""
         return _core_drive(self)
+
+
+def _rpm(speed: float) -> str:
+    return f"{speed * 30.0 / math.pi:.4g} rpm"
 
 
 def _plain(part: Any, *names: str) -> dict[str, float]:

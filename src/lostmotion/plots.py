@@ -2,101 +2,90 @@
 
 from __future__ import annotations
 
-import math
+import io
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from .variables import VARIABLES
+from .panels import COMMAND_STYLE, STYLES, Curve, Panel
+from .results import scenario_of
 
 if TYPE_CHECKING:
     import xarray
 
-# Dark to light as nonlinear to simple, so that they differ in grey too.
-STYLES: dict[str, dict[str, Any]] = {
-    "2-DOF-NL": {"color": "#0b3c5d", "linestyle": "-", "linewidth": 1.7},
-    "2-DOF-L": {"color": "#d9730d", "linestyle": "--", "linewidth": 1.3},
-    "1-DOF-L": {"color": "#7fae3f", "linestyle": "-.", "linewidth": 1.3},
+LOOKS: Any = {
+    "figure.constrained_layout.use": True,
+    "figure.dpi": 110,
+    "savefig.dpi": 150,
+    "font.size": 9.5,
+    "axes.grid": True,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "svg.hashsalt": "lostmotion",
+    "svg.fonttype": "path",
 }
-COMMAND_STYLE: dict[str, Any] = {"color": "0.45", "linestyle": ":", "linewidth": 1.3}
-
-mpl.rcParams.update(
-    {
-        "figure.constrained_layout.use": True,
-        "figure.dpi": 110,
-        "savefig.dpi": 150,
-        "font.size": 9.5,
-        "axes.grid": True,
-        "grid.color": "0.9",
-        "grid.linewidth": 0.7,
-        "axes.axisbelow": True,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "legend.frameon": False,
-        "svg.hashsalt": "lostmotion",
-        "svg.fonttype": "path",
-    }
-)
-
-LABELS = {v.name: v for v in VARIABLES}
 
 
-def axis_label(name: str) -> str:
-    """Name and unit of a result variable."""
-    unit = LABELS[name].unit.replace("*", "·")
-    return name.replace("_", " ") + (f" [{unit}]" if unit != "1" else " [-]")
+# Decorates what makes or draws figures; the looks of the user's own figures stay as they are.
+in_our_looks = mpl.rc_context(LOOKS)
 
 
-def scientific(value: float) -> str:
-    """Two digits and a power of ten, as text."""
-    if value <= 0.0:
-        return "0"
-    exponent = math.floor(math.log10(value))
-    return f"{value / 10.0**exponent:.1f}·10^{exponent}"
+class Picture(Figure):
+    """A figure that is drawn in the looks of this package, and shown by notebooks."""
+
+    @in_our_looks
+    def draw(self, renderer: Any) -> None:
+        super().draw(renderer)
+
+    @in_our_looks
+    def savefig(self, fname: Any, **options: Any) -> None:
+        super().savefig(fname, **options)
+
+    def _repr_png_(self) -> bytes:
+        png = io.BytesIO()
+        self.savefig(png, format="png", dpi=self.dpi)
+        return png.getvalue()
 
 
-@dataclass(frozen=True)
-class Curve:
-    """One line of a figure, with the names its data get in the figure's CSV."""
-
-    label: str
-    x: Any
-    y: Any
-    style: Mapping[str, Any]
-    legend: str | None = None  # in the figure, if not the label; "_": none
-
-    @property
-    def shown(self) -> str:
-        return self.label if self.legend is None else self.legend
+MOST_POINTS = 10_000  # of a curve that is drawn; more than twice the pixels across any figure
 
 
-@dataclass(frozen=True)
-class Panel:
-    """One pair of axes."""
+def thinned(x: Any, y: Any, most: int = MOST_POINTS) -> tuple[Any, Any]:
+    """Points of a curve that look the same: of each run of neighbours the first and the extremes of both coordinates."""
+    n = len(y)
+    if n <= most:
+        return x, y
+    x, y = np.asarray(x), np.asarray(y)
+    width = -(-n * 5 // most)
+    whole = n // width * width
+    firsts = np.arange(0, whole, width)
+    kept: list[Any] = [firsts, np.arange(whole, n), [n - 1]]
+    for values in (y,) if np.all(x[1:] >= x[:-1]) else (x, y):
+        rows = values[:whole].reshape(-1, width)
+        gaps = bool(np.isnan(rows.min()))
+        for extreme, fill in ((np.argmin, np.inf), (np.argmax, -np.inf)):
+            kept.append(firsts + extreme(np.where(np.isnan(rows), fill, rows) if gaps else rows, axis=1))
+    index: Any = np.unique(np.concatenate(kept))
+    return x[index], y[index]
 
-    title: str
-    x_label: str
-    y_label: str
-    curves: tuple[Curve, ...]
-    x_range: tuple[float, float] | None = None
-    y_range: tuple[float, float] | None = None
-    log_x: bool = False
-    log_y: bool = False
 
-
+@in_our_looks
 def draw(panels: Iterable[Panel], columns: int, size: tuple[float, float], note: str = "") -> Figure:
     """Panels in rows of `columns`, `size` [inch] in all; `note` stands below."""
     panels = list(panels)
-    figure = Figure(figsize=size)
+    figure = Picture(figsize=size)
     rows = -(-len(panels) // columns)
     for k, panel in enumerate(panels):
         axes = figure.add_subplot(rows, columns, k + 1)
         for curve in panel.curves:
-            axes.plot(curve.x, curve.y, label=curve.shown, **curve.style)
+            axes.plot(*thinned(curve.x, curve.y), label=curve.shown, **curve.style)
         if panel.log_x:
             axes.set_xscale("log")
         if panel.log_y and any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves):
@@ -127,6 +116,21 @@ def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tupl
     low, high = min(float(np.nanmin(y)) for y in inside), max(float(np.nanmax(y)) for y in inside)
     margin = 0.05 * (high - low) or 1.0
     return low - margin, high + margin
+
+
+# The result variables that the overview shows.
+OVERVIEW = (
+    "command",
+    "motor_torque",
+    "motor_speed",
+    "load_speed",
+    "input_torque",
+    "output_torque",
+    "load_torque",
+    "twist",
+    "input_contact",
+    "twist_contact",
+)
 
 
 def overview(result: xarray.Dataset) -> Figure:
@@ -174,14 +178,15 @@ def overview(result: xarray.Dataset) -> Figure:
 
 
 def _ratio(result: xarray.Dataset) -> float:
-    import json
+    if "gear_ratio" in result.attrs:  # a periodic motion, which knows its drive only
+        return float(result.attrs["gear_ratio"])
+    return scenario_of(result).gearbox.ratio
 
-    return float(json.loads(result.attrs["scenario"])["gearbox"]["ratio"])
 
-
+@in_our_looks
 def loss_map(speeds: Any, loads: Any, values: Any, note: str = "") -> Figure:
     """Figure 5: the loss coefficient as a surface and as curves. values[load, speed], driving side only."""
-    figure = Figure(figsize=(10.0, 4.2))
+    figure = Picture(figsize=(10.0, 4.2))
     surface: Any = figure.add_subplot(1, 2, 1, projection="3d")
     v, mu = np.meshgrid(speeds, loads)
     surface.plot_surface(v, mu, values, cmap="cividis", edgecolor="0.25", linewidth=0.4, alpha=0.95)
@@ -200,9 +205,10 @@ def loss_map(speeds: Any, loads: Any, values: Any, note: str = "") -> Figure:
     return figure
 
 
+@in_our_looks
 def amplitude_maps(frequency: Any, amplitude: Any, maps: Mapping[str, tuple[str, Any]], amplitude_label: str) -> Figure:
     """Contours over frequency [Hz] and amplitude: maps[title] = (label of the values, values[amplitude, frequency])."""
-    figure = Figure(figsize=(10.0, 3.4 * -(-len(maps) // 2)))
+    figure = Picture(figsize=(10.0, 3.4 * -(-len(maps) // 2)))
     for k, (title, (label, values)) in enumerate(maps.items()):
         axes = figure.add_subplot(-(-len(maps) // 2), 2, k + 1)
         shown = np.ma.masked_invalid(values)

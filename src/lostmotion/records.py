@@ -5,19 +5,19 @@ from __future__ import annotations
 import difflib
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import ValidationError
-
 from .data_sheet import SCALARS, GearboxSheet, MotorSheet
 from .errors import InputError
 from .loss_map_builder import BuiltMap, build_loss_map
-from .parts import Gearbox, Motor
+from .parts import Gearbox, LinearStiffness, Motor, TorsionCurve
 from .quantities import Angle, NotNegative, Number, Part, Positive, Temperature
 from .toml_files import read_toml
+from .validation import shown
 
 KINDS: dict[str, type[GearboxSheet] | type[MotorSheet]] = {"gearbox": GearboxSheet, "motor": MotorSheet}
 # Keys of a sheet file that hold for all of its records.
@@ -47,7 +47,7 @@ def catalogue() -> tuple[GearboxSheet | MotorSheet, ...]:
 
 
 def read_sheets(path: Path) -> list[GearboxSheet | MotorSheet]:
-    """The records of a file of one's own.
+    """The records of a sheet file.
 
     Raises
     ------
@@ -66,37 +66,30 @@ def parse_sheets(data: dict[str, Any], where: str) -> list[GearboxSheet | MotorS
             hint = f"did you mean {near[0]}?" if near else f"known here: {', '.join(sorted(known))}"
             raise InputError(f"{where}: key {key}: is not known; {hint}")
     records: list[GearboxSheet | MotorSheet] = []
+    common = {key: data[key] for key in COMMON if key in data}
     for table, kind in KINDS.items():
-        entries = data.get(table, [])
-        if not isinstance(entries, list):
-            raise InputError(f"{where}: key {table}: write [[{table}]] with double brackets, one for each record")
-        for entry in entries:
+        for entry in _tables(data, table, where):
             own = dict(entry)
-            sources, gaps = own.pop("source", []), own.pop("gap", [])
-            common = {key: data[key] for key in COMMON if key in data}
-            fields = common | own | {"sources": [*sources, *data.get("source", [])]}
-            fields["gaps"] = [*gaps, *data.get("gap", [])]
+            which = f"{where}: {table} {own.get('name', '(no name)')}"
+            fields = common | own
+            for key in ("source", "gap"):  # those of the record, then those of the whole file
+                fields.pop(key, None)
+                fields[f"{key}s"] = [*_tables(own, key, which), *_tables(data, key, where)]
             try:
                 records.append(kind(**fields))
-            except ValidationError as error:
-                raise InputError(f"{where}: {table} {own.get('name', '(no name)')}: {describe(error)}") from None
+            except InputError as error:
+                raise InputError(f"{which}: {error}") from None
     if not records:
         raise InputError(f"{where}: holds no record; add a table [[gearbox]] or [[motor]]")
     return records
 
 
-def describe(error: ValidationError) -> str:
-    """One line for a record that fails its schema."""
-    first = error.errors()[0]
-    key = ".".join(str(k) for k in first["loc"])
-    value = first["input"]
-    if first["type"] == "missing":
-        return f"key {key}: is missing; add it"
-    if first["type"] == "extra_forbidden":
-        return f"key {key}: is not known; run `lostmotion catalogue new` for a template with all keys"
-    text = str(first["ctx"]["error"]) if first["type"] == "value_error" else first["msg"]
-    shown = "" if isinstance(value, dict) else f"{value!r}: "
-    return f"key {key}: {shown}{text}" if key else text
+def _tables(data: Mapping[str, Any], key: str, where: str) -> list[Mapping[str, Any]]:
+    """The tables of an array of tables; none if the key is not there."""
+    entries = data.get(key, [])
+    if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
+        raise InputError(f"{where}: key {key}: {shown(entries)} must be tables; write [[{key}]] with double brackets")
+    return entries
 
 
 def find(reference: str, table: str) -> GearboxSheet | MotorSheet:
@@ -114,65 +107,134 @@ def find(reference: str, table: str) -> GearboxSheet | MotorSheet:
     """
     kind = KINDS[table]
     if reference.endswith(".toml"):
-        own = [r for r in read_sheets(Path(reference)) if isinstance(r, kind)]
+        records = read_sheets(Path(reference))
+        own = [r for r in records if isinstance(r, kind)]
         if len(own) != 1:
             raise InputError(
-                f"{reference}: holds {len(own)} records of kind {table}; it must hold one to be named here"
+                f"{reference}: holds {len(own)} records of kind {table} among {len(records)}; it must hold one to be named here"
             )
         return own[0]
-    records = {r.name: r for r in catalogue() if isinstance(r, kind)}
-    if reference not in records:
-        near = difflib.get_close_matches(reference, records, n=3, cutoff=0.5)
-        hint = f"did you mean {' or '.join(near)}?" if near else "`lostmotion catalogue` lists them"
-        raise InputError(f"{table} {reference!r} is not in the catalogue; {hint}")
-    return records[reference]
+    named = {r.name: r for r in catalogue()}
+    if isinstance(named.get(reference), kind):
+        return named[reference]
+    near = difflib.get_close_matches(reference, [r.name for r in catalogue() if isinstance(r, kind)], n=3, cutoff=0.5)
+    hint = f"did you mean {' or '.join(near)}?" if near else "`lostmotion catalogue` lists them"
+    if reference in named:
+        other = next(name for name, k in KINDS.items() if isinstance(named[reference], k))
+        raise InputError(f"{reference} is a {other}; a {table} is wanted here; `lostmotion catalogue` lists them")
+    raise InputError(f"{table} {shown(reference)} is not in the catalogue; {hint}")
 
 
 def gearbox_table(reference: str, changes: Mapping[str, Any]) -> tuple[dict[str, Any], BuiltMap | None]:
-    """Values of `[gearbox]` for a record, where nothing in `changes` takes their place, and the loss map's origin.
+    """Values of `[gearbox]` for a record with `changes`, and the loss map's origin.
+
+    A change takes the place of what it names and of nothing else: the hysteresis stays that of the record as printed,
+    whatever its stiffness is changed to, and wear that adds backlash leaves it as it is.
 
     Raises
     ------
     InputError
         The record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """
-    sheet = find(reference, "gearbox")
-    assert isinstance(sheet, GearboxSheet)
+    known = sorted({*Gearbox.model_fields, *Conditions.model_fields})
+    for key in changes:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"known here: {', '.join(known)}"
+            raise InputError(f"key gearbox.{key}: is not known; {hint}")
+    record = find(reference, "gearbox")
+    assert isinstance(record, GearboxSheet)
     scalars = {key: value for key, value in changes.items() if key in SCALARS}
     try:
-        sheet = GearboxSheet(**{**{k: getattr(sheet, k) for k in sheet.model_fields_set}, **scalars})
+        sheet = GearboxSheet(**_given(record) | scalars)
         conditions = Conditions(**{key: changes[key] for key in Conditions.model_fields if key in changes})
-    except ValidationError as error:
-        raise InputError(f"gearbox from {reference!r}: {describe(error)}") from None
+    except InputError as error:
+        raise InputError(f"gearbox from {shown(reference)}: {error}") from None
     for key, what in sheet.missing().items():
         if key not in changes:
             raise InputError(
-                f"gearbox from {reference!r}: the record lacks {key}, {what}; give gearbox.{key} beside `from`"
+                f"gearbox from {shown(reference)}: the record lacks {key}, {what}; give gearbox.{key} beside `from`"
             )
-    table: dict[str, Any] = sheet.scalars() | {"limits": sheet.limits().model_dump()}
     built = None
-    notes = [sheet.note] if sheet.note else []
-    try:
-        if "stiffness" not in changes:
-            curve = sheet.torsion_curve(conditions.added_backlash)
-            table["stiffness"] = curve.model_dump()
-            if (hysteresis := sheet.hysteresis(curve)) is not None:
-                table["hysteresis"] = hysteresis.model_dump()
-        elif conditions.added_backlash > 0.0:
-            raise ValueError(
-                "added_backlash belongs to the record's own stiffness; put it into gearbox.stiffness.backlash"
-            )
-        elif sheet.hysteresis_efficiency is not None:
-            table["hysteresis"] = {"efficiency": sheet.hysteresis_efficiency}
-        if "losses" not in changes:
+    if not _whole(changes.get("losses")):
+        try:
             built = build_loss_map(sheet, temperature=conditions.temperature, loss_factor=conditions.loss_factor)
-            table["losses"] = built.losses.model_dump()
-            notes += built.notes
+        except ValueError as error:
+            raise InputError(f"gearbox {error}") from None
+    table: dict[str, Any] = sheet.scalars() | {"limits": sheet.limits().model_dump()}
+    if sheet.stiffness is not None:
+        table["stiffness"] = sheet.torsion_curve().model_dump()
+    if built is not None:
+        table["losses"] = built.losses.model_dump()
+    if notes := [*filter(None, [sheet.note]), *(built.notes if built else ())]:
+        table["note"] = " ".join(notes)
+    _change(table, changes)
+    if "hysteresis" not in changes:
+        table["hysteresis"] = _hysteresis(record, sheet, table["stiffness"])
+    _wear(table, changes, conditions)
+    return table, built
+
+
+def _given(sheet: GearboxSheet | MotorSheet) -> dict[str, Any]:
+    return {name: getattr(sheet, name) for name in sheet.model_fields_set}
+
+
+def _whole(table: Any) -> bool:
+    """Whether a change takes the place of a whole table, as it says its kind."""
+    return isinstance(table, Mapping) and "kind" in table
+
+
+def _change(table: dict[str, Any], changes: Mapping[str, Any]) -> None:
+    """Puts changes into a part's values; a table without a kind changes single keys."""
+    for key, value in changes.items():
+        if key in Conditions.model_fields:
+            continue
+        old = table.get(key)
+        if isinstance(value, Mapping) and isinstance(old, Mapping) and not _whole(value):
+            table[key] = {**old, **value}
+        else:
+            table[key] = value
+
+
+def _hysteresis(record: GearboxSheet, sheet: GearboxSheet, stiffness: Any) -> dict[str, Any] | None:
+    """That of the record as printed; what it lacks for it comes from the changes."""
+    if isinstance(stiffness, Mapping) and stiffness.get("kind") == "rigid":
+        return None
+    figures = sheet if record.rated_output_torque is None else record
+    try:
+        curve = figures.torsion_curve() if figures.stiffness is not None else _curve(stiffness)
+        found = None if curve is None else figures.hysteresis(curve)
     except ValueError as error:
         raise InputError(f"gearbox {error}") from None
-    if notes:
-        table["note"] = " ".join(notes)
-    return table, built
+    return None if found is None else found.model_dump()
+
+
+def _curve(stiffness: Any) -> TorsionCurve | LinearStiffness | None:
+    """A stiffness as a part; None if it is not valid, which the gearbox then tells with the name of the key."""
+    if not isinstance(stiffness, Mapping):
+        return None
+    with suppress(InputError):
+        return LinearStiffness(**stiffness) if stiffness.get("kind") == "linear" else TorsionCurve(**stiffness)
+    return None
+
+
+def _wear(table: dict[str, Any], changes: Mapping[str, Any], conditions: Conditions) -> None:
+    """Adds the backlash, and refuses conditions that would have no effect."""
+    if "losses" in changes:
+        for key, default in (("loss_factor", 1.0), ("temperature", None)):
+            if getattr(conditions, key) != default:
+                raise InputError(
+                    f"key gearbox.{key}: acts on the record's own losses; leave it out beside gearbox.losses"
+                )
+    if conditions.added_backlash == 0.0:
+        return
+    curve = _curve(table["stiffness"])
+    if isinstance(curve, TorsionCurve):
+        table["stiffness"] = curve.model_dump() | {"backlash": curve.backlash + conditions.added_backlash}
+    elif curve is not None or _whole(table["stiffness"]):
+        raise InputError(
+            'key gearbox.added_backlash: needs a torsion curve; leave it out, or give gearbox.stiffness the kind "curve"'
+        )
 
 
 def gearbox(
@@ -218,11 +280,38 @@ def motor(name: str, *, voltage_limit: float | None = None) -> Motor:
     InputError
         There is no such record, or it lacks what a run needs.
     """
-    sheet = find(name, "motor")
-    assert isinstance(sheet, MotorSheet)
+    changes = {} if voltage_limit is None else {"voltage_limit": voltage_limit}
     try:
-        return sheet.motor(voltage_limit)
-    except ValidationError as error:
-        raise InputError(f"motor {name}: {describe(error)}") from None
+        return Motor(**motor_table(name, changes))
+    except InputError as error:
+        raise InputError(f"motor {name}: {error}") from None
+
+
+# Keys of `[motor]` that may close a gap of the record, and the name of that gap.
+CLOSES = {
+    "rotor_inertia": "rotor_inertia",
+    "friction_torque": "friction_torque or no_load_current",
+    "electrical_time_constant": "inductance",
+}
+
+
+def motor_table(reference: str, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of `[motor]` for a record with `changes`, each of which takes the place of what it names.
+
+    Raises
+    ------
+    InputError
+        The record lacks what a run needs and `changes` do not give it; the message says where to read it.
+    """
+    record = find(reference, "motor")
+    assert isinstance(record, MotorSheet)
+    missing = record.missing()
+    gaps = {key: changes[key] for key, gap in CLOSES.items() if key in changes and gap in missing}
+    try:
+        table = MotorSheet(**_given(record) | gaps).motor().model_dump()
     except ValueError as error:
-        raise InputError(f"motor {error}") from None
+        keys = [f"motor.{key}" for key, gap in CLOSES.items() if gap in missing and key not in changes]
+        remedy = f"; give {' and '.join(keys)} beside `from`" if keys else ""
+        raise InputError(f"motor from {shown(reference)}: {error}{remedy}") from None
+    _change(table, changes)
+    return table

@@ -1,4 +1,4 @@
-"""The report of `lostmotion reproduce`: one HTML file that needs nothing beside it."""
+"""The report of `lostmotion reproduce`: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from .pages import embed, render_page
+from .panels import scientific
 from .paper import AMPLITUDES, Constant
-from .plots import scientific
 
 if TYPE_CHECKING:
     from .reproduce import FigureSpec

@@ -1,4 +1,4 @@
-"""The paper, complete: its figures 5 and 9 to 18, their data, its constants, and a report that tells the story."""
+"""The paper reproduced: its figures 5 and 9 to 18, their data, its constants, and a report."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import plots
 from .harmonic_response import frequency_response
 from .linear_analysis import rigid_constants
 from .pages import panels_csv, save_figure, table_csv, write_text
+from .panels import COMMAND_STYLE, STYLES, Curve, Panel, scientific
 from .paper import AMPLITUDES, MODELS, Constant, constants, paper_scenario
 from .parts import LossMap
-from .plots import COMMAND_STYLE, STYLES, Curve, Panel
 from .results import energy_of
 from .run import simulate
 
@@ -196,7 +195,7 @@ def figure_specs(results: Results) -> list[FigureSpec]:
         FigureSpec(
             "12",
             "Load speed and output torque, detail",
-            "The reversal of figure 11 enlarged: the load coasts on within the soft zone while the motor stands.",
+            "The reversal of figure 11 enlarged: the load swings on within the zone of low stiffness while the motor stands still.",
             speed_and_load(x_range=(1.4, 1.7)),
         ),
         FigureSpec(
@@ -217,7 +216,7 @@ def figure_specs(results: Results) -> list[FigureSpec]:
         FigureSpec(
             "14",
             "Normalised hysteresis loop",
-            "Relative torque over twist / 3 mrad, the twist at about rated torque. The soft zone in the middle, the "
+            "Relative torque over twist / 3 mrad, the twist at about rated torque. The zone of low stiffness in the middle, the "
             "two branches apart by the hysteresis set at the last turning point.",
             tuple(
                 _pairs(
@@ -272,7 +271,7 @@ def _response_specs(results: Results) -> Iterator[FigureSpec]:
     worst = float(results.response["residual"].max())
     periodic = (
         f"{len(FREQUENCIES)} frequencies; each first harmonic comes from a motion whose states repeat within "
-        f"{plots.scientific(worst)} of their magnitude from one period to the next."
+        f"{scientific(worst)} of their magnitude from one period to the next."
     )
     yield FigureSpec(
         "17",
@@ -319,6 +318,8 @@ def _stand_in_table() -> tuple[Any, Any, Any]:
 
 def draw(spec: FigureSpec) -> Figure:
     """The figure of a spec."""
+    from . import plots
+
     note = STAND_IN if spec.stand_in else ""
     if spec.number == "05":
         return plots.loss_map(*_stand_in_table(), note=note)

@@ -7,6 +7,7 @@ import json
 import os
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import InputError
+from .errors import InputError, need
 from .scenario import Scenario
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import packed, packed_again, switchings_of
@@ -48,8 +49,25 @@ def installed_version() -> str:
     return version("lostmotion")
 
 
-def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) -> xarray.Dataset:
-    """Label what the solver returned."""
+@dataclass(frozen=True)
+class RawResult:
+    """A result as plain arrays. A dataset is made only where one is wanted: importing its library takes half a second."""
+
+    time: np.ndarray
+    values: dict[str, np.ndarray]
+    """of the result variables"""
+    attrs: dict[str, Any]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.time if name == "time" else self.values[name]
+
+    def dataset(self) -> xarray.Dataset:
+        """The labelled dataset."""
+        return _dataset(self.time, self.values, self.attrs)
+
+
+def raw_result(scenario: Scenario, result: Any, solver: str, *, ledger: bool) -> RawResult:
+    """What the solver returned, with all that belongs to it."""
     table, switchings, count, energy, state, capacity, left_data_at, steps = result
     data = dict(zip(CHANNEL_NAMES, table, strict=True))
     add_derived(data, scenario.gearbox.ratio)
@@ -73,7 +91,7 @@ def make_dataset(scenario: Scenario, result: Any, solver: str, *, ledger: bool) 
         )
     if scenario.gearbox.note:
         attributes["note"] = scenario.gearbox.note
-    return _dataset(time, data, attributes)
+    return RawResult(time, data, attributes)
 
 
 def _dataset(time: Any, data: dict[str, Any], attributes: dict[str, Any]) -> xarray.Dataset:
@@ -114,7 +132,7 @@ def scenario_of(dataset: xarray.Dataset) -> Scenario:
     return Scenario.from_json(dataset.attrs["scenario"])
 
 
-def energy_of(dataset: xarray.Dataset) -> dict[str, float]:
+def energy_of(dataset: xarray.Dataset | RawResult) -> dict[str, float]:
     """Energy ledger of a run [J].
 
     `source` is what the motor gave to the shaft; `input_damper`, `motor_friction`, `gear_losses`, `hysteresis`,
@@ -123,7 +141,7 @@ def energy_of(dataset: xarray.Dataset) -> dict[str, float]:
     of the magnitudes of all flows.
     """
     if "energy" not in dataset.attrs:
-        raise ValueError("this result has no energy ledger; simulate with the exact solver and energy=True")
+        raise InputError("this result has no energy ledger; simulate with the exact solver and energy=True")
     ledger: dict[str, float] = json.loads(dataset.attrs["energy"])
     return ledger
 
@@ -192,7 +210,15 @@ def check_output(path: str | Path) -> Path:
         raise InputError(f"{path}: is a directory; name a file")
     if not path.parent.is_dir():
         raise InputError(f"{path}: its directory does not exist; make it first")
+    _need_library(path)
     return path
+
+
+def _need_library(path: Path) -> None:
+    if path.suffix == ".nc":
+        need("h5netcdf", f"{path}: a NetCDF file", "netcdf")
+    elif path.suffix == ".parquet":
+        need("pyarrow", f"{path}: a Parquet file", "study")
 
 
 def save(dataset: xarray.Dataset, path: str | Path) -> None:
@@ -224,6 +250,7 @@ def open_result(path: str | Path) -> xarray.Dataset:
         )
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; check the name")
+    _need_library(path)
     try:
         return readers[path.suffix](path)
     except InputError:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
+from .errors import InputError
 from .parts import Drive
-from .results import make_dataset
+from .results import RawResult, raw_result
 from .scenario import Initial, LoadTable, Scenario, SimulationTable
 from .signals import CommandSignal, TorqueSignal
+from .validation import shown
 
 if TYPE_CHECKING:
     import xarray
@@ -59,7 +61,7 @@ def simulate(
 
     Raises
     ------
-    InputError, pydantic.ValidationError
+    InputError
         The scenario cannot be used.
     SolverError
         The motion has no continuation (jamming, accumulating switchings); the message names time and contact.
@@ -74,10 +76,17 @@ def simulate(
         sample_interval=sample_interval,
         initial=initial,
     )
+    return run(scenario, solver=solver, relative_tolerance=relative_tolerance, energy=energy).dataset()
+
+
+def run(
+    scenario: Scenario, *, solver: SolverName = "exact", relative_tolerance: float = 1e-8, energy: bool = True
+) -> RawResult:
+    """As `simulate`, of a scenario, with the result as plain arrays."""
     if solver not in ("exact", "dormand-prince"):
-        raise ValueError(f'solver {solver!r} is not known; it must be "exact" or "dormand-prince"')
+        raise InputError(f'solver {solver!r} is not known; it must be "exact" or "dormand-prince"')
     if relative_tolerance <= 0.0:
-        raise ValueError(f"relative_tolerance {relative_tolerance} must be greater than 0")
+        raise InputError(f"relative_tolerance {relative_tolerance} must be greater than 0")
     table = scenario.simulation
     exact = solver == "exact"
     result = _core.run(
@@ -90,7 +99,7 @@ def simulate(
         MAX_SWITCHINGS,
     )
     how = "exact" if exact else f"dormand-prince, relative tolerance {relative_tolerance:g}"
-    return make_dataset(scenario, result, how, ledger=energy and exact)
+    return raw_result(scenario, result, how, ledger=energy and exact)
 
 
 def as_scenario(
@@ -107,10 +116,10 @@ def as_scenario(
     if isinstance(scenario_or_drive, Drive):
         drive = scenario_or_drive
         if duration is None or sample_interval is None:
-            raise ValueError("a drive alone needs duration and sample_interval [s]")
+            raise InputError("a drive alone needs duration and sample_interval [s]")
         changes = {"motor": drive.motor, "gearbox": drive.gearbox, "load": LoadTable(**drive.load.model_dump())}
     elif not isinstance(scenario_or_drive, Scenario):
-        raise TypeError(f"simulate takes a Scenario or a Drive, not {type(scenario_or_drive).__name__}")
+        raise InputError(f"{shown(scenario_or_drive)} must be a Scenario, such as load(path) returns, or a Drive")
     elif all(v is None for v in (command, load_torque, duration, sample_interval, initial)):
         return scenario_or_drive
     else:

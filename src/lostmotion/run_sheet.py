@@ -4,23 +4,31 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .results import energy_of
+import numpy as np
+
+from .results import RawResult, energy_of
 
 if TYPE_CHECKING:
     import xarray
 
 
-def summary(result: xarray.Dataset) -> str:
+def summary(result: xarray.Dataset | RawResult) -> str:
     """A run in a few lines: the end, the extremes, the contacts, the energy."""
-    last = result.isel(time=-1)
-    stuck = float((result["input_contact"] == 0).mean())
+
+    def last(name: str) -> float:
+        return float(np.asarray(result[name])[-1])
+
+    def largest(name: str) -> float:
+        return float(np.max(np.abs(np.asarray(result[name]))))
+
+    stuck = float(np.mean(np.asarray(result["input_contact"]) == 0))
     lines = [
         result.attrs["title"] or "(no title)",
-        f"  {float(last['time']):g} s, {result.attrs['switching_count']} switchings, solver {result.attrs['solver']}",
-        f"  at the end: motor {float(last['motor_speed']):.6g} rad/s, load {float(last['load_speed']):.6g} rad/s "
-        f"at {float(last['load_angle']):.6g} rad, twist {1e3 * float(last['twist']):.4g} mrad",
-        f"  largest: motor torque {float(abs(result['motor_torque']).max()):.4g} N·m, output torque "
-        f"{float(abs(result['output_torque']).max()):.4g} N·m, load speed {float(abs(result['load_speed']).max()):.4g} rad/s",
+        f"  {last('time'):g} s, {result.attrs['switching_count']} events, solver {result.attrs['solver']}",
+        f"  at the end: motor {last('motor_speed'):.6g} rad/s, load {last('load_speed'):.6g} rad/s "
+        f"at {last('load_angle'):.6g} rad, twist {1e3 * last('twist'):.4g} mrad",
+        f"  largest: motor torque {largest('motor_torque'):.4g} N·m, output torque "
+        f"{largest('output_torque'):.4g} N·m, load speed {largest('load_speed'):.4g} rad/s",
         f"  input shaft stuck for {100.0 * stuck:.1f} % of the samples",
     ]
     if "energy" in result.attrs:

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import csv
 import difflib
 import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import ValidationError, model_validator
+from pydantic import model_validator
 
 from .errors import InputError
 from .parts import Drive, Gearbox, Load, Motor, Rigid
 from .quantities import Angle, NotNegative, Part, Positive, Speed, Time, Torque
-from .records import Conditions, gearbox_table, motor
+from .records import Conditions, gearbox_table, motor_table
+from .series_files import read_series
 from .signals import CommandSignal, TorqueSignal
 from .task import Task
 from .toml_files import read_toml
+from .validation import shown
 
 MAX_SAMPLES = 100_000_000
 
@@ -96,11 +98,15 @@ class Scenario(Part):
         load = Load(**{name: getattr(self.load, name) for name in Load.model_fields})
         return Drive(motor=self.motor, gearbox=self.gearbox, load=load)
 
+    def __repr__(self) -> str:
+        title = f"{self.title!r}, " if self.title else ""
+        return f"Scenario({title}{self.drive()!r}, {self.simulation.duration:.4g} s, {self.simulation.samples} samples)"
+
     def replace(self, **changes: Any) -> Scenario:
         """The same scenario with changes by dotted key, such as ``**{"command.amplitude": 0.1}``, checked anew."""
         data = self.model_dump()
-        for key, value in changes.items():
-            _set(data, key, value)
+        _set_all(data, changes.items())
+        _use_records(data)
         return Scenario(**data)
 
     def to_json(self) -> str:
@@ -111,6 +117,64 @@ class Scenario(Part):
     def from_json(cls, text: str) -> Scenario:
         return cls(**json.loads(text))
 
+    @classmethod
+    def _described_by(cls) -> dict[str, Any]:
+        return json_schema()
+
+
+def drive_of(what: Scenario | Drive) -> Drive:
+    """The drive of a scenario, or a drive as it is.
+
+    Raises
+    ------
+    InputError
+        It is neither.
+    """
+    if isinstance(what, Drive):
+        return what
+    if isinstance(what, Scenario):
+        return what.drive()
+    raise InputError(f"{what!r:.60} is no drive; give a Drive, or a Scenario such as load(path) returns")
+
+
+def mean_inputs(
+    what: Scenario | Drive, command: float | None = None, load_torque: float | None = None
+) -> tuple[float, float]:
+    """Constant parts of E_C [-] and M_Z [N·m]: as given, else those of the scenario, else 0."""
+    known = (what.command.mean, what.load.torque.mean) if isinstance(what, Scenario) else (0.0, 0.0)
+    return known[0] if command is None else command, known[1] if load_torque is None else load_torque
+
+
+def shipped_scenarios() -> dict[str, Path]:
+    """The scenarios that come with the package: name -> file."""
+    directory = files("lostmotion") / "scenarios"
+    return {f.name.removesuffix(".toml"): Path(str(f)) for f in sorted(directory.iterdir(), key=lambda f: f.name)}
+
+
+def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
+    """The file that is meant: a path relative to `directory`, or the name of a shipped scenario.
+
+    Raises
+    ------
+    InputError
+        It is neither; the message names what is near.
+    """
+    path = directory / name
+    shipped = shipped_scenarios() if len(Path(name).parts) == 1 else {}
+    if path.is_file() or not shipped:
+        return path
+    if str(name) in shipped:
+        return shipped[str(name)]
+    if Path(name).stem in shipped and not path.exists():
+        raise InputError(
+            f"{path}: there is no such file; the shipped scenario is called {Path(name).stem}, without ending"
+        )
+    if path.suffix or path.exists():
+        return path
+    near = difflib.get_close_matches(str(name), shipped, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"the scenarios that come with the package are {', '.join(shipped)}"
+    raise InputError(f"{name}: there is no such file (.toml) and no such scenario; {hint}")
+
 
 def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
     """Read a scenario file.
@@ -118,7 +182,8 @@ def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) ->
     Parameters
     ----------
     path
-        TOML file. Its key `base` may name another scenario file (relative to it) that this one changes.
+        TOML file, or the name of a scenario that comes with the package, such as ``"paper-2dof-nl-small"``. The key
+        `base` of a file may name another one (relative to it, or shipped) that this one changes.
     overrides
         ``{"command.amplitude": 0.1}`` or ``["command.amplitude=0.1"]``, as by ``--set``.
 
@@ -127,11 +192,20 @@ def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) ->
     InputError
         With one line that names the file, the key, the value and the remedy.
     """
-    tables = read_tables(path, overrides)
+    path = find_scenario(path)
+    return changed(read_tables(path, overrides), path)
+
+
+def changed(tables: dict[str, Any], path: Path) -> Scenario:
+    """The scenario of the tables of a file, whose name stands in messages.
+
+    Raises
+    ------
+    InputError
+        With one line that names the file, the key, the value and the remedy.
+    """
     try:
         return from_tables(tables)
-    except ValidationError as error:
-        raise InputError(f"{path}: {describe(error)}") from None
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -143,14 +217,24 @@ def read_tables(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] =
     ------
     InputError
     """
-    data = _read(Path(path), ())
-    items = overrides.items() if isinstance(overrides, Mapping) else [_parse_override(text) for text in overrides]
-    for key, value in items:
-        try:
-            _set(data, key, value)
-        except KeyError as error:
-            raise InputError(f"--set {key}: {error.args[0]}") from None
+    path = find_scenario(path)
+    data = _read(path, ())
+    override(data, overrides, path)
     return data
+
+
+def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str], path: Path) -> None:
+    """Changes tables of a file by dotted key.
+
+    Raises
+    ------
+    InputError
+    """
+    items = overrides.items() if isinstance(overrides, Mapping) else [_parse_override(text) for text in overrides]
+    try:
+        _set_all(data, items)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def from_tables(tables: Mapping[str, Any]) -> Scenario:
@@ -158,7 +242,7 @@ def from_tables(tables: Mapping[str, Any]) -> Scenario:
 
     Raises
     ------
-    InputError, pydantic.ValidationError
+    InputError
         A record is unknown or lacks what a run needs; a value cannot be used.
     """
     data = dict(tables)
@@ -179,7 +263,8 @@ def json_schema() -> dict[str, Any]:
             "type": "object",
             "properties": {"from": name} | conditions,
             "required": ["from"],
-            "description": f"A {table} of the catalogue, or of a sheet file; other keys take the place of its values.",
+            "description": f"A {table} of the catalogue, or of a sheet file; other keys take the place of its values. A table "
+            "that says its kind takes the place of the whole one, any other changes the keys that it gives.",
         }
         schema["properties"][table] = {"anyOf": [whole, name, from_record]}
     return schema
@@ -200,8 +285,8 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
         return data
     base = data.pop("base")
     if not isinstance(base, str):
-        raise InputError(f"{path}: key base: {base!r} must be the name of a scenario file")
-    return _merge(_read(path.parent / base, (*including, path.resolve())), data)
+        raise InputError(f"{path}: key base: {shown(base)} must be the name of a scenario file")
+    return _merge(_read(find_scenario(base, path.parent), (*including, path.resolve())), data)
 
 
 def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...]) -> None:
@@ -214,28 +299,15 @@ def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...]) -> Non
             _read_series(value, path, where)
             continue
         name = value.pop("file")
-        problem = f"{path}: key {'.'.join(where)}.file: {name!r}"
+        problem = f"{path}: key {'.'.join(where)}.file: {shown(name)}"
         if value:
             raise InputError(f"{problem} leaves no room for {', '.join(value)}; give the file alone")
         if not isinstance(name, str):
             raise InputError(f"{problem} must be the name of a CSV file with columns time [s] and value")
         try:
-            with (path.parent / name).open(newline="", encoding="utf-8") as file:
-                rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
-            points = [(float(time), float(number)) for time, number in rows[_has_heading(rows) :]]
-        except OSError as error:
-            raise InputError(f"{problem} cannot be read: {error.strerror}") from None
-        except ValueError:
-            raise InputError(f"{problem} is not a CSV file with two columns of numbers, time [s] and value") from None
-        value["times"], value["values"] = [t for t, _ in points], [v for _, v in points]
-
-
-def _has_heading(rows: list[list[str]]) -> bool:
-    try:
-        float(rows[0][0])
-    except (ValueError, IndexError):
-        return bool(rows)
-    return False
+            value["times"], value["values"] = read_series(path.parent / name, "" if where[0] == "command" else "N*m")
+        except InputError as error:
+            raise InputError(f"{path}: key {'.'.join(where)}.file: {error}") from None
 
 
 def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
@@ -258,18 +330,18 @@ def _use_records(data: dict[str, Any]) -> None:
         changes = data.get(table)
         if isinstance(changes, str):
             changes = {"from": changes}
-        if not isinstance(changes, dict) or "from" not in changes:
+        if not isinstance(changes, dict):
+            continue
+        if "from" not in changes:
+            for key in Conditions.model_fields if table == "gearbox" else ():
+                if key in changes:
+                    raise InputError(f"key gearbox.{key}: acts on a record; give gearbox.from, or leave it out")
             continue
         changes = dict(changes)
         record = changes.pop("from")
         if not isinstance(record, str):
-            raise InputError(f"key {table}.from: {record!r} must be the name of a record, or of a file with one")
-        if table == "gearbox":
-            values, _ = gearbox_table(record, changes)
-            changes = {key: value for key, value in changes.items() if key not in Conditions.model_fields}
-        else:
-            values = motor(record).model_dump()
-        data[table] = _merge(values, changes)
+            raise InputError(f"key {table}.from: {shown(record)} must be the name of a record, or of a file with one")
+        data[table] = gearbox_table(record, changes)[0] if table == "gearbox" else motor_table(record, changes)
 
 
 def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[Gearbox, tuple[str, ...]]:
@@ -280,15 +352,12 @@ def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[
     InputError
     """
     changes: dict[str, Any] = {}
-    for key, value in map(_parse_override, overrides):
-        _set(changes, key, value)
+    _set_all(changes, ((key.removeprefix("gearbox."), value) for key, value in map(_parse_override, overrides)))
     values, built = gearbox_table(reference, changes)
-    own = {key: value for key, value in changes.items() if key not in Conditions.model_fields}
     try:
-        part = Gearbox(**_merge(values, own))
-    except ValidationError as error:
-        raise InputError(f"gearbox {reference}: {describe(error).removeprefix('the scenario ')}") from None
-    return part, built.notes if built else ()
+        return Gearbox(**values), built.notes if built else ()
+    except InputError as error:
+        raise InputError(f"gearbox {reference}: {error}") from None
 
 
 def _parse_override(text: str) -> tuple[str, Any]:
@@ -296,32 +365,43 @@ def _parse_override(text: str) -> tuple[str, Any]:
     if not equals or not key.strip():
         raise InputError(f"--set {text}: must be KEY=VALUE, such as --set command.amplitude=0.1")
     try:
-        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+        parsed = tomllib.loads(f"value = {value}")
     except tomllib.TOMLDecodeError:
         return key.strip(), value.strip()
+    return key.strip(), parsed["value"] if len(parsed) == 1 else value.strip()
 
 
-def _set(data: dict[str, Any], key: str, value: Any) -> None:
-    *tables, name = key.split(".")
-    if name == "from" and len(tables) == 1:  # the record takes the place of the whole table
-        data[tables[0]] = {"from": value}
-        return
-    if tables and isinstance(data.get(tables[0]), str):
-        data[tables[0]] = {"from": data[tables[0]]}
-    node: Any = data
-    for table in tables:
-        place: Any = list_index(node, table) if isinstance(node, list) else table
-        inner = node[place] if isinstance(node, list) else node.setdefault(place, {})
-        if table == "torque" and not isinstance(inner, dict):
-            inner = node[place] = {"mean": inner}
-        if inner is None:
-            inner = node[place] = {}
-        if isinstance(inner, tuple):
-            inner = node[place] = list(inner)
-        if not isinstance(inner, dict | list):
-            raise KeyError(f"{table} is the value {inner!r}, not a table; it has no {name}")
-        node = inner
-    node[list_index(node, name) if isinstance(node, list) else name] = value
+def _set_all(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None:
+    """Changes values by dotted key. A record comes before what changes it, in whatever order they are given."""
+    whole = ("gearbox", "motor", "gearbox.from", "motor.from")
+    for key, value in sorted(changes, key=lambda change: change[0] not in whole):
+        first, *rest = key.split(".")
+        data[first] = _changed(data.get(first), rest, value, first)
+
+
+def _changed(node: Any, keys: list[str], value: Any, where: str) -> Any:
+    """A node of a scenario file with one value changed; lists are counted from 0."""
+    if not keys:
+        return value
+    if keys == ["from"] and where in ("gearbox", "motor"):  # the record takes the place of the whole table
+        return {"from": value}
+    if where in ("gearbox", "motor") and isinstance(node, str):
+        node = {"from": node}
+    if where in ("command", "load.torque") and isinstance(node, int | float | str):
+        node = {"mean": node}
+    key, *rest = keys
+    inner = f"{where}.{key}"
+    if isinstance(node, list | tuple) or (node is None and key.isdecimal()):
+        entries = node or ()
+        try:
+            place = list_index(entries, key)
+        except ValueError as error:
+            raise InputError(f"key {inner}: {error}") from None
+        return [_changed(x, rest, value, inner) if n == place else x for n, x in enumerate(entries)]
+    if node is not None and not isinstance(node, dict):
+        raise InputError(f"key {inner}: {where} is the value {shown(node)}, not a table; it has no {key}")
+    table = node or {}
+    return {**table, key: _changed(table.get(key), rest, value, inner)}
 
 
 def list_index(entries: Sequence[Any], part: str) -> int:
@@ -329,86 +409,12 @@ def list_index(entries: Sequence[Any], part: str) -> int:
 
     Raises
     ------
-    KeyError
+    ValueError
         There is no such entry.
     """
     if not (part.isascii() and part.isdigit()):
-        raise KeyError(f"{part!r} is no index; entries of a list are numbered from 0")
+        raise ValueError(f"{part!r} is no index; entries of a list are numbered from 0")
     if int(part) >= len(entries):
         count = f"{len(entries)} entr{'y' if len(entries) == 1 else 'ies'}"
-        raise KeyError(f"there is no entry {part}; the list has {count}, numbered from 0")
+        raise ValueError(f"there is no entry {part}; the list has {count}, numbered from 0")
     return int(part)
-
-
-def describe(error: ValidationError) -> str:
-    """One line for a failed validation: the key, the value and what would be right."""
-    # A misspelt key is the cause of the missing one.
-    problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
-    first = problems[0]
-    # Names of classes that the choice between kinds puts into the location are not keys of the file.
-    kinds = {"curve", "linear", "rigid", "constant_efficiency", "map"}
-    location = list(first["loc"])
-    keys = [
-        k for n, k in enumerate(location) if not (k in kinds and n > 0 and location[n - 1] in ("stiffness", "losses"))
-    ]
-    name = _dotted(keys)
-    text = _explain(first, keys)
-    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    return (f"key {name}: {text}" if name else f"the scenario {text}") + more
-
-
-def _dotted(keys: list[int | str]) -> str:
-    text = ""
-    for k in keys:
-        text += f"[{k}]" if isinstance(k, int) else f".{k}" if text else str(k)
-    return text
-
-
-def _explain(problem: Any, keys: list[int | str]) -> str:
-    kind, value, context = problem["type"], problem["input"], problem.get("ctx", {})
-    shown = repr(value) if len(repr(value)) < 60 else repr(value)[:57] + "..."
-    if kind == "missing":
-        return "is missing; add it"
-    if kind == "extra_forbidden":
-        known = _known_keys(keys[:-1])
-        near = difflib.get_close_matches(str(keys[-1]), known, n=1)
-        return f"is not known; did you mean {near[0]}?" if near else f"is not known; known here: {', '.join(known)}"
-    if kind == "value_error":
-        text = str(context["error"])
-        return text if isinstance(value, dict) or not isinstance(value, str | float | int) else f"{shown} {text}"
-    if kind == "union_tag_invalid":
-        return f"kind {context['tag']!r} is not known; it must be one of {context['expected_tags']}"
-    if kind == "union_tag_not_found":
-        return "lacks kind, which says what it is"
-    if kind in ("model_type", "model_attributes_type", "dict_type"):
-        return f"{shown} must be a table with some of the keys {', '.join(_known_keys(keys))}"
-    if kind == "finite_number":
-        return f"{shown} must be a finite number"
-    message = problem["msg"]
-    return f"{shown}: {message[0].lower()}{message[1:].replace('Input should', 'must')}".replace("input should", "must")
-
-
-def _known_keys(keys: list[int | str]) -> list[str]:
-    """Field names of the table at this place of the schema."""
-    schema = json_schema()
-    node: Any = schema
-    for key in keys:
-        node = _resolve(node, schema)
-        node = node.get("items", {}) if isinstance(key, int) else node.get("properties", {}).get(key, {})
-    return sorted(_resolve(node, schema).get("properties", {}))
-
-
-def _resolve(node: Any, schema: dict[str, Any]) -> dict[str, Any]:
-    """Follows references and merges the properties of alternatives."""
-    if "$ref" in node:
-        return _resolve(schema["$defs"][node["$ref"].rsplit("/", 1)[1]], schema)
-    options = node.get("anyOf", []) + node.get("oneOf", []) + node.get("allOf", [])
-    if not options:
-        return dict(node)
-    properties: dict[str, Any] = {}
-    items: Any = {}
-    for option in options:
-        resolved = _resolve(option, schema)
-        properties |= resolved.get("properties", {})
-        items = resolved.get("items", items)
-    return {"properties": properties, "items": items}

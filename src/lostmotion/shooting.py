@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core
+from .errors import InputError
 from .parts import Drive
 from .results import add_derived
 from .run import start_state
-from .scenario import Initial
+from .scenario import Initial, Scenario, drive_of
 from .signals import CommandSignal, TorqueSignal
 from .variables import CHANNEL_NAMES, STATES, VARIABLES
 
@@ -56,7 +57,7 @@ def respond(
     threads: int | None,
     progress: Callable[[int], None] | None,
 ) -> dict[str, Any]:
-    """Motions that repeat, one for each (command, load torque, period [s], start): arrays of the core, a row a point."""
+    """Periodic motions, one for each (command, load torque, period [s], start): arrays of the core, a row a point."""
     core = [(c.core(), t.core(), period, start_state(s), s.hysteresis_capacity) for c, t, period, s in points]
     return _core.respond(
         drive.core(),
@@ -76,48 +77,51 @@ def _period(*signals: CommandSignal | TorqueSignal) -> float:
 
     Raises
     ------
-    ValueError
+    InputError
         They have none.
     """
     frequencies = []
     for s in signals:
         if s.steps or s.ramps or s.chirp is not None or s.samples is not None:
-            raise ValueError(
+            raise InputError(
                 "a periodic motion needs signals of mean and sines only; leave out steps, ramps, chirp, samples"
             )
         frequencies += [f for _, f, _ in s.sine_list()]
     if not frequencies:
-        raise ValueError("a periodic motion needs at least one sine in command or load torque, or a period")
+        raise InputError("a periodic motion needs at least one sine in command or load torque, or a period")
     base = min(frequencies)
     for parts in range(1, 101):
         shares = [parts * f / base for f in frequencies]
         if all(abs(q - round(q)) <= 1e-9 * q for q in shares):
             return parts / base
-    raise ValueError(f"the frequencies {sorted(set(frequencies))} Hz have no common period within 100 of the slowest")
+    raise InputError(f"the frequencies {sorted(set(frequencies))} Hz have no common period within 100 of the slowest")
 
 
 def periodic_motion(
-    drive: Drive,
-    command: CommandSignal | float = 0.0,
-    load_torque: TorqueSignal | float = 0.0,
+    drive: Drive | Scenario,
+    command: CommandSignal | float | None = None,
+    load_torque: TorqueSignal | float | None = None,
     *,
     multiple: int = 1,
     start: Initial | None = None,
     max_periods: int = MAX_PERIODS,
 ) -> xarray.Dataset:
-    """A motion that repeats with the inputs, by shooting.
+    """A periodic motion under periodic inputs, by shooting.
 
     Newton's method on the map over one period, with its exact Jacobian; it is entered after a few periods from `start`,
     and where it does not converge, the transient is followed further. The load angle is neutral: it may drift.
 
     Parameters
     ----------
+    drive
+        A drive, or a scenario.
     command, load_torque
-        Constants, or signals of mean and sines with a common period.
+        E_C [-] and M_Z [N·m]: constants, or signals of mean and sines with a common period; left out, those of the
+        scenario, or 0.
     multiple
         The motion may repeat after this many periods of the inputs (sub-harmonics).
     start
-        From where; at rest if left out. Coexisting motions are reached from different ones.
+        From where; the initial state of the scenario, or rest, if left out. Coexisting motions are reached from different ones.
 
     Returns
     -------
@@ -125,7 +129,7 @@ def periodic_motion(
         The result variables over one period, and the ``jacobian`` of the map over it. Attributes: ``residual`` (largest change of a state over the period / its
         largest magnitude), ``drift`` of the load angle [rad], ``multipliers_real`` and ``multipliers_imag`` (Floquet),
         ``stable``, ``smooth`` (the multipliers are exact: no switching grazes), ``periods`` followed, ``newton_steps``,
-        ``start_<state>``, ``period`` [s].
+        ``start_<state>``, ``period`` [s], ``gear_ratio``.
 
     Raises
     ------
@@ -134,10 +138,15 @@ def periodic_motion(
     """
     import xarray as xr
 
-    command = command if isinstance(command, CommandSignal) else CommandSignal(mean=command)
-    load_torque = load_torque if isinstance(load_torque, TorqueSignal) else TorqueSignal(mean=load_torque)
+    if isinstance(drive, Scenario):
+        command = drive.command if command is None else command
+        load_torque = drive.load.torque if load_torque is None else load_torque
+        start = start or drive.initial
+    drive = drive_of(drive)
+    command = command if isinstance(command, CommandSignal) else CommandSignal(mean=command or 0.0)
+    load_torque = load_torque if isinstance(load_torque, TorqueSignal) else TorqueSignal(mean=load_torque or 0.0)
     if multiple < 1:
-        raise ValueError(f"multiple {multiple} must be 1 or more")
+        raise InputError(f"multiple {multiple} must be 1 or more")
     period = multiple * _period(command, load_torque)
     r = respond(
         drive,
@@ -167,6 +176,7 @@ def periodic_motion(
         },
         attrs={
             "period": period,
+            "gear_ratio": drive.gearbox.ratio,
             "residual": float(r["residual"][0]),
             "drift": float(r["drift"][0]),
             "multipliers_real": multipliers.real.tolist(),
@@ -187,9 +197,9 @@ def is_stable(multipliers: np.ndarray) -> bool:
 
 
 def periodic_motions(
-    drive: Drive,
-    command: CommandSignal | float = 0.0,
-    load_torque: TorqueSignal | float = 0.0,
+    drive: Drive | Scenario,
+    command: CommandSignal | float | None = None,
+    load_torque: TorqueSignal | float | None = None,
     *,
     starts: Iterable[Initial],
     multiples: Iterable[int] = (1,),
@@ -206,7 +216,7 @@ def periodic_motions(
                 motion = periodic_motion(drive, command, load_torque, multiple=multiple, start=start)
             except RuntimeError:
                 continue
-            if not any(_same(drive, motion, other) for other in found):
+            if not any(_same(drive_of(drive), motion, other) for other in found):
                 found.append(motion)
     return found
 

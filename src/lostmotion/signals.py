@@ -7,12 +7,13 @@ import itertools
 import math
 from collections import deque
 from functools import lru_cache
+from numbers import Real
 from typing import Annotated, Any, Generic, Self, TypeVar
 
 from pydantic import Field, model_validator
 
 from . import _core
-from .quantities import Angle, Frequency, NotNegative, Number, Part, Positive, Time, Torque
+from .quantities import Angle, Frequency, NotNegative, Number, Part, Positive, Time, Torque, Whole
 
 V = TypeVar("V")  # the value of the signal, with its unit
 
@@ -61,7 +62,7 @@ class Chirp(Part, Generic[V]):
     end_frequency: Annotated[Frequency, Positive]
     duration: Annotated[Time, Positive]
     begin: Annotated[Time, NotNegative] = 0.0
-    points_per_period: Annotated[int, Field(ge=8, le=1000)] = 64
+    points_per_period: Annotated[Whole, Field(ge=8, le=1000)] = 64
 
     def knots(self) -> list[Knot]:
         fastest = max(self.begin_frequency, self.end_frequency)
@@ -77,7 +78,8 @@ class Chirp(Part, Generic[V]):
 class Samples(Part, Generic[V]):
     """Straight lines through the points given; before the first and after the last the value stays.
 
-    In a scenario file, `file = "points.csv"` may stand for both keys: two columns, time [s] and value.
+    In a scenario file, `file = "points.csv"` may stand for both keys: two columns, time [s] and value. A heading such as
+    ``time [ms],torque [Nm]`` gives other units.
     """
 
     times: tuple[Time, ...]
@@ -121,7 +123,7 @@ class Signal(Part, Generic[V]):
     @model_validator(mode="before")
     @classmethod
     def _from_constant(cls, data: Any) -> Any:
-        plain = isinstance(data, int | float | str) and not isinstance(data, bool)
+        plain = isinstance(data, Real | str) and not isinstance(data, bool)
         return {"mean": data} if plain else data
 
     @model_validator(mode="after")
@@ -154,6 +156,10 @@ class Signal(Part, Generic[V]):
             final += sum(value for piece, (value, _) in zip(active, here, strict=True) if time >= piece[-1][0])
             active = [piece for piece in active if time < piece[-1][0]]
         return knots
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # The classes of the parts are generic, and as such have no name by which they could be pickled.
+        return type(self).model_validate, (self.model_dump(exclude_unset=True),)
 
     def core(self) -> _core.Signal:
         """The solver's signal; made once for equal signals."""

@@ -11,14 +11,14 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from . import _core
+from .errors import InputError
 from .harmonic_response import bandwidth
 from .parts import Rigid
 from .results import ENERGY, add_derived, installed_version
 from .run import core_inputs, simulate
-from .scenario import Scenario, describe
+from .scenario import Scenario
 from .study_check import COLUMNS, check_columns
 from .study_file import Study, from_json
 from .study_functions import REDUCTIONS
@@ -94,7 +94,7 @@ def _reductions(study: Study) -> dict[str, tuple[str, str]]:
 
 
 def _needed(study: Study) -> frozenset[str]:
-    """The result variables that the study looks at."""
+    """The result variables that the study uses."""
     return frozenset(_used(study) | set(study.trajectories.variables if study.trajectories else ()))
 
 
@@ -269,8 +269,8 @@ def _one_by_one(study: Study, parameters: np.ndarray, channels: list[str], energ
             scenario = study.scenario_at(row)
             result = simulate(scenario, energy=energy)
             checks = check_columns(scenario) if _checks(study) else {}
-        except (ValidationError, RuntimeError, ValueError) as error:
-            runs.errors[k] = describe(error) if isinstance(error, ValidationError) else str(error)
+        except (RuntimeError, ValueError) as error:
+            runs.errors[k] = str(error)
             continue
         for c in channels:
             runs.samples[c][k] = result[c].values
@@ -381,10 +381,10 @@ def _out_of_range(study: Study, parameters: np.ndarray) -> list[str]:
     try:
         study.scenario_at(low)
         study.scenario_at(high)
-    except ValidationError:
+    except InputError:
         for k, row in enumerate(parameters):
             try:
                 study.scenario_at(row)
-            except ValidationError as error:
-                errors[k] = describe(error)
+            except InputError as error:
+                errors[k] = str(error)
     return errors

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from .errors import InputError
+from .errors import need
 
 CHUNK = 500  # runs that are computed, and written, as one
 
@@ -62,10 +62,8 @@ def _latin_hypercube(parameters: int, total: int, seed: int) -> np.ndarray:
 
 @lru_cache(maxsize=2)
 def _saltelli(parameters: int, base: int, seed: int) -> np.ndarray:
-    try:
-        from SALib.sample import sobol
-    except ImportError:
-        raise InputError("design saltelli needs SALib: pip install lostmotion[study]") from None
+    need("SALib", "The design saltelli", "study")
+    from SALib.sample import sobol
 
     names = [str(k) for k in range(parameters)]
     problem = {"num_vars": parameters, "names": names, "bounds": [[0.0, 1.0]] * parameters}

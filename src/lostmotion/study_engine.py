@@ -8,7 +8,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExec
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError
+from .errors import InputError, need
 from .results import write_bytes
 from .study_chunk import as_parquet, compute_chunk, parsed, pieces, run_piece, tabulate
 from .study_design import CHUNK
@@ -23,10 +23,10 @@ def study(
     executor: Executor | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Path:
-    """Run a study, or go on with it, into a directory of Parquet files.
+    """Run a study, or resume it, into a directory of Parquet files.
 
     Runs are computed and written in chunks; a chunk that is written is whole. Interrupted at any instant and called again, it
-    goes on with the chunks that are missing, so no run is lost and none is there twice. Rows depend on the study alone, not on
+    computes the chunks that are missing, so no run is lost and none is there twice. Rows depend on the study alone, not on
     threads, workers or interruptions.
 
     Parameters
@@ -52,6 +52,8 @@ def study(
     InputError
         The directory holds another study, or cannot be written; what is there stays.
     """
+    need("pyarrow", "A study", "study")
+    need("scipy", "A study", "study")
     directory = Path(directory)
     text = to_json(what)
     _prepare(directory, text)

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from .errors import InputError
 from .quantities import Part
-from .scenario import Scenario, load, read_tables
+from .scenario import Scenario, find_scenario, load, read_tables
 from .study_design import unit_cube
 from .study_expressions import Expression, read_expression
 from .study_records import CONDITIONS, TABLE_OF, with_records
@@ -170,7 +170,7 @@ class Study(Part):
 
         Raises
         ------
-        InputError, pydantic.ValidationError
+        InputError
             There is no such scenario.
         """
         values = {key: (v, v.value(number)) for v, number in zip(self.vary, row, strict=True) for key in v.all_keys}
@@ -250,53 +250,14 @@ def load_study(path: str | Path) -> Study:
     changes = data.pop("set", {})
     if not isinstance(changes, dict):
         raise InputError(f'{path}: key set: must be a table, such as set = {{ "load.inertia" = 2 }}')
-    scenario, written = load(path.parent / base, changes), read_tables(path.parent / base, changes)
+    where = find_scenario(base, path.parent)
+    scenario, written = load(where, changes), read_tables(where, changes)
     for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:
         _find_sheets(entry, path.parent)
     try:
         return Study(scenario=scenario, written=written, **data)
-    except ValidationError as error:
-        raise InputError(f"{path}: {_describe(error)}") from None
-
-
-# What a failed check of the schema says, by its type.
-PLAIN = {
-    "extra_forbidden": "is not known; see the page on studies for the keys",
-    "missing": "is missing; add it",
-    "tuple_type": "must be a list",
-    "too_short": "must not be empty",
-    "dict_type": "must be a table",
-    "model_type": "must be a table",
-    "string_type": "must be a text in quotes",
-    "bool_type": "must be true or false",
-    "bool_parsing": "must be true or false",
-    "int_type": "must be a whole number",
-    "int_parsing": "must be a whole number",
-    "int_from_float": "must be a whole number",
-    "float_type": "must be a number",
-    "float_parsing": "must be a number",
-    "finite_number": "must be a finite number",
-}
-
-
-def _describe(error: ValidationError) -> str:
-    """One line for a study that fails its schema: the key, the value and what would be right."""
-    # A list is also called too short if its entries have failed.
-    problems = [p for p in error.errors() if not (p["type"] == "too_short" and p["input"])]
-    # A misspelt key is the cause of the missing one.
-    first = min(problems, key=lambda problem: problem["type"] != "extra_forbidden")
-    kind, value = first["type"], first["input"]
-    loc = [part for part in first["loc"] if part not in ("float", "str")]  # which of two types was tried is no key
-    key = ".".join(str(part) for part in loc)
-    shown = "" if kind in ("extra_forbidden", "missing") or isinstance(value, dict | list | tuple) else f"{value!r} "
-    if kind == "value_error":
-        text = str(first["ctx"]["error"])
-    elif kind == "literal_error":
-        text = f"{shown}must be one of {first['ctx']['expected']}"
-    else:
-        text = shown + PLAIN.get(kind, first["msg"].replace("Input should", "must"))
-    more = "" if len(problems) == 1 else f" (and {len(problems) - 1} more)"
-    return f"{f'key {key}: ' if key else 'the study '}{text}{more}"
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _find_sheets(entry: Any, directory: Path) -> None:

@@ -92,7 +92,7 @@ def with_records(written: Mapping[str, Any], changes: Mapping[str, Any]) -> Scen
 
     Raises
     ------
-    InputError, pydantic.ValidationError
+    InputError
         A record lacks what a run needs, or a value cannot be used.
     """
     tables = dict(written)

@@ -1,4 +1,4 @@
-"""What a study shows: statistics, distributions, what matters, Sobol indices, scatter, the best designs."""
+"""The report of a study: statistics, distributions, correlations, Sobol indices, scatter, the best designs."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from .errors import InputError
+from .errors import InputError, need
 from .pages import save_figure, table_csv, write_text
-from .plots import STYLES  # with them come the settings of all figures
+from .panels import STYLES
+from .plots import Picture, in_our_looks
 from .study_engine import study_of
 from .study_file import Study
 from .study_selection_report import show_selection
@@ -19,6 +19,7 @@ from .study_vary import Vary
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    from matplotlib.figure import Figure
 
 MOST_LABELS = 20  # names along an axis
 INK, ACCENT = STYLES["2-DOF-NL"]["color"], STYLES["2-DOF-L"]["color"]
@@ -31,7 +32,7 @@ def figures_of(directory: Path) -> Path:
 
 
 def statistics(table: pa.Table, study: Study) -> list[list[Any]]:
-    """Name, mean, deviation, least, 5 %, 50 %, 95 %, largest of each kept value."""
+    """Name, mean, standard deviation, least, 5 %, 50 %, 95 %, largest of each kept value."""
     rows = []
     for name in study.keep:
         x = _finite(table, name)
@@ -129,9 +130,10 @@ def best_runs(table: pa.Table, name: str, count: int = 10, *, largest: bool = Fa
 def _grid(count: int, width: float = 3.3, height: float = 2.6) -> tuple[Figure, int, int]:
     columns = min(3, count)
     rows = -(-count // columns)
-    return Figure(figsize=(max(4.5, width * columns), height * rows)), rows, columns
+    return Picture(figsize=(max(4.5, width * columns), height * rows)), rows, columns
 
 
+@in_our_looks
 def distributions(table: pa.Table, study: Study) -> Figure:
     """A histogram of each kept value, with its 5, 50 and 95 %."""
     figure, rows, columns = _grid(len(study.keep))
@@ -146,6 +148,7 @@ def distributions(table: pa.Table, study: Study) -> Figure:
     return figure
 
 
+@in_our_looks
 def bars(values: dict[str, dict[str, Any]], label: str) -> Figure:
     """Horizontal bars by parameter for each kept value, the longest on top (tornado); pairs as two bars."""
     figure, rows, columns = _grid(len(values), 3.8, 0.7 + 0.35 * max(len(v) for v in values.values()) + 0.9)
@@ -167,11 +170,12 @@ def bars(values: dict[str, dict[str, Any]], label: str) -> Figure:
     return figure
 
 
+@in_our_looks
 def scatter(table: pa.Table, study: Study, most: int = 6) -> Figure:
     """Kept values over parameters, at most six of each and 5000 points."""
     keep, vary = list(study.keep)[:most], study.vary[:most]
     some = table.take(np.linspace(0, table.num_rows - 1, min(table.num_rows, 5000)).astype(int))
-    figure = Figure(figsize=(max(4.5, 2.6 * len(vary)), 2.3 * len(keep)))
+    figure = Picture(figsize=(max(4.5, 2.6 * len(vary)), 2.3 * len(keep)))
     for r, name in enumerate(keep):
         for c, v in enumerate(vary):
             axes = figure.add_subplot(len(keep), len(vary), r * len(vary) + c + 1)
@@ -191,9 +195,11 @@ def scatter(table: pa.Table, study: Study, most: int = 6) -> Figure:
 
 def show(directory: Path) -> list[str]:
     """Writes figures and statistics.csv into a directory beside that of the data; returns what to print."""
+    need("pyarrow", "Showing a study", "study")
+    need("scipy", "Showing a study", "study")
     study, table = study_of(directory), read_table(directory)
     rows = statistics(table, study)
-    header = ["", "mean", "deviation", "least", "5 %", "50 %", "95 %", "largest"]
+    header = ["", "mean", "std. dev.", "least", "5 %", "50 %", "95 %", "largest"]
     failed = [e for e in table["error"].to_pylist() if e]
     lines = [study.title or str(directory), f"  {table.num_rows} of {study.total} runs, {len(failed)} failed"]
     lines += [f"    {failed.count(e)} x {e}" for e in list(dict.fromkeys(failed))[:5]]

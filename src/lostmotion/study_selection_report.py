@@ -6,10 +6,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from matplotlib.figure import Figure
-
 from .pages import save_figure, table_csv, write_text
-from .plots import STYLES
+from .panels import STYLES
+from .plots import Picture, in_our_looks
 from .study_file import Study
 from .study_select import SHARES, USE, Selection
 from .study_selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
@@ -17,6 +16,7 @@ from .study_table import labelled
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    from matplotlib.figure import Figure
 
 INK, ACCENT = STYLES["2-DOF-NL"]["color"], STYLES["2-DOF-L"]["color"]
 MOST = 10  # lines of each list that are printed; selection.csv has all
@@ -108,10 +108,11 @@ def _misfits(ranked: list[Candidate]) -> list[str]:
     return [*lines, f"  and {len(out) - MOST} more, see selection.csv"] if len(out) > MOST else lines
 
 
+@in_our_looks
 def pareto_figure(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> Figure:
     """The first two objectives of all runs: those that fit, those that do not, and the front of those that fit."""
     x, y = list(select.objectives)[:2]
-    figure = Figure(figsize=(6.4, 4.4))
+    figure = Picture(figsize=(6.4, 4.4))
     axes = figure.add_subplot()
     groups = (
         ([c for c in ranked if not c.fits], {"marker": "x", "color": "0.6", "label": "does not fit"}),

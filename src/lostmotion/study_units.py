@@ -8,7 +8,8 @@ from typing import Any
 
 from .quantities import unit_in_schema
 from .scenario import json_schema
-from .units import si_number, to_si
+from .units import to_si
+from .validation import shown
 
 
 @cache
@@ -52,7 +53,10 @@ def in_si(value: Any, unit: str | None) -> Any:
     if isinstance(value, bool):
         raise ValueError(f"{str(value).lower()} is no number")
     if isinstance(value, str):
-        return si_number(value) if unit is None else to_si(value, unit)
+        try:
+            return value if unit is None else to_si(value, unit)
+        except ValueError as error:
+            raise ValueError(f"{shown(value)} {error}") from None
     if isinstance(value, list | tuple):
         return [in_si(x, unit) for x in value]
     return {k: in_si(x, unit) for k, x in value.items()} if isinstance(value, dict) else value

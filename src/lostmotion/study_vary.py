@@ -24,6 +24,7 @@ class Normal(Part):
 
     mean: float
     deviation: Annotated[float, Field(gt=0.0)]
+    """standard deviation"""
 
 
 class Vary(Part):
@@ -174,9 +175,9 @@ def base_value(scenario: Scenario, key: str) -> Any:
             elif isinstance(node, BaseModel) and part in type(node).model_fields:
                 node = getattr(node, part)
             else:
-                raise KeyError(f"there is no {part}")
-        except KeyError as error:
-            raise ValueError(f"varies {key}, which the base scenario does not know ({error.args[0]})") from None
+                raise ValueError(f"there is no {part}")
+        except ValueError as error:
+            raise ValueError(f"varies {key}, which the base scenario does not know ({error})") from None
     return node
 
 

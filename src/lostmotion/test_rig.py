@@ -1,4 +1,4 @@
-"""Virtual test rig: what makers measure of a gearbox, measured on the simulated one.
+"""Virtual test rig: what manufacturers measure of a gearbox, measured on the simulated one.
 
 Nothing here reads the loss map or the torsion curve back; every figure comes out of a simulated run, as on the rigs of
 figures 6 to 8 of the paper.
@@ -7,13 +7,14 @@ figures 6 to 8 of the paper.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from .data_sheet import GearboxSheet
+from .errors import InputError
 from .parts import Drive, Gearbox, Load, Motor, Rigid
 from .run import simulate
 from .scenario import Initial
@@ -23,15 +24,17 @@ from .switchings import switchings_of
 if TYPE_CHECKING:
     import xarray
 
+T = TypeVar("T")
+
 FLYWHEEL = 1e9  # [kg m2] on the input: keeps its speed, or stands still, whatever the gearbox does
-RIG_FREQUENCY = 20.0  # [Hz] of the load on the stiffest piece of the curve, damped critically
+RIG_FREQUENCY = 20.0  # [Hz] of the load on the stiffest segment of the curve, damped critically
 SETTLING = 4.0  # [s] until a steady state is read
 RAMP = 400.0  # [s] of a slow ramp
 LOST_MOTION_LOAD = 0.03  # of rated torque, where lost motion is read
 
 
 class RigError(ValueError):
-    """A measurement did not come to an end."""
+    """A measurement did not settle."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ class TestRig:
 
     def __init__(self, gearbox: Gearbox) -> None:
         if isinstance(gearbox.stiffness, Rigid):
-            raise ValueError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
+            raise InputError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
         self.gearbox = gearbox
         self.breaks, self.slopes = gearbox.stiffness.pieces()
         k = max(self.slopes)
@@ -137,13 +140,19 @@ class TestRig:
         driving = T_2 / (self.gearbox.ratio * T_1)
         return driving if load > 0.0 else max(0.0, 1.0 / driving)
 
-    def efficiency_map(self, speeds: Iterable[float], loads: Iterable[float]) -> xarray.Dataset:
-        """Efficiency and loss torque over input speed [rad/s] and relative load."""
-        import xarray as xr
-
+    def efficiency_map(
+        self, speeds: Iterable[float], loads: Iterable[float], progress: Callable[[], None] = lambda: None
+    ) -> xarray.Dataset:
+        """Efficiency and loss torque over input speed [rad/s] and relative load; `progress` is called for each load."""
         g = self.gearbox
         speeds, loads = list(speeds), list(loads)
-        pairs = np.array([[self.steady(n, mu) for n in speeds] for mu in loads])
+        rows = []
+        for mu in loads:
+            rows.append([self.steady(n, mu) for n in speeds])
+            progress()
+        import xarray as xr
+
+        pairs = np.array(rows)
         T_1, T_2 = pairs[..., 0], pairs[..., 1]
         return xr.Dataset(
             {
@@ -194,7 +203,7 @@ class TestRig:
         return out
 
     def backlash(self, torque: float) -> float:
-        """Total gap [rad]: twice where the first loaded piece, taken up to `torque` [N·m], meets zero torque."""
+        """Total gap [rad]: twice where the first loaded segment, taken up to `torque` [N·m], meets zero torque."""
         twist, T = self.virgin_curve(torque)
         inside = (0.1 * torque < T) & (0.9 * torque > T)
         slope, offset = np.polyfit(twist[inside], T[inside], 1)
@@ -215,7 +224,7 @@ class TestRig:
     # --- (d): breaking loose ---
 
     def starting_torque(self, load: float = 0.0) -> float:
-        """Input torque [N·m] that starts the gearbox against a relative load, by a slow ramp."""
+        """Input torque [N·m] that sets the gearbox in motion against a relative load, by a slow ramp."""
         g = self.gearbox
         against = load * g.rated_output_torque
         begin, most = against / g.ratio, (1.0 + 4.0 * load) * g.rated_output_torque / g.ratio
@@ -231,7 +240,7 @@ class TestRig:
         return begin + most * self._break_away(result)[0] / RAMP
 
     def backdriving_torque(self) -> float | None:
-        """Output torque [N·m] that starts the gearbox with a free input, by a slow ramp; None: it holds 3 times rated torque."""
+        """Output torque [N·m] that sets the gearbox in motion with a free input, by a slow ramp; None: it holds three times its rated torque."""
         g = self.gearbox
         result = simulate(
             self._braked(),
@@ -266,7 +275,7 @@ class TestRig:
 
 @dataclass(frozen=True)
 class RigReport:
-    """All that the rig measured of one gearbox."""
+    """All measurements of one gearbox."""
 
     gearbox: Gearbox
     map: xarray.Dataset
@@ -283,8 +292,20 @@ class RigReport:
     comparisons: tuple[Comparison, ...] = field(default=())
 
 
-def measure(gearbox: Gearbox, sheet: GearboxSheet | None = None, notes: Iterable[str] = ()) -> RigReport:
-    """Puts a gearbox through all measurements.
+# What the rig measures beside its comparisons: parts of rated speed, and relative loads.
+SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
+LOADS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5)
+LOOPS = (1.0, 0.6, 0.3)
+WORK = len(LOADS) + len(LOOPS) + 6  # how often `measure` reports progress
+
+
+def measure(
+    gearbox: Gearbox,
+    sheet: GearboxSheet | None = None,
+    notes: Iterable[str] = (),
+    progress: Callable[[], None] = lambda: None,
+) -> RigReport:
+    """Measure all figures of a gearbox.
 
     Parameters
     ----------
@@ -292,21 +313,27 @@ def measure(gearbox: Gearbox, sheet: GearboxSheet | None = None, notes: Iterable
         Figures to compare with.
     notes
         Of the loss map's making; a contradiction among the figures is pointed out beside them.
+    progress
+        Called `WORK` times.
     """
     rig = TestRig(gearbox)
     T_2R, n_1R = gearbox.rated_output_torque, gearbox.rated_input_speed
-    speeds = n_1R * np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0])
-    loads = [0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5]
+    speeds = n_1R * np.array(SPEEDS)
+
+    def done(measured: T) -> T:
+        progress()
+        return measured
+
     return RigReport(
         gearbox=gearbox,
-        map=rig.efficiency_map(speeds, loads),
-        no_load=(speeds, np.array([rig.no_load_torque(n) for n in speeds])),
-        virgin=rig.virgin_curve(1.2 * T_2R),
-        loops=tuple(rig.loop(share * T_2R) for share in (1.0, 0.6, 0.3)),
-        starting_torque=rig.starting_torque(),
-        backdriving_torque=rig.backdriving_torque(),
-        lost_motion=rig.lost_motion(),
-        comparisons=() if sheet is None else tuple(_compare(rig, sheet, tuple(notes))),
+        map=rig.efficiency_map(speeds, LOADS, progress),
+        no_load=(speeds, done(np.array([rig.no_load_torque(n) for n in speeds]))),
+        virgin=done(rig.virgin_curve(1.2 * T_2R)),
+        loops=tuple(done(rig.loop(share * T_2R)) for share in LOOPS),
+        starting_torque=done(rig.starting_torque()),
+        backdriving_torque=done(rig.backdriving_torque()),
+        lost_motion=done(rig.lost_motion()),
+        comparisons=done(() if sheet is None else tuple(_compare(rig, sheet, tuple(notes)))),
     )
 
 

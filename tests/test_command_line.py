@@ -1,0 +1,332 @@
+"""The command line: what it takes, when it starts, what it tries before the work, what it says meanwhile."""
+
+import errno
+import os
+import pty
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import lostmotion as lm
+from conftest import ROOT, SCENARIOS
+from lostmotion import plots
+from lostmotion.cli import app
+from lostmotion.listing import list_records
+
+SMALL = "paper-2dof-nl-small"
+
+
+def lostmotion(*arguments: object, cwd: Path, **options) -> subprocess.CompletedProcess[str]:
+    words = [sys.executable, "-m", "lostmotion", *map(str, arguments)]
+    return subprocess.run(words, cwd=cwd, capture_output=True, text=True, check=False, **options)
+
+
+# --- scenarios by name, results as scenarios ---
+
+
+def test_shipped_scenarios_are_known_by_name(tmp_path: Path) -> None:
+    assert list(lm.shipped_scenarios()) == [p.stem for p in SCENARIOS]
+    for path in SCENARIOS:
+        assert lm.load(path.stem) == lm.load(path)
+    by_name, by_file = (
+        lostmotion("run", what, cwd=tmp_path) for what in (SMALL, SCENARIOS[0].parent / f"{SMALL}.toml")
+    )
+    assert by_name.returncode == 0
+    assert by_name.stdout == by_file.stdout
+    listed = lostmotion("scenarios", cwd=tmp_path).stdout
+    for path in SCENARIOS:
+        assert f"{path.stem} " in listed
+
+
+def test_a_file_comes_before_a_shipped_name_and_may_build_on_one(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.toml").write_text(f'base = "{SMALL}"\ntitle = "mine"\n')
+    assert lm.load("mine.toml") == lm.load(SMALL).replace(title="mine")
+    Path(SMALL).write_text(f'base = "{SCENARIOS[0]}"\ntitle = "a file of that name"\n')
+    assert lm.load(SMALL).title == "a file of that name"
+    Path("study.toml").write_text(
+        'base = "step-to-standstill"\ndesign = "list"\n[[vary]]\nkey = "load.inertia"\nvalues = [1]\n[keep]\na = "peak(twist)"\n'
+    )
+    assert lm.load_study("study.toml").scenario == lm.load("step-to-standstill")
+
+
+def test_an_unknown_name_is_told_with_the_nearest(tmp_path: Path) -> None:
+    done = lostmotion("run", "paper-2dof-nl-smal", cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr == (
+        "lostmotion: paper-2dof-nl-smal: there is no such file (.toml) and no such scenario; did you mean paper-2dof-nl-small?\n"
+    )
+    with pytest.raises(lm.InputError, match="the scenarios that come with the package are backlash-reversing-load, "):
+        lm.load("xyz")
+
+
+def test_a_directory_does_not_hide_a_shipped_scenario_and_its_file_name_leads_to_it(
+    tmp_path: Path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path(SMALL).mkdir()
+    assert lm.load(SMALL) == lm.load(SCENARIOS[0].parent / f"{SMALL}.toml")
+    with pytest.raises(
+        lm.InputError, match=f"{SMALL}.toml: there is no such file; the shipped scenario is called {SMALL}"
+    ):
+        lm.load(f"{SMALL}.toml")
+    Path("folder").mkdir()
+    with pytest.raises(lm.InputError, match="folder: is a directory"):
+        lm.load("folder")
+
+
+def test_a_file_that_is_no_result_of_a_run_is_refused(tmp_path: Path) -> None:
+    response = lm.frequency_response(lm.load(SMALL), [1.0], 0.1)[["efficiency", "drift"]]
+    response.to_netcdf(tmp_path / "response.nc", engine="h5netcdf")
+    (tmp_path / "table.csv").write_text("a,b\n1,2\n")
+    for name, words in (
+        ("response.nc", "carries no scenario"),
+        ("table.csv", "no result"),
+        ("none.csv", "no such file"),
+    ):
+        done = lostmotion("run", name, cwd=tmp_path)
+        assert done.returncode == 1
+        assert done.stderr.startswith(f"lostmotion: {name}: ")
+        assert words in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("ending", ["csv", "nc", "parquet"])
+def test_a_saved_result_is_run_again_as_it_was(tmp_path: Path, ending: str) -> None:
+    first, second = tmp_path / f"first.{ending}", tmp_path / f"second.{ending}"
+    assert lostmotion("run", SMALL, "--set", "load.inertia=1.5", "-o", first, cwd=tmp_path).returncode == 0
+    again = lostmotion("run", first, "-o", second, cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert lm.open_result(second).identical(lm.open_result(first))
+    changed = lm.load(first, ["command.amplitude=0.1"])
+    assert changed == lm.load(SMALL, {"load.inertia": 1.5, "command.amplitude": 0.1})
+    with pytest.raises(lm.InputError, match=rf"first.{ending}: key load.inertai: is not known; did you mean inertia"):
+        lm.load(first, ["load.inertai=1"])
+
+
+# --- the catalogue ---
+
+
+def test_the_catalogue_says_what_is_a_gearbox_a_motor_complete_or_not() -> None:
+    lines = list_records().splitlines()
+    assert lines[0].split()[:3] == ["name", "type", "kind"]
+    of = {line.split()[0]: line.split()[1:] for line in lines[1:-2]}
+    for record in lm.catalogue():
+        table = "motor" if isinstance(record, lm.MotorSheet) else "gearbox"
+        assert of[record.name][:2] == [table, record.kind]
+        assert ("yes" in of[record.name]) is (not record.missing())
+    gearboxes = [r for r in lm.catalogue() if isinstance(r, lm.GearboxSheet)]
+    complete = [r for r in gearboxes if not r.missing()]
+    assert 0 < len(complete) < len(gearboxes)
+    assert f"{len(gearboxes)} gearboxes, {len(complete)} of them complete" in lines[-2]
+    only = list_records("gearbox", complete=True).splitlines()
+    assert [line.split()[0] for line in only[1:-2]] == [r.name for r in complete]
+    assert len(list_records("dc_brushed").splitlines()) > 4
+    with pytest.raises(lm.InputError, match=r"--kind engine: must be one of gearbox, motor, .*worm"):
+        list_records("engine")
+
+
+@pytest.mark.parametrize(("kind", "expected"), [("motor", "brushless"), ("dc_brushed", "dc_brushed")])
+def test_the_template_of_a_motor_sheet_can_be_used_as_it_is(tmp_path: Path, kind: str, expected: str) -> None:
+    made = lostmotion("catalogue", "new", "--kind", kind, "-o", "my-motor.toml", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert "Complete: it can be simulated." in lostmotion("catalogue", "my-motor.toml", cwd=tmp_path).stdout
+    (tmp_path / "drive.toml").write_text('base = "catalogue-robot-joint"\nmotor = "my-motor.toml"\n')
+    assert lostmotion("run", "drive.toml", cwd=tmp_path).returncode == 0
+    text = (tmp_path / "my-motor.toml").read_text()
+    assert f'kind = "{expected}"' in text
+    for figure in lm.MotorSheet.model_fields:
+        assert figure in ("note", "sources", "gaps") or f"{figure} = " in text
+
+
+def test_the_template_of_a_gearbox_sheet_takes_its_kind() -> None:
+    out = CliRunner().invoke(app, ["catalogue", "new", "--kind", "worm"]).output
+    assert 'kind = "worm"' in out
+    assert 'kind = "planetary"' in CliRunner().invoke(app, ["catalogue", "new"]).output
+
+
+# --- before the work ---
+
+UNWRITABLE = [
+    ("run", SMALL, "-o", "/proc/result.csv"),
+    ("run", SMALL, "--plot", "/proc/run.png"),
+    ("rig", "schaeffler-rt1-h-20-100", "-o", "/proc/rig"),
+    ("response", SMALL, "-o", "/proc/response"),
+    ("reproduce", "-o", "/proc/paper"),
+    ("study", "study.toml", "-o", "/proc/study"),
+]
+
+
+@pytest.mark.parametrize("call", UNWRITABLE, ids=lambda c: " ".join(c[:1] + c[-2:]))
+def test_output_is_tried_before_the_work(tmp_path: Path, call: tuple[str, ...]) -> None:
+    (tmp_path / "study.toml").write_text(
+        (ROOT / "examples" / "tolerance.toml").read_text().replace("../scenarios/", "")
+    )
+    (tmp_path / f"{SMALL}.toml").write_text(f'base = "{SMALL}"\n')
+    done = subprocess.run(
+        [sys.executable, "-c", STOPS_AT_THE_FIRST_COMPUTATION, *call],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "computes" not in done.stdout
+    assert done.stderr.startswith(f"lostmotion: {call[-1]}: ")
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_trying_leaves_nothing_behind(tmp_path: Path) -> None:
+    done = lostmotion("rig", "nord-sk1si50-60", "-o", "a/b/c", cwd=tmp_path)  # a record that lacks figures
+    assert done.returncode == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- quick to start ---
+
+STOPS_AT_THE_FIRST_COMPUTATION = """
+import os, sys, time, lostmotion._core
+def stop(*arguments, **options):
+    print("computes", time.process_time(), *sorted({m.partition(".")[0] for m in sys.modules}), flush=True)
+    os._exit(0)
+core = sys.modules["lostmotion._core"]
+core.run = core.respond = core.run_batch = stop
+from lostmotion.cli import main
+main()
+"""
+# Libraries that take a tenth of a second or more to import, and those that others drag along where they are installed.
+SLOW = {"xarray", "pandas", "matplotlib", "pyarrow", "h5netcdf", "h5py", "control", "SALib", "distributed", "rich"}
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        ("run", SMALL),
+        ("rig", "schaeffler-rt1-h-20-100"),
+        ("drive", "check", "catalogue-robot-joint"),
+        ("response", SMALL),
+        ("reproduce",),
+    ],
+    ids=" ".join,
+)
+def test_no_command_imports_a_slow_library_before_it_computes(tmp_path: Path, call: tuple[str, ...]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", STOPS_AT_THE_FIRST_COMPUTATION, *call],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    word, _, *modules = done.stdout.split()
+    assert word == "computes"
+    assert {"numpy", "pydantic", "lostmotion"} <= set(modules)
+    assert not SLOW & set(modules)
+
+
+@pytest.mark.parametrize("call", [("--help",), ("--version",), ("run", "--help"), ("study", "--help")], ids=" ".join)
+def test_help_imports_next_to_nothing(tmp_path: Path, call: tuple[str, ...]) -> None:
+    done = lostmotion(*call, cwd=tmp_path, env=os.environ | {"PYTHONPROFILEIMPORTTIME": "1"})
+    assert done.returncode == 0
+    imported = {line.rpartition("|")[2].strip().partition(".")[0] for line in done.stderr.splitlines()}
+    assert "typer" in imported
+    assert not imported & (SLOW | {"numpy", "pint", "scipy"})
+
+
+@pytest.mark.parametrize("call", [("run", SMALL), ("catalogue",), ("scenarios",), ("schema",)], ids=" ".join)
+def test_what_draws_nothing_imports_neither_figures_nor_datasets(tmp_path: Path, call: tuple[str, ...]) -> None:
+    done = lostmotion(*call, cwd=tmp_path, env=os.environ | {"PYTHONPROFILEIMPORTTIME": "1"})
+    assert done.returncode == 0
+    imported = {line.rpartition("|")[2].strip().partition(".")[0] for line in done.stderr.splitlines()}
+    assert "pydantic" in imported
+    assert not imported & SLOW
+
+
+# --- help, version, completion, progress ---
+
+
+def test_short_help_version_and_completion() -> None:
+    run = CliRunner().invoke
+    for command in ([], ["run"], ["rig"], ["drive", "check"], ["study"]):
+        short, long = (run(app, [*command, option]) for option in ("-h", "--help"))
+        assert short.exit_code == 0
+        assert short.output == long.output
+    assert run(app, ["--version"]).output == f"{lm.__version__}\n"
+    assert "--install-completion" in run(app, ["--help"]).output
+
+
+@pytest.mark.parametrize(
+    ("typed", "expected"),
+    [
+        ("lostmotion run paper-2dof-nl-", ["paper-2dof-nl-large", "paper-2dof-nl-small"]),
+        ("lostmotion rig schaeffler-rt1-h-2", ["schaeffler-rt1-h-20-100", "schaeffler-rt1-h-25-100"]),
+        ("lostmotion run my", ["my-drive.toml"]),
+        ("lostmotion run /usr/li", ["/usr/lib/"]),
+    ],
+)
+def test_the_shell_completes_scenarios_gearboxes_and_files(tmp_path: Path, typed: str, expected: list[str]) -> None:
+    (tmp_path / "my-drive.toml").touch()
+    words = {"_LOSTMOTION_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}
+    script = "from lostmotion.cli import app; app(prog_name='lostmotion')"
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=tmp_path,
+        env=os.environ | words,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert [name for name in done.stdout.split() if name in expected] == expected
+    assert all(name.startswith(typed.rsplit(maxsplit=1)[-1]) for name in done.stdout.split())
+
+
+def on_a_terminal(script: str, cwd: Path) -> str:
+    """What a script writes to its standard error while that is a terminal."""
+    leader, follower = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-c", script], cwd=cwd, stderr=follower, env=os.environ | {"TERM": "xterm"}
+    )
+    os.close(follower)
+    seen = b""
+    while True:
+        try:
+            piece = os.read(leader, 4096)
+        except OSError as error:  # the other end is closed
+            assert error.errno == errno.EIO
+            break
+        if not piece:
+            break
+        seen += piece
+    os.close(leader)
+    assert process.wait() == 0
+    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", seen.decode())
+
+
+def test_long_work_shows_what_it_does_and_short_work_nothing(tmp_path: Path) -> None:
+    script = "import time; from lostmotion.terminal import busy\nwith busy('Simulating'): time.sleep({})"
+    assert "Simulating 0:00:0" in on_a_terminal(script.format(1.5), tmp_path)
+    assert on_a_terminal(script.format(0.01), tmp_path) == ""
+
+
+def test_the_rig_reports_its_progress_to_the_end() -> None:
+    from lostmotion.test_rig import WORK
+
+    steps: list[None] = []
+    gearbox = lm.load(SMALL).gearbox
+    lm.measure(gearbox, progress=lambda: steps.append(None))
+    assert len(steps) == WORK
+
+
+def test_a_run_of_a_million_samples_is_drawn_in_seconds() -> None:
+    scenario = lm.load(SMALL).replace(**{"simulation.sample_interval": 2e-6})
+    result = lm.simulate(scenario)
+    assert result.sizes["time"] == 1_000_001
+    begin = time.process_time()
+    figure = plots.overview(result)
+    figure.savefig(os.devnull, format="png")
+    # All points would take 10 s on an idle machine; the thinned ones take about 1.
+    assert time.process_time() - begin < 5.0
+    for axes in figure.axes:
+        for line in axes.lines:
+            assert len(line.get_xdata()) <= plots.MOST_POINTS + 10
+    drawn = figure.axes[4].lines[0].get_ydata()
+    assert np.max(drawn) == pytest.approx(1e3 * float(result["twist"].max()), rel=1e-15)

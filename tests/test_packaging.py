@@ -1,0 +1,152 @@
+"""What is installed with what: declared libraries, extras, messages where one is missing, warnings of compilers."""
+
+import ast
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import lostmotion as lm
+from conftest import ROOT
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+EXTRAS = PROJECT["optional-dependencies"]
+
+
+def names(requirements: list[str]) -> set[str]:
+    return {re.match(r"[\w-]+", r).group().lower() for r in requirements}  # type: ignore[union-attr]
+
+
+def imports(node: ast.AST) -> set[str]:
+    """Other people's packages that are imported anywhere below a node."""
+    found = set()
+    for n in ast.walk(node):
+        if isinstance(n, ast.Import):
+            found |= {a.name.partition(".")[0] for a in n.names}
+        elif isinstance(n, ast.ImportFrom) and n.level == 0 and n.module:
+            found.add(n.module.partition(".")[0])
+    own = {"lostmotion", "mpl_toolkits", "pydantic_core", "markupsafe"}  # the last three come with those they belong to
+    return {m.lower() for m in found - own if m not in sys.stdlib_module_names}
+
+
+def test_the_core_installation_is_small_and_covers_all_that_is_imported_at_once() -> None:
+    core = names(PROJECT["dependencies"])
+    assert core == {"numpy", "xarray", "pydantic", "pint", "matplotlib", "typer", "rich"}
+    everything = core | set().union(*(names(r) for r in EXTRAS.values()))
+    for path in (ROOT / "src" / "lostmotion").glob("*.py"):
+        tree = ast.parse(path.read_text())
+        checking = [n for n in tree.body if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.dump(n.test)]
+        at_once = [n for n in tree.body if isinstance(n, ast.Import | ast.ImportFrom)]
+        assert set().union(*(imports(n) for n in at_once)) <= core, path.name
+        assert imports(tree) - set().union(*(imports(n) for n in checking)) <= everything, path.name
+
+
+def test_extras_and_metadata() -> None:
+    assert {"study", "docs", "report"} <= set(EXTRAS)
+    assert names(EXTRAS["all"]) == {"lostmotion"}
+    assert PROJECT["version"] == lm.__version__
+    assert any(c.startswith("Topic :: Scientific/Engineering") for c in PROJECT["classifiers"])
+    cited = (ROOT / "CITATION.cff").read_text()
+    assert re.search(r"^version: (.*)$", cited, re.M).group(1) == PROJECT["version"]  # type: ignore[union-attr]
+    assert f"license: {PROJECT['license']}" in cited
+
+
+# --- missing libraries ---
+
+OPTIONAL = ("scipy", "pyarrow", "h5netcdf", "h5py", "jinja2", "control", "SALib", "distributed", "dask")
+WITHOUT = f"import sys; sys.modules.update(dict.fromkeys({OPTIONAL!r}));"
+
+
+def without_extras(*call: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    script = f"{WITHOUT} from lostmotion.cli import main; main()"
+    return subprocess.run([sys.executable, "-c", script, *call], cwd=cwd, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        ("run", "paper-2dof-nl-small", "-o", "small.csv", "--plot", "small.png", "--explain", "0.3"),
+        ("drive", "check", "catalogue-robot-joint"),
+        ("catalogue",),
+        ("catalogue", "schaeffler-rt1-h-20-100"),
+        ("scenarios",),
+        ("schema",),
+    ],
+    ids=lambda c: " ".join(c[:2]),
+)
+def test_the_core_installation_runs_checks_and_draws(tmp_path: Path, call: tuple[str, ...]) -> None:
+    done = without_extras(*call, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_response_leaves_out_only_the_file_that_it_cannot_write(tmp_path: Path) -> None:
+    grid = ("--amplitudes", "0.1,1", "--frequencies", "1,2,3")
+    done = without_extras("response", "paper-2dof-nl-small", *grid, "-o", "r", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert 'response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"' in done.stdout
+    assert {p.name for p in (tmp_path / "r").iterdir()} == {
+        "bode.png", "bode.svg", "bode.csv", "maps.png", "maps.svg", "response.csv", "characteristics.csv",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("call", "library", "extra"),
+    [
+        (("run", "paper-2dof-nl-small", "-o", "a.nc"), "h5netcdf", "netcdf"),
+        (("run", "paper-2dof-nl-small", "-o", "a.parquet"), "pyarrow", "study"),
+        (("rig", "schaeffler-rt1-h-20-100"), "jinja2", "report"),
+        (("reproduce",), "jinja2", "report"),
+        (("study", str(ROOT / "examples" / "tolerance.toml")), "pyarrow", "study"),
+        (("study", str(ROOT / "examples" / "tolerance.toml"), "--scheduler", "tcp://a:1"), "distributed", "cluster"),
+    ],
+    ids=lambda v: " ".join(v[:2]) if isinstance(v, tuple) else None,
+)
+def test_a_missing_library_ends_in_one_line_that_says_what_to_install(
+    tmp_path: Path, call: tuple[str, ...], library: str, extra: str
+) -> None:
+    done = without_extras(*call, cwd=tmp_path)
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert line.endswith(f'needs {library}; install it: pip install "lostmotion[{extra}]"')
+    assert library.lower() in names(EXTRAS[extra])
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("what", "library"),
+    [
+        ("lm.bandwidth(s, 1.0)", "scipy"),
+        ("lm.linearize(s, lm.Initial(motor_speed=1.0)).antiresonances()", "scipy"),
+        ("lm.linearize(s, lm.Initial(motor_speed=1.0)).to_scipy()", "scipy"),
+        ("lm.linearize(s, lm.Initial(motor_speed=1.0)).to_control()", "control"),
+    ],
+)
+def test_in_python_too(what: str, library: str) -> None:
+    script = f"{WITHOUT} import lostmotion as lm; s = lm.load('paper-2dof-nl-small')\ntry: {what}\n"
+    script += "except lm.MissingLibraryError as error: print(error)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip().endswith(f'needs {library}; install it: pip install "lostmotion[control]"')
+
+
+# --- building ---
+
+
+@pytest.mark.parametrize("strict", [False, True])
+def test_warnings_are_errors_in_our_own_builds_only(tmp_path: Path, strict: bool) -> None:
+    tools = Path(sys.executable).parent
+    cmake = shutil.which("cmake", path=str(tools)) or shutil.which("cmake")
+    ninja = shutil.which("ninja", path=str(tools)) or shutil.which("ninja")
+    options = ["-DLOSTMOTION_BENCHMARKS=ON", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON"] + ["-DLOSTMOTION_WERROR=ON"] * strict
+    command = [cmake, "-S", ROOT, "-B", tmp_path, "-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={ninja}", *options]
+    subprocess.run(command, check=True, capture_output=True)  # type: ignore[arg-type]
+    compiled = json.loads((tmp_path / "compile_commands.json").read_text())
+    assert len(compiled) >= 2
+    core = [c["command"] for c in compiled if "-ffp-contract=off" in c["command"]]
+    assert core
+    assert all(("-Werror" in c) is strict for c in core)
+    assert (ROOT / "Makefile").read_text().count("LOSTMOTION_WERROR=ON") == 3

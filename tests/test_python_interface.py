@@ -1,0 +1,259 @@
+"""The Python interface: what takes a scenario, what can be pickled, shown and plotted, what is exported."""
+
+import copy
+import inspect
+import pickle
+import re
+import timeit
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from conftest import ROOT, SCENARIOS
+from lostmotion import plots
+from lostmotion.quantities import Part
+
+SMALL = lm.load("paper-2dof-nl-small")
+
+
+# --- scenarios in the place of drives ---
+
+
+def test_every_function_that_needs_a_drive_takes_a_scenario() -> None:
+    drive, rigid = SMALL.drive(), lm.load("paper-1dof-l-large")
+    for takes in (
+        lambda d: lm.bandwidth(d, 1.0),
+        lambda d: lm.frequency_response(d, [1.0], 1.0)["response"].values,
+        lambda d: lm.characteristics(lm.frequency_response(d, [1.0, 9.0], 1.0), d)["bandwidth"].values,
+        lambda d: lm.Simulation(d)["command"],
+    ):
+        assert np.array_equal(takes(drive), takes(SMALL), equal_nan=True)
+    assert lm.rigid_constants(rigid) == lm.rigid_constants(rigid.drive())
+    assert lm.linearize(SMALL, lm.Initial(motor_speed=1.0)).contacts == (
+        lm.linearize(drive, lm.Initial(motor_speed=1.0)).contacts
+    )
+    one, other = lm.periodic_motion(SMALL), lm.periodic_motion(drive, SMALL.command)
+    assert np.array_equal(one["load_speed"], other["load_speed"])
+    (only,) = lm.periodic_motions(SMALL, starts=[lm.Initial()])
+    assert np.array_equal(only["load_speed"], one["load_speed"])
+
+
+def test_a_scenario_brings_its_constant_inputs_and_its_start_along() -> None:
+    scenario = SMALL.replace(**{"command.mean": 0.2, "load.torque": 3.0, "initial.load_angle": 1.5})
+    assert lm.Simulation(scenario)["load_angle"] == 1.5
+    response = lm.frequency_response(scenario, [1.0], 0.1)
+    same = lm.frequency_response(scenario.drive(), [1.0], 0.1, mean_command=0.2, mean_load_torque=3.0)
+    without = lm.frequency_response(scenario.drive(), [1.0], 0.1)
+    assert np.array_equal(response["response"], same["response"])
+    assert not np.array_equal(response["response"], without["response"])
+
+
+def test_what_is_no_drive_is_refused_in_plain_words() -> None:
+    with pytest.raises(lm.InputError, match=r"'drive.toml' is no drive; give a Drive, or a Scenario"):
+        lm.bandwidth("drive.toml", 1.0)
+
+
+# --- pickling, showing ---
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
+def test_scenarios_drives_and_results_survive_pickling(path) -> None:
+    scenario = lm.load(path)
+    for thing in (scenario, scenario.drive(), scenario.command, scenario.load):
+        assert pickle.loads(pickle.dumps(thing)) == thing
+        assert copy.deepcopy(thing) == thing
+    result = lm.simulate(scenario)
+    assert pickle.loads(pickle.dumps(result)).identical(result)
+
+
+def test_signals_of_all_parts_survive_pickling() -> None:
+    signal = lm.TorqueSignal(
+        mean=1.0,
+        sines=[{"amplitude": 1.0, "frequency": 2.0}],
+        steps=[{"height": 1.0}],
+        ramps=[{"rise": 1.0, "duration": 2.0}],
+        chirp={"amplitude": 1.0, "begin_frequency": 1.0, "end_frequency": 2.0, "duration": 1.0},
+        samples={"times": [0, 1], "values": [0, 1]},
+    )
+    assert pickle.loads(pickle.dumps(signal)) == signal
+
+
+def test_representations_are_short_and_name_the_drive() -> None:
+    assert repr(SMALL.drive()) == (
+        "Drive(Motor(dc, 0.521 N·m at 3300 rpm, rotor 8e-06 kg·m²), Gearbox(90:1, 51.6 N·m at 3630 rpm, "
+        "stiffness curve, losses map), Load(2 kg·m²))"
+    )
+    assert len(repr(SMALL)) < 300
+    assert "0.025" in repr(SMALL)
+    assert "2001 samples" in repr(SMALL)
+    assert repr(lm.CommandSignal(mean=0.5)) == "CommandSignal(mean=0.5)"
+    long = lm.CommandSignal(samples={"times": range(1000), "values": range(1000)})
+    assert len(repr(long)) < 200
+    assert "1000 entries" in repr(long)
+    assert "values=(6 x 7 numbers)" in repr(SMALL.gearbox.losses)
+    simulation = lm.Simulation(SMALL)
+    simulation.advance(0.25, 0.1)
+    assert repr(simulation).endswith("at 0.25 s)")
+    assert len(repr(lm.linearize(SMALL, lm.Initial(motor_speed=1.0)))) < 300
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
+def test_notebooks_show_every_value_with_its_unit(path) -> None:
+    page = lm.load(path)._repr_html_()
+    assert "<td>rotor_inertia</td>" in page
+    assert "<td>kg·m^2</td>" in page
+    assert "E_C: 1 is rated voltage" not in page  # a table has its own rows, not its description
+    assert page.count("<table>") == page.count("</table>") > 5
+
+
+# --- plots ---
+
+
+def test_a_result_draws_the_figures_of_the_command_line() -> None:
+    result = lm.simulate(SMALL)
+    figure = result.lm.plot()
+    assert [a.get_xlabel() for a in figure.axes] == ["time [s]"] * 6
+    drawn = figure.axes[2].lines[1].get_xydata()
+    assert np.array_equal(drawn[:, 1], result["load_speed"])
+    response = lm.frequency_response(SMALL, [0.5, 5.0], [0.1, 1.0])
+    bode = response.lm.plot("twist")
+    assert bode.axes[0].get_ylabel() == "gain [rad / -]"
+    assert len(response.lm.plot_maps().axes) >= 4
+    motion = lm.periodic_motion(SMALL)
+    assert np.array_equal(motion.lm.plot().axes[0].lines[0].get_ydata(), motion["command"])
+    with pytest.raises(ValueError, match="lacks twist, which the figure of a run shows"):
+        result.drop_vars("twist").lm.plot()
+    with pytest.raises(ValueError, match="no figure of it"):
+        lm.TestRig(SMALL.gearbox).efficiency_map([100.0], [0.5]).lm.plot()
+
+
+def test_a_figure_shows_itself_in_a_notebook_and_leaves_the_user_s_settings_alone() -> None:
+    before = dict(mpl.rcParams)
+    picture = lm.simulate(SMALL).lm.plot()._repr_png_()
+    assert picture.startswith(b"\x89PNG")
+    assert dict(mpl.rcParams) == before
+
+
+def test_a_result_knows_its_scenario_summary_and_energy() -> None:
+    result = lm.simulate(SMALL)
+    assert result.lm.scenario == SMALL
+    assert result.lm.energy == lm.energy_of(result)
+    assert " events, solver exact" in result.lm.summary()
+
+
+def test_long_curves_are_drawn_from_few_points_that_keep_every_peak() -> None:
+    x = np.linspace(0.0, 1.0, 1_000_003)
+    y = np.sin(40.0 * x)
+    y[123_457], y[777_777], y[500_000] = 5.0, -7.0, np.nan
+    thin_x, thin_y = plots.thinned(x, y)
+    assert len(thin_x) == len(thin_y) <= plots.MOST_POINTS + 10
+    assert np.nanmax(thin_y) == 5.0
+    assert np.nanmin(thin_y) == -7.0
+    assert thin_x[0] == 0.0
+    assert thin_x[-1] == 1.0
+    assert np.all(np.diff(thin_x) > 0.0)
+    loop_x, loop_y = plots.thinned(np.cos(9 * x), np.sin(9 * x))  # also where x is no time
+    assert (loop_x.max(), loop_y.max()) == (np.cos(9 * x).max(), np.sin(9 * x).max())
+    few = np.arange(10.0)
+    assert plots.thinned(few, few)[1] is few
+
+
+# --- step by step ---
+
+
+def test_reading_a_variable_costs_no_more_than_a_step() -> None:
+    simulation = lm.Simulation(SMALL)
+    simulation.advance(1e-3, 0.02)
+
+    def cost(what) -> float:
+        return min(timeit.repeat(what, number=2000, repeat=15))
+
+    # The two are about equal; the factor is for a busy machine. An array per read, as before, would cost fifteen times as much.
+    assert cost(lambda: simulation["load_speed"]) < 2.0 * cost(lambda: simulation.advance(1e-3, 0.02))
+
+
+def test_variables_read_step_by_step_are_those_of_a_run() -> None:
+    names = tuple(v.name for v in lm.VARIABLES)
+    constant = {
+        "command": -0.3,
+        "load.torque": 20.0,
+        "simulation.sample_interval": 0.01,
+    }  # driving, overrunning, reversal
+    scenario = lm.load("overrunning-load").replace(**constant)
+    result = lm.simulate(scenario)
+    assert {-1, 1} <= set(np.sign(result["output_torque"].values * result["motor_speed"].values))
+    simulation = lm.Simulation(scenario, step=0.01)
+    for k in range(1, 60):  # later the vibration has died out, and which way the gear twists is a matter of rounding
+        simulation.advance(0.01, -0.3, 20.0)
+        here = result.isel(time=k)
+        expected = [float(here[name]) for name in names]
+        assert simulation[names].tolist() == pytest.approx(expected, rel=1e-9, abs=1e-12, nan_ok=True)
+    assert simulation.read() == pytest.approx(dict(zip(names, simulation[names], strict=True)), nan_ok=True)
+
+
+def test_several_variables_come_as_an_array_and_a_wrong_name_is_told() -> None:
+    simulation = lm.Simulation(SMALL)
+    simulation.advance(0.3, 0.5)
+    pair = simulation["load_speed", "efficiency"]
+    assert pair.tolist() == [simulation["load_speed"], simulation["efficiency"]]
+    assert simulation[["load_speed", "efficiency"]].tolist() == pair.tolist()
+    with pytest.raises(KeyError, match="'load_sped' is no variable; the variables are command, "):
+        simulation["load_sped"]
+
+
+def test_reset_gives_the_same_motion_again() -> None:
+    simulation = lm.Simulation(SMALL, initial=lm.Initial(motor_speed=10.0))
+
+    def motion() -> list[float]:
+        out = []
+        for k in range(50):
+            simulation.advance(1e-3, 0.1 * k)
+            out.append(simulation["twist"])
+        return out
+
+    first = motion()
+    simulation.reset()
+    assert simulation.time == 0.0
+    assert simulation["motor_speed"] == 10.0
+    assert motion() == first
+    simulation.reset(lm.Initial(load_angle=2.0))
+    assert simulation["load_angle"] == 2.0
+
+
+# --- what is exported ---
+
+
+def returned_by(thing: object) -> set[str]:
+    """Names in the return annotations of a function, or of the public methods and fields of a class."""
+    if inspect.isclass(thing):
+        texts = [str(t) for t in getattr(thing, "__annotations__", {}).values()] if not issubclass(thing, Part) else []
+        for name, member in inspect.getmembers(thing):
+            function = member.fget if isinstance(member, property) else member
+            own = inspect.isfunction(function) and function.__module__.startswith("lostmotion")
+            if own and not name.startswith("_"):
+                texts.append(str(function.__annotations__.get("return", "")))
+    else:
+        texts = [str(getattr(thing, "__annotations__", {}).get("return", ""))]
+    return {word for text in texts for word in re.findall(r"(?<![.\w])[A-Z]\w+", text)}
+
+
+def test_what_functions_return_is_exported() -> None:
+    own = {
+        name
+        for module in (ROOT / "src" / "lostmotion").glob("*.py")
+        for name in re.findall(r"^class (\w+)", module.read_text(), re.M)
+    }
+    page = (ROOT / "docs" / "api.md").read_text()
+    without_members = set(re.findall(r"lostmotion\.(\w+)\n   :no-members:", page))
+    for name in set(lm.__all__) - without_members:
+        missing = (returned_by(getattr(lm, name)) & own) - set(lm.__all__)
+        assert not missing, f"{name} gives {missing}"
+
+
+def test_every_exported_name_is_documented() -> None:
+    page = (ROOT / "docs" / "api.md").read_text()
+    listed = set(re.findall(r":: lostmotion\.(\w+)$", page, re.M))
+    assert listed == set(lm.__all__) - {"__version__"}
+    assert re.fullmatch(r"\d+\.\d+\.\d+.*", lm.__version__)
