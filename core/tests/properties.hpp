@@ -1,0 +1,123 @@
+// Properties that hold for any drive, for the tests and, at length, for the soak.
+#pragma once
+
+#include <algorithm>
+
+#include "lostmotion/simulation.hpp"
+#include "support.hpp"
+
+namespace lostmotion {
+
+// Random drives whose worm-like gear locks: it needs more torque to lower a load than the load brings. No friction but
+// that of the mesh, so that what it can hold vanishes with the load.
+class SelfLockingDrives : public RandomDrives {
+ public:
+    SelfLockingDrives(unsigned seed, bool hysteresis) : RandomDrives(seed), hysteresis_(hysteresis) {}
+
+    Drive drive() {
+        Drive d = RandomDrives::drive();
+        Gearbox& g = d.gearbox;
+        d.motor.friction_torque = d.load.friction_torque = 0.0;
+        if (g.compliance == Gearbox::rigid) {
+            g.compliance = Gearbox::torsion_curve;
+            g.curve = TorsionCurve({}, {std::pow(2.0 * pi * spread(5.0, 150.0), 2) * d.input_inertia() * g.ratio});
+        }
+        g.hysteresis_efficiency = hysteresis_ ? uniform(0.7, 0.99) : 1.0;
+        g.losses = Gearbox::loss_map;
+        const double driving = 1.0 / uniform(0.3, 0.6) - 1.0, overrunning = 1.0 + uniform(0.02, 0.8),
+                     moving = uniform(0.6, 1.0);
+        const std::vector<double> speeds{0.0, 0.3, 1.0}, loads{-1.0, -0.3, 0.0, 0.3, 1.0};
+        std::vector<double> values;
+        for (const double mu : loads)
+            for (const double v : speeds)
+                values.push_back((mu < 0.0 ? -mu * overrunning : mu * driving) * (v == 0.0   ? 1.0
+                                                                                  : v == 0.3 ? moving
+                                                                                             : 0.9 * moving));
+        g.map = LossMap(speeds, loads, values);
+        return d;
+    }
+    // A load that reverses, and half of the time a command.
+    Signals reversing(const Drive& d) {
+        const double T = d.gearbox.rated_output_torque;
+        Signals s{coin() ? Signal{} : sine(uniform(0.1, 1.0), spread(0.5, 5.0)),
+                  sine(T * uniform(0.1, 0.8), spread(0.5, 10.0), uniform(-pi, pi))};
+        if (coin(0.3)) s[1].knots[0].value = T * uniform(-0.3, 0.3);
+        return s;
+    }
+
+ private:
+    bool hysteresis_;
+};
+
+// Inputs that move for a while and are constant, or zero, from then on.
+inline Signals that_end(Signals s, double at, bool in_zero) {
+    for (Signal& signal : s) {
+        signal.sines.clear();
+        std::vector<Knot> knots;
+        for (const Knot& k : signal.knots)
+            if (k.time < at) knots.push_back(k);
+        knots.push_back({at, in_zero ? 0.0 : knots.back().value, 0.0});
+        signal.knots = knots;
+    }
+    return s;
+}
+
+// Largest difference of the coupled states at the end, in units of each one's largest magnitude in a run (or a
+// billionth of its rated size, if it hardly moves). Speeds of input and load are one quantity seen from two sides.
+inline double difference_at_end(const Drive& drive, const Samples& run, const State& other) {
+    constexpr std::array<Channel, n_coupled> channels{ch_motor_torque, ch_motor_speed, ch_load_speed, ch_twist};
+    std::array<double, n_coupled> size{};
+    for (int k = 0; k < n_coupled; ++k) {
+        size[k] = 1e-9 * drive.rated_scale()[k];
+        for (std::size_t n = 0; n < run.count; ++n) size[k] = std::fmax(size[k], std::fabs(run(channels[k], n)));
+    }
+    size[load_speed] = std::fmax(size[load_speed], size[motor_speed] / drive.gearbox.ratio);
+    double worst = 0.0;
+    for (int k = 0; k < n_coupled; ++k) worst = std::fmax(worst, std::fabs(run.report.x[k] - other[k]) / size[k]);
+    return worst;
+}
+
+struct Splitting {
+    Status status = Status::done, split = Status::done;
+    double time = 0.0;           // [s] reached
+    double gap = 0.0;            // between the whole run and the one that is split
+    double amplification = 0.0;  // what becomes of a relative change of the inputs by 1e-14
+};
+
+// A run in one go against the same run that looks at its contacts anew at an instant.
+inline Splitting split_run(const Drive& drive, const Signals& signals, double duration, double at) {
+    Splitting out;
+    const double interval = duration / 200.0;
+    const Samples whole = run(drive, signals, duration, interval);
+    out.status = whole.report.status;
+    out.time = whole.report.time;
+    if (out.status != Status::done) return out;
+    const SwitchedDrive system(drive);
+    ExactSolver<SwitchedDrive> solver(system, signals, interval, drive.balanced_scale());
+    struct {
+        bool segment(const Segment<SwitchedDrive>&) { return true; }
+    } nothing;
+    out.split = solver.begin(0.0, {}, {});
+    if (out.split == Status::done) out.split = solver.advance(at, nothing);
+    if (out.split == Status::done) out.split = solver.inputs_changed();
+    if (out.split == Status::done) out.split = solver.advance(duration, nothing);
+    if (out.split != Status::done) return out;
+    out.gap = difference_at_end(drive, whole, solver.state());
+    if (out.gap > 1e-10) {
+        Signals changed = signals;
+        for (Signal& s : changed) {
+            for (Knot& k : s.knots) k.value *= 1.0 + 1e-14, k.slope *= 1.0 + 1e-14;
+            for (Sine& q : s.sines) q.amplitude *= 1.0 + 1e-14;
+        }
+        const Samples other = run(drive, changed, duration, interval);
+        out.amplification = other.report.status == Status::done ? difference_at_end(drive, whole, other.report.x) : 1.0;
+    }
+    return out;
+}
+
+// Rounding, as far as the motion amplifies it.
+inline bool same_beyond_rounding(const Splitting& s) {
+    return s.status == Status::done && s.split == Status::done && s.gap <= std::fmax(1e-9, 10.0 * s.amplification);
+}
+
+}  // namespace lostmotion

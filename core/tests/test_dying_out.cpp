@@ -1,0 +1,206 @@
+// Exact where motion dies out: speeds and rates that become very small, torques that vanish together, long rest.
+#include <doctest/doctest.h>
+
+#include <cstdio>
+
+#include "properties.hpp"
+#include "referee_compare.hpp"
+
+using namespace lostmotion;
+using doctest::Approx;
+
+namespace {
+
+Drive hysteretic_drive() { return paper_drive(plane_map(0.02, 0.04, 0.06)); }
+
+// The same for all but the steps of height zero, samples or stepping: to rounding.
+void check_same(const Samples& a, const State& x, const Memory& m) {
+    for (int k = 0; k < n_coupled; ++k) CHECK(x[k] == Approx(a.report.x[k]).epsilon(1e-12));
+    CHECK(m.hysteresis_capacity == Approx(a.report.memory.hysteresis_capacity).epsilon(1e-12));
+}
+
+}  // namespace
+
+TEST_SUITE("dying_out") {
+    // At constant speed the twist rate decays as exp(-16.4 t) and keeps its sign for ever: (16) sets nothing anew.
+    TEST_CASE("constant speed: steps of height zero, sampled constants and stepping change nothing") {
+        const Drive drive = hysteretic_drive();
+        const Samples plain = run(drive, {constant(0.3), Signal{}}, 3.0);
+        CHECK(plain.report.memory.hysteresis_capacity == Approx(1.00868926882631));
+        for (const double at : {0.5, 1.0, 1.33, 1.5, 2.0, 2.9}) {
+            const Samples step = run(drive, {lines({{0.0, 0.3, 0.0}, {at, 0.3, 0.0}}), Signal{}}, 3.0);
+            check_same(plain, step.report.x, step.report.memory);
+            CHECK(step.report.switching_count == plain.report.switching_count);
+        }
+        std::vector<Knot> samples;
+        for (int k = 0; k < 3000; ++k) samples.push_back({1e-3 * k, 0.3, 0.0});
+        const Samples sampled = run(drive, {lines(samples), lines({{0.0, 0.0, 0.0}, {1.5, 0.0, 0.0}})}, 3.0);
+        check_same(plain, sampled.report.x, sampled.report.memory);
+        for (const double step : {1e-3, 0.0137}) {
+            Simulation simulation(drive, step);
+            while (simulation.time() < 3.0 - 1e-9)
+                REQUIRE(simulation.advance(std::min(step, 3.0 - simulation.time()), 0.3, 0.3, 0.0, 0.0) ==
+                        Status::done);
+            check_same(plain, simulation.snapshot().x, simulation.snapshot().memory);
+        }
+    }
+    // A load torque of 1e-9 N m is no step of height zero: in 40 digits it carries the twist rate, then -4.8e-13 rad/s,
+    // through zero 0.98 ms later, and that is a turning point; one of -1e-9 N m does not.
+    TEST_CASE("constant speed: a tiny load torque turns the twist where it does so in forty digits") {
+        const Drive drive = hysteretic_drive();
+        for (const double torque : {1e-9, -1e-9, 1e-11}) {
+            const Signals signals{constant(0.3), lines({{0.0, 0.0, 0.0}, {1.5, torque, 0.0}})};
+            const Samples s = run(drive, signals, 2.0);
+            bool turned = false;
+            for (const Switching& w : s.report.switchings)
+                if (w.kind == Guard::speed && !w.input_jump && w.time > 1.5 && w.time < 1.6) {
+                    turned = true;
+                    CHECK(w.time == Approx(1.50098).epsilon(1e-5));
+                    break;
+                }
+            CHECK(turned == (torque == 1e-9));
+            referee::Agreement a;
+            CHECK(referee::referee_agrees(drive, signals, 2.0, 0.1, run(drive, signals, 2.0, 0.1), 1e-9, &a));
+        }
+    }
+    // The load rings down on the gear's soft zone, each half swing a smaller copy of the last, for ever.
+    TEST_CASE("run, stop, wait: no error, no slow-down, no dependence on sampling") {
+        const Drive drive = hysteretic_drive();
+        const Signals signals{lines({{0.0, 0.4, 0.0}, {1.0, 0.0, 0.0}}), Signal{}};
+        const Samples early = run(drive, signals, 60.0, 0.1);
+        REQUIRE(early.report.status == Status::done);
+        for (const auto& [duration, interval] : {std::pair{201.0, 0.1}, {201.0, 1e-2}, {3600.0, 1.0}, {3600.0, 7.3}}) {
+            const Samples s = run(drive, signals, duration, interval);
+            REQUIRE(s.report.status == Status::done);
+            CHECK(s.report.steps < 20000);
+            CHECK(std::fabs(s.report.x[load_speed]) < 1e-100);
+            CHECK(s.report.x[load_angle] == Approx(early.report.x[load_angle]).epsilon(1e-12));
+        }
+    }
+    TEST_CASE("constant inputs may last for ever") {
+        Drive plain = hysteretic_drive();
+        plain.gearbox.hysteresis_efficiency = 1.0;
+        Drive rigid = hysteretic_drive();
+        rigid.gearbox.compliance = Gearbox::rigid;
+        for (const Drive& drive : {hysteretic_drive(), plain, rigid}) {
+            const Samples s = run(drive, {constant(0.3), Signal{}}, 1e9, 1e6);
+            REQUIRE(s.report.status == Status::done);
+            CHECK(s.report.steps < 2000);
+            CHECK(s.report.x[motor_speed] == Approx(90.0 * s.report.x[load_speed]).epsilon(1e-12));
+            CHECK(s.report.x[load_angle] == Approx(1e9 * s.report.x[load_speed]).epsilon(1e-6));
+        }
+    }
+    TEST_CASE("splitting a run of 2000 random drives at a random instant changes nothing beyond rounding") {
+        RandomDrives random(20261122);
+        double worst = 0.0;
+        for (int n = 0; n < 2000; ++n) {
+            const Drive drive = random.drive();
+            const int kind = n % 4;
+            const double duration = kind < 2 ? 0.25 : 2.0, at = duration * random.uniform(0.02, 0.98);
+            Signals signals = random.signals(drive, 0.25);
+            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) continue;
+            if (kind > 0) signals = that_end(signals, kind == 1 ? 0.02 : 0.2, kind == 3);
+            const Splitting s = split_run(drive, signals, duration, at);
+            CAPTURE(n);
+            CHECK_MESSAGE(same_beyond_rounding(s), "status ", static_cast<int>(s.status), " at ", s.time, ", split ",
+                          static_cast<int>(s.split), ", gap ", s.gap, ", amplification ", s.amplification);
+            worst = std::fmax(worst, s.amplification > 1e-10 ? 0.0 : s.gap);
+        }
+        std::printf("dying out: 2000 random drives split, largest gap of a motion that amplifies nothing %.1e\n",
+                    worst);
+    }
+    TEST_CASE("self-locking gears whose load reverses stay stuck or go on, but do not jam") {
+        for (const bool hysteresis : {false, true}) {
+            SelfLockingDrives random(7, hysteresis);
+            for (int n = 0; n < 2000; ++n) {
+                const Drive drive = random.drive();
+                const Signals signals = random.reversing(drive);
+                const Samples s = run(drive, signals, 0.5, 0.05);
+                CAPTURE(n);
+                CAPTURE(hysteresis);
+                CHECK(s.report.status == Status::done);
+                if (n % 100 == 0)
+                    CHECK(referee::referee_agrees(drive, signals, 0.05, 0.005, run(drive, signals, 0.05, 0.005), 1e-8));
+            }
+        }
+    }
+    TEST_CASE("everything that holds a load vanishes with it: a swinging load on a locked input") {
+        // w = 0.25 cos 8 t; capacity b |T_2|/i and held torque |T_2|/i pass zero together at t = pi/16 k.
+        Drive d = plain_drive(2.0, 1.0, 4.0);
+        d.gearbox.compliance = Gearbox::torsion_curve;
+        d.gearbox.curve = TorsionCurve({}, {256.0});
+        d.gearbox.losses = Gearbox::loss_map;
+        d.gearbox.rated_output_torque = 4.0;
+        for (const double b : {1.1, 2.0}) {
+            d.gearbox.map = LossMap({0.0, 1.0}, {-1.0, 0.0, 1.0}, {b, b, 0.0, 0.0, 0.5, 0.5});
+            Start start;
+            start.x[load_speed] = 0.25;
+            const Samples s = run(d, {}, 20.0, 0.01, start);
+            REQUIRE(s.report.status == Status::done);
+            for (std::size_t k = 0; k < s.count; ++k) {
+                CHECK(s(ch_load_speed, k) ==
+                      Approx(0.25 * std::cos(0.08 * static_cast<double>(k))).epsilon(1e-11).scale(0.25));
+                CHECK(s(ch_motor_speed, k) == 0.0);
+            }
+        }
+    }
+    TEST_CASE("ripple of 300 kHz to 1 MHz: the sample interval does not matter") {
+        RandomDrives random(5);
+        for (int n = 0; n < 40; ++n) {
+            const Drive drive = random.drive();
+            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) continue;
+            Signals signals = random.signals(drive, 0.01);
+            const bool load = random.coin();
+            signals[load ? 1 : 0].sines.push_back(
+                {load ? drive.gearbox.rated_output_torque * random.spread(1e-3, 0.3) : random.spread(0.01, 0.3),
+                 random.spread(3e5, 1e6), 0.0});
+            const Samples first = run(drive, signals, 2e-3, 1e-3);
+            CAPTURE(n);
+            REQUIRE(first.report.status == Status::done);
+            for (const double interval : {1e-4, 3e-4, 7e-5, 2e-6}) {
+                const Samples s = run(drive, signals, 2e-3, interval);
+                REQUIRE(s.report.status == Status::done);
+                CHECK(difference_at_end(drive, first, s.report.x) < 1e-9);
+            }
+        }
+    }
+    TEST_CASE("the ledger of a stiff drive closes, and long panels make it quick") {
+        for (const double tau : {1e-6, 1e-8, 1e-10}) {
+            Drive d = hysteretic_drive();
+            d.motor.electrical_time_constant = tau;
+            const Samples s = run(d, {sine(1.0275, 1.0), Signal{}}, 1.0, 1e-2);
+            REQUIRE(s.report.status == Status::done);
+            CHECK(std::fabs(s.report.energy.residual()) < 1e-10 * s.report.energy.turned_over);
+        }
+        Drive d = hysteretic_drive();
+        d.load.viscous_friction = 1e6;
+        const Samples s = run(d, {sine(1.0275, 1.0), Signal{}}, 1.0, 1e-2);
+        CHECK(std::fabs(s.report.energy.residual()) < 1e-10 * s.report.energy.turned_over);
+    }
+    TEST_CASE("adaptive solver: a sample at a jump has the inputs and the modes after it") {
+        Drive d = hysteretic_drive();
+        const Signals signals{lines({{0.0, 0.05, 0.0}, {0.1, 0.9, 0.0}, {0.2, -0.9, 0.0}}),
+                              lines({{0.0, 0.0, 0.0}, {0.15, 20.0, 0.0}})};
+        for (const double end : {0.3, 0.2}) {  // a jump at the end belongs to what comes after
+            const Samples exact = run(d, signals, end, 0.01), fine = run(d, signals, end, 0.01, {}, 1e-12);
+            REQUIRE(exact.count == fine.count);
+            for (std::size_t k = 0; k < exact.count; ++k) {
+                CHECK(fine(ch_command, k) == exact(ch_command, k));
+                CHECK(fine(ch_load_torque, k) == exact(ch_load_torque, k));
+                CHECK(fine(ch_output_torque, k) == Approx(exact(ch_output_torque, k)).epsilon(1e-7).scale(1.0));
+                CHECK(fine(ch_input_contact, k) == exact(ch_input_contact, k));
+            }
+        }
+    }
+    TEST_CASE("adaptive solver: a very light load is stiff, but no accumulation") {
+        for (const double inertia : {1e-9, 1e-7}) {
+            Drive d = hysteretic_drive();
+            d.load.inertia = inertia;
+            d.load.viscous_friction = 0.04 * std::sqrt(0.65 * 26.5e3 * inertia);
+            const Signals signals{sine(1.0275, 1.0), Signal{}};
+            const Samples exact = run(d, signals, 0.02), adaptive = run(d, signals, 0.02, 1e-3, {}, 1e-8);
+            REQUIRE(adaptive.report.status == Status::done);
+            CHECK(adaptive.report.x[motor_speed] == Approx(exact.report.x[motor_speed]).epsilon(1e-6));
+        }
+    }
+}
