@@ -192,10 +192,15 @@ class SwitchedDrive {
 
     // A contact whose capacity has been overcome begins to slip that way, from rest with no acceleration: the torques
     // are those before. Its jerk has the sign of the fall of the capacity's margin, so that there is nothing to decide
-    // as long as all others go on as they were.
+    // as long as all others go on as they were. If the capacity itself has gone with its margin, as where a load that
+    // alone holds a self-locking gear reverses, the contact may as well stay stuck.
     template <class Cache>
     bool breaks_away(Cache& cache, Instant& now, const Event& event, RegimeKey& key) const {
         const Contact c = event.fired->contact;
+        const auto size = [&](const State& x, const std::array<double, n_inputs>& u) {
+            return magnitude(event.fired->form, x, now.memory, u);
+        };
+        if (size(now.x, now.input[0]) <= far_from_event / clear_of_zero * size(near_state_, near_input_)) return false;
         Modes modes = key.modes;
         modes[c] = static_cast<std::int8_t>(event.fired->neighbour);
         Event slipping{event.at_rest, event.T_2};
@@ -294,10 +299,12 @@ class SwitchedDrive {
         if (found != Found::inconsistent || !event.from_each_load || s == 0 || modes[twist_contact] != 0) return found;
         // The torque that keeps the twist at rest depends on the cell, and the cell on the torque.
         for (int j = 0; j < gearbox.map.load_intervals(); ++j) {
-            trial.cell = gearbox.map.triangle(
-                0.5 * (gearbox.map.load_interval_lower(j) + gearbox.map.load_interval_upper(j)), v);
-            const Found other = walk(cache, now, event, trial, key);
-            if (other == Found::yes) return other;
+            const double middle = 0.5 * (gearbox.map.load_interval_lower(j) + gearbox.map.load_interval_upper(j));
+            for (const int half : {0, 1}) {  // of the two triangles at this speed
+                trial.cell = gearbox.map.triangle(middle, v) ^ half;
+                const Found other = walk(cache, now, event, trial, key);
+                if (other == Found::yes) return other;
+            }
         }
         return found;
     }
