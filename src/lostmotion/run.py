@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 SolverName = Literal["exact", "dormand-prince"]
 
 MAX_SWITCHINGS = 100_000  # kept with a result; beyond it they are only counted
+BYTES_PER_SAMPLE = 170  # of a result while it is made, measured
 
 
 def simulate(
@@ -88,6 +90,7 @@ def run(
     if relative_tolerance <= 0.0:
         raise InputError(f"relative_tolerance {relative_tolerance} must be greater than 0")
     table = scenario.simulation
+    check_memory(table.samples)
     exact = solver == "exact"
     result = _core.run(
         *core_inputs(scenario),
@@ -100,6 +103,36 @@ def run(
     )
     how = "exact" if exact else f"dormand-prince, relative tolerance {relative_tolerance:g}"
     return raw_result(scenario, result, how, ledger=energy and exact)
+
+
+def check_memory(samples: int) -> None:
+    """Refuse a run whose samples do not fit into the memory that is free.
+
+    Raises
+    ------
+    InputError
+        It says what they need and what there is.
+    """
+    needed, free = samples * BYTES_PER_SAMPLE, free_memory()
+    if free is not None and needed > free:
+        raise InputError(
+            f"simulation.sample_interval: {samples:.3g} samples need {needed / 1e9:.3g} GB of memory, and {free / 1e9:.3g}"
+            " GB are free; take a longer sample_interval, or a shorter duration"
+        )
+
+
+def free_memory() -> int | None:
+    """Bytes of memory that programs can still have, or None where the system does not tell."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as table:
+            kilobytes = next(line.split()[1] for line in table if line.startswith("MemAvailable:"))
+        return 1024 * int(kilobytes)
+    except (OSError, StopIteration):
+        pass
+    try:
+        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return None
 
 
 def as_scenario(
