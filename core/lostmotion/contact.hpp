@@ -228,15 +228,12 @@ class SwitchedDrive {
                 choices[k][n[k]++] = key.modes[c];
             }
         }
-        Found found = search(cache, now, choices, n, event, key);
-        if (found == Found::inconsistent && drive_.gearbox.losses == Gearbox::loss_map) {
-            event.from_each_load = true;
-            found = search(cache, now, choices, n, event, key);
-        }
-        if (found == Found::inconsistent) {
-            event.closest = true;
-            found = search(cache, now, choices, n, event, key);
-        }
+        const Found found = search(cache, now, choices, n, event, key);
+        if (found == Found::yes) return found;
+        event.from_each_load = drive_.gearbox.losses == Gearbox::loss_map;
+        if (event.from_each_load && search(cache, now, choices, n, event, key) == Found::yes) return Found::yes;
+        event.closest = true;
+        if (search(cache, now, choices, n, event, key) == Found::yes) return Found::yes;
         return found;
     }
 
