@@ -248,13 +248,14 @@ class SwitchedDrive {
     }
 
     // Those with most contacts stuck first. While everything stands the output torque stays as it was, and gives way
-    // only if neither that nor a motion is consistent.
+    // only if neither that nor a motion is consistent, and then by as little as it can.
     template <class Cache>
     Found search(Cache& cache, Instant& now, const Choices& choices, const std::array<int, n_contacts>& n,
                  const Event& event, RegimeKey& key) const {
         const Memory before = now.memory;  // all that a trial may change
         Found worst = Found::inconsistent;
-        double least = largest_violation;
+        const double largest = event.closest ? largest_violation : std::numeric_limits<double>::infinity();
+        double least = largest;
         RegimeKey closest;
         Memory of_closest;
         for (const bool limit : {false, true})
@@ -267,16 +268,18 @@ class SwitchedDrive {
                             if (at_its_limit(modes) != limit) continue;
                             now.memory = before;
                             const Found found = settle(cache, now, modes, event, key);
-                            if (found == Found::yes && !event.closest) return found;
+                            if (found == Found::yes && !event.closest && !limit) return found;
                             if (found == Found::outside) worst = found;
                             if (found != Found::yes) continue;
-                            if (const double v = violation(cache.entry(key), now, event); v < least) {
+                            const double v = event.closest ? violation(cache.entry(key), now, event)
+                                                           : torque_change(cache.regime(key), now, event);
+                            if (v < least) {
                                 least = v;
                                 closest = key;
                                 of_closest = now.memory;
                             }
                         }
-        if (least == largest_violation) return worst;
+        if (least == largest) return worst;
         key = closest;
         now.memory = of_closest;
         return Found::yes;
@@ -359,6 +362,11 @@ class SwitchedDrive {
         for (int c = 0; c < n_contacts; ++c)
             if (!event.at_rest[c]) guards |= entry.speeds[c];
         return guards;
+    }
+
+    // By how much the output torque changes with a regime [N m].
+    static double torque_change(const Regime& r, const Instant& now, const Event& event) {
+        return std::fabs(evaluate(r.output_torque, now.x, now.memory, now.input[0]) - event.T_2);
     }
 
     // By how much the contacts' guards of a regime are violated, each in units of the sum of its terms' magnitudes: by
