@@ -36,7 +36,6 @@ class Flow {
     // terms; 0 if it stays at zero.
     int sign(const LinearForm& form, int k, double value, double size) {
         while (++k < n_derivatives) {
-            if (k > 1 && std::fabs(value) > clear_of_zero * size) return value > 0.0 ? +1 : -1;
             const auto [rate, rate_size] = derivative(form, k);
             if (std::fabs(value) > noise(size, rate)) return value > 0.0 ? +1 : -1;
             value = rate;
