@@ -1,5 +1,6 @@
 """Bad input ends in one line that names the file, the key and the remedy, and in exit code 1; nothing is left behind."""
 
+import math
 import re
 import subprocess
 import sys
@@ -243,6 +244,14 @@ def test_constructors_refuse_in_the_words_of_the_command_line(make: Callable[[],
 FUNCTIONS = [
     (lambda s: lm.simulate(3), "3 must be a Scenario"),
     (lambda s: lm.simulate(s, solver="euler"), "solver 'euler' is not known"),
+    (lambda s: lm.simulate(s, relative_tolerance=1e-9), "the exact solver has none"),
+    *(
+        (
+            lambda s, t=t: lm.simulate(s, solver="dormand-prince", relative_tolerance=t),
+            f"relative_tolerance {t:g} must lie",
+        )
+        for t in (math.nan, math.inf, -1.0, 0.0, 1e-300, 1.0)
+    ),
     (lambda s: lm.simulate(s.drive()), "needs duration and sample_interval"),
     (lambda s: lm.simulate(s, duration="1,5 s"), 'key duration: "1,5 s" has a decimal comma; write "1.5 s"'),
     (lambda s: lm.simulate(s, command="50 Hz"), 'key command.mean: "50 Hz" has the unit of something else'),
@@ -383,6 +392,11 @@ CALLS = [
     ("an explanation after the end", ["run", "good.toml", "--explain", "99"], ["--explain 99", "0.01"]),
     ("an unknown solver", ["run", "good.toml", "--solver", "euler"], ["euler", "exact"]),
     ("a tolerance of zero", ["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "0"], ["tolerance"]),
+    (
+        "a tolerance below rounding",
+        ["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "1e-300"],
+        ["--tolerance 1e-300", "between 1e-15 and 0.001"],
+    ),
     (
         "a tolerance of the exact solver",
         ["run", "good.toml", "--tolerance", "1e-9"],
