@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from . import _core
 from .duty_cycle import DutyCycle, duty_cycle
+from .errors import InputError
 from .holding import holding
 from .parts import Gearbox, Rigid
 from .run import simulate
@@ -86,6 +87,10 @@ def check_drive(scenario: Scenario) -> tuple[Finding, ...]:
     SolverError
         As `simulate`.
     """
+    if not isinstance(scenario, Scenario):
+        raise InputError(
+            f"{scenario!r:.60} has no task to be checked against; give a Scenario, such as load(path) returns"
+        )
     result = _finely_sampled(scenario)
     cycle = duty_cycle(result, scenario.task.cycle)
     findings = [

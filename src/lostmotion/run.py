@@ -161,8 +161,17 @@ def core_inputs(scenario: Scenario) -> tuple[_core.Drive, _core.Signal, _core.Si
 
 
 def start_state(initial: Initial) -> list[float]:
-    """The solver's state vector."""
+    """The solver's state vector.
+
+    Raises
+    ------
+    InputError
+        It is no state.
+    """
     from .variables import STATES
+
+    if not isinstance(initial, Initial):
+        raise InputError(f"initial {shown(initial)} must be a state, such as Initial(motor_speed=100)")
 
     return [getattr(initial, name) for name in STATES]
 

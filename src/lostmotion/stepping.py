@@ -12,8 +12,10 @@ import numpy as np
 from . import _core
 from .errors import InputError
 from .parts import Drive
+from .quantities import argument
 from .run import start_state
 from .scenario import Initial, Scenario, drive_of
+from .validation import shown
 from .variables import CHANNEL_NAMES, VARIABLES
 
 _CHANNEL = {name: k for k, name in enumerate(CHANNEL_NAMES)}
@@ -49,6 +51,7 @@ class Simulation:
     """
 
     def __init__(self, drive: Drive | Scenario, *, step: float = 1e-3, initial: Initial | None = None) -> None:
+        step = argument("step", step, "s")
         if not step > 0.0:
             raise InputError(f"step {step} must be greater than 0 s")
         if initial is None:
@@ -110,9 +113,14 @@ class Simulation:
         """
         c0, c1 = command if isinstance(command, tuple) else (command, command)
         m0, m1 = load_torque if isinstance(load_torque, tuple) else (load_torque, load_torque)
-        if not (interval > 0.0 and c0 - c0 == 0.0 and c1 - c1 == 0.0 and m0 - m0 == 0.0 and m1 - m1 == 0.0):
+        try:
+            usable = interval > 0.0 and c0 - c0 == 0.0 and c1 - c1 == 0.0 and m0 - m0 == 0.0 and m1 - m1 == 0.0
+        except TypeError:
+            usable = False
+        if not usable:
             raise InputError(
-                f"interval {interval} s must be positive, command {command} and load_torque {load_torque} finite"
+                f"interval {shown(interval)} must be positive [s], command {shown(command)} and load_torque "
+                f"{shown(load_torque)} finite numbers or pairs of them"
             )
         self._core.advance(interval, c0, c1, m0, m1)
 

@@ -273,11 +273,13 @@ def _of_something_else(digits: str, units: Product, symbol: str, unit: str) -> s
         plainly = f', or "{digits} Hz" for that many periods in a second' if "radian" in units else ""
         value = f"{float(Decimal(digits) * turns):.7g}"
         return f'is a speed of rotation, not a frequency; write "{value} Hz" for one period in each turn{plainly}'
-    if hertz := next((name for name in units if name.endswith("hertz")), None):
+    if counted := next((name for name in units if name.endswith("hertz")), None):
         speeds = [{angle: 1, "second": -1} for angle in ("revolution", "radian")]
-        by_speed = [_with(units, hertz, speed) for speed in speeds]
+        by_speed = [_with(units, counted, speed) for speed in speeds]
         if all(_factor(reading, unit) is not None for reading in by_speed):
-            value = f"{float(Decimal(digits) * (_ratio({hertz: units[hertz]}, {'hertz': units[hertz]}) or 1)):.7g}"
+            value = (
+                f"{float(Decimal(digits) * (_ratio({counted: units[counted]}, {'hertz': units[counted]}) or 1)):.7g}"
+            )
             return "may mean turns or radians; write " + " or ".join(f'"{value} {written(r)}"' for r in by_speed)
     angle = angle_of(wanted)
     if (
