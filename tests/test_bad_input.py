@@ -512,6 +512,19 @@ def test_an_unreadable_file_is_refused(tmp_path: Path, monkeypatch: pytest.Monke
         lm.load(path)
 
 
+@pytest.mark.parametrize("ending", [".csv", ".nc", ".parquet"])
+def test_a_result_that_is_cut_off_is_refused_in_plain_words(large: Path, tmp_path: Path, ending: str) -> None:
+    lm.save(lm.simulate(lm.load(large)), tmp_path / f"whole{ending}")
+    content = (tmp_path / f"whole{ending}").read_bytes()
+    for length in (len(content) // 50, len(content) // 2, len(content) - 3):  # the last one within a number
+        cut = tmp_path / f"cut{ending}"
+        cut.write_bytes(content[:length])
+        with pytest.raises(lm.InputError, match=re.escape(cut.name)) as caught:
+            lm.open_result(cut)
+        assert_plain(str(caught.value))
+        assert not re.search("Error|Arrow|sblock|header", str(caught.value))
+
+
 def test_damaged_result_files_are_refused(tmp_path: Path) -> None:
     for name in ("a.csv", "a.nc", "a.parquet"):
         (tmp_path / name).write_bytes(b"not a result\n1,2\n")
