@@ -507,6 +507,11 @@ def study(
                 work(loaded, directory, threads=threads, executor=executor, progress=report)
         except KeyboardInterrupt:
             fail(f"interrupted; what is in {directory} stays, and the same command resumes it", 130)
+    from .study_table import failures
+
+    failed = failures(directory)
+    if failed:
+        print(f"{len(failed)} of {loaded.total} runs failed, such as: {failed[0]}", file=sys.stderr)
     print(f"{loaded.total} runs are in {directory}; `lostmotion study show {directory}` shows them")
 
 
