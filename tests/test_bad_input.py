@@ -222,6 +222,8 @@ PARTS = [
     (lambda: lm.Load(inertia=None), "key inertia: None must be a number in kg*m^2"),
     (lambda: lm.Load(inertia=10**400), "is beyond the range of numbers"),
     (lambda: lm.Load.model_validate({"inertia": -1}), "key inertia: -1.0 must be greater than 0"),
+    (lambda: lm.Load(inertia=1).model_copy(update={"inertia": "1,2 kg*m^2"}), "has a decimal comma"),
+    (lambda: lm.Load(inertia=1).model_copy(update={"inertja": 2}), "key inertja: is not known; did you mean inertia?"),
     (lambda: lm.TorsionCurve(slopes=[1, 2]), "the torsion curve has 2 slopes and 0 breaks"),
     (lambda: lm.TorsionCurve(slopes=5), "key slopes: 5 must be a list"),
     (lambda: lm.CommandSignal(amplitude=3), "the command signal lacks frequency"),

@@ -98,6 +98,12 @@ class Part(BaseModel):
         with cls._one_error(obj):
             return super().model_validate(obj, **options)
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with changes, which are checked as in the constructor."""
+        if not update:
+            return super().model_copy(deep=deep)
+        return type(self)(**({name: getattr(self, name) for name in self.model_fields_set} | dict(update)))
+
     @classmethod
     def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:
         """As the constructor, from JSON."""
