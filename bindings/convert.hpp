@@ -47,6 +47,10 @@ inline std::string status_text(Status status, double time, Contact contact) {
         case Status::zeno:
             return "switching instants of the contact '" + std::string(contact_name(contact)) + "' accumulate " + at +
                    ": infinitely many in finite time. The model ends here.";
+        case Status::unseen:
+            return "the drive has dry contacts, which do not feel a nonlinear torque. Take them out, or make the "
+                   "torque "
+                   "piecewise linear.";
         default: return "interrupted";
     }
 }

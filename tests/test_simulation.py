@@ -126,7 +126,7 @@ def test_a_bad_step_is_refused_and_changes_nothing(small: Path) -> None:
     sim.advance(1e-3, command=0.1)
     before = sim.state
     for arguments in ((0.0, 0.1), (-1.0, 0.1), (1e-3, math.nan), (1e-3, 0.1, math.inf)):
-        with pytest.raises(ValueError, match="must be positive"):
+        with pytest.raises(ValueError, match=r"must lie between|must be finite"):
             sim.advance(*arguments)
     assert sim.state == before
 
@@ -239,3 +239,76 @@ def test_end_state_continues_a_run(small: Path) -> None:
     end = json.loads(half.attrs["end_state"])
     rest = lm.simulate(scenario, duration=1.0, initial=lm.Initial(**end))
     assert float(rest["load_speed"][-1]) == pytest.approx(float(whole["load_speed"][-1]), rel=1e-6)
+
+
+@pytest.mark.parametrize("interval", [math.inf, 1e300, 1e-300, 0.0, -1e-3, math.nan])
+def test_intervals_that_no_motion_can_have_are_refused(interval):
+    drive = lm.load("paper-2dof-nl-small").drive()
+    with pytest.raises(lm.InputError, match="must lie between 1e-12 s and 1e\\+12 s"):
+        lm.Simulation(drive, step=interval)
+    simulation = lm.Simulation(drive)
+    with pytest.raises(lm.InputError, match="must lie between 1e-12 s and 1e\\+12 s"):
+        simulation.advance(interval, command=0.1)
+    assert simulation.time == 0.0
+
+
+def test_an_interval_below_the_resolution_of_the_time_is_refused():
+    simulation = lm.Simulation(lm.load("paper-2dof-nl-small").drive())
+    simulation.advance(1e6, command=0.0)
+    with pytest.raises(lm.InputError, match="below the resolution of the time"):
+        simulation.advance(1e-12, command=0.1)
+
+
+def test_samples_that_do_not_fit_into_memory_are_refused_before_the_run(monkeypatch):
+    monkeypatch.setattr("lostmotion.run.free_memory", lambda: 5_000_000_000)
+    with pytest.raises(lm.InputError, match=r"1e\+08 samples need 17 GB of memory, and 5 GB are free"):
+        lm.simulate(lm.load("paper-2dof-nl-small"), duration=100.0, sample_interval=1.0000001e-6)
+
+
+def test_a_billion_seconds_at_constant_command_end():
+    result = lm.simulate(lm.load("paper-2dof-nl-small"), command=0.3, duration=1e9, sample_interval=1e6)
+    speed = result["load_speed"].values
+    assert speed[1] == pytest.approx(speed[-1], rel=1e-12)
+    assert result["load_angle"].values[-1] == pytest.approx(1e9 * speed[-1], rel=1e-6)
+
+
+def test_stepping_and_sampled_constants_change_nothing_at_constant_speed():
+    scenario = lm.load("paper-2dof-nl-large")
+    whole = lm.simulate(scenario, command=0.3, duration=2.0, sample_interval=1e-3)
+    times = [0.0, *(k * 1e-3 for k in range(1, 2000))]
+    sampled = lm.simulate(
+        scenario,
+        command=lm.CommandSignal(samples={"times": times, "values": [0.3] * len(times)}),
+        duration=2.0,
+        sample_interval=1e-3,
+    )
+    np.testing.assert_array_equal(sampled["output_torque"].values, whole["output_torque"].values)
+    simulation = lm.Simulation(scenario.drive(), step=1e-3)
+    torque = []
+    for _ in range(2000):
+        simulation.advance(1e-3, command=0.3)
+        torque.append(simulation["output_torque"])
+    np.testing.assert_allclose(torque, whole["output_torque"].values[1:], rtol=1e-9)
+
+
+def test_thousands_of_steps_are_summed_as_one_by_one():
+    steps = [{"time": 1e-3 * k, "height": 0.001 * (-1) ** k * (k % 7)} for k in range(1, 4000)]
+    knots = lm.CommandSignal(mean=0.5, steps=steps).knot_list()
+    total = 0.5 + np.cumsum([s["height"] for s in steps])
+    assert [t for t, _, _ in knots[1:]] == [s["time"] for s in steps]
+    np.testing.assert_allclose([v for _, v, _ in knots[1:]], total, rtol=0, atol=1e-12)
+    assert all(slope == 0.0 for _, _, slope in knots)
+
+
+def test_ramps_that_overlap_are_added():
+    signal = lm.CommandSignal(
+        ramps=[
+            {"begin": 0.0, "duration": 2.0, "rise": 1.0},
+            {"begin": 1.0, "duration": 2.0, "rise": -0.5},
+        ],
+        steps=[{"time": 1.5, "height": 0.25}],
+    )
+    for t, value, slope in signal.knot_list():
+        first, second = min(t, 2.0) / 2.0, -0.25 * min(max(t - 1.0, 0.0), 2.0)
+        assert value == pytest.approx(first + second + (0.25 if t >= 1.5 else 0.0), abs=1e-15)
+        assert slope == pytest.approx((0.5 if t < 2.0 else 0.0) - (0.25 if 1.0 <= t < 3.0 else 0.0))

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <type_traits>
 
 #include "exact_solver.hpp"
 
@@ -41,7 +42,9 @@ struct DormandPrince {
     };
 };
 
-// A remainder adds to the linear rates; called as remainder(t, x, rate).
+// A remainder adds to the linear rates; called as remainder(t, x, rate). What holds a contact at rest, the guards and
+// the energy do not see it. So it is refused for a drive with dry contacts: one that is stuck would stay so against any
+// torque, and gain speed.
 struct NoRemainder {
     void operator()(double, const State&, State&) const {}
 };
@@ -96,6 +99,7 @@ class AdaptiveSolver {
     std::size_t switchings() const { return switchings_; }
 
     Status begin(double time, const State& x, const Memory& memory) {
+        if (!std::is_same_v<Remainder, NoRemainder> && has_dry_contacts()) return Status::unseen;
         time_ = time;
         now_.x = x;
         now_.memory = memory;
@@ -134,6 +138,12 @@ class AdaptiveSolver {
     }
 
  private:
+    // A rigid gear is none: it holds whatever acts.
+    bool has_dry_contacts() const {
+        const Drive& drive = system_.drive();
+        return drive.has(input_contact) || drive.has(load_contact) || drive.gearbox.has_hysteresis();
+    }
+
     template <class Observer>
     Status change_regime(const Guard* fired, Observer& observer) {
         if (fired != nullptr) input_.anchor(time_);

@@ -157,6 +157,7 @@ class SwitchedDrive {
         RegimeKey before{};
         bool from_each_load = false;  // begin the search for the cell of the loss map from each load
         bool by_value = false;        // a guard that is zero to rounding holds, whatever its derivatives
+        bool closest = false;         // take the combination that violates its guards least
 
         // The margins of a contact that has just come to a stop are zero by chance only. If one is, the contact may
         // well rest for that moment, and breaks away again. So their derivatives, which rounding may falsify, are not
@@ -192,10 +193,15 @@ class SwitchedDrive {
 
     // A contact whose capacity has been overcome begins to slip that way, from rest with no acceleration: the torques
     // are those before. Its jerk has the sign of the fall of the capacity's margin, so that there is nothing to decide
-    // as long as all others go on as they were.
+    // as long as all others go on as they were. If the capacity itself has gone with its margin, as where a load that
+    // alone holds a self-locking gear reverses, the contact may as well stay stuck.
     template <class Cache>
     bool breaks_away(Cache& cache, Instant& now, const Event& event, RegimeKey& key) const {
         const Contact c = event.fired->contact;
+        const auto size = [&](const State& x, const std::array<double, n_inputs>& u) {
+            return magnitude(event.fired->form, x, now.memory, u);
+        };
+        if (size(now.x, now.input[0]) <= far_from_event / clear_of_zero * size(near_state_, near_input_)) return false;
         Modes modes = key.modes;
         modes[c] = static_cast<std::int8_t>(event.fired->neighbour);
         Event slipping{event.at_rest, event.T_2};
@@ -203,8 +209,9 @@ class SwitchedDrive {
         return !at_its_limit(modes) && settle(cache, now, modes, slipping, key) == Found::yes;
     }
 
-    // Tries the combinations of modes. If the guards that start on zero leave none, the motion is too small beside its
-    // torques for rounding to tell which of them rise: then those that are zero to rounding hold.
+    // Tries the combinations of modes. Usually piece and cell are found by a walk from those before. If the guards that
+    // are zero or nearly so leave none, the motion is too small beside its torques for rounding to tell which of them
+    // rise: then the combination that violates its guards least is taken. A drive that jams violates them by more.
     template <class Cache>
     Found find(Cache& cache, Instant& now, Event event, RegimeKey& key) const {
         Choices choices{};
@@ -221,15 +228,12 @@ class SwitchedDrive {
                 choices[k][n[k]++] = key.modes[c];
             }
         }
-        Found found = search(cache, now, choices, n, event, key);
-        if (found == Found::inconsistent && drive_.gearbox.losses == Gearbox::loss_map) {
-            event.from_each_load = true;
-            found = search(cache, now, choices, n, event, key);
-        }
-        if (found == Found::inconsistent) {
-            event.by_value = true;
-            found = search(cache, now, choices, n, event, key);
-        }
+        const Found found = search(cache, now, choices, n, event, key);
+        if (found == Found::yes) return found;
+        event.from_each_load = drive_.gearbox.losses == Gearbox::loss_map;
+        if (event.from_each_load && search(cache, now, choices, n, event, key) == Found::yes) return Found::yes;
+        event.closest = true;
+        if (search(cache, now, choices, n, event, key) == Found::yes) return Found::yes;
         return found;
     }
 
@@ -250,6 +254,9 @@ class SwitchedDrive {
                  const Event& event, RegimeKey& key) const {
         const Memory before = now.memory;  // all that a trial may change
         Found worst = Found::inconsistent;
+        double least = largest_violation;
+        RegimeKey closest;
+        Memory of_closest;
         for (const bool limit : {false, true})
             for (int slips = 0; slips <= n_contacts; ++slips)
                 for (int a = 0; a < n[0]; ++a)
@@ -260,10 +267,19 @@ class SwitchedDrive {
                             if (at_its_limit(modes) != limit) continue;
                             now.memory = before;
                             const Found found = settle(cache, now, modes, event, key);
-                            if (found == Found::yes) return found;
+                            if (found == Found::yes && !event.closest) return found;
                             if (found == Found::outside) worst = found;
+                            if (found != Found::yes) continue;
+                            if (const double v = violation(cache.entry(key), now, event); v < least) {
+                                least = v;
+                                closest = key;
+                                of_closest = now.memory;
+                            }
                         }
-        return worst;
+        if (least == largest_violation) return worst;
+        key = closest;
+        now.memory = of_closest;
+        return Found::yes;
     }
 
     // Is this combination of modes consistent? Piece and cell are found by a walk that begins at what the torque T_2
@@ -294,10 +310,12 @@ class SwitchedDrive {
         if (found != Found::inconsistent || !event.from_each_load || s == 0 || modes[twist_contact] != 0) return found;
         // The torque that keeps the twist at rest depends on the cell, and the cell on the torque.
         for (int j = 0; j < gearbox.map.load_intervals(); ++j) {
-            trial.cell = gearbox.map.triangle(
-                0.5 * (gearbox.map.load_interval_lower(j) + gearbox.map.load_interval_upper(j)), v);
-            const Found other = walk(cache, now, event, trial, key);
-            if (other == Found::yes) return other;
+            const double middle = 0.5 * (gearbox.map.load_interval_lower(j) + gearbox.map.load_interval_upper(j));
+            for (const int half : {0, 1}) {  // of the two triangles at this speed
+                trial.cell = gearbox.map.triangle(middle, v) ^ half;
+                const Found other = walk(cache, now, event, trial, key);
+                if (other == Found::yes) return other;
+            }
         }
         return found;
     }
@@ -306,27 +324,63 @@ class SwitchedDrive {
     template <class Cache>
     Found walk(Cache& cache, const Instant& now, const Event& event, RegimeKey trial, RegimeKey& key) const {
         constexpr int longest_walk = 400;
+        RegimeKey previous = trial;
+        unsigned along = 0;  // edges that lead back to where the walk came from: the motion goes along them
         for (int step = 0; step < longest_walk; ++step) {
             const auto& entry = cache.entry(trial);
             if (!entry.regime.solvable) return Found::inconsistent;
-            // The mode of a contact that moves was chosen by its speed.
-            unsigned ignored = 0;
-            for (int c = 0; c < n_contacts; ++c)
-                if (!event.at_rest[c]) ignored |= entry.speeds[c];
-            const auto [left, overcome] = violated(entry, now, ignored, &event);
+            const auto [left, overcome] = violated(entry, now, moving(entry, event) | along, &event);
             if (left != nullptr && left->kind == Guard::outside) return Found::outside;
             if (left == nullptr) {
-                if (overcome) return Found::inconsistent;
-                if (event.has_ended(trial)) {
+                if (overcome && !event.closest) return Found::inconsistent;
+                if (event.has_ended(trial) && !event.closest) {
                     if (event.fired->kind == Guard::capacity) return Found::inconsistent;
                     cross(*event.fired, trial);
                 }
                 key = trial;
                 return Found::yes;
             }
-            cross(*left, trial);
+            RegimeKey next = trial;
+            cross(*left, next);
+            if (step > 0 && next == previous) {
+                along |= 1u << (left - entry.regime.guards.data());
+                continue;
+            }
+            previous = std::exchange(trial, next);
+            along = 0;
         }
         return Found::inconsistent;
+    }
+
+    // The guards of the speeds of contacts that move, as bits: their modes were chosen by their speeds.
+    template <class Entry>
+    static unsigned moving(const Entry& entry, const Event& event) {
+        unsigned guards = 0;
+        for (int c = 0; c < n_contacts; ++c)
+            if (!event.at_rest[c]) guards |= entry.speeds[c];
+        return guards;
+    }
+
+    // By how much the contacts' guards of a regime are violated, each in units of the sum of its terms' magnitudes: by
+    // the value or, of one that is zero to rounding, by the rate.
+    template <class Entry>
+    static double violation(const Entry& entry, const Instant& now, const Event& event) {
+        const unsigned ignored = moving(entry, event);
+        Flow flow(entry.rates, now);
+        double worst = 0.0;
+        for (int k = 0; k < entry.regime.n_guards; ++k) {
+            if ((entry.contacts & ~ignored & 1u << k) == 0) continue;
+            const LinearForm& form = entry.regime.guards[k].form;
+            const double value = evaluate(form, now.x, now.memory, now.input[0]);
+            const double size = magnitude(form, now.x, now.memory, now.input[0]);
+            const auto [rate, rate_size] = flow.derivative(form, 1);
+            const bool zero = std::fabs(value) <= flow.noise(size, rate);
+            if (zero && rate < 0.0 && !event.by_value_alone(entry.regime.guards[k]))
+                worst = std::fmax(worst, -rate / rate_size);
+            else if (!zero && value < 0.0)
+                worst = std::fmax(worst, -value / size);
+        }
+        return worst;
     }
 
     // A guard of the curve, the map or the amplifier that does not hold just after now, and whether a contact's does
@@ -384,17 +438,14 @@ class SwitchedDrive {
         return true;
     }
 
-    // An input has changed: does the regime go on? The contacts that move keep their direction.
+    // An input has changed: does the regime go on? The contacts that move keep their direction. A guard that is zero to
+    // rounding has not ended it; the solver finds it if it goes on to fall.
     template <class Cache>
     bool stays(Cache& cache, const Instant& now, const RegimeKey& key) const {
         const auto& entry = cache.entry(key);
-        unsigned moving = 0;
-        for (int k = 0; k < n_contacts; ++k) {
-            const auto c = static_cast<Contact>(k);
-            if (entry.regime.at_rest[c] || key.modes[c] == absent) continue;
-            moving |= entry.speeds[c];
-        }
-        const auto [left, overcome] = violated(entry, now, moving);
+        Event lasting{entry.regime.at_rest, 0.0};
+        lasting.by_value = true;
+        const auto [left, overcome] = violated(entry, now, moving(entry, lasting), &lasting);
         return left == nullptr && !overcome;
     }
 
@@ -411,6 +462,8 @@ class SwitchedDrive {
         now.memory.held_torque = std::clamp(T_2, low, high);
         return true;
     }
+
+    static constexpr double largest_violation = 1e-6;  // that rounding may make
 
     const Drive& drive_;
     State near_state_{};  // magnitudes of states and inputs that a guard must exceed to be far from an event

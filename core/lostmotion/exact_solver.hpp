@@ -202,12 +202,13 @@ class ExactSolver {
         if (!e.propagator.ready()) e.prepare(turns_, scale_);
         return (e.propagator.level(first_level).growth * absolute(rate))[twist];
     }
-    // Rounding of a rate that is computed from the state, relative to the rate, as far as it acts on the twist.
+    // Rounding of a rate that is computed from the state, relative to the rate, as far as it acts on the twist. What
+    // the search for the modes takes for zero must not be seen to fall at once.
     double rate_doubt(typename Cache::Entry& e, const Cursor& at, const Memory& memory) const {
         State size = e.rates.size(magnitudes(at.x()), magnitudes(memory), at.input().sizes());
         if (at.rate()[twist] == 0.0) size[twist] = 0.0;  // it starts from rest
         const double bound = slip_bound(e, coupled(at.rate()));
-        const double rounding_of_rate = 4.0 * std::numeric_limits<double>::epsilon() * slip_bound(e, coupled(size));
+        const double rounding_of_rate = rounding * slip_bound(e, coupled(size));
         return bound > rounding_of_rate ? rounding_of_rate / bound : 1.0;
     }
 
@@ -275,6 +276,7 @@ class ExactSolver {
             if (!(std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100)) return Status::outside;
             const Coupled fourth = absolute(cursor->fourth_derivative());
             const double left = limit - time_;
+            while (!p.level(level).bounded) --level;  // the motion grows beyond all bounds before a look that long ends
             double h = std::min(p.length(level), left);
             while (true) {
                 if (h == p.length(level)) {

@@ -22,9 +22,10 @@ namespace lostmotion {
 
 // Everything needed to step by one length h in one regime.
 struct Step {
-    Integral integral;  // G(h)
-    Matrix growth;      // bound on |exp(A s)|, element by element, for 0 <= s <= h; 1e200 if it is no less
-    Matrix change;      // E(h) = exp(A h) - 1
+    Integral integral;    // G(h)
+    Matrix growth;        // bound on |exp(A s)|, element by element, for 0 <= s <= h; 1e200 if it is no less
+    Matrix change;        // E(h) = exp(A h) - 1
+    bool bounded = true;  // whether `growth` is a bound
 };
 
 // What a pair of functions of the inputs brings over one length.
@@ -180,6 +181,7 @@ class Propagator {
     void add_base() {
         make_room();
         Step& s = steps_[0];
+        s.bounded = true;
         const double h = base_;
         s.integral = taylor_.integral(h);
         s.change = rates().rate * s.integral.coupled;
@@ -217,6 +219,9 @@ class Propagator {
             const Coupled size = absolute(Matrix::identity().at(c) + load(change));
             least(most(a.growth.at(c), a.growth * size), unbounded).store(b.growth.column[c].data());
         }
+        b.bounded = a.bounded;
+        for (int c = 0; c < n_coupled; ++c)
+            for (const double bound : b.growth.column[c]) b.bounded = b.bounded && bound < unbounded;
         const Coupled angle = angle_change(a.integral);
         (2.0 * load(a.integral.angle) + a.integral.coupled.after(angle)).store(b.integral.angle.data());
         b.integral.length = 2.0 * a.integral.length;

@@ -12,6 +12,7 @@ enum class Status {
     jammed,   // no combination of contact modes is consistent
     outside,  // left the extended loss map, or the range of the arithmetic
     zeno,     // switching instants accumulate
+    unseen,   // a nonlinear remainder acts on a drive whose contacts would not feel it
 };
 
 inline Status status_of(Found found) {

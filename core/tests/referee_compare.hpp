@@ -36,7 +36,9 @@ inline std::array<double, n_states> differences(const Drive& drive, const Sample
     size[load_speed] = std::fmax(size[load_speed], size[motor_speed] / i);
     size[motor_speed] = i * size[load_speed];
     size[twist] = size[load_angle] = std::fmax(size[twist], size[load_angle]);
-    for (int c = 0; c < n_states; ++c) gap[c] = gap[c] == 0.0 ? 0.0 : gap[c] / size[c];
+    // What should not move at all may move by rounding of what does.
+    const State rated = drive.rated_scale();
+    for (int c = 0; c < n_states; ++c) gap[c] /= std::fmax(size[c], 1e-9 * rated[c]);
     return gap;
 }
 

@@ -200,5 +200,11 @@ TEST_SUITE("events") {
         REQUIRE(solver.advance(period, nothing) == Status::done);
         CHECK(solver.state()[load_angle] == Approx(1.0).epsilon(1e-8));
         CHECK(solver.state()[load_speed] == Approx(0.0).scale(1.0).epsilon(1e-7));
+        // A pendulum that 100 N m of friction holds against 25 N m of gravity must not gain speed.
+        Drive held = d;
+        held.load.friction_torque = 100.0;
+        const SwitchedDrive held_system(held);
+        AdaptiveSolver<SwitchedDrive, Gravity> refusing(held_system, none, 1e-11, {1, 1, 1, 1, 1});
+        CHECK(refusing.begin(0.0, x, {}) == Status::unseen);
     }
 }

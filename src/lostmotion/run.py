@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
@@ -21,6 +22,7 @@ TOLERANCE = 1e-8  # of the adaptive solver, if none is given
 TOLERANCES = (1e-15, 1e-3)  # beyond rounding, and beyond what finds the switching instants
 
 MAX_SWITCHINGS = 100_000  # kept with a result; beyond it they are only counted
+BYTES_PER_SAMPLE = 170  # of a result while it is made, measured
 
 
 def simulate(
@@ -98,6 +100,7 @@ def run(
     if not least <= tolerance <= largest:
         raise InputError(f"relative_tolerance {tolerance:g} must lie between {least:g} and {largest:g}")
     table = scenario.simulation
+    check_memory(table.samples)
     result = _core.run(
         *core_inputs(scenario),
         table.duration,
@@ -109,6 +112,36 @@ def run(
     )
     how = "exact" if exact else f"dormand-prince, relative tolerance {tolerance:g}"
     return raw_result(scenario, result, how, ledger=energy and exact)
+
+
+def check_memory(samples: int) -> None:
+    """Refuse a run whose samples do not fit into the memory that is free.
+
+    Raises
+    ------
+    InputError
+        It says what they need and what there is.
+    """
+    needed, free = samples * BYTES_PER_SAMPLE, free_memory()
+    if free is not None and needed > free:
+        raise InputError(
+            f"simulation.sample_interval: {samples:.3g} samples need {needed / 1e9:.3g} GB of memory, and {free / 1e9:.3g}"
+            " GB are free; take a longer sample_interval, or a shorter duration"
+        )
+
+
+def free_memory() -> int | None:
+    """Bytes of memory that programs can still have, or None where the system does not tell."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as table:
+            kilobytes = next(line.split()[1] for line in table if line.startswith("MemAvailable:"))
+        return 1024 * int(kilobytes)
+    except (OSError, StopIteration):
+        pass
+    try:
+        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return None
 
 
 def as_scenario(

@@ -18,6 +18,9 @@ from .scenario import Initial, Scenario, drive_of
 from .validation import shown
 from .variables import CHANNEL_NAMES, VARIABLES
 
+SHORTEST_INTERVAL, LONGEST_INTERVAL = 1e-12, 1e12
+"""Of a step [s]: below, it is lost in the rounding of the time; above, in that of a motion's phase."""
+
 _CHANNEL = {name: k for k, name in enumerate(CHANNEL_NAMES)}
 
 
@@ -52,8 +55,8 @@ class Simulation:
 
     def __init__(self, drive: Drive | Scenario, *, step: float = 1e-3, initial: Initial | None = None) -> None:
         step = argument("step", step, "s")
-        if not step > 0.0:
-            raise InputError(f"step {step} must be greater than 0 s")
+        if not SHORTEST_INTERVAL <= step <= LONGEST_INTERVAL:
+            raise InputError(f"step {step} s must lie between {SHORTEST_INTERVAL:g} s and {LONGEST_INTERVAL:g} s")
         if initial is None:
             initial = drive.initial if isinstance(drive, Scenario) else Initial()
         self._drive = drive_of(drive)
@@ -107,20 +110,28 @@ class Simulation:
         Raises
         ------
         InputError
-            The interval is not positive, or a value is not finite.
+            The interval is shorter than 1e-12 s or longer than 1e12 s, or a value is not finite.
         SolverError
             The motion has no continuation. The state stays as it was.
         """
         c0, c1 = command if isinstance(command, tuple) else (command, command)
         m0, m1 = load_torque if isinstance(load_torque, tuple) else (load_torque, load_torque)
         try:
-            usable = interval > 0.0 and c0 - c0 == 0.0 and c1 - c1 == 0.0 and m0 - m0 == 0.0 and m1 - m1 == 0.0
+            within = SHORTEST_INTERVAL <= interval <= LONGEST_INTERVAL
+            finite = c0 - c0 == 0.0 and c1 - c1 == 0.0 and m0 - m0 == 0.0 and m1 - m1 == 0.0
         except TypeError:
-            usable = False
-        if not usable:
             raise InputError(
-                f"interval {shown(interval)} must be positive [s], command {shown(command)} and load_torque "
-                f"{shown(load_torque)} finite numbers or pairs of them"
+                f"interval {shown(interval)}, command {shown(command)} and load_torque {shown(load_torque)} must be numbers (SI)"
+            ) from None
+        if not within:
+            raise InputError(
+                f"interval {interval} s must lie between {SHORTEST_INTERVAL:g} s and {LONGEST_INTERVAL:g} s"
+            )
+        if not finite:
+            raise InputError(f"command {command} and load_torque {load_torque} must be finite")
+        if self.time + interval == self.time:
+            raise InputError(
+                f"interval {interval} s is below the resolution of the time, {self.time} s; take a longer one, or reset"
             )
         self._core.advance(interval, c0, c1, m0, m1)
 

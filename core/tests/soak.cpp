@@ -1,0 +1,147 @@
+// Random drives at length, each property checked and every disagreement put before the referee. `make soak` runs it:
+// soak [cases of each kind] [seed]. Prints what it found; ends with 1 if anything is wrong.
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include "properties.hpp"
+#include "referee_compare.hpp"
+#include "round_drives.hpp"
+
+using namespace lostmotion;
+
+namespace {
+
+struct Tally {
+    const char* what;
+    long cases = 0, refused = 0, ambiguous = 0, wrong = 0;
+
+    void print() const {
+        std::printf("%-58s %8ld runs, %ld refused, %ld with several motions, %ld wrong\n", what, cases, refused,
+                    ambiguous, wrong);
+    }
+};
+
+bool jams(const Drive& d) { return d.rigid() && d.smallest_rigid_inertia() <= 0.0; }
+
+// The exact run of a drive against the referee's.
+void adjudicate(Tally& t, const std::string& which, const Drive& drive, const Signals& signals, double duration,
+                const Samples& exact, const Start& start = {}) {
+    referee::Agreement a;
+    if (referee::referee_agrees(drive, signals, duration, duration / 100.0, exact, 1e-8, &a, start)) return;
+    if (a.truth.outcome == referee::Outcome::several_continuations) {
+        ++t.ambiguous;
+        return;
+    }
+    // What a change of the inputs by 1e-14 does, too, is rounding that the motion amplifies.
+    Signals changed = signals;
+    for (Signal& s : changed) {
+        for (Knot& k : s.knots) k.value *= 1.0 + 1e-14, k.slope *= 1.0 + 1e-14;
+        for (Sine& q : s.sines) q.amplitude *= 1.0 + 1e-14;
+    }
+    const Samples other = run(drive, changed, duration, duration / 100.0, start);
+    if (exact.report.status == Status::done && other.report.status == Status::done &&
+        difference_at_end(drive, exact, other.report.x) > 1e-9)
+        return;
+    ++t.wrong;
+    std::printf("  %s: %s, exact status %d at %.9g s, referee %d at %.9g s, difference %.2g\n", t.what, which.c_str(),
+                static_cast<int>(exact.report.status), exact.report.time, static_cast<int>(a.truth.outcome),
+                a.truth.time, a.worst);
+}
+
+// Exact against adaptive solver; the referee decides where they differ.
+Tally solvers(long count, unsigned seed) {
+    Tally t{"exact and adaptive solver on random drives"};
+    RandomDrives random(seed);
+    for (long n = 0; n < count; ++n) {
+        const Drive drive = random.drive();
+        const Signals signals = random.signals(drive, 0.2);
+        if (jams(drive)) {
+            ++t.refused;
+            continue;
+        }
+        ++t.cases;
+        const Samples exact = run(drive, signals, 0.2, 2e-3), fine = run(drive, signals, 0.2, 2e-3, {}, 1e-10);
+        if (exact.report.status == Status::done && fine.report.status == Status::done &&
+            difference_at_end(drive, exact, fine.report.x) < 1e-6)
+            continue;
+        adjudicate(t, "seed " + std::to_string(seed) + " drive " + std::to_string(n), drive, signals, 0.2, exact);
+    }
+    return t;
+}
+
+Tally splits(long count, unsigned seed) {
+    Tally t{"runs that are split at a random instant"};
+    RandomDrives random(seed);
+    for (long n = 0; n < count; ++n) {
+        const Drive drive = random.drive();
+        Signals signals = random.signals(drive, 0.25);
+        const int kind = static_cast<int>(n % 4);
+        const double duration = kind < 2 ? 0.25 : 5.0, at = duration * random.uniform(0.02, 0.98);
+        if (jams(drive)) {
+            ++t.refused;
+            continue;
+        }
+        ++t.cases;
+        if (kind > 0) signals = that_end(signals, kind == 1 ? 0.02 : 0.2, kind == 3);
+        const Splitting s = split_run(drive, signals, duration, at);
+        if (same_beyond_rounding(s)) continue;
+        ++t.wrong;
+        std::printf("  %s: seed %u drive %ld at %.9g s: status %d, split %d, gap %.2g, amplification %.2g\n", t.what,
+                    seed, n, at, static_cast<int>(s.status), static_cast<int>(s.split), s.gap, s.amplification);
+    }
+    return t;
+}
+
+Tally self_locking(long count, unsigned seed, bool hysteresis) {
+    Tally t{hysteresis ? "self-locking gears with hysteresis" : "self-locking gears without any other friction"};
+    SelfLockingDrives random(seed, hysteresis);
+    for (long n = 0; n < count; ++n) {
+        const Drive drive = random.drive();
+        const Signals signals = random.reversing(drive);
+        ++t.cases;
+        const Samples whole = run(drive, signals, 1.0, 1e-2);
+        const std::string which = "seed " + std::to_string(seed) + " drive " + std::to_string(n);
+        if (whole.report.status != Status::done)
+            adjudicate(t, which, drive, signals, 1.0, whole);
+        else if (n % 50 == 0)
+            adjudicate(t, which, drive, signals, 0.1, run(drive, signals, 0.1, 1e-3));
+    }
+    return t;
+}
+
+Tally round_numbers(long count, unsigned seed) {
+    Tally t{"drives of round numbers, against the referee"};
+    RoundDrives random(seed);
+    for (long n = 0; n < count; ++n) {
+        const RoundDrives::Run r = random.next(1.0);
+        if (jams(r.drive)) {
+            ++t.refused;
+            continue;
+        }
+        ++t.cases;
+        adjudicate(t, "seed " + std::to_string(seed) + " drive " + std::to_string(n), r.drive, r.signals, 1.0,
+                   run(r.drive, r.signals, 1.0, 1e-2, r.start), r.start);
+    }
+    return t;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    const long count = argc > 1 ? std::atol(argv[1]) : 100000;
+    const unsigned seed = argc > 2 ? static_cast<unsigned>(std::strtoul(argv[2], nullptr, 10)) : 1;
+    std::setvbuf(stdout, nullptr, _IOLBF, 0);
+    std::printf("soak: %ld cases of each kind, seed %u\n", count, seed);
+    long wrong = 0;
+    const auto done = [&wrong](const Tally& t) {
+        t.print();
+        wrong += t.wrong;
+    };
+    done(splits(count, seed));
+    done(self_locking(count, seed, false));
+    done(self_locking(count, seed, true));
+    done(solvers(count / 10, seed));
+    done(round_numbers(count / 100, seed));
+    return wrong > 0;
+}
