@@ -1,5 +1,6 @@
 """Bad input ends in one line that names the file, the key and the remedy, and in exit code 1; nothing is left behind."""
 
+import math
 import re
 import subprocess
 import sys
@@ -221,6 +222,8 @@ PARTS = [
     (lambda: lm.Load(inertia=None), "key inertia: None must be a number in kg*m^2"),
     (lambda: lm.Load(inertia=10**400), "is beyond the range of numbers"),
     (lambda: lm.Load.model_validate({"inertia": -1}), "key inertia: -1.0 must be greater than 0"),
+    (lambda: lm.Load(inertia=1).model_copy(update={"inertia": "1,2 kg*m^2"}), "has a decimal comma"),
+    (lambda: lm.Load(inertia=1).model_copy(update={"inertja": 2}), "key inertja: is not known; did you mean inertia?"),
     (lambda: lm.TorsionCurve(slopes=[1, 2]), "the torsion curve has 2 slopes and 0 breaks"),
     (lambda: lm.TorsionCurve(slopes=5), "key slopes: 5 must be a list"),
     (lambda: lm.CommandSignal(amplitude=3), "the command signal lacks frequency"),
@@ -243,12 +246,36 @@ def test_constructors_refuse_in_the_words_of_the_command_line(make: Callable[[],
 FUNCTIONS = [
     (lambda s: lm.simulate(3), "3 must be a Scenario"),
     (lambda s: lm.simulate(s, solver="euler"), "solver 'euler' is not known"),
+    (lambda s: lm.simulate(s, relative_tolerance=1e-9), "the exact solver has none"),
+    *(
+        (
+            lambda s, t=t: lm.simulate(s, solver="dormand-prince", relative_tolerance=t),
+            f"relative_tolerance {t:g} must lie",
+        )
+        for t in (math.nan, math.inf, -1.0, 0.0, 1e-300, 1.0)
+    ),
     (lambda s: lm.simulate(s.drive()), "needs duration and sample_interval"),
     (lambda s: lm.simulate(s, duration="1,5 s"), 'key duration: "1,5 s" has a decimal comma; write "1.5 s"'),
     (lambda s: lm.simulate(s, command="50 Hz"), 'key command.mean: "50 Hz" has the unit of something else'),
     (lambda s: lm.explain(s, 99.0), "must lie between 0 and the duration"),
-    (lambda s: lm.Simulation(s.drive(), step=0.0), "must be greater than 0 s"),
-    (lambda s: lm.Simulation(s.drive()).advance(-1.0, 0.0), "must be positive"),
+    (lambda s: lm.explain(s, "0,1 s"), 'time: "0,1 s" has a decimal comma'),
+    (lm.explain, "time is missing"),
+    (lambda s: lm.explain(s.drive(), 0.1), "give a Scenario"),
+    (lambda s: lm.check_drive(s.drive()), "give a Scenario"),
+    (lambda s: lm.frequency_response(s, ["60 rpm"], [0.1]), 'frequencies: "60 rpm" is a speed of rotation'),
+    (lambda s: lm.frequency_response(s, [math.nan], [0.1]), "frequencies: nan must be a finite number"),
+    (lambda s: lm.frequency_response(s, [1.0], [0.1], harmonics=0), "harmonics 0 must be 1 or more"),
+    (lambda s: lm.linearize(s, 5), "initial 5 must be a state"),
+    (lambda s: lm.linearize(s, lm.Initial(), command=math.nan), "command: nan must be a finite number"),
+    (lambda s: lm.Simulation(s, step="1,5 ms"), 'step: "1,5 ms" has a decimal comma'),
+    (lambda s: lm.Simulation(s).advance("1 ms", 0.1), 'interval "1 ms", command 0.1 and'),
+    (lambda s: lm.gearbox(5), "gearbox: 5 must be the name of a record"),
+    (lambda s: lm.load(5), "5 must be the name of a scenario"),
+    (lambda s: lm.Scenario.from_json("{"), "is not valid JSON"),
+    (lambda s: lm.Scenario.from_json("[]"), "must be a table"),
+    (lambda s: lm.simulate(s).drop_vars("twist").lm.plot(), "lacks twist"),
+    (lambda s: lm.Simulation(s.drive(), step=0.0), "must lie between"),
+    (lambda s: lm.Simulation(s.drive()).advance(-1.0, 0.0), "must lie between"),
     (lambda s: lm.frequency_response(s.drive(), [-1.0], [0.1]), "frequencies must be positive"),
     (lambda s: lm.periodic_motion(s.drive(), command=0.1), "needs at least one sine"),
     (lambda s: lm.build_loss_map(lm.GearboxSheet(name="x", kind="other", ratio=3)), "lacks rated_output_torque"),
@@ -384,6 +411,11 @@ CALLS = [
     ("an unknown solver", ["run", "good.toml", "--solver", "euler"], ["euler", "exact"]),
     ("a tolerance of zero", ["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "0"], ["tolerance"]),
     (
+        "a tolerance below rounding",
+        ["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "1e-300"],
+        ["--tolerance 1e-300", "between 1e-15 and 0.001"],
+    ),
+    (
         "a tolerance of the exact solver",
         ["run", "good.toml", "--tolerance", "1e-9"],
         ["--tolerance", "exact solver has none"],
@@ -480,6 +512,19 @@ def test_an_unreadable_file_is_refused(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(Path, "read_text", refuse)  # a test that runs as root could read anything
     with pytest.raises(lm.InputError, match=r"secret\.toml: cannot be read: Permission denied"):
         lm.load(path)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".nc", ".parquet"])
+def test_a_result_that_is_cut_off_is_refused_in_plain_words(large: Path, tmp_path: Path, ending: str) -> None:
+    lm.save(lm.simulate(lm.load(large)), tmp_path / f"whole{ending}")
+    content = (tmp_path / f"whole{ending}").read_bytes()
+    for length in (len(content) // 50, len(content) // 2, len(content) - 3):  # the last one within a number
+        cut = tmp_path / f"cut{ending}"
+        cut.write_bytes(content[:length])
+        with pytest.raises(lm.InputError, match=re.escape(cut.name)) as caught:
+            lm.open_result(cut)
+        assert_plain(str(caught.value))
+        assert not re.search("Error|Arrow|sblock|header", str(caught.value))
 
 
 def test_damaged_result_files_are_refused(tmp_path: Path) -> None:

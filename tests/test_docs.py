@@ -82,6 +82,12 @@ def test_the_first_commands_run(tmp_path: Path, page: str) -> None:
             assert line.strip() == "..." or line in printed[0]
 
 
+def test_the_command_of_the_page_on_the_drive_check_runs(tmp_path: Path) -> None:
+    for command in commands_in("docs/drive-check.md"):
+        words = [sys.executable, "-m", "lostmotion", *shlex.split(command)]
+        subprocess.run(words, cwd=tmp_path, check=True, capture_output=True, text=True)
+
+
 def test_every_extra_is_explained_on_the_home_page() -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     page = (ROOT / "docs" / "index.md").read_text()

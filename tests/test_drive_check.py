@@ -269,3 +269,18 @@ def test_the_command_line_says_what_is_wrong():
     assert done.exit_code == 0
     assert "WARNING  holding 20 N·m with command 0: the load torque drives the load" in done.output
     assert "No warnings" not in done.output
+
+
+def test_no_mean_is_judged_ok_by_waiting_while_the_load_sinks():
+    steps = [{"height": 0.5}, {"height": -0.5, "time": 0.5}]
+    changes = {"command": {"steps": steps}, "load.torque": 20.0, "task.hold_without_power": False}
+    scenario = lm.load("catalogue-robot-joint", changes)
+    means = {"average_output_torque", "average_input_speed", "motor_torque", "winding_temperature"}
+    verdicts = {}
+    for duration in (0.5, 20.0, 200.0):
+        found = lm.check_drive(scenario.replace(**{"simulation.duration": duration}))
+        verdicts[duration] = {f.rule: f.verdict for f in found if f.rule in means}
+    assert "unknown" not in verdicts[0.5].values()
+    for duration in (20.0, 200.0):
+        assert set(verdicts[duration]) == means
+        assert "ok" not in verdicts[duration].values()

@@ -1,5 +1,7 @@
 """What a study can vary: records by name, conditions of their use, entries of lists; and what it cannot."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -119,6 +121,26 @@ uniform = [1.0, 2.0]
     assert set(rows["gearbox"]) == set(GEARBOXES)
     assert rows["error"] == [""] * 40
     assert study.parameters(7, 8)[0, 1] == rows["load.inertia"][7]
+
+
+def test_a_constant_load_torque_varies_in_its_own_unit(tmp_path: Path):
+    study, rows = rows_of(
+        write(tmp_path, '[[vary]]\nkey = "load.torque"\nvalues = ["3 N*m", "500 N*cm"]', OVERRUNNING), tmp_path
+    )
+    assert rows["load.torque"] == [3.0, 5.0]
+    assert [scenario_of_run(study, run).load.torque.mean for run in range(2)] == [3.0, 5.0]
+    assert study.vary[0].unit == "N*m"
+    with pytest.raises(lm.InputError, match='"3,5 N\\*m" has a decimal comma'):
+        lm.load_study(write(tmp_path, '[[vary]]\nkey = "load.torque"\nvalues = ["3,5 N*m"]', OVERRUNNING))
+
+
+def test_runs_that_fail_are_counted_on_the_command_line(tmp_path: Path):
+    path = write(tmp_path, '[[vary]]\nkey = "gearbox.temperature"\nvalues = ["20 degC", "40 degC"]')
+    done = subprocess.run(
+        [sys.executable, "-m", "lostmotion", "study", str(path)],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert "1 of 2 runs failed, such as: gearbox schaeffler-rt1-h-20-100: has figures for 20 °C only" in done.stderr
 
 
 def test_the_catalogue_is_filtered_by_figures(tmp_path: Path):

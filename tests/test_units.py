@@ -205,6 +205,9 @@ REFUSED = [
     ("motor.rated_speed", "50 s^-1", 'write "50 rev/s" or "50 rad/s"'),
     ("motor.rated_speed", "1.5 kHz", 'write "1500 rev/s" or "1500 rad/s"'),
     ("command.frequency", "60 rpm", 'write "1 Hz"'),
+    ("load.viscous_friction", "3 N*m/Hz", 'turns or radians; write "3 N*m*s/rev" or "3 N*m*s/rad"'),
+    ("motor.limits.torque_constant", "3 V/kHz", 'write "0.003 V*s/rev" or "0.003 V*s/rad"'),
+    ("motor.rated_speed", "3 rad*Hz", "something else"),
     ("command.frequency", "1 rad/s", '"0.1591549 Hz" for one period in each turn, or "1 Hz"'),
     ("command.frequency", "360 deg/s", 'write "1 Hz"'),
     # the angle of a stiffness

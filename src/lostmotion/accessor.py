@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
+from .errors import InputError
 from .results import energy_of, scenario_of
 from .run_sheet import summary
 from .scenario import Scenario
@@ -37,7 +38,7 @@ class ResultAccessor:
 
         Raises
         ------
-        ValueError
+        InputError
             The dataset is of another kind.
         """
         from . import plots, response_figures
@@ -46,9 +47,9 @@ class ResultAccessor:
             return response_figures.bode_figure({"": self._dataset}, output)
         lacking = [name for name in plots.OVERVIEW if name not in self._dataset]
         if len(lacking) == len(plots.OVERVIEW):
-            raise ValueError("this dataset is neither a run nor a frequency response; there is no figure of it")
+            raise InputError("this dataset is neither a run nor a frequency response; there is no figure of it")
         if lacking:
-            raise ValueError(f"this dataset lacks {', '.join(lacking)}, which the figure of a run shows")
+            raise InputError(f"this dataset lacks {', '.join(lacking)}, which the figure of a run shows")
         return plots.overview(self._dataset)
 
     def plot_maps(self, output: str = "load_speed") -> Figure:
@@ -56,13 +57,13 @@ class ResultAccessor:
 
         Raises
         ------
-        ValueError
+        InputError
             The dataset is no frequency response, or has fewer than two amplitudes or frequencies.
         """
         from . import response_figures
 
         if "response" not in self._dataset:
-            raise ValueError("this dataset is no frequency response; lm.frequency_response makes one")
+            raise InputError("this dataset is no frequency response; lm.frequency_response makes one")
         return response_figures.maps_figure(self._dataset, output)
 
     def summary(self) -> str:

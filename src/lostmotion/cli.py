@@ -171,7 +171,10 @@ def run(
     tolerance: Annotated[
         float | None,
         typer.Option(
-            "--tolerance", metavar="VALUE", parser=number(), help="Relative tolerance of dormand-prince (1e-8)."
+            "--tolerance",
+            metavar="VALUE",
+            parser=number(),
+            help="Relative tolerance of dormand-prince, 1e-15 to 1e-3 (1e-8).",
         ),
     ] = None,
 ) -> None:
@@ -200,6 +203,7 @@ def run(
         raise InputError(
             f"--explain {explain}: must lie between 0 and simulation.duration, {loaded.simulation.duration} s"
         )
+    from .run import TOLERANCES
     from .run import run as work
 
     if solver not in ("exact", "dormand-prince"):
@@ -208,11 +212,11 @@ def run(
         raise InputError(
             f"--tolerance {tolerance:g}: the exact solver has none; leave it out, or add --solver dormand-prince"
         )
-    if tolerance is not None and not tolerance > 0.0:
-        raise InputError(f"--tolerance {tolerance:g}: must be greater than 0")
+    if tolerance is not None and not TOLERANCES[0] <= tolerance <= TOLERANCES[1]:
+        raise InputError(f"--tolerance {tolerance:g}: must lie between {TOLERANCES[0]:g} and {TOLERANCES[1]:g}")
     try:
         with busy("Simulating"):
-            result = work(loaded, solver=solver, relative_tolerance=1e-8 if tolerance is None else tolerance)  # type: ignore[arg-type]
+            result = work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
     except RuntimeError as error:
         raise InputError(f"{scenario}: {error}") from None
     from .run_sheet import summary
@@ -503,6 +507,11 @@ def study(
                 work(loaded, directory, threads=threads, executor=executor, progress=report)
         except KeyboardInterrupt:
             fail(f"interrupted; what is in {directory} stays, and the same command resumes it", 130)
+    from .study_table import failures
+
+    failed = failures(directory)
+    if failed:
+        print(f"{len(failed)} of {loaded.total} runs failed, such as: {failed[0]}", file=sys.stderr)
     print(f"{loaded.total} runs are in {directory}; `lostmotion study show {directory}` shows them")
 
 

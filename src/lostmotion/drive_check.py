@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from . import _core
 from .duty_cycle import DutyCycle, duty_cycle
+from .errors import InputError
 from .holding import holding
 from .parts import Gearbox, Rigid
 from .run import simulate
@@ -23,6 +24,11 @@ INERTIA_RATIO = 10.0  # beyond it a load is usually called hard to control
 NEAR_RESONANCE = 1.5  # a command within this factor of a resonance excites it
 POINTS = 40  # samples to a period of the fastest resonance, so that no peak is missed
 SAMPLES = (2_000, 200_000)  # the fewest of a run, and the most at the finest interval
+
+MOST_IDLE = (
+    0.5  # share of a run that may be motion with command 0, such as a load that sinks, before means are not judged
+)
+MEANS = ("average_output_torque", "average_input_speed", "motor_torque", "winding_temperature")
 
 Verdict = Literal["ok", "warning", "unknown"]
 ARCMIN = 10800.0 / math.pi
@@ -86,6 +92,10 @@ def check_drive(scenario: Scenario) -> tuple[Finding, ...]:
     SolverError
         As `simulate`.
     """
+    if not isinstance(scenario, Scenario):
+        raise InputError(
+            f"{scenario!r:.60} has no task to be checked against; give a Scenario, such as load(path) returns"
+        )
     result = _finely_sampled(scenario)
     cycle = duty_cycle(result, scenario.task.cycle)
     findings = [
@@ -102,7 +112,24 @@ def check_drive(scenario: Scenario) -> tuple[Finding, ...]:
     ]
     if scenario.gearbox.losses.kind == "map":
         findings.append(_loss_map(result))
+    if cycle.holding_torque is None and _idle_share(result) > MOST_IDLE:
+        findings = [_not_judged(f) if f.rule in MEANS and f.verdict == "ok" else f for f in findings]
     return tuple(findings)
+
+
+def _idle_share(result: xarray.Dataset) -> float:
+    """Share of the run after the last command that is not 0."""
+    commanded = result["time"].values[result["command"].values != 0.0]
+    end = float(result["time"][-1])
+    return (end - float(commanded[-1])) / end if len(commanded) else 0.0
+
+
+def _not_judged(finding: Finding) -> Finding:
+    remark = (
+        "with command 0 the load keeps moving until the end of the run, so that this mean depends on the duration; let the run end "
+        "with the move"
+    )
+    return replace(finding, verdict="unknown", remark=remark)
 
 
 def _loss_map(result: xarray.Dataset) -> Finding:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from . import _core
 from .errors import InputError
 from .parts import Drive
+from .quantities import argument
 from .run import core_inputs
 from .scenario import Scenario
 from .stepping import Simulation
@@ -102,7 +103,15 @@ def explain(what: Scenario | Simulation, time: float | None = None) -> Explanati
             raise InputError("a simulation is explained at its present time; leave time out")
         values, contacts = what._core.explain()
         return _explanation(what.drive, what.time, values, contacts)
-    if time is None or not 0.0 <= time <= what.simulation.duration:
+    if not isinstance(what, Scenario):
+        raise InputError(
+            f"{what!r:.60} has no inputs to be explained; give a Scenario, such as load(path) or scenario_of(result) returns, "
+            "or a Simulation"
+        )
+    if time is None:
+        raise InputError(f"time is missing; give one between 0 and the duration, {what.simulation.duration} s")
+    time = argument("time", time, "s")
+    if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     values, contacts = _core.explain_at(*core_inputs(what), time)
     return _explanation(what.drive(), time, values, contacts)

@@ -11,6 +11,7 @@ import numpy as np
 from .errors import InputError, need
 from .linear_analysis import _control
 from .parts import Drive
+from .quantities import arguments
 from .scenario import Initial, Scenario, drive_of, mean_inputs
 from .shooting import MAX_PERIODS, SAMPLES_PER_PERIOD, floquet_multipliers, is_stable, reason_of, respond
 from .signals import CommandSignal, TorqueSignal
@@ -27,7 +28,7 @@ Source = Literal["command", "load_torque"]
 
 def frequency_response(
     drive: Drive | Scenario,
-    frequencies: Sequence[float],
+    frequencies: Sequence[float] | float,
     amplitudes: Sequence[float] | float,
     *,
     source: Source = "command",
@@ -76,15 +77,22 @@ def frequency_response(
         ``load_power``, ``gear_loss`` [W], ``drift`` [rad] a period, ``residual`` of periodicity, ``periods``,
         ``newton_steps``, ``multiplier`` (largest Floquet multiplier), ``stable``, ``reason`` (empty where a motion was
         found; elsewhere why not, and the values are NaN).
+
+    Raises
+    ------
+    InputError
+        An argument cannot be used.
     """
-    frequencies = sorted({float(f) for f in frequencies})
-    amplitudes = [float(a) for a in ([amplitudes] if isinstance(amplitudes, int | float) else amplitudes)]
+    frequencies = sorted(set(arguments("frequencies", frequencies, "Hz")))
+    amplitudes = arguments("amplitudes", amplitudes, "" if source == "command" else "N*m")
     if not frequencies or frequencies[0] <= 0.0:
         raise InputError("frequencies must be positive; give at least one")
     if not amplitudes or min(amplitudes) <= 0.0:
         raise InputError("amplitudes must be positive; give at least one")
     if source not in ("command", "load_torque"):
         raise InputError(f"source {source!r} is not known; it must be command or load_torque")
+    if harmonics < 1:
+        raise InputError(f"harmonics {harmonics} must be 1 or more")
     means = mean_inputs(drive, mean_command, mean_load_torque)
     drive = drive_of(drive)
 

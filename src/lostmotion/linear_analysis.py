@@ -11,6 +11,7 @@ import numpy as np
 from . import _core
 from .errors import InputError, need
 from .parts import ConstantEfficiency, Drive, Rigid
+from .quantities import argument
 from .run import start_state
 from .scenario import Initial, Scenario, drive_of
 from .variables import CONTACTS, STATES
@@ -167,6 +168,7 @@ def linearize(
         The state has no continuation.
     """
     drive = drive_of(drive)
+    command, load_torque = argument("command", command, ""), argument("load_torque", load_torque, "N*m")
     if state is None:
         if regimes := _why_several_regimes(drive):
             raise InputError(
@@ -179,7 +181,7 @@ def linearize(
         start_state(state),
         state.hysteresis_capacity,
         [command, load_torque],
-        [command_rate, load_torque_rate],
+        [argument("command_rate", command_rate, "1/s"), argument("load_torque_rate", load_torque_rate, "N*m/s")],
     )
     n = len(STATES)
     A, B = rates[:, :n], rates[:, n : n + 2]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any, Self
@@ -13,7 +14,7 @@ from pydantic_core import CoreSchema
 
 from .errors import InputError
 from .units import Unit
-from .validation import describe
+from .validation import describe, shown
 
 Number = Annotated[float, Unit("")]
 Torque = Annotated[float, Unit("N*m")]
@@ -97,6 +98,12 @@ class Part(BaseModel):
         with cls._one_error(obj):
             return super().model_validate(obj, **options)
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with changes, which are checked as in the constructor."""
+        if not update:
+            return super().model_copy(deep=deep)
+        return type(self)(**({name: getattr(self, name) for name in self.model_fields_set} | dict(update)))
+
     @classmethod
     def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:
         """As the constructor, from JSON."""
@@ -146,6 +153,29 @@ def abridged(value: Any, longest: int = 6) -> Any:
     if len(value) <= longest:
         return value
     return _Abridged(f"({value[0]!r}, {value[1]!r}, ..., {value[-1]!r}; {len(value)} entries)")
+
+
+def argument(name: str, value: Any, unit: str) -> float:
+    """A number that is given to a function, in `unit` (SI); as a string with its own unit too.
+
+    Raises
+    ------
+    InputError
+        It is no finite number, or has the unit of something else.
+    """
+    try:
+        number = Unit(unit).read(value)
+    except ValueError as error:
+        raise InputError(f"{name}: {shown(value)} {error}") from None
+    if not math.isfinite(number):
+        raise InputError(f"{name}: {shown(value)} must be a finite number")
+    return float(number)
+
+
+def arguments(name: str, values: Any, unit: str) -> list[float]:
+    """Several such numbers, or one alone."""
+    several = values if isinstance(values, Iterable) and not isinstance(values, str) else [values]
+    return [argument(name, value, unit) for value in several]
 
 
 def unit_in_schema(node: Mapping[str, Any]) -> str | None:

@@ -106,6 +106,8 @@ def find(reference: str, table: str) -> GearboxSheet | MotorSheet:
         There is none.
     """
     kind = KINDS[table]
+    if not isinstance(reference, str):
+        raise InputError(f"{table}: {shown(reference)} must be the name of a record, or of a file with one")
     if reference.endswith(".toml"):
         records = read_sheets(Path(reference))
         own = [r for r in records if isinstance(r, kind)]

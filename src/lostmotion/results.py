@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import os
@@ -255,10 +256,16 @@ def open_result(path: str | Path) -> xarray.Dataset:
         return readers[path.suffix](path)
     except InputError:
         raise
-    except Exception as error:  # whatever the format's library makes of a damaged file
-        raise InputError(
-            f"{path}: cannot be read as a result ({type(error).__name__}: {str(error).splitlines()[0]})"
-        ) from None
+    except OSError as error:
+        if error.strerror and error.errno in (errno.EACCES, errno.EPERM):
+            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        raise InputError(_damaged(path)) from None
+    except Exception:  # whatever the format's library makes of a damaged file
+        raise InputError(_damaged(path)) from None
+
+
+def _damaged(path: Path) -> str:
+    return f"{path}: is no {FORMATS[path.suffix]} file of a result, or is damaged or cut off; run the scenario again"
 
 
 def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
@@ -325,7 +332,10 @@ def _read_csv(path: Path) -> xarray.Dataset:
         names = [cell.split(" [")[0] for cell in file.readline().strip().split(",")]
         if not first.startswith("# lostmotion "):
             raise InputError(f"{path}: is no result of lostmotion; its first line does not say so")
-        table = np.loadtxt(file, delimiter=",", ndmin=2)
+        lines = file.readlines()
+        if not lines or not lines[-1].endswith("\n"):
+            raise InputError(_damaged(path))
+        table = np.loadtxt(lines, delimiter=",", ndmin=2)
     return _assemble(first.removeprefix("# lostmotion "), dict(zip(names, table.T.copy(), strict=True)), path)
 
 

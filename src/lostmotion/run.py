@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 SolverName = Literal["exact", "dormand-prince"]
 
+TOLERANCE = 1e-8  # of the adaptive solver, if none is given
+TOLERANCES = (1e-15, 1e-3)  # beyond rounding, and beyond what finds the switching instants
+
 MAX_SWITCHINGS = 100_000  # kept with a result; beyond it they are only counted
 BYTES_PER_SAMPLE = 170  # of a result while it is made, measured
 
@@ -31,7 +34,7 @@ def simulate(
     sample_interval: float | None = None,
     initial: Initial | None = None,
     solver: SolverName = "exact",
-    relative_tolerance: float = 1e-8,
+    relative_tolerance: float | None = None,
     energy: bool = True,
 ) -> xarray.Dataset:
     """Simulate a drive.
@@ -51,7 +54,7 @@ def simulate(
     solver
         ``"exact"``, or ``"dormand-prince"`` for the adaptive second opinion, which keeps no energy ledger.
     relative_tolerance
-        Of the adaptive solver.
+        Of the adaptive solver, 1e-15 to 1e-3; default 1e-8. The exact solver has none.
     energy
         Whether to keep the energy ledger (it takes about as long as the motion).
 
@@ -82,26 +85,32 @@ def simulate(
 
 
 def run(
-    scenario: Scenario, *, solver: SolverName = "exact", relative_tolerance: float = 1e-8, energy: bool = True
+    scenario: Scenario, *, solver: SolverName = "exact", relative_tolerance: float | None = None, energy: bool = True
 ) -> RawResult:
     """As `simulate`, of a scenario, with the result as plain arrays."""
     if solver not in ("exact", "dormand-prince"):
         raise InputError(f'solver {solver!r} is not known; it must be "exact" or "dormand-prince"')
-    if relative_tolerance <= 0.0:
-        raise InputError(f"relative_tolerance {relative_tolerance} must be greater than 0")
+    exact = solver == "exact"
+    if exact and relative_tolerance is not None:
+        raise InputError(
+            f'relative_tolerance {relative_tolerance:g}: the exact solver has none; leave it out, or give solver="dormand-prince"'
+        )
+    tolerance = TOLERANCE if relative_tolerance is None else relative_tolerance
+    least, largest = TOLERANCES
+    if not least <= tolerance <= largest:
+        raise InputError(f"relative_tolerance {tolerance:g} must lie between {least:g} and {largest:g}")
     table = scenario.simulation
     check_memory(table.samples)
-    exact = solver == "exact"
     result = _core.run(
         *core_inputs(scenario),
         table.duration,
         table.sample_interval,
         table.samples,
         energy and exact,
-        0.0 if exact else relative_tolerance,
+        0.0 if exact else tolerance,
         MAX_SWITCHINGS,
     )
-    how = "exact" if exact else f"dormand-prince, relative tolerance {relative_tolerance:g}"
+    how = "exact" if exact else f"dormand-prince, relative tolerance {tolerance:g}"
     return raw_result(scenario, result, how, ledger=energy and exact)
 
 
@@ -185,8 +194,17 @@ def core_inputs(scenario: Scenario) -> tuple[_core.Drive, _core.Signal, _core.Si
 
 
 def start_state(initial: Initial) -> list[float]:
-    """The solver's state vector."""
+    """The solver's state vector.
+
+    Raises
+    ------
+    InputError
+        It is no state.
+    """
     from .variables import STATES
+
+    if not isinstance(initial, Initial):
+        raise InputError(f"initial {shown(initial)} must be a state, such as Initial(motor_speed=100)")
 
     return [getattr(initial, name) for name in STATES]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
@@ -115,7 +114,7 @@ class Scenario(Part):
 
     @classmethod
     def from_json(cls, text: str) -> Scenario:
-        return cls(**json.loads(text))
+        return cls.model_validate_json(text)
 
     @classmethod
     def _described_by(cls) -> dict[str, Any]:
@@ -230,6 +229,7 @@ def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str],
     ------
     InputError
     """
+    overrides = [overrides] if isinstance(overrides, str) else overrides
     items = overrides.items() if isinstance(overrides, Mapping) else [_parse_override(text) for text in overrides]
     try:
         _set_all(data, items)

@@ -11,6 +11,7 @@ from . import scenario
 from .errors import InputError
 from .results import FORMATS, open_result
 from .scenario import Scenario, changed, override
+from .validation import shown
 
 
 def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
@@ -30,6 +31,8 @@ def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) 
     InputError
         With one line that names the file, the key, the value and the remedy.
     """
+    if not isinstance(source, str | Path):
+        raise InputError(f"{shown(source)} must be the name of a scenario, or of a file with a scenario or a result")
     path = Path(source)
     if path.suffix not in FORMATS:
         return scenario.load(source, overrides)

@@ -12,8 +12,10 @@ import numpy as np
 from . import _core
 from .errors import InputError
 from .parts import Drive
+from .quantities import argument
 from .run import start_state
 from .scenario import Initial, Scenario, drive_of
+from .validation import shown
 from .variables import CHANNEL_NAMES, VARIABLES
 
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 1e-12, 1e12
@@ -52,6 +54,7 @@ class Simulation:
     """
 
     def __init__(self, drive: Drive | Scenario, *, step: float = 1e-3, initial: Initial | None = None) -> None:
+        step = argument("step", step, "s")
         if not SHORTEST_INTERVAL <= step <= LONGEST_INTERVAL:
             raise InputError(f"step {step} s must lie between {SHORTEST_INTERVAL:g} s and {LONGEST_INTERVAL:g} s")
         if initial is None:
@@ -113,11 +116,18 @@ class Simulation:
         """
         c0, c1 = command if isinstance(command, tuple) else (command, command)
         m0, m1 = load_torque if isinstance(load_torque, tuple) else (load_torque, load_torque)
-        if not SHORTEST_INTERVAL <= interval <= LONGEST_INTERVAL:
+        try:
+            within = SHORTEST_INTERVAL <= interval <= LONGEST_INTERVAL
+            finite = c0 - c0 == 0.0 and c1 - c1 == 0.0 and m0 - m0 == 0.0 and m1 - m1 == 0.0
+        except TypeError:
+            raise InputError(
+                f"interval {shown(interval)}, command {shown(command)} and load_torque {shown(load_torque)} must be numbers (SI)"
+            ) from None
+        if not within:
             raise InputError(
                 f"interval {interval} s must lie between {SHORTEST_INTERVAL:g} s and {LONGEST_INTERVAL:g} s"
             )
-        if not (c0 - c0 == 0.0 and c1 - c1 == 0.0 and m0 - m0 == 0.0 and m1 - m1 == 0.0):
+        if not finite:
             raise InputError(f"command {command} and load_torque {load_torque} must be finite")
         if self.time + interval == self.time:
             raise InputError(

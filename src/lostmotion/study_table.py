@@ -27,6 +27,15 @@ def read_table(directory: Path) -> pa.Table:
     return ds.dataset(files, format="parquet").to_table().sort_by("run")
 
 
+def failures(directory: Path) -> list[str]:
+    """Why runs have failed, each reason once for each of them."""
+    import pyarrow.dataset as ds
+
+    files = sorted(str(p) for p in directory.glob("part-*.parquet"))
+    table = ds.dataset(files, format="parquet").to_table(columns=["error"], filter=ds.field("error") != "")
+    return [str(reason) for reason in table["error"].to_pylist()]
+
+
 def unit_of(table: pa.Table, name: str) -> str:
     """Unit of a column, ``"1"`` for a plain number; empty where it is not known."""
     return str((table.schema.field(name).metadata or {}).get(b"units", b"").decode())

@@ -39,6 +39,8 @@ def unit_of_key(key: str) -> str | None:
             for node in nodes
         ]
         nodes = [option for node in inner if node is not None for option in _options(node)]
+    if any({"mean", "sines"} <= node.get("properties", {}).keys() for node in nodes):
+        return unit_of_key(f"{key}.mean")  # a signal, which one value makes constant
     return next((unit for node in nodes if (unit := unit_in_schema(node)) is not None), None)
 
 

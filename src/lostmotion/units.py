@@ -204,12 +204,22 @@ def _factor(units: Product, unit: str) -> Decimal | None:
 
 def _readings(units: Product, wanted: Product) -> Iterator[Product]:
     """What a product may mean where `wanted` is: as it stands, with turns for a speed in 1/min, with pounds as forces."""
+    if any(name.endswith("hertz") for name in units) and not any(name.endswith("hertz") for name in wanted):
+        return  # whether turns or radians are counted cannot be told
     turns = angle_of(wanted)
     if turns and angle_of(units) == 0 and units.get("minute", 0) == -turns:
         yield units | {"revolution": turns}
         return  # 1/min is never rad/min
     yield units
     yield from _as_forces(units, POUNDS)
+
+
+def _with(units: Product, name: str, other: Product) -> Product:
+    """A product with another one, to the same power, in the place of a unit."""
+    rest = {n: power for n, power in units.items() if n != name}
+    for n, power in other.items():
+        rest[n] = rest.get(n, 0) + power * units[name]
+    return {n: power for n, power in rest.items() if power}
 
 
 def _as_forces(units: Product, masses: tuple[str, ...]) -> Iterator[Product]:
@@ -263,8 +273,21 @@ def _of_something_else(digits: str, units: Product, symbol: str, unit: str) -> s
         plainly = f', or "{digits} Hz" for that many periods in a second' if "radian" in units else ""
         value = f"{float(Decimal(digits) * turns):.7g}"
         return f'is a speed of rotation, not a frequency; write "{value} Hz" for one period in each turn{plainly}'
+    if counted := next((name for name in units if name.endswith("hertz")), None):
+        speeds = [{angle: 1, "second": -1} for angle in ("revolution", "radian")]
+        by_speed = [_with(units, counted, speed) for speed in speeds]
+        if all(_factor(reading, unit) is not None for reading in by_speed):
+            value = (
+                f"{float(Decimal(digits) * (_ratio({counted: units[counted]}, {'hertz': units[counted]}) or 1)):.7g}"
+            )
+            return "may mean turns or radians; write " + " or ".join(f'"{value} {written(r)}"' for r in by_speed)
     angle = angle_of(wanted)
-    if angle and _ratio(units, {}) is None and _ratio(units | {"radian": angle}, wanted) is not None:
+    if (
+        angle
+        and angle_of(units) == 0
+        and _ratio(units, {}) is None
+        and _ratio(units | {"radian": angle}, wanted) is not None
+    ):
         both = (written(units | {name: angle}) for name in ("radian", "arcminute"))
         return "lacks the angle; write " + " or ".join(f'"{digits} {text}"' for text in both)
     for reading in _as_forces(units, tuple(FORCE_OF)):
