@@ -77,6 +77,7 @@ class ExactSolver {
     const Memory& memory() const { return now_.memory; }
     const RegimeKey& key() const { return key_; }
     const Regime& regime() { return cache_.regime(key_); }
+    const Regime& regime(const RegimeKey& key) { return cache_.regime(key); }
     const std::vector<InputBasis>& basis() const { return turns_.basis(); }
     double unit() const { return unit_; }
     Contact stopped_at() const { return stopped_at_; }

@@ -59,7 +59,7 @@ class Simulation {
     // Variables at the present instant, with the inputs at their last values.
     Reading reading() {
         if (!now_.started) advance_nowhere();
-        const Regime regime = system_.build(now_.key);
+        const Regime& regime = solver_.regime(now_.key);
         return Reader(drive_, regime, now_.memory)(now_.x, now_.input);
     }
     Regime regime() const { return system_.build(now_.key); }
