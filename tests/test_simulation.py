@@ -244,10 +244,10 @@ def test_end_state_continues_a_run(small: Path) -> None:
 @pytest.mark.parametrize("interval", [math.inf, 1e300, 1e-300, 0.0, -1e-3, math.nan])
 def test_intervals_that_no_motion_can_have_are_refused(interval):
     drive = lm.load("paper-2dof-nl-small").drive()
-    with pytest.raises(lm.InputError, match="must lie between 1e-12 s and 1e\\+12 s"):
+    with pytest.raises(lm.InputError, match=r"must lie between 1e-12 s and 1e\+12 s|must be a finite number"):
         lm.Simulation(drive, step=interval)
     simulation = lm.Simulation(drive)
-    with pytest.raises(lm.InputError, match="must lie between 1e-12 s and 1e\\+12 s"):
+    with pytest.raises(lm.InputError, match=r"must lie between 1e-12 s and 1e\+12 s|must be a finite number"):
         simulation.advance(interval, command=0.1)
     assert simulation.time == 0.0
 
