@@ -77,6 +77,15 @@ inline double difference_at_end(const Drive& drive, const Samples& run, const St
     return worst;
 }
 
+// All values of the inputs times 1 + 1e-14: what this changes in a motion, rounding may change as well.
+inline Signals perturbed(Signals signals) {
+    for (Signal& s : signals) {
+        for (Knot& k : s.knots) k.value *= 1.0 + 1e-14, k.slope *= 1.0 + 1e-14;
+        for (Sine& q : s.sines) q.amplitude *= 1.0 + 1e-14;
+    }
+    return signals;
+}
+
 struct Splitting {
     Status status = Status::done, split = Status::done;
     double time = 0.0;           // [s] reached
@@ -104,12 +113,7 @@ inline Splitting split_run(const Drive& drive, const Signals& signals, double du
     if (out.split != Status::done) return out;
     out.gap = difference_at_end(drive, whole, solver.state());
     if (out.gap > 1e-10) {
-        Signals changed = signals;
-        for (Signal& s : changed) {
-            for (Knot& k : s.knots) k.value *= 1.0 + 1e-14, k.slope *= 1.0 + 1e-14;
-            for (Sine& q : s.sines) q.amplitude *= 1.0 + 1e-14;
-        }
-        const Samples other = run(drive, changed, duration, interval);
+        const Samples other = run(drive, perturbed(signals), duration, interval);
         out.amplification = other.report.status == Status::done ? difference_at_end(drive, whole, other.report.x) : 1.0;
     }
     return out;

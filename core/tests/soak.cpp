@@ -34,12 +34,7 @@ void adjudicate(Tally& t, const std::string& which, const Drive& drive, const Si
         return;
     }
     // What a change of the inputs by 1e-14 does, too, is rounding that the motion amplifies.
-    Signals changed = signals;
-    for (Signal& s : changed) {
-        for (Knot& k : s.knots) k.value *= 1.0 + 1e-14, k.slope *= 1.0 + 1e-14;
-        for (Sine& q : s.sines) q.amplitude *= 1.0 + 1e-14;
-    }
-    const Samples other = run(drive, changed, duration, duration / 100.0, start);
+    const Samples other = run(drive, perturbed(signals), duration, duration / 100.0, start);
     if (exact.report.status == Status::done && other.report.status == Status::done &&
         difference_at_end(drive, exact, other.report.x) > 1e-9)
         return;
