@@ -92,9 +92,12 @@ class SwitchedDrive {
     explicit SwitchedDrive(const Drive& drive) : drive_(drive) { drive_changed(); }
     // To be called when the drive that this refers to has been given other parameters.
     void drive_changed() {
-        (far_from_event / clear_of_zero * lostmotion::load(drive_.rated_scale())).store(near_state_.data());
-        near_input_ = {far_from_event / clear_of_zero,
-                       far_from_event / clear_of_zero * drive_.gearbox.rated_output_torque};
+        (far_from_event * lostmotion::load(drive_.rated_scale())).store(near_state_.data());
+        near_input_ = {far_from_event, far_from_event * drive_.gearbox.rated_output_torque};
+    }
+    // What each guard has to exceed, beside its share of its terms, to be far from an event.
+    void near_event(const GuardTable& guards, GuardTable::Values& out) const {
+        guards.rate_sizes(near_state_, near_input_, out);
     }
     const Drive& drive() const { return drive_; }
     Regime build(const RegimeKey& key) const { return drive_.build(key); }
@@ -197,10 +200,9 @@ class SwitchedDrive {
     template <class Cache>
     bool breaks_away(Cache& cache, Instant& now, const Event& event, RegimeKey& key) const {
         const Contact c = event.fired->contact;
-        const auto size = [&](const State& x, const std::array<double, n_inputs>& u) {
-            return magnitude(event.fired->form, x, now.memory, u);
-        };
-        if (size(now.x, now.input[0]) <= far_from_event / clear_of_zero * size(near_state_, near_input_)) return false;
+        const auto& ended = cache.entry(event.before);
+        const auto guard = static_cast<std::size_t>(event.fired - ended.regime.guards.data());
+        if (magnitude(event.fired->form, now.x, now.memory, now.input[0]) <= ended.near_event[guard]) return false;
         Modes modes = key.modes;
         modes[c] = static_cast<std::int8_t>(event.fired->neighbour);
         Event slipping{event.at_rest, event.T_2};
@@ -399,16 +401,13 @@ class SwitchedDrive {
         GuardTable::Values constant, value, size, slope, slope_size;
         guards.constants(now.memory, constant);
         guards.evaluate(constant, now.x, now.input[0], value);
-        State span;
-        (lostmotion::load(magnitudes(now.x)) + lostmotion::load(near_state_)).store(span.data());
-        guards.sizes(magnitudes(now.memory), span,
-                     {now.input_size[0] + near_input_[0], now.input_size[1] + near_input_[1]}, size);
+        guards.sizes(magnitudes(now.memory), magnitudes(now.x), now.input_size, size);
         unsigned near = 0;
         for (int g = 0; g < guards.rows(); g += vec_width)
-            near |= (all_bits & ~above(load(&value[g]), clear_of_zero * load(&size[g]))) << g;
+            near |= (all_bits & ~above(load(&value[g]), clear_of_zero * load(&size[g]) + load(&entry.near_event[g])))
+                    << g;
         near &= ~ignored;
         if (near == 0) return {nullptr, false};
-        guards.sizes(magnitudes(now.memory), magnitudes(now.x), now.input_size, size);
         Flow flow(entry.rates, now);
         const auto& [rate, rate_size] = flow.rate();
         guards.rates(rate, now.input[1], slope);
@@ -473,7 +472,7 @@ class SwitchedDrive {
     static constexpr double largest_violation = 1e-6;  // that rounding may make
 
     const Drive& drive_;
-    State near_state_{};  // magnitudes of states and inputs that a guard must exceed to be far from an event
+    State near_state_{};  // magnitudes of states and inputs whose part in a guard it must exceed
     std::array<double, n_inputs> near_input_{};
 };
 

@@ -27,8 +27,10 @@ class Cursor {
         } else {
             arrive(load(x));
         }
-        carries_rate_ = input_.constant() && (rate != nullptr || driven());
+        constant_inputs_ = input_.constant();
+        carries_rate_ = constant_inputs_ && (rate != nullptr || driven());
     }
+    bool constant_inputs() const { return constant_inputs_; }  // where it was placed
     bool carries_rate() const { return carries_rate_; }
     // From now on nothing moves but the load angle.
     void settle() {
@@ -157,7 +159,7 @@ class Cursor {
     State x_{};
     mutable State rate_{};  // once it has been asked for
     mutable bool rate_known_ = false;
-    bool carries_rate_ = false;
+    bool constant_inputs_ = false, carries_rate_ = false;
 };
 
 }  // namespace lostmotion

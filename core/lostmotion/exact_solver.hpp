@@ -45,6 +45,12 @@ struct Course {
     bool off_zero = false;    // has it been off zero?
     double touch_size = 0.0;  // the largest size of its terms [rad/s]
     double doubt = 0.0;       // rounding of the rate where the regime began, relative to the rate
+
+    // In another regime: what is kept of the numbers means nothing.
+    void forget() {
+        rate_known = off_zero = false;
+        touch_size = doubt = 0.0;
+    }
 };
 
 template <class System>
@@ -130,7 +136,7 @@ class ExactSolver {
             Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
                                     now_.x};
             begin_->place(entry.propagator, segment.constant, now_.x, course_.rate_known ? &course_.rate : nullptr);
-            if (begin_->input().constant() && has_settled(entry.regime, begin_->rate())) begin_->settle();
+            if (begin_->constant_inputs() && has_settled(entry.regime, begin_->rate())) begin_->settle();
             if (!(time_ < knot_)) knot_ = next_knot(signals_, time_);
             const double limit = std::min(t_end, knot_);
             const Guard* fired = nullptr;
@@ -184,7 +190,7 @@ class ExactSolver {
     // After a change of the inputs: if the regime goes on, the rate jumps by no more than what they bring.
     void follow_inputs(const RegimeKey& before) {
         if (!course_.rate_known || !(key_ == before)) {
-            course_ = {};
+            course_.forget();
             return;
         }
         const LinearRates& rates = cache_.entry(key_).rates;
@@ -226,7 +232,7 @@ class ExactSolver {
         if (fired == nullptr)
             follow_inputs(before);
         else
-            course_ = {};
+            course_.forget();
         ++switchings_;
         return accumulation_.add(time_, unit_) ? Status::zeno : Status::done;
     }
@@ -250,7 +256,7 @@ class ExactSolver {
         e.guards.constants(segment.memory, constant);
         Cursor *cursor = begin_, *end = there_;
         Ends *here = &ends_[0], *there = &ends_[1];
-        const bool constant_inputs = cursor->input().constant();
+        const bool constant_inputs = cursor->constant_inputs();
         if (!course_.rate_known && cursor->carries_rate()) course_.doubt = rate_doubt(e, *cursor, segment.memory);
         evaluate(e, constant, *cursor, *here);
         Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
@@ -277,7 +283,7 @@ class ExactSolver {
             if (!(std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100)) return Status::outside;
             const Coupled fourth = absolute(cursor->fourth_derivative());
             const double left = limit - time_;
-            while (!p.level(level).bounded) --level;  // the motion grows beyond all bounds before a look that long ends
+            level = p.bounded_level(level);
             double h = std::min(p.length(level), left);
             while (true) {
                 if (h == p.length(level)) {
@@ -397,8 +403,9 @@ class ExactSolver {
             const bool falls = std::max(d0, std::max(d1, d2)) < -slope_share * error;
             if (rises && c.c0 >= -tolerance && !(touches && c.c0 <= touch)) continue;
             if (falls && c.c3 >= -tolerance) continue;
+            const bool starts_on_zero = c.c0 <= rounding * size[g];
             if (falls) {
-                crossing_[n_crossing_++] = {g, false};
+                crossing_[n_crossing_++] = {g, false, starts_on_zero};
                 continue;
             }
             if (c.c0 <= tolerance && !touches && departs(e, memory, cursor, g, h)) continue;
@@ -414,9 +421,9 @@ class ExactSolver {
             // The cubic is the guard to rounding, or as near as the shortest look comes; does it dip below zero?
             const double lowest = c(c.lowest_at());
             if (lowest < -std::max(tolerance, error))
-                crossing_[n_crossing_++] = {g, false};
+                crossing_[n_crossing_++] = {g, false, starts_on_zero};
             else if (touches && lowest <= resolved)
-                crossing_[n_crossing_++] = {g, true};
+                crossing_[n_crossing_++] = {g, true, starts_on_zero};
         }
         return n_crossing_ > 0 ? Verdict::crossing : Verdict::clear;
     }
@@ -465,7 +472,7 @@ class ExactSolver {
         };
         std::array<double, max_guards> estimate;
         for (int k = 0; k < n_crossing_; ++k) {
-            const auto& [g, touch] = crossing_[k];
+            const auto& [g, touch, starts_on_zero] = crossing_[k];
             const Cubic c = cubic(g);
             estimate[g] = touch ? c.lowest_at() : c.zero(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
         }
@@ -473,14 +480,14 @@ class ExactSolver {
             std::sort(crossing_.begin(), crossing_.begin() + n_crossing_,
                       [&](const Crossing& a, const Crossing& b) { return estimate[a.guard] < estimate[b.guard]; });
         for (int k = 0; k < n_crossing_; ++k) {
-            const auto& [g, touch] = crossing_[k];
+            const auto& [g, touch, starts_on_zero] = crossing_[k];
             // Still positive where another has crossed: later.
             if (k > 0 && cubic(g)(best / h) > bounds_.error[g]) continue;
             double s = estimate[g] * h;
             if (touch) {
                 trial_->advance_from(cursor, s);
             } else {
-                s = find_zero(e, g, memory, cursor, here.value[g], s, h);
+                s = find_zero(e, g, memory, cursor, starts_on_zero, s, h);
             }
             if (s < best) {
                 best = s;
@@ -507,14 +514,14 @@ class ExactSolver {
         return high;
     }
 
-    // Where a guard that starts with this value falls through zero within h, near an estimate. Leaves trial_ there,
+    // Where a guard falls through zero within h, near an estimate. Leaves trial_ there,
     // returns when. About the nearest instant that whole levels lead to, the guard is a polynomial to rounding.
-    double find_zero(typename Cache::Entry& e, int g, const Memory& memory, const Cursor& cursor, double start,
+    double find_zero(typename Cache::Entry& e, int g, const Memory& memory, const Cursor& cursor, bool starts_on_zero,
                      double estimate, double h) {
         const LinearForm form = e.guards.form(g);
         const double base = e.propagator.length(0);
         double low = 0.0, high = h, s = estimate;
-        if (start <= rounding * magnitude(form, cursor.x(), memory, cursor.input().values())) {
+        if (starts_on_zero) {
             if (const auto order = departure(e, memory, cursor, g).order; order > 0) {
                 const double end = std::min(h, base);
                 if (const double z = first_return(form, cursor, order, end); z < end) return z;
@@ -583,7 +590,7 @@ class ExactSolver {
     bool roomy_ = false;  // in the last look the guards that were clear were so by far
     struct Crossing {
         int guard;
-        bool touch;
+        bool touch, starts_on_zero;
     };
     std::array<Crossing, max_guards> crossing_{};
     int n_crossing_ = 0;

@@ -22,10 +22,9 @@ namespace lostmotion {
 
 // Everything needed to step by one length h in one regime.
 struct Step {
-    Integral integral;    // G(h)
-    Matrix growth;        // bound on |exp(A s)|, element by element, for 0 <= s <= h; 1e200 if it is no less
-    Matrix change;        // E(h) = exp(A h) - 1
-    bool bounded = true;  // whether `growth` is a bound
+    Integral integral;  // G(h)
+    Matrix growth;      // bound on |exp(A s)|, element by element, for 0 <= s <= h; 1e200 if it is no less
+    Matrix change;      // E(h) = exp(A h) - 1
 };
 
 // What a pair of functions of the inputs brings over one length.
@@ -90,6 +89,11 @@ class Propagator {
     const Step& level(int k) {
         while (levels_ <= k) add_doubled();
         return steps_[k];
+    }
+    // The level or, if the motion grows beyond all bounds before it ends, the highest whose `growth` is a bound.
+    int bounded_level(int k) {
+        level(k);
+        return std::min(k, bounded_);
     }
     const Response* responses(int k) const { return responses_.data() + k * n_pairs_; }
     const Turn* turns(int k) const { return turns_of_level_[k]; }
@@ -181,7 +185,7 @@ class Propagator {
     void add_base() {
         make_room();
         Step& s = steps_[0];
-        s.bounded = true;
+        bounded_ = max_levels;
         const double h = base_;
         s.integral = taylor_.integral(h);
         s.change = rates().rate * s.integral.coupled;
@@ -219,9 +223,9 @@ class Propagator {
             const Coupled size = absolute(Matrix::identity().at(c) + load(change));
             least(most(a.growth.at(c), a.growth * size), unbounded).store(b.growth.column[c].data());
         }
-        b.bounded = a.bounded;
         for (int c = 0; c < n_coupled; ++c)
-            for (const double bound : b.growth.column[c]) b.bounded = b.bounded && bound < unbounded;
+            for (const double bound : b.growth.column[c])
+                if (!(bound < unbounded)) bounded_ = std::min(bounded_, k);
         const Coupled angle = angle_change(a.integral);
         (2.0 * load(a.integral.angle) + a.integral.coupled.after(angle)).store(b.integral.angle.data());
         b.integral.length = 2.0 * a.integral.length;
@@ -270,9 +274,10 @@ class Propagator {
     Taylor taylor_;
     double base_ = 0.0;  // length of level 0 [s]
     double per_first_ = 0.0;
-    int exponent_ = 0;  // of two: base / unit
-    int longest_ = 0;   // level
-    int n_pairs_ = 0;   // of functions of the inputs
+    int exponent_ = 0;          // of two: base / unit
+    int longest_ = 0;           // level
+    int bounded_ = max_levels;  // the highest level whose growth is bounded, as far as they are computed
+    int n_pairs_ = 0;           // of functions of the inputs
     InputTurns* turns_ = nullptr;
     int levels_ = 0;
     std::vector<Step> steps_;          // one a level, kept when others are reckoned

@@ -33,6 +33,7 @@ class RegimeCache {
         };
         std::array<TwistSpeed, n_contacts> twist_speeds{};
         int n_twist_speeds = 0;
+        GuardTable::Values near_event;  // what each guard exceeds where it is far from an event
         Propagator propagator;
         std::array<Entry*, max_guards> neighbour{};  // what lies beyond each guard, as far as it is known
 
@@ -56,6 +57,7 @@ class RegimeCache {
                 }
                 if (r.guards[g].kind == Guard::speed || r.guards[g].kind == Guard::capacity) contacts |= 1u << g;
             }
+            if constexpr (requires { system.near_event(guards, near_event); }) system.near_event(guards, near_event);
             propagator.reset();
         }
         void prepare(InputTurns& turns, const State& scale) { propagator.prepare(rates, turns, scale); }
