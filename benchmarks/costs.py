@@ -14,8 +14,8 @@ from report import Report, best
 
 import lostmotion as lm
 from lostmotion import _core
-from lostmotion.run import core_inputs
-from lostmotion.variables import CHANNEL_NAMES
+from lostmotion.simulation.run import core_inputs
+from lostmotion.simulation.variables import CHANNEL_NAMES
 
 CORES = os.cpu_count() or 1
 PLANE = {

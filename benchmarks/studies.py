@@ -16,9 +16,9 @@ from report import Report, best
 
 import lostmotion as lm
 from lostmotion import _core
-from lostmotion.run import core_inputs
-from lostmotion.study_file import CHUNK, to_json
-from lostmotion.variables import CHANNEL_NAMES
+from lostmotion.simulation.run import core_inputs
+from lostmotion.simulation.variables import CHANNEL_NAMES
+from lostmotion.studies.file import CHUNK, to_json
 
 CORES = os.cpu_count() or 1
 KEEP = {"peak": "peak(load_speed)", "rms": "rms(twist)"}

@@ -10,12 +10,12 @@ from typing import Any
 from typer.main import get_command
 
 import lostmotion as lm
-from lostmotion import signals
 from lostmotion.cli import app
-from lostmotion.quantities import unit_in_schema
-from lostmotion.scenario import json_schema
-from lostmotion.unit_grammar import PREFIXED, SPELLINGS
-from lostmotion.variables import VARIABLES
+from lostmotion.inputs.quantities import unit_in_schema
+from lostmotion.model import signals
+from lostmotion.simulation.scenario import json_schema
+from lostmotion.simulation.variables import VARIABLES
+from lostmotion.units.grammar import PREFIXED, SPELLINGS
 
 OUT = Path(__file__).parent / "_generated"
 

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import lostmotion as lm
-from lostmotion.scenario import Scenario
+from lostmotion.simulation.scenario import Scenario
 
 GOOD = """
 [command]
@@ -495,7 +495,7 @@ def test_an_old_result_survives_a_failed_write(tmp_path: Path, monkeypatch: pyte
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("lostmotion.results._header", full)
+    monkeypatch.setattr("lostmotion.simulation.results._header", full)
     with pytest.raises(lm.InputError, match="No space left"):
         lm.save(result, target)
     assert target.read_bytes() == old

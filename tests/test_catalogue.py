@@ -12,14 +12,14 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
-from lostmotion.data_sheet import GearboxSheet, Lubricant, MotorSheet
-from lostmotion.drive_check import check_drive
+from lostmotion.data_sheets.loss_map_builder import build_loss_map
+from lostmotion.data_sheets.records import catalogue, find, gearbox_table, parse_sheets
+from lostmotion.data_sheets.sheets import GearboxSheet, Lubricant, MotorSheet
 from lostmotion.errors import InputError
-from lostmotion.loss_map_builder import build_loss_map
 from lostmotion.paper import paper_scenario
-from lostmotion.records import catalogue, find, gearbox_table, parse_sheets
-from lostmotion.scenario import gearbox_from_record
-from lostmotion.test_rig import Comparison, TestRig, _compare
+from lostmotion.simulation.scenario import gearbox_from_record
+from lostmotion.sizing.drive_check import check_drive
+from lostmotion.test_rig.rig import Comparison, TestRig, _compare
 
 RPM = math.pi / 30.0
 ARCMIN = math.pi / 10800.0

@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from conftest import ROOT, SCENARIOS
-from lostmotion import plots
 from lostmotion.cli import app
-from lostmotion.listing import list_records
+from lostmotion.reports import plots
+from lostmotion.reports.listing import list_records
 
 SMALL = "paper-2dof-nl-small"
 
@@ -302,13 +302,13 @@ def on_a_terminal(script: str, cwd: Path) -> str:
 
 
 def test_long_work_shows_what_it_does_and_short_work_nothing(tmp_path: Path) -> None:
-    script = "import time; from lostmotion.terminal import busy\nwith busy('Simulating'): time.sleep({})"
+    script = "import time; from lostmotion.cli.terminal import busy\nwith busy('Simulating'): time.sleep({})"
     assert "Simulating 0:00:0" in on_a_terminal(script.format(1.5), tmp_path)
     assert on_a_terminal(script.format(0.01), tmp_path) == ""
 
 
 def test_the_rig_reports_its_progress_to_the_end() -> None:
-    from lostmotion.test_rig import WORK
+    from lostmotion.test_rig.rig import WORK
 
     steps: list[None] = []
     gearbox = lm.load(SMALL).gearbox

@@ -95,7 +95,7 @@ def test_every_extra_is_explained_on_the_home_page() -> None:
 
 
 def test_the_paper_is_cited_in_full_where_it_is_meant() -> None:
-    for page in ("README.md", "docs/citing.md", "CITATION.cff", "src/lostmotion/report.html.jinja"):
+    for page in ("README.md", "docs/citing.md", "CITATION.cff", "src/lostmotion/paper/report.html.jinja"):
         text = " ".join((ROOT / page).read_text().replace(">", " ").split()).lower()
         for word in ("simplified dynamic model of the transmission", "ft-ta3/103", "jevický"):
             assert word in text, page

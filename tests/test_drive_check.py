@@ -9,10 +9,10 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT, SCENARIOS
 from lostmotion.cli import app
-from lostmotion.drive_check import RULES, Finding, check_drive
-from lostmotion.duty_cycle import DutyCycle, duty_cycle
-from lostmotion.holding import holding
-from lostmotion.scenario import from_tables
+from lostmotion.simulation.scenario import from_tables
+from lostmotion.sizing.drive_check import RULES, Finding, check_drive
+from lostmotion.sizing.duty_cycle import DutyCycle, duty_cycle
+from lostmotion.sizing.holding import holding
 
 RPM = math.pi / 30.0
 

@@ -14,75 +14,50 @@ from lostmotion import _instruction_set
 
 PACKAGE = ROOT / "src" / "lostmotion"
 
-# Each module may import only from rooms before its own. The way of the data: parts -> scenario -> run -> dataset ->
-# analysis -> plots -> report -> command line.
-ROOMS = [
-    {"_instruction_set", "errors"},
-    {"_core", "variables", "unit_grammar", "validation"},
+# Each package may import only from those in layers below its own, each module of the root counts as a package. The way of
+# the data: units -> parts -> scenario -> run -> dataset -> analysis -> figures and reports -> command line.
+LAYERS = [
+    {"errors", "_instruction_set"},
+    {"_core"},
     {"units"},
-    {"quantities", "notebook", "toml_files", "series_files"},
-    {"signals", "parts", "task"},
-    {"data_sheet"},
-    {"loss_map_builder"},
-    {"records"},
-    {"scenario"},
-    {"switchings"},
-    {"results"},
-    {"sources"},
-    {"run"},
-    {"test_rig"},
-    {"duty_cycle", "holding"},
-    {"drive_check"},
-    {"stepping"},
-    {"explanation"},
-    {"linear_analysis"},
-    {"shooting"},
-    {"harmonic_response"},
+    {"inputs"},
+    {"model"},
+    {"data_sheets"},
+    {"simulation"},
+    {"response", "test_rig"},
+    {"sizing"},
+    {"studies"},
+    {"reports"},
     {"paper"},
-    {"panels"},
-    {"plots"},
-    {"pages"},
-    {"sheet_rows", "grids"},
-    {"rig_sheet"},
-    {"study_units", "study_measures", "study_design"},
-    {"study_functions"},
-    {"study_expressions", "study_records", "study_select"},
-    {"study_check"},
-    {"study_vary"},
-    {"study_file"},
-    {"study_chunk"},
-    {"study_engine", "study_table"},
-    {"study_selection"},
-    {"study_selection_report"},
-    {"study_report"},
-    {"listing"},
-    {"response_figures"},
-    {"response_sheet"},
-    {"run_sheet", "terminal"},
-    {"accessor"},
-    {"reproduce", "report"},
     {"cli"},
     {"__init__", "__main__"},
 ]
+MODULES = sorted(p.relative_to(PACKAGE) for p in PACKAGE.rglob("*.py"))
 
 
-def imports_of(path: Path) -> set[str]:
+def room_of(module: Path) -> str:
+    """The package of a module, by its path below the root."""
+    return module.parts[0] if len(module.parts) > 1 else module.stem
+
+
+def imports_of(module: Path) -> set[str]:
+    """Packages, other than its own, from which a module imports anywhere, also inside its functions."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.level == 1:
+    depth = len(module.parts)
+    for node in ast.walk(ast.parse((PACKAGE / module).read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level == depth:
             found |= {node.module.split(".")[0]} if node.module else {a.name for a in node.names}
     return found
 
 
-def test_every_module_has_its_room() -> None:
-    assert {p.stem for p in PACKAGE.glob("*.py")} | {"_instruction_set"} == set.union(*ROOMS)
+def test_every_package_has_its_layer() -> None:
+    assert {room_of(m) for m in MODULES} | {"_instruction_set"} == set.union(*LAYERS)
 
 
-@pytest.mark.parametrize("path", sorted(PACKAGE.glob("*.py")), ids=lambda p: p.stem)
-def test_imports_go_one_way(path: Path) -> None:
-    room = next(k for k, names in enumerate(ROOMS) if path.stem in names)
-    allowed = set.union(*ROOMS[: room + 1])
-    assert imports_of(path) <= allowed
+@pytest.mark.parametrize("module", MODULES, ids=str)
+def test_imports_go_to_lower_layers_only(module: Path) -> None:
+    layer = next(k for k, names in enumerate(LAYERS) if room_of(module) in names)
+    assert imports_of(module) <= set().union(*LAYERS[:layer])
 
 
 def test_importing_takes_no_plotting_or_data_library_along() -> None:

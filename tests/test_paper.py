@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 import lostmotion as lm
+from lostmotion.model.parts import Drive
 from lostmotion.paper import constants, paper_scenario
-from lostmotion.parts import Drive
-from lostmotion.reproduce import WORK, reproduce
+from lostmotion.paper.reproduce import WORK, reproduce
 
 # From the data and formulas of the paper, worked out by hand: name, recomputed, from the printed t_m0 and T_RC (where it differs).
 EXPECTED = {

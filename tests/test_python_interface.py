@@ -12,8 +12,8 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT, SCENARIOS
-from lostmotion import plots
-from lostmotion.quantities import Part
+from lostmotion.inputs.quantities import Part
+from lostmotion.reports import plots
 
 SMALL = lm.load("paper-2dof-nl-small")
 

@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
-from lostmotion.linear_analysis import rigid_constants
 from lostmotion.paper import paper_scenario
-from lostmotion.shooting import PERIODICITY
-from lostmotion.variables import STATES
+from lostmotion.response.linear import rigid_constants
+from lostmotion.response.shooting import PERIODICITY
+from lostmotion.simulation.variables import STATES
 
 NONLINEAR = paper_scenario("2-DOF-NL", "large").drive()
 

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import lostmotion as lm
-from lostmotion.variables import VARIABLES
+from lostmotion.simulation.variables import VARIABLES
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT, SCENARIOS
-from lostmotion.scenario import json_schema
+from lostmotion.simulation.scenario import json_schema
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)

@@ -260,7 +260,7 @@ def test_an_interval_below_the_resolution_of_the_time_is_refused():
 
 
 def test_samples_that_do_not_fit_into_memory_are_refused_before_the_run(monkeypatch):
-    monkeypatch.setattr("lostmotion.run.free_memory", lambda: 5_000_000_000)
+    monkeypatch.setattr("lostmotion.simulation.run.free_memory", lambda: 5_000_000_000)
     with pytest.raises(lm.InputError, match=r"1e\+08 samples need 17 GB of memory, and 5 GB are free"):
         lm.simulate(lm.load("paper-2dof-nl-small"), duration=100.0, sample_interval=1.0000001e-6)
 

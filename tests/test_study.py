@@ -20,16 +20,16 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from conftest import ROOT
-from lostmotion import study_chunk
 from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
-from lostmotion.study_chunk import _core_can, pieces, run_piece, scenario_of_run
-from lostmotion.study_design import CHUNK
-from lostmotion.study_expressions import FUNCTIONS, REDUCTIONS
-from lostmotion.study_file import Study
-from lostmotion.study_report import best_runs, influence, read_table, sobol_indices
-from lostmotion.variables import CHANNEL_NAMES
+from lostmotion.reports.study import best_runs, influence, read_table, sobol_indices
+from lostmotion.simulation.variables import CHANNEL_NAMES
+from lostmotion.studies import chunk as study_chunk
+from lostmotion.studies.chunk import _core_can, pieces, run_piece, scenario_of_run
+from lostmotion.studies.design import CHUNK
+from lostmotion.studies.expressions import FUNCTIONS, REDUCTIONS
+from lostmotion.studies.file import Study
 
 SHORT = paper_scenario("2-DOF-NL", "large").replace(**{"simulation.duration": 0.2, "simulation.sample_interval": 2e-3})
 

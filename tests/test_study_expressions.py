@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.paper import paper_scenario
-from lostmotion.results import ENERGY
-from lostmotion.study_expressions import OF_THE_RUN, read_expression
-from lostmotion.study_functions import FUNCTIONS, METHODS
-from lostmotion.units import registry
-from lostmotion.variables import VARIABLES
+from lostmotion.simulation.results import ENERGY
+from lostmotion.simulation.variables import VARIABLES
+from lostmotion.studies.expressions import OF_THE_RUN, read_expression
+from lostmotion.studies.functions import FUNCTIONS, METHODS
+from lostmotion.units.conversion import registry
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,12 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
-from lostmotion.drive_check import check_drive
-from lostmotion.study_chunk import scenario_of_run
-from lostmotion.study_report import best_lines
-from lostmotion.study_select import Selection
-from lostmotion.study_selection import NOT_RUN, Candidate, candidates, pareto_front, prices
-from lostmotion.study_table import read_table
+from lostmotion.reports.study import best_lines
+from lostmotion.sizing.drive_check import check_drive
+from lostmotion.studies.chunk import scenario_of_run
+from lostmotion.studies.select import Selection
+from lostmotion.studies.selection import NOT_RUN, Candidate, candidates, pareto_front, prices
+from lostmotion.studies.table import read_table
 
 EXAMPLE = ROOT / "examples" / "select-gearbox.toml"
 

@@ -9,9 +9,9 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT
-from lostmotion.data_sheet import GearboxSheet
-from lostmotion.study_chunk import scenario_of_run
-from lostmotion.study_report import read_table
+from lostmotion.data_sheets.sheets import GearboxSheet
+from lostmotion.reports.study import read_table
+from lostmotion.studies.chunk import scenario_of_run
 
 JOINT = ROOT / "scenarios" / "catalogue-robot-joint.toml"
 OVERRUNNING = ROOT / "scenarios" / "overrunning-load.toml"
@@ -173,7 +173,7 @@ def test_a_record_with_gaps_is_a_row_that_says_what_it_lacks(tmp_path: Path):
 
 
 def test_a_sheet_of_one_s_own_stands_beside_the_study(tmp_path: Path):
-    sheet = (ROOT / "src" / "lostmotion" / "gearbox-template.toml").read_text()
+    sheet = (ROOT / "src" / "lostmotion" / "data_sheets" / "gearbox-template.toml").read_text()
     (tmp_path / "own.toml").write_text(sheet)
     study = lm.load_study(write(tmp_path, f'[[vary]]\nkey = "gearbox"\nvalues = ["own.toml", "{GEARBOXES[0]}"]'))
     assert study.vary[0].names == (str(tmp_path / "own.toml"), GEARBOXES[0])

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 import lostmotion as lm
 from conftest import ROOT
-from lostmotion.records import parse_sheets
-from lostmotion.scenario import gearbox_from_record
-from lostmotion.study_units import unit_of_key
-from lostmotion.unit_grammar import plain, read_unit, symbols, written
-from lostmotion.units import to_si
+from lostmotion.data_sheets.records import parse_sheets
+from lostmotion.simulation.scenario import gearbox_from_record
+from lostmotion.studies.units import unit_of_key
+from lostmotion.units.conversion import to_si
+from lostmotion.units.grammar import plain, read_unit, symbols, written
 
 RPM = 2.0 * math.pi / 60.0
 DEG = math.pi / 180.0

@@ -5,15 +5,15 @@ import tempfile
 from pathlib import Path
 
 import lostmotion as lm
-from lostmotion import plots
-from lostmotion.panels import STYLES, Curve, Panel
+from lostmotion.data_sheets.records import find
 from lostmotion.paper import AMPLITUDES, MODELS, paper_scenario
-from lostmotion.records import find
-from lostmotion.rig_sheet import panels
-from lostmotion.study_selection import candidates, pareto_front
-from lostmotion.study_selection_report import pareto_figure
-from lostmotion.study_table import read_table
-from lostmotion.test_rig import measure
+from lostmotion.reports import plots
+from lostmotion.reports.panels import STYLES, Curve, Panel
+from lostmotion.reports.rig import panels
+from lostmotion.reports.study_selection import pareto_figure
+from lostmotion.studies.selection import candidates, pareto_front
+from lostmotion.studies.table import read_table
+from lostmotion.test_rig.rig import measure
 
 HERE = Path(__file__).parent
 

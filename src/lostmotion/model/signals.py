@@ -1,0 +1,218 @@
+"""Commands and disturbances as functions of time: piecewise linear plus sines."""
+
+from __future__ import annotations
+
+import bisect
+import itertools
+import math
+from collections import deque
+from functools import lru_cache
+from numbers import Real
+from typing import Annotated, Any, Generic, Self, TypeVar
+
+from pydantic import Field, model_validator
+
+from .. import _core
+from ..inputs.quantities import Angle, Frequency, NotNegative, Number, Part, Positive, Time, Torque, Whole
+
+V = TypeVar("V")  # the value of the signal, with its unit
+
+Knot = tuple[float, float, float]  # from a time [s] on: value, slope
+
+
+class Sine(Part, Generic[V]):
+    """``amplitude * sin(2 pi frequency t + phase)``."""
+
+    amplitude: V
+    frequency: Annotated[Frequency, Positive]
+    phase: Angle = 0.0
+
+
+class Step(Part, Generic[V]):
+    """Adds `height` from `time` on."""
+
+    height: V
+    time: Annotated[Time, NotNegative] = 0.0
+
+    def knots(self) -> list[Knot]:
+        return [(self.time, float(self.height), 0.0)]  # type: ignore[arg-type]
+
+
+class Ramp(Part, Generic[V]):
+    """Rises by `rise` in a straight line within `duration`, from `begin` on, and stays there."""
+
+    rise: V
+    duration: Annotated[Time, Positive]
+    begin: Annotated[Time, NotNegative] = 0.0
+
+    def knots(self) -> list[Knot]:
+        rise = float(self.rise)  # type: ignore[arg-type]
+        return [(self.begin, 0.0, rise / self.duration), (self.begin + self.duration, rise, 0.0)]
+
+
+class Chirp(Part, Generic[V]):
+    """Sine whose frequency runs in a straight line from one value to another, drawn with straight lines.
+
+    The chords depart from the sine by at most ``amplitude * (pi / points_per_period)**2 / 2`` where the frequency is
+    highest: 0.12 % with 64 points.
+    """
+
+    amplitude: V
+    begin_frequency: Annotated[Frequency, Positive]
+    end_frequency: Annotated[Frequency, Positive]
+    duration: Annotated[Time, Positive]
+    begin: Annotated[Time, NotNegative] = 0.0
+    points_per_period: Annotated[Whole, Field(ge=8, le=1000)] = 64
+
+    def knots(self) -> list[Knot]:
+        fastest = max(self.begin_frequency, self.end_frequency)
+        n = max(2, math.ceil(self.duration * fastest * self.points_per_period))
+        rate = (self.end_frequency - self.begin_frequency) / self.duration
+        amplitude = float(self.amplitude)  # type: ignore[arg-type]
+        times = [self.duration * k / n for k in range(n + 1)]
+        values = [amplitude * math.sin(2.0 * math.pi * (self.begin_frequency + 0.5 * rate * t) * t) for t in times]
+        lines = _polyline([self.begin + t for t in times], values)
+        return [*lines[:-1], (self.begin + self.duration, 0.0, 0.0)]
+
+
+class Samples(Part, Generic[V]):
+    """Straight lines through the points given; before the first and after the last the value stays.
+
+    In a scenario file, `file = "points.csv"` may stand for both keys: two columns, time [s] and value. A heading such as
+    ``time [ms],torque [Nm]`` gives other units.
+    """
+
+    times: tuple[Time, ...]
+    values: tuple[V, ...]
+
+    @model_validator(mode="after")
+    def _fit_together(self) -> Self:
+        if len(self.times) != len(self.values):
+            raise ValueError(f"has {len(self.times)} times and {len(self.values)} values; give as many of each")
+        if len(self.times) < 2:
+            raise ValueError("has fewer than two points; give at least two, or use mean")
+        if self.times[0] < 0.0:
+            raise ValueError(f"begins at {self.times[0]} s; times must not be negative")
+        for k, (a, b) in enumerate(itertools.pairwise(self.times)):
+            if b <= a:
+                raise ValueError(f"times must rise, but times[{k + 1}] = {b} follows {a}")
+        return self
+
+    def knots(self) -> list[Knot]:
+        values = [float(v) for v in self.values]  # type: ignore[arg-type]
+        lines = _polyline(self.times, values)
+        return lines if self.times[0] == 0.0 else [(0.0, values[0], 0.0), *lines]
+
+
+class Signal(Part, Generic[V]):
+    """The sum of all that is given; a bare number is a constant."""
+
+    mean: V = 0.0  # type: ignore[assignment]
+    """constant part"""
+    amplitude: V | None = None
+    """of one sine, with frequency and phase"""
+    frequency: Annotated[Frequency, Positive] | None = None
+    phase: Angle = 0.0
+    sines: tuple[Sine[V], ...] = ()
+    """more sines"""
+    steps: tuple[Step[V], ...] = ()
+    ramps: tuple[Ramp[V], ...] = ()
+    chirp: Chirp[V] | None = None
+    samples: Samples[V] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_constant(cls, data: Any) -> Any:
+        plain = isinstance(data, Real | str) and not isinstance(data, bool)
+        return {"mean": data} if plain else data
+
+    @model_validator(mode="after")
+    def _amplitude_and_frequency(self) -> Self:
+        if (self.amplitude is None) != (self.frequency is None):
+            missing = "frequency" if self.frequency is None else "amplitude"
+            raise ValueError(f"lacks {missing}; amplitude and frequency belong together")
+        if self.phase != 0.0 and self.amplitude is None:
+            raise ValueError("has a phase but no sine; give amplitude and frequency too")
+        return self
+
+    def sine_list(self) -> list[tuple[float, float, float]]:
+        """(amplitude, frequency [Hz], phase [rad]) of each sine."""
+        own = [] if self.amplitude is None else [(self.amplitude, self.frequency, self.phase)]
+        return [*own, *((s.amplitude, s.frequency, s.phase) for s in self.sines)]  # type: ignore[list-item]
+
+    def knot_list(self) -> list[Knot]:
+        """The piecewise-linear part, from t = 0 on."""
+        pieces = [part.knots() for part in (*self.steps, *self.ramps, self.chirp, self.samples) if part is not None]
+        mean = float(self.mean)  # type: ignore[arg-type]
+        knots = []
+        waiting = deque(sorted(pieces, key=lambda piece: piece[0][0]))
+        active: list[list[Knot]] = []
+        final = 0.0  # sum of the pieces that are past their last knot and constant from there on
+        for time in sorted({0.0, *(t for piece in pieces for t, _, _ in piece)}):
+            while waiting and waiting[0][0][0] <= time:
+                active.append(waiting.popleft())
+            here = [_at(piece, time) for piece in active]
+            knots.append((time, mean + sum((value for value, _ in here), final), sum(slope for _, slope in here)))
+            final += sum(value for piece, (value, _) in zip(active, here, strict=True) if time >= piece[-1][0])
+            active = [piece for piece in active if time < piece[-1][0]]
+        return knots
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # The classes of the parts are generic, and as such have no name by which they could be pickled.
+        return type(self).model_validate, (self.model_dump(exclude_unset=True),)
+
+    def core(self) -> _core.Signal:
+        """The solver's signal; made once for equal signals."""
+        return _core_signal(self)
+
+    def mirrored(self) -> Self:
+        """The same signal with the other sign."""
+        return self.scaled(-1.0)
+
+    def scaled(self, factor: float) -> Self:
+        """All values times `factor`."""
+
+        def scale(data: Any, keys: tuple[str, ...]) -> Any:
+            return {
+                k: ([factor * x for x in v] if isinstance(v, list | tuple) else factor * v)
+                if k in keys and v is not None
+                else v
+                for k, v in data.items()
+            }
+
+        data = scale(self.model_dump(), ("mean", "amplitude"))
+        data["sines"] = [scale(s, ("amplitude",)) for s in data["sines"]]
+        data["steps"] = [scale(s, ("height",)) for s in data["steps"]]
+        data["ramps"] = [scale(s, ("rise",)) for s in data["ramps"]]
+        for key, inner in (("chirp", ("amplitude",)), ("samples", ("values",))):
+            if data[key] is not None:
+                data[key] = scale(data[key], inner)
+        return type(self)(**data)
+
+
+@lru_cache(maxsize=256)
+def _core_signal(signal: Signal[Any]) -> _core.Signal:
+    return _core.Signal(signal.knot_list(), signal.sine_list())
+
+
+def _at(piece: list[Knot], time: float) -> tuple[float, float]:
+    """Value and slope at `time` (right limit); 0 before the first knot."""
+    k = bisect.bisect_right(piece, time, key=lambda knot: knot[0]) - 1
+    if k < 0:
+        return 0.0, 0.0
+    begin, value, slope = piece[k]
+    return value + slope * (time - begin), slope
+
+
+def _polyline(times: Any, values: list[float]) -> list[Knot]:
+    points = list(zip(times, values, strict=True))
+    lines = [(t0, v0, (v1 - v0) / (t1 - t0)) for (t0, v0), (t1, v1) in itertools.pairwise(points)]
+    return [*lines, (times[-1], values[-1], 0.0)]
+
+
+class CommandSignal(Signal[Number]):
+    """A command E_C over time: the sum of all that is given."""
+
+
+class TorqueSignal(Signal[Torque]):
+    """A torque [N·m] over time: the sum of all that is given."""

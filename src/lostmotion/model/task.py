@@ -1,0 +1,19 @@
+"""What is asked of a drive: the duty cycle and the requirements that the drive check compares with."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from ..inputs.quantities import Angle, Part, Positive, Temperature, Time
+
+
+class Task(Part):
+    """What is asked of the drive. No run depends on it; the drive check compares with it."""
+
+    cycle: Annotated[Time, Positive] | None = None
+    """period after which the motion of the run repeats, pause included; left out, it repeats without a pause"""
+    ambient_temperature: Temperature = 25.0
+    max_lost_motion: Annotated[Angle, Positive] | None = None
+    """largest permissible lost motion at 3 % of the rated torque, total at the output"""
+    hold_without_power: bool = True
+    """whether the load must stay at rest against its torque with command 0; false where a brake or a controller holds it"""

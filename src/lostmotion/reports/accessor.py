@@ -1,0 +1,81 @@
+"""What a result can do by itself: `result.lm`, an accessor of xarray datasets."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import xarray as xr
+
+from ..errors import InputError
+from ..simulation.results import energy_of, scenario_of
+from ..simulation.scenario import Scenario
+from .run import summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@xr.register_dataset_accessor("lm")  # type: ignore[no-untyped-call]
+class ResultAccessor:
+    """Figures, text and scenario of a result: ``result.lm.plot()``.
+
+    It is there once a function of lostmotion that returns a dataset has been used.
+    """
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    def __repr__(self) -> str:
+        return "result.lm: plot(), plot_maps(), summary(), scenario, energy"
+
+    def plot(self, output: str = "load_speed") -> Figure:
+        """The figure that the command line draws: of a run the overview, of a frequency response the Bode figure.
+
+        Parameters
+        ----------
+        output
+            The variable of a frequency response.
+
+        Raises
+        ------
+        InputError
+            The dataset is of another kind.
+        """
+        from . import plots, response_figures
+
+        if "response" in self._dataset:
+            return response_figures.bode_figure({"": self._dataset}, output)
+        lacking = [name for name in plots.OVERVIEW if name not in self._dataset]
+        if len(lacking) == len(plots.OVERVIEW):
+            raise InputError("this dataset is neither a run nor a frequency response; there is no figure of it")
+        if lacking:
+            raise InputError(f"this dataset lacks {', '.join(lacking)}, which the figure of a run shows")
+        return plots.overview(self._dataset)
+
+    def plot_maps(self, output: str = "load_speed") -> Figure:
+        """Gain, phase, efficiency and distortion of a frequency response over amplitude and frequency.
+
+        Raises
+        ------
+        InputError
+            The dataset is no frequency response, or has fewer than two amplitudes or frequencies.
+        """
+        from . import response_figures
+
+        if "response" not in self._dataset:
+            raise InputError("this dataset is no frequency response; lm.frequency_response makes one")
+        return response_figures.maps_figure(self._dataset, output)
+
+    def summary(self) -> str:
+        """A run in a few lines, as `lostmotion run` prints it."""
+        return summary(self._dataset)
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario that the run came from."""
+        return scenario_of(self._dataset)
+
+    @property
+    def energy(self) -> dict[str, float]:
+        """The energy ledger [J], as of `lostmotion.energy_of`."""
+        return energy_of(self._dataset)

@@ -1,0 +1,224 @@
+"""Figures. The same model has the same colour and line everywhere; all are readable in grey."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..simulation.results import scenario_of
+from .panels import COMMAND_STYLE, STYLES, Curve, Panel
+
+if TYPE_CHECKING:
+    import xarray
+
+LOOKS: Any = {
+    "figure.constrained_layout.use": True,
+    "figure.dpi": 110,
+    "savefig.dpi": 150,
+    "font.size": 9.5,
+    "axes.grid": True,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "svg.hashsalt": "lostmotion",
+    "svg.fonttype": "path",
+}
+
+
+# Decorates what makes or draws figures; the looks of the user's own figures stay as they are.
+in_our_looks = mpl.rc_context(LOOKS)
+
+
+class Picture(Figure):
+    """A figure that is drawn in the looks of this package, and shown by notebooks."""
+
+    @in_our_looks
+    def draw(self, renderer: Any) -> None:
+        super().draw(renderer)
+
+    @in_our_looks
+    def savefig(self, fname: Any, **options: Any) -> None:
+        super().savefig(fname, **options)
+
+    def _repr_png_(self) -> bytes:
+        png = io.BytesIO()
+        self.savefig(png, format="png", dpi=self.dpi)
+        return png.getvalue()
+
+
+MOST_POINTS = 10_000  # of a curve that is drawn; more than twice the pixels across any figure
+
+
+def thinned(x: Any, y: Any, most: int = MOST_POINTS) -> tuple[Any, Any]:
+    """Points of a curve that look the same: of each run of neighbours the first and the extremes of both coordinates."""
+    n = len(y)
+    if n <= most:
+        return x, y
+    x, y = np.asarray(x), np.asarray(y)
+    width = -(-n * 5 // most)
+    whole = n // width * width
+    firsts = np.arange(0, whole, width)
+    kept: list[Any] = [firsts, np.arange(whole, n), [n - 1]]
+    for values in (y,) if np.all(x[1:] >= x[:-1]) else (x, y):
+        rows = values[:whole].reshape(-1, width)
+        gaps = bool(np.isnan(rows.min()))
+        for extreme, fill in ((np.argmin, np.inf), (np.argmax, -np.inf)):
+            kept.append(firsts + extreme(np.where(np.isnan(rows), fill, rows) if gaps else rows, axis=1))
+    index: Any = np.unique(np.concatenate(kept))
+    return x[index], y[index]
+
+
+@in_our_looks
+def draw(panels: Iterable[Panel], columns: int, size: tuple[float, float], note: str = "") -> Figure:
+    """Panels in rows of `columns`, `size` [inch] in all; `note` stands below."""
+    panels = list(panels)
+    figure = Picture(figsize=size)
+    rows = -(-len(panels) // columns)
+    for k, panel in enumerate(panels):
+        axes = figure.add_subplot(rows, columns, k + 1)
+        for curve in panel.curves:
+            axes.plot(*thinned(curve.x, curve.y), label=curve.shown, **curve.style)
+        if panel.log_x:
+            axes.set_xscale("log")
+        if panel.log_y and any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves):
+            axes.set_yscale("log")
+        axes.set(title=panel.title, xlabel=panel.x_label, ylabel=panel.y_label)
+        axes.title.set_fontsize(10)
+        if panel.x_range is not None:
+            axes.set_xlim(*panel.x_range)
+        if panel.y_range is not None:
+            axes.set_ylim(*panel.y_range)
+        elif panel.x_range is not None:
+            axes.set_ylim(*_range_within(panel.curves, panel.x_range))
+    labels = [[c.shown for c in panel.curves] for panel in panels]
+    if len(labels[0]) > 1 and all(names == labels[0] for names in labels):
+        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=8.5)
+    else:
+        for axes, names in zip(figure.axes, labels, strict=True):
+            if len(names) > 1:
+                axes.legend(fontsize=8, loc="best")
+    if note:
+        figure.supxlabel(note, fontsize=8, color="0.35")
+    return figure
+
+
+def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tuple[float, float]:
+    """Limits that hold all points within a range of x, with a margin."""
+    inside = [np.asarray(c.y)[(np.asarray(c.x) >= x_range[0]) & (np.asarray(c.x) <= x_range[1])] for c in curves]
+    low, high = min(float(np.nanmin(y)) for y in inside), max(float(np.nanmax(y)) for y in inside)
+    margin = 0.05 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+# The result variables that the overview shows.
+OVERVIEW = (
+    "command",
+    "motor_torque",
+    "motor_speed",
+    "load_speed",
+    "input_torque",
+    "output_torque",
+    "load_torque",
+    "twist",
+    "input_contact",
+    "twist_contact",
+)
+
+
+def overview(result: xarray.Dataset) -> Figure:
+    """A run at a glance: command and motor, speeds, torques, twist and contacts."""
+    t = result["time"].values
+    ink = STYLES["2-DOF-NL"]
+    second = STYLES["2-DOF-L"]
+    ratio = _ratio(result)
+
+    def curve(name: str, style: Mapping[str, Any], factor: float = 1.0, label: str = "") -> Curve:
+        return Curve(label or name.replace("_", " "), t, factor * result[name].values, style)
+
+    panels = [
+        Panel("", "time [s]", "command [-]", (curve("command", ink),)),
+        Panel("", "time [s]", "torque [N·m]", (curve("motor_torque", ink),)),
+        Panel(
+            "",
+            "time [s]",
+            "speed at the load [rad/s]",
+            (curve("motor_speed", second, 1.0 / ratio, "motor speed / ratio"), curve("load_speed", ink)),
+        ),
+        Panel(
+            "",
+            "time [s]",
+            "torque [N·m]",
+            (
+                curve("input_torque", second, ratio, "input torque x ratio"),
+                curve("output_torque", ink),
+                curve("load_torque", COMMAND_STYLE),
+            ),
+        ),
+        Panel("", "time [s]", "twist [mrad]", (curve("twist", ink, 1e3),)),
+        Panel(
+            "",
+            "time [s]",
+            "contact: -1, 0 stuck, +1",
+            (curve("input_contact", ink), curve("twist_contact", {**second, "linewidth": 1.0})),
+            y_range=(-1.15, 1.15),
+        ),
+    ]
+    figure = draw(panels, 2, (10.0, 8.0), note=result.attrs.get("warning", "") or result.attrs.get("note", ""))
+    if result.attrs.get("title"):
+        figure.suptitle(result.attrs["title"])
+    return figure
+
+
+def _ratio(result: xarray.Dataset) -> float:
+    if "gear_ratio" in result.attrs:  # a periodic motion, which knows its drive only
+        return float(result.attrs["gear_ratio"])
+    return scenario_of(result).gearbox.ratio
+
+
+@in_our_looks
+def loss_map(speeds: Any, loads: Any, values: Any, note: str = "") -> Figure:
+    """Figure 5: the loss coefficient as a surface and as curves. values[load, speed], driving side only."""
+    figure = Picture(figsize=(10.0, 4.2))
+    surface: Any = figure.add_subplot(1, 2, 1, projection="3d")
+    v, mu = np.meshgrid(speeds, loads)
+    surface.plot_surface(v, mu, values, cmap="cividis", edgecolor="0.25", linewidth=0.4, alpha=0.95)
+    surface.set(xlabel="relative speed v [-]", ylabel="relative load µ [-]", zlabel="$m_{2B}$ [-]")
+    surface.tick_params(labelsize=7.5, pad=0)
+    surface.view_init(elev=24, azim=-125)
+    surface.set_box_aspect(None, zoom=0.88)
+    curves = figure.add_subplot(1, 2, 2)
+    shades = mpl.colormaps["cividis"](np.linspace(0.0, 0.85, len(loads)))
+    for row, load, colour in zip(values, loads, shades, strict=True):
+        curves.plot(speeds, row, color=colour, marker="o", markersize=3, label=f"µ = {load:g}")
+    curves.set(xlabel="relative speed v [-]", ylabel="loss coefficient $m_{2B}$ [-]", ylim=(0.0, None))
+    curves.legend(fontsize=8, ncols=2)
+    if note:
+        figure.supxlabel(note, fontsize=8, color="0.35")
+    return figure
+
+
+@in_our_looks
+def amplitude_maps(frequency: Any, amplitude: Any, maps: Mapping[str, tuple[str, Any]], amplitude_label: str) -> Figure:
+    """Contours over frequency [Hz] and amplitude: maps[title] = (label of the values, values[amplitude, frequency])."""
+    figure = Picture(figsize=(10.0, 3.4 * -(-len(maps) // 2)))
+    for k, (title, (label, values)) in enumerate(maps.items()):
+        axes = figure.add_subplot(-(-len(maps) // 2), 2, k + 1)
+        shown = np.ma.masked_invalid(values)
+        axes.set(xscale="log", yscale="log", title=title, xlabel="frequency [Hz]", ylabel=amplitude_label)
+        axes.title.set_fontsize(10)
+        axes.grid(visible=False)
+        if shown.count() == 0 or float(np.ptp(shown.compressed())) == 0.0:
+            axes.text(0.5, 0.5, "nothing to show", transform=axes.transAxes, ha="center", color="0.35")
+            continue
+        filled = axes.contourf(frequency, amplitude, shown, levels=14, cmap="cividis")
+        figure.colorbar(filled, ax=axes, label=label)
+        axes.contour(frequency, amplitude, shown, levels=14, colors="0.15", linewidths=0.4)
+    return figure

@@ -1,0 +1,90 @@
+"""The figures of a data sheet as rows of text, in the units that data sheets use."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..data_sheets.sheets import Record
+from ..inputs.quantities import unit_in_schema
+from ..model.parts import Gearbox
+
+# Practical units of data sheets: SI unit -> (unit, factor).
+PRACTICAL = {
+    "rad/s": ("rpm", 30.0 / np.pi),
+    "rad": ("arcmin", 10800.0 / np.pi),
+    "kg*m^2": ("kg·cm²", 1e4),
+    "s": ("ms", 1e3),
+    "H": ("mH", 1e3),
+    "degC": ("°C", 1.0),
+    "ohm": ("Ω", 1.0),
+}
+
+
+def shown(value: Any, unit: str) -> str:
+    """A figure in the units that data sheets use."""
+    if isinstance(value, str):
+        return value
+    name, factor = PRACTICAL.get(unit, (unit.replace("*", "·"), 1.0))
+    text = ", ".join(f"{factor * v:.5g}" for v in (value if isinstance(value, tuple) else (value,)))
+    return f"{text} {name}".strip()
+
+
+def rows_of(record: Record) -> list[tuple[str, str, str]]:
+    """(figure, value, status of its source) of all figures of a record."""
+    fields = type(record).model_json_schema()["properties"]
+    out: list[tuple[str, str, str]] = []
+
+    def add(key: str, label: str, text: str) -> None:
+        source = record.source_of(key)
+        out.append((label, text, source.status if source else "own figure"))
+
+    for name in type(record).model_fields:
+        value = getattr(record, name)
+        if name in Record.model_fields or name == "kind" or value is None or name not in record.model_fields_set:
+            continue
+        label = name.replace("_", " ")
+        if name == "stiffness":
+            for k, slope in enumerate(value.slopes):
+                upto = f" up to {value.torques[k]:g} N·m" if k < len(value.torques) else ""
+                add(name, f"torsional stiffness K{k + 1}{upto}", f"{slope:.4g} N·m/rad")
+            if value.scatter:
+                add(name, "scatter of the stiffness", f"±{100 * value.scatter:.0f} %")
+        elif name == "losses":
+            _add_losses(value, add)
+        else:
+            add(name, label, shown(value, unit_in_schema(fields[name]) or ""))
+    return out
+
+
+def _add_losses(losses: Any, add: Any) -> None:
+    for key in ("efficiency", "backdrive_efficiency"):
+        for p in getattr(losses, key):
+            where = f"{key.replace('_', ' ')} at {shown(p.input_speed, 'rad/s')}, load {p.load:g}"
+            add(f"losses.{key}", where, f"{p.efficiency:g}")
+    for q in losses.no_load_torque:
+        at = f"no-load torque at {shown(q.input_speed, 'rad/s')}" + (
+            f", {q.temperature:g} °C" if q.temperature is not None else ""
+        )
+        add("losses.no_load_torque", at, f"{q.torque:g} N·m")
+    for load, factor in losses.load_correction:
+        add("losses.load_correction", f"load correction at load {load:g}", f"{factor:g}")
+    for key, unit in (("starting_torque", "N·m"), ("backdriving_torque", "N·m"), ("static_efficiency", "")):
+        value = getattr(losses, key)
+        if value is not None:
+            add(
+                f"losses.{key}",
+                key.replace("_", " ").replace("backdriving", "back-driving"),
+                f"{value:g} {unit}".strip(),
+            )
+    if losses.table is not None:
+        t = losses.table
+        add("losses.table", "loss map", f"{len(t.loads)} loads x {len(t.speeds)} speeds")
+
+
+def rows_of_part(g: Gearbox) -> list[tuple[str, str, str]]:
+    """The figures of a gearbox that has no sheet."""
+    names = (("rated_output_torque", "N*m"), ("rated_input_speed", "rad/s"), ("inertia", "kg*m^2"))
+    plain = [(name.replace("_", " "), shown(getattr(g, name), unit), "own figure") for name, unit in names]
+    return [("ratio", f"{g.ratio:g}", "own figure"), *plain]

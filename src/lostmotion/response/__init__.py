@@ -1,0 +1,1 @@
+"""Linear models, periodic motions and frequency responses."""

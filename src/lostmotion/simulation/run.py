@@ -1,0 +1,213 @@
+"""Runs: from a scenario, or a drive and what acts on it, to a labelled dataset."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any, Literal
+
+from .. import _core
+from ..errors import InputError
+from ..inputs.validation import shown
+from ..model.parts import Drive
+from ..model.signals import CommandSignal, TorqueSignal
+from .results import RawResult, raw_result
+from .scenario import Initial, LoadTable, Scenario, SimulationTable
+
+if TYPE_CHECKING:
+    import xarray
+
+SolverName = Literal["exact", "dormand-prince"]
+
+TOLERANCE = 1e-8  # of the adaptive solver, if none is given
+TOLERANCES = (1e-15, 1e-3)  # beyond rounding, and beyond what finds the switching instants
+
+MAX_SWITCHINGS = 100_000  # kept with a result; beyond it they are only counted
+BYTES_PER_SAMPLE = 170  # of a result while it is made, measured
+
+
+def simulate(
+    scenario_or_drive: Scenario | Drive,
+    *,
+    command: CommandSignal | float | None = None,
+    load_torque: TorqueSignal | float | None = None,
+    duration: float | None = None,
+    sample_interval: float | None = None,
+    initial: Initial | None = None,
+    solver: SolverName = "exact",
+    relative_tolerance: float | None = None,
+    energy: bool = True,
+) -> xarray.Dataset:
+    """Simulate a drive.
+
+    Parameters
+    ----------
+    scenario_or_drive
+        A scenario, whose values the other arguments replace, or a drive alone.
+    command
+        E_C [-]; default 0 for a drive alone.
+    load_torque
+        M_Z [N·m]; default 0 for a drive alone.
+    duration, sample_interval
+        [s]; needed for a drive alone. They say at which instants the result is wanted and do not affect the motion.
+    initial
+        State at t = 0; default rest.
+    solver
+        ``"exact"``, or ``"dormand-prince"`` for the adaptive second opinion, which keeps no energy ledger.
+    relative_tolerance
+        Of the adaptive solver, 1e-15 to 1e-3; default 1e-8. The exact solver has none.
+    energy
+        Whether to keep the energy ledger (it takes about as long as the motion).
+
+    Returns
+    -------
+    xarray.Dataset
+        The variables of `lostmotion.VARIABLES` over the coordinate ``time`` [s], the switching instants, and in the
+        attributes the energy ledger, the end state and the scenario.
+
+    Raises
+    ------
+    InputError
+        The scenario cannot be used.
+    SolverError
+        The motion has no continuation (jamming, accumulating switchings); the message names time and contact.
+    KeyboardInterrupt
+        Ctrl-C ends the run at once.
+    """
+    scenario = as_scenario(
+        scenario_or_drive,
+        command=command,
+        load_torque=load_torque,
+        duration=duration,
+        sample_interval=sample_interval,
+        initial=initial,
+    )
+    return run(scenario, solver=solver, relative_tolerance=relative_tolerance, energy=energy).dataset()
+
+
+def run(
+    scenario: Scenario, *, solver: SolverName = "exact", relative_tolerance: float | None = None, energy: bool = True
+) -> RawResult:
+    """As `simulate`, of a scenario, with the result as plain arrays."""
+    if solver not in ("exact", "dormand-prince"):
+        raise InputError(f'solver {solver!r} is not known; it must be "exact" or "dormand-prince"')
+    exact = solver == "exact"
+    if exact and relative_tolerance is not None:
+        raise InputError(
+            f'relative_tolerance {relative_tolerance:g}: the exact solver has none; leave it out, or give solver="dormand-prince"'
+        )
+    tolerance = TOLERANCE if relative_tolerance is None else relative_tolerance
+    least, largest = TOLERANCES
+    if not least <= tolerance <= largest:
+        raise InputError(f"relative_tolerance {tolerance:g} must lie between {least:g} and {largest:g}")
+    table = scenario.simulation
+    check_memory(table.samples)
+    result = _core.run(
+        *core_inputs(scenario),
+        table.duration,
+        table.sample_interval,
+        table.samples,
+        energy and exact,
+        0.0 if exact else tolerance,
+        MAX_SWITCHINGS,
+    )
+    how = "exact" if exact else f"dormand-prince, relative tolerance {tolerance:g}"
+    return raw_result(scenario, result, how, ledger=energy and exact)
+
+
+def check_memory(samples: int) -> None:
+    """Refuse a run whose samples do not fit into the memory that is free.
+
+    Raises
+    ------
+    InputError
+        It says what they need and what there is.
+    """
+    needed, free = samples * BYTES_PER_SAMPLE, free_memory()
+    if free is not None and needed > free:
+        raise InputError(
+            f"simulation.sample_interval: {samples:.3g} samples need {needed / 1e9:.3g} GB of memory, and {free / 1e9:.3g}"
+            " GB are free; take a longer sample_interval, or a shorter duration"
+        )
+
+
+def free_memory() -> int | None:
+    """Bytes of memory that programs can still have, or None where the system does not tell."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as table:
+            kilobytes = next(line.split()[1] for line in table if line.startswith("MemAvailable:"))
+        return 1024 * int(kilobytes)
+    except (OSError, StopIteration):
+        pass
+    try:
+        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return None
+
+
+def as_scenario(
+    scenario_or_drive: Scenario | Drive,
+    *,
+    command: CommandSignal | float | None = None,
+    load_torque: TorqueSignal | float | None = None,
+    duration: float | None = None,
+    sample_interval: float | None = None,
+    initial: Initial | None = None,
+) -> Scenario:
+    """A scenario with the given changes, or a drive with its surroundings."""
+    changes: dict[str, Any] = {}
+    if isinstance(scenario_or_drive, Drive):
+        drive = scenario_or_drive
+        if duration is None or sample_interval is None:
+            raise InputError("a drive alone needs duration and sample_interval [s]")
+        changes = {"motor": drive.motor, "gearbox": drive.gearbox, "load": LoadTable(**drive.load.model_dump())}
+    elif not isinstance(scenario_or_drive, Scenario):
+        raise InputError(f"{shown(scenario_or_drive)} must be a Scenario, such as load(path) returns, or a Drive")
+    elif all(v is None for v in (command, load_torque, duration, sample_interval, initial)):
+        return scenario_or_drive
+    else:
+        s = scenario_or_drive
+        changes = {name: getattr(s, name) for name in Scenario.model_fields}
+        duration = s.simulation.duration if duration is None else duration
+        sample_interval = s.simulation.sample_interval if sample_interval is None else sample_interval
+    changes["simulation"] = SimulationTable(duration=duration, sample_interval=sample_interval)
+    if command is not None:
+        changes["command"] = _signal(command, CommandSignal)
+    if load_torque is not None:
+        load = changes["load"]
+        torque = _signal(load_torque, TorqueSignal)
+        changes["load"] = LoadTable(**{**{n: getattr(load, n) for n in LoadTable.model_fields}, "torque": torque})
+    if initial is not None:
+        changes["initial"] = initial
+    return Scenario(**changes)
+
+
+def core_inputs(scenario: Scenario) -> tuple[_core.Drive, _core.Signal, _core.Signal, list[float], float]:
+    """What every run of the core begins with: drive, command, load torque, state, hysteresis capacity."""
+    start = scenario.initial
+    return (
+        scenario.drive().core(),
+        scenario.command.core(),
+        scenario.load.torque.core(),
+        start_state(start),
+        start.hysteresis_capacity,
+    )
+
+
+def start_state(initial: Initial) -> list[float]:
+    """The solver's state vector.
+
+    Raises
+    ------
+    InputError
+        It is no state.
+    """
+    from .variables import STATES
+
+    if not isinstance(initial, Initial):
+        raise InputError(f"initial {shown(initial)} must be a state, such as Initial(motor_speed=100)")
+
+    return [getattr(initial, name) for name in STATES]
+
+
+def _signal(value: Any, kind: Any) -> Any:
+    return kind(mean=value) if isinstance(value, int | float) else value

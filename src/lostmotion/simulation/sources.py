@@ -1,0 +1,44 @@
+"""Where a scenario may come from: a file, the name of a shipped one, or a saved result."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..inputs.validation import shown
+from . import scenario
+from .results import FORMATS, open_result
+from .scenario import Scenario, changed, override
+
+
+def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
+    """The scenario of a file, of a shipped example, or of a saved result.
+
+    Parameters
+    ----------
+    source
+        A scenario file (``.toml``), whose key `base` may name another scenario that it changes; the name of a scenario
+        that comes with the package, such as ``"paper-2dof-nl-small"``; or a result (``.nc``, ``.csv``, ``.parquet``),
+        whose scenario is taken so that it can be run again.
+    overrides
+        ``{"command.amplitude": 0.1}`` or ``["command.amplitude=0.1"]``, as by ``--set``.
+
+    Raises
+    ------
+    InputError
+        With one line that names the file, the key, the value and the remedy.
+    """
+    if not isinstance(source, str | Path):
+        raise InputError(f"{shown(source)} must be the name of a scenario, or of a file with a scenario or a result")
+    path = Path(source)
+    if path.suffix not in FORMATS:
+        return scenario.load(source, overrides)
+    result = open_result(path)
+    if "scenario" not in result.attrs:
+        raise InputError(f"{path}: is no result of a run; it carries no scenario that could be run again")
+    tables = json.loads(result.attrs["scenario"])
+    override(tables, overrides, path)
+    return changed(tables, path)

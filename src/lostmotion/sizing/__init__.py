@@ -1,0 +1,1 @@
+"""Does a drive fit its task?"""

@@ -1,0 +1,131 @@
+"""The duty cycle of a run, and the means over it by which gearboxes and motors are sized.
+
+Rest before and after the motion says nothing about the task, so no mean depends on how much of it a run has: the motion is
+taken to repeat without a pause, or after `task.cycle`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    import xarray
+
+STANDSTILL = 1e-3  # below this share of its largest speed the motor is taken to stand still
+SHORTEST = 0.01  # of the time in motion; a shorter standstill is no rest
+STEADY = 0.01  # of the largest motor torque, within which it does not change at rest
+
+
+@dataclass(frozen=True)
+class DutyCycle:
+    """What repeats."""
+
+    time: np.ndarray
+    """instants of the motion [s]"""
+    input_speed: np.ndarray
+    """magnitude at these instants [rad/s]"""
+    output_torque: np.ndarray
+    """[N·m]"""
+    motor_torque: np.ndarray
+    """[N·m]"""
+    holding_torque: float | None
+    """of the motor, at rest after the motion [N·m]; None: the run ends in motion"""
+    period: float | None
+    """`task.cycle` [s]; None: no pause"""
+
+    def __str__(self) -> str:
+        if not self.moves:
+            return "at rest throughout"
+        motion = f"the motion of {self.duration:.4g} s repeated"
+        return f"{motion} every {self.period:.4g} s" if self.period is not None else f"{motion} without a pause"
+
+    @property
+    def moves(self) -> bool:
+        """Whether the motor turns at all."""
+        return bool(self.input_speed.any())
+
+    @property
+    def duration(self) -> float:
+        """Of the motion [s]."""
+        return float(self.time[-1] - self.time[0])
+
+    def _integral(self, values: np.ndarray) -> float:
+        return float(np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(self.time)))
+
+    def mean_input_speed(self) -> float:
+        """Mean of the magnitude over the cycle, pause included [rad/s]."""
+        return self._integral(self.input_speed) / (self.period or self.duration)
+
+    def mean_output_torque(self) -> float:
+        """Cubic mean of the magnitude, weighted with the input speed [N·m]; 0 where nothing turns."""
+        turned = self._integral(self.input_speed)
+        work = self._integral(self.input_speed * np.abs(self.output_torque) ** 3)
+        return float((work / turned) ** (1.0 / 3.0)) if turned > 0.0 else 0.0
+
+    def rms_motor_torque(self) -> float:
+        """Root mean square over the cycle [N·m].
+
+        In the pause the motor holds what it held at the end of the run. Without `task.cycle` no pause is known, and the larger
+        of motion and holding is taken, which is an upper bound for any pause.
+        """
+        square = self._integral(self.motor_torque**2)
+        held = (self.holding_torque or 0.0) ** 2
+        if self.period is not None:
+            return float(np.sqrt((square + (self.period - self.duration) * held) / self.period))
+        return float(np.sqrt(max(square / self.duration, held)))
+
+
+def duty_cycle(result: xarray.Dataset, period: float | None) -> DutyCycle:
+    """The duty cycle of a run.
+
+    A standstill at its beginning or end is rest if it is no mere reversal of the motion: if it is not too short, and the torque
+    of the motor does not change.
+
+    Parameters
+    ----------
+    result
+        Of `simulate`.
+    period
+        `task.cycle` [s].
+
+    Raises
+    ------
+    InputError
+        The motion does not fit into the period, or is not at its end where a pause would begin.
+    """
+    time, torque = result["time"].values, result["motor_torque"].values
+    speed = np.abs(result["motor_speed"].values)
+    turning = np.flatnonzero(speed > STANDSTILL * speed.max())
+    first, last = (turning[0], turning[-1]) if len(turning) else (0, len(speed) - 1)
+    shortest = SHORTEST * (time[last] - time[first])
+    steady = STEADY * np.abs(torque).max()
+    before, after = first // 2 + 1, (last + len(speed)) // 2  # halves of the standstills, those far from the motion
+    waits = time[first] - time[0] > shortest and np.ptp(torque[:before]) <= steady
+    rests = not len(turning) or (time[-1] - time[last] > shortest and np.ptp(torque[after:]) <= steady)
+    part = slice(max(first - 1, 0) if waits else 0, last + 2 if rests else len(speed))
+    found = DutyCycle(
+        time[part],
+        speed[part],
+        result["output_torque"].values[part],
+        torque[part],
+        float(torque[-1]) if rests else None,
+        period,
+    )
+    if period is None or not found.moves:
+        return found
+    if period < found.duration * (1.0 - 1e-9):
+        raise InputError(
+            f"task.cycle: {period:.6g} s is shorter than the motion of {found.duration:.6g} s; it is the period after which the "
+            "motion repeats, pause included"
+        )
+    if not rests and period > found.duration * (1.0 + 1e-9):
+        raise InputError(
+            f"task.cycle: {period:.6g} s leaves a pause after the {found.duration:.6g} s of the run, but the motor still turns at "
+            "its end; lengthen simulation.duration until it rests, or leave task.cycle out"
+        )
+    return found

@@ -1,0 +1,1 @@
+"""Many runs: what is varied, what is kept, and what is selected."""

@@ -1,0 +1,36 @@
+"""The drive check of each run of a study, as columns of its table."""
+
+from __future__ import annotations
+
+import math
+
+from ..simulation.scenario import Scenario
+from ..sizing.drive_check import RULES, check_drive
+from .select import SHARES, USE
+
+TEXTS = ("violated", "why", "not judged")
+"""rules that are violated, in words, and rules without a limit to compare with"""
+COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in SHARES} | dict.fromkeys(TEXTS, "")
+"""each with what stands in the row of a run that has failed"""
+
+
+def check_columns(scenario: Scenario) -> dict[str, float | str]:
+    """The columns of one run.
+
+    Raises
+    ------
+    InputError, SolverError
+        As `check_drive`.
+    """
+    row = dict(COLUMNS)
+    findings = check_drive(scenario)
+    for finding in findings:
+        column = f"{USE}{finding.rule}"
+        if finding.use is not None:
+            before = float(row[column])
+            row[column] = finding.use if math.isnan(before) else max(before, finding.use)
+    wrong = [f for f in findings if f.verdict == "warning"]
+    row["violated"] = " ".join(rule for rule in RULES if any(f.rule == rule for f in wrong))
+    row["why"] = "; ".join(f"{f.what}: {f.value}" + (f" ({f.remark})" if f.remark else "") for f in wrong)
+    row["not judged"] = " ".join(f.rule for f in findings if f.verdict == "unknown")
+    return row

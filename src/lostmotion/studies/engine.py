@@ -1,0 +1,188 @@
+"""Running studies: chunk by chunk, on all cores or any executor, safe against interruption at any instant."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, need
+from ..simulation.results import write_bytes
+from .chunk import as_parquet, compute_chunk, parsed, pieces, run_piece, tabulate
+from .design import CHUNK
+from .file import Study, from_json, to_json
+
+
+def study(
+    what: Study,
+    directory: str | Path,
+    *,
+    threads: int | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Path:
+    """Run a study, or resume it, into a directory of Parquet files.
+
+    Runs are computed and written in chunks; a chunk that is written is whole. Interrupted at any instant and called again, it
+    computes the chunks that are missing, so no run is lost and none is there twice. Rows depend on the study alone, not on
+    threads, workers or interruptions.
+
+    Parameters
+    ----------
+    what
+        From `load_study`, or made in Python.
+    directory
+        Made if missing. ``pandas.read_parquet(directory)``, DuckDB and polars open it directly.
+    threads
+        In the core, if there is no executor: all cores, if left out.
+    executor
+        Any `concurrent.futures.Executor`, such as a process pool or that of a Dask client.
+    progress
+        Called with the number of runs done; of slow studies without executor also within a chunk, before it is written.
+
+    Returns
+    -------
+    Path
+        The directory.
+
+    Raises
+    ------
+    InputError
+        The directory holds another study, or cannot be written; what is there stays.
+    """
+    need("pyarrow", "A study", "study")
+    need("scipy", "A study", "study")
+    directory = Path(directory)
+    text = to_json(what)
+    _prepare(directory, text)
+    missing = [(first, last) for first, last in _chunks(what) if not _part(directory, first).exists()]
+    done = what.total - sum(last - first for first, last in missing)
+    report = _rising(progress or _silent)
+    report(done)
+    for first, last, content in _compute(text, missing, threads or os.cpu_count() or 1, executor, report, done):
+        write_bytes(_part(directory, first), content)
+        done += last - first
+        report(done)
+    return directory
+
+
+def _silent(done: int) -> None:
+    """No progress wanted."""
+
+
+def _rising(progress: Callable[[int], None]) -> Callable[[int], None]:
+    """The same, told of the furthest only: a chunk is simulated while the one before it is being written."""
+    furthest = 0
+
+    def report(done: int) -> None:
+        nonlocal furthest
+        furthest = max(furthest, done)
+        progress(furthest)
+
+    return report
+
+
+def _chunks(study: Study) -> Iterator[tuple[int, int]]:
+    return ((first, min(first + CHUNK, study.total)) for first in range(0, study.total, CHUNK))
+
+
+def _part(directory: Path, first: int) -> Path:
+    return directory / f"part-{first // CHUNK:06d}.parquet"
+
+
+def _prepare(directory: Path, text: str) -> None:
+    """Makes the directory, or sees that it holds this study; what a killed run left half-written is removed."""
+    note = directory / "_study.json"  # a leading underscore: readers of Parquet directories pass it over
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{directory}: cannot be made: {error.strerror}") from None
+    for leftover in directory.glob(".part-*"):
+        leftover.unlink(missing_ok=True)
+    if note.exists():
+        if note.read_text(encoding="utf-8") != text:
+            raise InputError(f"{directory}: holds another study; name another directory, or remove it")
+        return
+    if any(directory.glob("*.parquet")):
+        raise InputError(f"{directory}: holds Parquet files that are of no study; name another directory")
+    write_bytes(note, text.encode())
+
+
+def _compute(
+    text: str,
+    missing: list[tuple[int, int]],
+    threads: int,
+    executor: Executor | None,
+    report: Callable[[int], None],
+    done: int,
+) -> Iterator[tuple[int, int, bytes]]:
+    if executor is None:
+        yield from _compute_here(text, missing, threads, report, done)
+        return
+    # A few chunks more than there are workers, so that memory does not grow with the study.
+    waiting: dict[Future[bytes], tuple[int, int]] = {}
+    ahead = 2 * (getattr(executor, "_max_workers", None) or os.cpu_count() or 1) + 2
+    rest = iter(missing)
+    try:
+        while True:
+            for chunk in rest:
+                waiting[executor.submit(compute_chunk, text, *chunk)] = chunk
+                if len(waiting) >= ahead:
+                    break
+            if not waiting:
+                return
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                first, last = waiting.pop(future)
+                yield first, last, future.result()
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+def _compute_here(
+    text: str, missing: list[tuple[int, int]], threads: int, report: Callable[[int], None], done: int
+) -> Iterator[tuple[int, int, bytes]]:
+    """While a piece is simulated, the one before it is made into a table beside it."""
+    study = parsed(text)
+    before: tuple[int, int, Future[bytes]] | None = None
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        for first, last in missing:
+            tables: list[Future[Any]] = []
+            try:
+                for a, b in pieces(study, first, last):
+                    runs = run_piece(study, a, b, threads)
+                    if tables:
+                        tables[-1].result()
+                    tables.append(beside.submit(tabulate, study, text, a, b, runs, threads))
+                    done += b - a
+                    if b < last:
+                        report(done)
+            except BaseException:  # interrupted; what is simulated is not lost
+                if before is not None:
+                    yield before[0], before[1], before[2].result()
+                raise
+            if before is not None:
+                yield before[0], before[1], before[2].result()
+            before = first, last, beside.submit(_together, text, tables)
+        if before is not None:
+            yield before[0], before[1], before[2].result()
+
+
+def _together(text: str, tables: list[Future[Any]]) -> bytes:
+    return as_parquet(text, [table.result() for table in tables])
+
+
+def study_of(directory: str | Path) -> Study:
+    """The study that a directory holds.
+
+    Raises
+    ------
+    InputError
+        It holds none.
+    """
+    note = Path(directory) / "_study.json"
+    if not note.is_file():
+        raise InputError(f"{directory}: holds no study; run `lostmotion study STUDY.toml -o {directory}` first")
+    return from_json(note.read_text(encoding="utf-8"))

@@ -1,0 +1,85 @@
+"""What a study selects by: the table `[select]` of its file."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from ..inputs.quantities import Part
+from ..sizing.drive_check import RULES
+from .units import in_si
+
+Direction = Literal["least", "largest"]
+
+USE = "use of "
+"""begins the columns of the drive check: the share of each limit that is used"""
+SHARES = tuple(rule for rule in RULES if rule not in ("resonance", "dead_zone", "holding", "loss_map"))
+"""rules of the drive check that compare a figure with a limit"""
+
+
+class Bound(Part):
+    """Permissible values of a column, in its unit."""
+
+    min: float | str | None = None
+    max: float | str | None = None
+
+    @field_validator("min", "max", mode="before")
+    @classmethod
+    def _no_boolean(cls, value: Any) -> Any:
+        if isinstance(value, bool):
+            raise ValueError(f"{str(value).lower()} is no number")
+        return value
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Self:
+        if self.min is None and self.max is None:
+            raise ValueError("needs min or max")
+        return self
+
+    def in_unit(self, unit: str | None) -> tuple[float, float]:
+        """(least, largest) permissible value in a unit; None: it is not known, any is taken in SI.
+
+        Raises
+        ------
+        ValueError
+            A value has the unit of something else.
+        """
+        low, high = in_si(self.min, unit), in_si(self.max, unit)
+        return (-float("inf") if low is None else float(low), float("inf") if high is None else float(high))
+
+
+class Selection(Part):
+    """Which runs fit the task, and which of these are best."""
+
+    objectives: dict[str, Direction] = Field(min_length=1)
+    """columns, each to be least or largest; the first ranks the runs, the first two make the Pareto plot"""
+    limits: dict[str, Bound] = Field(default={})
+    """columns and their permissible values"""
+    drive_check: bool = True
+    """each run must also pass the drive check"""
+
+    def named(self) -> tuple[str, ...]:
+        """All columns that it names."""
+        return (*self.objectives, *self.limits)
+
+    def direction(self, column: str) -> float:
+        """+1 where less is better, -1 where more is."""
+        return 1.0 if self.objectives[column] == "least" else -1.0
+
+
+def check_bounds(selection: Selection, units: dict[str, str]) -> None:
+    """Sees that the limits can be read in the units of their columns.
+
+    Raises
+    ------
+    ValueError
+    """
+    for column, bound in selection.limits.items():
+        unit: Any = units.get(column)
+        try:
+            low, high = bound.in_unit({"1": "", "": None}.get(unit, unit))
+        except ValueError as error:
+            raise ValueError(f"select.limits.{column}: {error}") from None
+        if low > high:
+            raise ValueError(f"select.limits.{column}: min {low:g} is above max {high:g}")

@@ -1,0 +1,139 @@
+"""Which runs of a study fit the task, which are best, and what each limit costs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from .file import Study
+from .select import SHARES, USE, Selection
+from .table import unit_of
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+NOT_RUN = "cannot be run"
+"""stands among the limits of a run that has failed"""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One run of a study that selects."""
+
+    run: int
+    name: str
+    """what varies, as text"""
+    violated: tuple[str, ...]
+    """rules of the drive check, columns with a limit, or `NOT_RUN`"""
+    why: str
+    not_judged: str
+    """rules of the drive check that have no limit to compare with"""
+    values: dict[str, float]
+    """of the objectives"""
+    tightest: str = ""
+    """the rule of the drive check whose limit is used most, and its share"""
+
+    @property
+    def fits(self) -> bool:
+        """Whether it keeps all limits."""
+        return not self.violated
+
+
+@dataclass(frozen=True)
+class Price:
+    """What one limit costs."""
+
+    limit: str
+    excludes: int
+    """runs that violate it"""
+    alone: int
+    """runs that violate it and nothing else"""
+    best: Candidate | None
+    """the best that would fit without it"""
+    gain: float
+    """by how much the first objective would then be better, as a share of its value now; NaN where there is no such figure"""
+
+
+def candidates(table: pa.Table, study: Study) -> list[Candidate]:
+    """The runs of a study that selects: first those that fit, then those that violate one limit, two, ..., each from the best to
+    the worst, and last those that cannot be run.
+
+    Raises
+    ------
+    ValueError
+        The study has no table `[select]`.
+    """
+    select = study.select
+    if select is None:
+        raise ValueError("this study does not select; give it a table [select]")
+    bounds = {
+        column: b.in_unit({"1": "", "": None}.get(u := unit_of(table, column), u))
+        for column, b in select.limits.items()
+    }
+    found = [_candidate(row, study, select, bounds) for row in table.to_pylist()]
+    return sorted(found, key=lambda c: (NOT_RUN in c.violated, len(c.violated), _rank(c, select), c.run))
+
+
+def _rank(candidate: Candidate, select: Selection) -> tuple[float, ...]:
+    values = (select.direction(column) * value for column, value in candidate.values.items())
+    return tuple(math.inf if math.isnan(v) else v for v in values)
+
+
+def _candidate(
+    row: dict[str, Any], study: Study, select: Selection, bounds: dict[str, tuple[float, float]]
+) -> Candidate:
+    values = {column: float(row[column]) for column in select.objectives}
+    shown = [row[v.title] if v.names is not None else f"{v.title} {row[v.title]:.6g}" for v in study.vary]
+    name = ", ".join(shown)
+    if row["error"]:
+        return Candidate(row["run"], name, (NOT_RUN,), row["error"], "", values)
+    violated, why = row.get("violated", "").split(), [row["why"]] if row.get("why") else []
+    for column, (low, high) in bounds.items():
+        if not low <= row[column] <= high:
+            violated.append(column)
+            why.append(
+                f"{column} {row[column]:.6g} is {f'above {high:.6g}' if row[column] > high else f'below {low:.6g}'}"
+            )
+    for column, value in values.items():
+        if math.isnan(value):
+            violated.append(column)
+            why.append(f"{column} has no value")
+    uses = {rule: use for rule in SHARES if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
+    most = max(uses, key=lambda rule: uses[rule], default="")
+    tightest = f"{most} {100.0 * uses[most]:.0f} %" if most else ""
+    return Candidate(row["run"], name, tuple(violated), "; ".join(why), row.get("not judged", ""), values, tightest)
+
+
+def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
+    """What each limit costs that some run violates, the one that excludes most first.
+
+    Parameters
+    ----------
+    ranked
+        From `candidates`.
+    """
+    objective = next(iter(select.objectives))
+    best = next((c for c in ranked if c.fits), None)
+    limits = dict.fromkeys(limit for c in ranked for limit in c.violated if limit != NOT_RUN)
+    out = []
+    for limit in limits:
+        alone = [c for c in ranked if set(c.violated) == {limit} and not math.isnan(c.values[objective])]
+        without = min(alone + ([best] if best else []), key=lambda c: _rank(c, select), default=None)
+        gain = math.nan
+        if best is not None and without is not None and best.values[objective] != 0.0:
+            better = select.direction(objective) * (best.values[objective] - without.values[objective])
+            gain = better / abs(best.values[objective])
+        excluded = sum(limit in c.violated for c in ranked)
+        out.append(Price(limit, excluded, len(alone), without, gain))
+    return sorted(out, key=lambda p: -p.excludes)
+
+
+def pareto_front(ranked: list[Candidate], select: Selection) -> list[Candidate]:
+    """Those that fit and of which none that fits is better in one objective without being worse in another."""
+    fitting = [(c, _rank(c, select)) for c in ranked if c.fits]
+
+    def dominated(rank: tuple[float, ...]) -> bool:
+        return any(all(o <= r for o, r in zip(other, rank, strict=True)) and other != rank for _, other in fitting)
+
+    return [c for c, rank in fitting if not dominated(rank)]

@@ -1,0 +1,221 @@
+"""One parameter that a study varies: its key, its values or their distribution, and what they do to a scenario."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import BaseModel, Field, model_validator
+
+from ..inputs.quantities import Part
+from ..model.signals import Signal
+from ..simulation.scenario import Scenario, list_index
+from .records import CONDITIONS, TABLE_OF, check_names, names_that_fit
+from .units import in_si, unit_of_key
+
+MOST_LEVELS = 1_000_000  # of one parameter
+WAYS = ("values", "grid", "uniform", "log_uniform", "normal", "triangular")
+
+
+class Normal(Part):
+    """Normal distribution."""
+
+    mean: float
+    deviation: Annotated[float, Field(gt=0.0)]
+    """standard deviation"""
+
+
+class Vary(Part):
+    """One parameter, or several that go together.
+
+    Values are SI, or strings with a unit of what the key measures; of the keys `gearbox` and `motor` names of records.
+    """
+
+    key: str = ""
+    """dotted key of the scenario, such as load.inertia"""
+    keys: tuple[str, ...] = ()
+    """several keys that all get the value"""
+    name: str = ""
+    """column in the result; the first key if left out"""
+    relative: bool = False
+    """the value multiplies what the base scenario has (of a list, each entry)"""
+    values: tuple[float | str, ...] | None = None
+    """as they are, or names of records; in a random design each is as likely"""
+    grid: tuple[float, float, int] | None = None
+    """first, last, how many"""
+    uniform: tuple[float, float] | None = None
+    log_uniform: tuple[float, float] | None = None
+    normal: Normal | None = None
+    triangular: tuple[float, float, float] | None = None
+    """least, most likely, largest"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_units(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        key = str(data.get("key") or next(iter(data.get("keys") or ()), ""))
+        unit = "" if data.get("relative") else unit_of_key(key)
+        try:
+            if key in TABLE_OF:
+                return _with_names(data, TABLE_OF[key])
+            if "catalogue" in data:
+                raise ValueError(f"has a catalogue filter, which only {', '.join(TABLE_OF)} take")
+            return data | {way: in_si(data[way], unit) for way in WAYS if way in data}
+        except ValueError as error:
+            raise ValueError(f"of {key}: {error}") from None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        ways = [w for w in WAYS if getattr(self, w) is not None]
+        if bool(self.key) == bool(self.keys):
+            raise ValueError("needs key or keys, one of the two")
+        if len(ways) != 1:
+            more = ", catalogue" if self.all_keys[0] in TABLE_OF else ""
+            raise ValueError(f"of {self.title}: needs one of {', '.join(WAYS)}{more}")
+        if any(key in TABLE_OF for key in self.all_keys) and (self.names is None or self.keys or self.relative):
+            raise ValueError(f"of {self.title}: names of records need a key of their own, and values or catalogue")
+        if self.names is None and any(isinstance(x, str) for x in self.values or ()):
+            raise ValueError(f"of {self.title}: has values that are no numbers")
+        pair = self.uniform or self.log_uniform
+        if pair is not None and not pair[0] < pair[1]:
+            raise ValueError(f"of {self.title}: {pair[0]} must be below {pair[1]}")
+        if self.log_uniform is not None and self.log_uniform[0] <= 0.0:
+            raise ValueError(f"of {self.title}: log_uniform needs positive bounds")
+        if self.grid is not None and not 1 <= self.grid[2] <= MOST_LEVELS:
+            raise ValueError(f"of {self.title}: grid needs 1 to {MOST_LEVELS} values, not {self.grid[2]}")
+        if self.values is not None and not self.values:
+            raise ValueError(f"of {self.title}: values is empty")
+        if self.triangular is not None and not self.triangular[0] <= self.triangular[1] <= self.triangular[2]:
+            raise ValueError(f"of {self.title}: triangular must rise")
+        return self
+
+    @property
+    def all_keys(self) -> tuple[str, ...]:
+        return self.keys or (self.key,)
+
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        """The names of records, where it varies these; else None."""
+        if not self.values or self.all_keys[0] not in TABLE_OF:
+            return None
+        return tuple(str(name) for name in self.values)
+
+    @property
+    def title(self) -> str:
+        return self.name or self.all_keys[0]
+
+    @property
+    def unit(self) -> str:
+        """Of the values."""
+        return (unit_of_key(self.all_keys[0]) if not self.relative else None) or "1"
+
+    def value(self, number: float) -> float | str:
+        """What a number of `levels` or `quantile` stands for: itself, or the name at this place."""
+        return float(number) if self.names is None else self.names[int(number)]
+
+    def levels(self) -> np.ndarray | None:
+        """Values of a grid or list, of names their places in it; None for a distribution."""
+        if self.names is not None:
+            return np.arange(len(self.names), dtype=float)
+        if self.values is not None:
+            return np.array(self.values, dtype=float)
+        return None if self.grid is None else np.linspace(self.grid[0], self.grid[1], self.grid[2])
+
+    def quantile(self, u: np.ndarray) -> np.ndarray:
+        """Values at probabilities 0 < u < 1."""
+        import scipy.stats as st
+
+        levels = self.levels()
+        if levels is not None:
+            out: Any = levels[np.minimum((u * len(levels)).astype(int), len(levels) - 1)]
+        elif self.uniform is not None:
+            out = self.uniform[0] + u * (self.uniform[1] - self.uniform[0])
+        elif self.log_uniform is not None:
+            a, b = (math.log(x) for x in self.log_uniform)
+            out = np.exp(a + u * (b - a))
+        elif self.normal is not None:
+            out = st.norm.ppf(u, self.normal.mean, self.normal.deviation)
+        else:
+            assert self.triangular is not None
+            low, mode, high = self.triangular
+            out = st.triang.ppf(u, (mode - low) / (high - low), low, high - low) if high > low else np.full_like(u, low)
+        return np.asarray(out, dtype=float)
+
+
+def _with_names(data: Mapping[str, Any], table: str) -> dict[str, Any]:
+    """A filter of the catalogue in the place of the names that it lets through."""
+    out = dict(data)
+    if "catalogue" in out:
+        if "values" in out:
+            raise ValueError("has values and catalogue; give one of the two")
+        wanted = out.pop("catalogue")
+        if not isinstance(wanted, dict):
+            raise ValueError(f'has catalogue = {wanted!r}; it must be a table, such as {{ kind = "strain_wave" }}')
+        out["values"] = names_that_fit(table, wanted)
+    check_names(table, out.get("values") or ())
+    return out
+
+
+def base_value(scenario: Scenario, key: str) -> Any:
+    """What a scenario has under a dotted key.
+
+    Raises
+    ------
+    ValueError
+        There is nothing of that name.
+    """
+    node: Any = scenario
+    for part in key.split("."):
+        try:
+            if isinstance(node, tuple | list):
+                node = node[list_index(node, part)]
+            elif isinstance(node, BaseModel) and part in type(node).model_fields:
+                node = getattr(node, part)
+            else:
+                raise ValueError(f"there is no {part}")
+        except ValueError as error:
+            raise ValueError(f"varies {key}, which the base scenario does not know ({error})") from None
+    return node
+
+
+def check_key(scenario: Scenario, key: str, *, relative: bool) -> None:
+    """Sees that a number, or with `relative` a factor, can take the place of what a scenario has under a key.
+
+    Raises
+    ------
+    ValueError
+        It cannot; the message says what to vary instead.
+    """
+    if key in CONDITIONS:
+        if relative:
+            raise ValueError(f"varies {key} with relative, but it is itself no figure of the record; give its values")
+        return
+    value = base_value(scenario, key)
+    if isinstance(value, BaseModel):
+        if isinstance(value, Signal) and not relative:
+            return  # a bare number is a constant
+        inner = ", ".join(f"{key}.{name}" for name in type(value).model_fields if name != "kind")
+        raise ValueError(f"varies {key}, which is a table; vary one of its keys: {inner}")
+    if value is None:
+        if relative:
+            raise ValueError(f"varies {key} with relative, but the base scenario has no value there to multiply")
+        if unit_of_key(key) is None:
+            raise ValueError(f"varies {key}, which the base scenario does not have; give it there first")
+    elif isinstance(value, str | bool):
+        raise ValueError(f"varies {key}, which is {value!r} and no number")
+    elif isinstance(value, tuple) and not (relative and value and _is_numbers(value)):
+        raise ValueError(f"varies {key}, which is a list; vary its entries, such as {key}.0, or numbers with relative")
+
+
+def _is_numbers(value: Any) -> bool:
+    if isinstance(value, tuple | list):
+        return all(_is_numbers(x) for x in value)
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def scaled(value: Any, factor: float) -> Any:
+    """A number, or each of a list, times a factor."""
+    return [scaled(x, factor) for x in value] if isinstance(value, tuple | list) else factor * float(value)

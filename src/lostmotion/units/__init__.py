@@ -1,0 +1,1 @@
+"""Units at the edge: what may be written, and its value in SI."""
