@@ -1,5 +1,8 @@
 """Shared by the tests."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -16,3 +19,14 @@ def large() -> Path:
 @pytest.fixture(scope="session")
 def small() -> Path:
     return ROOT / "scenarios" / "paper-2dof-nl-small.toml"
+
+
+def run_in_build(build: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Python in a process of its own, with the named build of the core."""
+    return subprocess.run(
+        [sys.executable, *arguments],
+        env=os.environ | {"LOSTMOTION_CORE": build},
+        capture_output=True,
+        text=True,
+        check=False,
+    )

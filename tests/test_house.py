@@ -1,7 +1,6 @@
 """The rules of the house: one-way imports, quick start-up, stub and docs in step with the code."""
 
 import ast
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import lostmotion
-from conftest import ROOT
+from conftest import ROOT, run_in_build
 from lostmotion import _instruction_set
 
 PACKAGE = ROOT / "src" / "lostmotion"
@@ -99,13 +98,8 @@ def test_all_builds_of_the_core_give_the_same_bits() -> None:
     scenarios = [str(p) for p in sorted((ROOT / "scenarios").glob("*.toml"))]
     prints = {}
     for build in _instruction_set.builds():
-        done = subprocess.run(
-            [sys.executable, "-c", script, *scenarios],
-            env=os.environ | {"LOSTMOTION_CORE": build},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
+        done = run_in_build(build, "-c", script, *scenarios)
+        assert done.returncode == 0, done.stderr
         name, *prints[build] = done.stdout.split()
         assert name == f"lostmotion._core_{build}"
     assert int(prints["any"][1]) > 1_000_000
@@ -113,13 +107,7 @@ def test_all_builds_of_the_core_give_the_same_bits() -> None:
 
 
 def test_a_build_of_the_core_that_is_not_there_is_refused() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", "from lostmotion import _core"],
-        env=os.environ | {"LOSTMOTION_CORE": "abacus"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_in_build("abacus", "-c", "from lostmotion import _core")
     assert done.returncode != 0
     assert "LOSTMOTION_CORE = 'abacus' is no build of the core here; take " in done.stderr
 
