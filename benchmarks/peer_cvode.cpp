@@ -17,7 +17,7 @@ namespace {
 struct Context {
     const Regime* regime = nullptr;
     Memory memory;
-    InputState* input = nullptr;
+    InputState<DriveDims>* input = nullptr;
     LinearRates linear;
     Column constant{};
     // Guards that have been off zero since the regime began. CVODE refuses to go on from a root, or from near one.
@@ -146,7 +146,7 @@ class Cvode {
     SwitchedDrive system_;
     RegimeCache<SwitchedDrive> cache_;
     std::vector<InputBasis> basis_;
-    InputState input_;
+    InputState<DriveDims> input_;
     Context user_;
     SUNContext context_ = nullptr;
     N_Vector y_ = nullptr;

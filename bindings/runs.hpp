@@ -172,7 +172,7 @@ inline nb::dict respond_to(SharedDrive& drive, const std::vector<Point>& asked, 
 // friction of the input contact.
 inline nb::tuple linearization(const Drive& drive, const std::array<double, n_states>& x, double capacity,
                                const std::array<double, n_inputs>& u, const std::array<double, n_inputs>& slope) {
-    Signals signals = ramped_inputs();
+    Signals signals = ramped_inputs<DriveDims>();
     for (int i = 0; i < n_inputs; ++i) signals[i].knots[0] = {0.0, u[i], slope[i]};
     const SwitchedDrive system(drive);
     ExactSolver<SwitchedDrive> solver(system, signals, 1e-3, drive.balanced_scale());
@@ -223,7 +223,7 @@ inline nb::tuple explain_at(const Drive& drive, const Signals& signals, const st
         status = solver.advance(time, recorder);
     }
     check(status, solver.time(), solver.stopped_at());
-    InputState input(signals, solver.basis());
+    InputState<DriveDims> input(signals, solver.basis());
     input.anchor(time);
     const auto u = input.values();
     const Reading reading = Reader(drive, solver.regime(), solver.memory())(solver.state(), u);

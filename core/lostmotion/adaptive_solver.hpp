@@ -304,7 +304,7 @@ class AdaptiveSolver {
     double tolerance_;
     State scale_;
     Remainder remainder_;
-    InputState input_;
+    InputState<DriveDims> input_;
 
     double longest_step_ = std::numeric_limits<double>::infinity();
     double time_ = 0.0, step_ = 0.0, t_end_ = 0.0;

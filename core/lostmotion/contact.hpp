@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "drive.hpp"
-#include "linear_rates.hpp"
+#include "kernel/rates.hpp"
 
 namespace lostmotion {
 
@@ -89,6 +89,8 @@ enum class Found { yes, inconsistent, outside };
 // The drive as a switched linear system: which regime follows at an event.
 class SwitchedDrive {
  public:
+    using Dims = DriveDims;
+
     explicit SwitchedDrive(const Drive& drive) : drive_(drive) { drive_changed(); }
     // To be called when the drive that this refers to has been given other parameters.
     void drive_changed() {

@@ -51,9 +51,9 @@ class EnergyMeter {
         if (!(s.end > s.begin)) return true;
         const Regime& r = s.entry.regime;
         if (r.at_rest[input_contact] && r.at_rest[load_contact]) return true;
-        Propagator& p = s.entry.propagator;
+        Propagator<DriveDims>& p = s.entry.propagator;
         if (!cursor_) end_ = cursor_.emplace(s.at.input());
-        Cursor &cursor = *cursor_, &end = *end_;
+        Cursor<DriveDims>&cursor = *cursor_, &end = *end_;
         cursor = s.at;
         const Factors factors(drive_, r, s.memory);
         Powers here, there;
@@ -96,7 +96,7 @@ class EnergyMeter {
 
     // Every power is a product of two linear forms; all are evaluated at once, as columns.
     struct Factors {
-        FormTable<n_flows> left, right;
+        FormTable<DriveDims, n_flows> left, right;
         std::array<double, n_flows> left_constant, right_constant;
 
         Factors(const Drive& drive, const Regime& r, const Memory& m) {
@@ -122,7 +122,7 @@ class EnergyMeter {
             right.constants(m, right_constant);
         }
 
-        void powers(const Propagator& p, Cursor& c, Powers& out) const {
+        void powers(const Propagator<DriveDims>& p, Cursor<DriveDims>& c, Powers& out) const {
             const auto u = c.input().jet<orders>();
             Powers a, b;
             State x = c.x();
@@ -148,7 +148,7 @@ class EnergyMeter {
         }
 
         // The powers alone.
-        void powers(const Cursor& c, Flows& out) const {
+        void powers(const Cursor<DriveDims>& c, Flows& out) const {
             const auto u = c.input().values();
             Flows a, b;
             left.evaluate(left_constant, c.x(), u, a);
@@ -179,8 +179,8 @@ class EnergyMeter {
     }
 
     // The same by the powers at nodes, from where a cursor stands.
-    double add_stiff_panel(const Factors& factors, const Cursor& from, double h) {
-        Cursor& node = node_.emplace(from);
+    double add_stiff_panel(const Factors& factors, const Cursor<DriveDims>& from, double h) {
+        Cursor<DriveDims>& node = node_.emplace(from);
         Flows sums{}, coarse{}, power;
         for (int k = 0; k < kronrod_nodes; ++k)
             for (const double side : {-1.0, +1.0}) {
@@ -233,7 +233,7 @@ class EnergyMeter {
     }};
 
     const Drive& drive_;
-    std::optional<Cursor> cursor_, end_, node_;  // kept from segment to segment for their memory
+    std::optional<Cursor<DriveDims>> cursor_, end_, node_;  // kept from segment to segment for their memory
     int level_ = 4;
     double elapsed_ = 0.0, mean_power_ = 0.0;
 };

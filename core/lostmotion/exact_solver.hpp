@@ -15,8 +15,8 @@
 #include <limits>
 #include <memory>
 
-#include "cursor.hpp"
-#include "polynomial.hpp"
+#include "kernel/cursor.hpp"
+#include "kernel/polynomial.hpp"
 #include "regime_cache.hpp"
 #include "switching.hpp"
 
@@ -27,9 +27,9 @@ template <class System>
 struct Segment {
     using Entry = typename RegimeCache<System>::Entry;
     Entry& entry;
-    const Cursor& at;   // where it begins
-    double begin, end;  // [s]
-    bool last;          // no further segment follows in this call: `end` belongs to it
+    const Cursor<typename System::Dims>& at;  // where it begins
+    double begin, end;                        // [s]
+    bool last;                                // no further segment follows in this call: `end` belongs to it
     Memory memory;
     Column constant;  // the part of dx/dt that depends on neither state nor inputs
     State x_end;      // at end, before any stop there
@@ -57,6 +57,11 @@ template <class System>
 class ExactSolver {
  public:
     using Cache = RegimeCache<System>;
+    using D = typename System::Dims;
+    using Cursor = lostmotion::Cursor<D>;
+    using InputState = lostmotion::InputState<D>;
+    using Propagator = lostmotion::Propagator<D>;
+    using Expansion = lostmotion::Expansion<D>;
 
     // unit: a length of time [s] that is to be a power-of-two multiple of the elementary steps, such as the
     // sampling interval. scale: natural sizes of the states.

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "linear_form.hpp"
+#include "variables.hpp"
 
 namespace lostmotion {
 

@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "drive.hpp"
+#include "kernel/stride.hpp"
 
 namespace lostmotion {
 
@@ -38,21 +39,7 @@ struct Reading {
     std::array<double, n_channels> value;
 };
 
-// State and inputs at up to `most` instants of one regime, variable by variable.
-struct Instants {
-    static constexpr int most = 64;
-    static_assert(most % vec_width == 0);
-    using Column = std::array<double, most>;
-
-    alignas(64) std::array<Column, n_states> x{};
-    alignas(64) std::array<Column, n_inputs> u{};
-
-    [[gnu::always_inline]] void set(int k, const Lanes& state, const std::array<double, n_inputs>& input) {
-        for (int j = 0; j < n_coupled; ++j) x[j][k] = state.coupled[j];
-        x[load_angle][k] = state.angle;
-        for (int i = 0; i < n_inputs; ++i) u[i][k] = input[i];
-    }
-};
+using Instants = InstantsOf<DriveDims>;
 
 // Reads the channels in one regime, as many instants at once as the instruction set holds numbers.
 class Reader {

@@ -6,12 +6,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "linear_form.hpp"
+#include "variables.hpp"
 
 namespace lostmotion {
-
-// The dry contacts of the drive.
-enum Contact : int { input_contact, twist_contact, load_contact, n_contacts };
 
 // A contact slips forward (+1), slips backward (-1) or is stuck (0). A contact that the drive does not have is
 // `absent` and acts as if it were not there.
@@ -56,8 +53,7 @@ struct Guard {
     bool by_touch = false;  // ends the regime also by touching zero without falling through it
 };
 
-inline constexpr int max_guards = 16;
-using GuardTable = FormTable<max_guards>;
+using GuardTable = FormTable<DriveDims, max_guards>;
 
 struct Regime {
     RegimeKey key;

@@ -6,7 +6,7 @@
 #include <new>
 #include <vector>
 
-#include "propagator.hpp"
+#include "kernel/propagator.hpp"
 #include "regime.hpp"
 
 namespace lostmotion {
@@ -34,13 +34,13 @@ class RegimeCache {
         std::array<TwistSpeed, n_contacts> twist_speeds{};
         int n_twist_speeds = 0;
         GuardTable::Values near_event;  // what each guard exceeds where it is far from an event
-        Propagator propagator;
+        Propagator<DriveDims> propagator;
         std::array<Entry*, max_guards> neighbour{};  // what lies beyond each guard, as far as it is known
 
         void set(const System& system, const RegimeKey& key) {
             // In place, since they are large.
             const Regime& r = *new (&regime) Regime(system.build(key));
-            new (&rates) LinearRates(r);
+            new (&rates) LinearRates(r.rate);
             guards = {};
             neighbour = {};
             touch_guard = -1;

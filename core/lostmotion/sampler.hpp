@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "exact_solver.hpp"
+#include "kernel/stride.hpp"
 #include "reader.hpp"
-#include "stride.hpp"
 
 namespace lostmotion {
 
@@ -57,18 +57,18 @@ class Sampler {
  private:
     // The samples of one segment.
     struct Piece {
-        explicit Piece(const Cursor& like) : cursor(like) {}
+        explicit Piece(const Cursor<DriveDims>& like) : cursor(like) {}
         typename Segment<SwitchedDrive>::Entry* entry = nullptr;
         Memory memory;
         Column constant;
-        Cursor cursor;
+        Cursor<DriveDims> cursor;
         std::size_t first = 0, end = 0;
         double rest = 0.0;  // from the cursor to the first [s]
     };
     static constexpr std::size_t most_pieces = 4;
 
     bool write(Piece& p) {
-        Propagator& propagator = p.entry->propagator;
+        auto& propagator = p.entry->propagator;
         const int level = propagator.level_of(interval_);
         const Reader reader(drive_, p.entry->regime, p.memory);
         for (std::size_t next = p.first;;) {
@@ -127,7 +127,7 @@ class Sampler {
     std::span<const int> channels_;
     std::array<std::optional<Piece>, most_pieces> pieces_;
     std::size_t n_pieces_ = 0;  // that have been collected
-    Stride stride_;
+    Stride<DriveDims> stride_;
     Instants instants_;
 };
 

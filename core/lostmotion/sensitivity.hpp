@@ -60,7 +60,7 @@ class Sensitivity {
         x_ = s.x_end;
         memory_ = s.memory;
         if (!(s.end > s.begin)) return true;
-        const Integral G = s.entry.propagator.integral(s.end - s.begin);
+        const auto G = s.entry.propagator.integral(s.end - s.begin);
         // x(s) = x + G x', column by column.
         for (int c = 0; c < n_components; ++c) {
             State rate{};
@@ -169,7 +169,7 @@ class Sensitivity {
 
     const Drive& drive_;
     RegimeCache<SwitchedDrive>& cache_;
-    std::optional<InputState> input_;
+    std::optional<InputState<DriveDims>> input_;
     // Where the last segment ended.
     const Regime* regime_ = nullptr;
     State x_{};

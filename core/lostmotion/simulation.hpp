@@ -23,7 +23,7 @@ class Simulation {
 
     // step: the usual interval [s]; others are allowed, this one is fastest.
     Simulation(const Drive& drive, double step)
-        : drive_(drive), system_(drive_), solver_(system_, ramped_inputs(), step, drive_.balanced_scale()) {}
+        : drive_(drive), system_(drive_), solver_(system_, ramped_inputs<DriveDims>(), step, drive_.balanced_scale()) {}
     Simulation(const Simulation&) = delete;
     Simulation& operator=(const Simulation&) = delete;
 

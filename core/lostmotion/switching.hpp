@@ -2,7 +2,7 @@
 #pragma once
 
 #include "contact.hpp"
-#include "signal.hpp"
+#include "kernel/inputs.hpp"
 
 namespace lostmotion {
 
@@ -34,7 +34,7 @@ struct Switching {
 };
 
 // Inputs and their rates at an instant, for the search of contact modes. At a jump: the right limit.
-inline void see_inputs(const InputState& input, double time, Instant& now) {
+inline void see_inputs(const InputState<DriveDims>& input, double time, Instant& now) {
     now.time = time;
     input.jet(n_derivatives, now.input.data());
     now.input_size = input.sizes();
@@ -55,7 +55,7 @@ bool wants_switching(const Observer& observer) {
 // Finds the regime that follows after `fired` has reached zero, with the inputs of that instant, or, if it is nullptr,
 // after an input has jumped. Tells the observer, if it wants to know.
 template <class System, class Cache, class Observer>
-Status switch_regime(const System& system, Cache& cache, InputState& input, double time, const Guard* fired,
+Status switch_regime(const System& system, Cache& cache, InputState<DriveDims>& input, double time, const Guard* fired,
                      Instant& now, RegimeKey& key, Observer& observer) {
     if (fired != nullptr && fired->kind == Guard::outside) return Status::outside;
     const bool wanted = wants_switching(observer);

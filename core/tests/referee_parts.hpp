@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "lostmotion/gearbox.hpp"
-#include "lostmotion/signal.hpp"
+#include "lostmotion/kernel/inputs.hpp"
 #include "referee_polynomial.hpp"
 
 namespace lostmotion::referee {

@@ -128,7 +128,7 @@ TEST_SUITE("contacts") {
         int stuck = 0;
         for (int k = 1; k <= 400; ++k) {
             REQUIRE(solver.advance(0.005 * k, nothing) == Status::done);
-            InputState input(signals, solver.basis());
+            InputState<DriveDims> input(signals, solver.basis());
             input.anchor(solver.time());
             const ContactReport c =
                 explain_contact(drive, solver.regime(), input_contact, solver.state(), solver.memory(), input.values());

@@ -31,6 +31,8 @@ Samples swinging(double at, double duration, double interval) {
 
 // A ball that loses half its speed at each bounce: switchings accumulate at a known time.
 struct BouncingBall {
+    using Dims = DriveDims;
+
     // Its height is held by the twist, its speed by that of the load.
     double restitution = 0.5;
     Regime build(const RegimeKey& key) const {

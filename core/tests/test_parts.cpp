@@ -102,20 +102,20 @@ TEST_SUITE("parts") {
             for (int c = 0; c < n_contacts; ++c)
                 if (key.modes[c] == 0 && !(c == twist_contact && drive.rigid())) key.modes[c] = 1;
             const Regime r = drive.build(key);
-            Propagator p;
-            InputTurns turns(1e-3, input_basis({}));
-            const LinearRates rates(r);
+            Propagator<DriveDims> p;
+            InputTurns turns(1e-3, input_basis(Signals{}));
+            const LinearRates rates(r.rate);
             p.prepare(rates, turns, drive.balanced_scale());
             const State scale = drive.balanced_scale();
             for (int level = 0; p.length(level) < 1.0; level += 2) {
-                const Step& step = p.level(level);
+                const auto& step = p.level(level);
                 const LongMatrix expected = reference_exponential(r, p.length(level));
                 for (int i = 0; i < n_states; ++i)
                     for (int j = 0; j < n_states; ++j) {
                         const double e = static_cast<double>(expected[i][j]) - (i == j ? 1.0 : 0.0);
                         // In balanced units; doubling adds about one rounding a level.
                         const double change = j == load_angle   ? 0.0
-                                              : i == load_angle ? rates.turning * step.integral.coupled(load_speed, j)
+                                              : i == load_angle ? rates.turning[0] * step.integral.coupled(load_speed, j)
                                                                 : step.change(i, j);
                         CHECK(std::fabs(change - e) * scale[j] / scale[i] < 1e-10);
                     }
@@ -131,9 +131,9 @@ TEST_SUITE("parts") {
             Instant now;
             RegimeKey key;
             REQUIRE(system.start(cache, now, key) == Found::yes);
-            Propagator p;
-            InputTurns turns(1e-3, input_basis({}));
-            const LinearRates rates(drive.build(key));
+            Propagator<DriveDims> p;
+            InputTurns turns(1e-3, input_basis(Signals{}));
+            const LinearRates rates(drive.build(key).rate);
             p.prepare(rates, turns, drive.balanced_scale());
             for (int level = 3; level < 9; ++level)
                 for (int inner = 0; inner <= level; ++inner)

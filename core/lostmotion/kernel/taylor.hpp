@@ -1,6 +1,6 @@
 // Taylor series of the motion in one regime about an instant.
 //
-// The derivatives of the state follow from one another, x^(k+1) = A x^(k) + B u^(k). They are reckoned three at a time,
+// The derivatives of the state follow from one another, x^(k+1) = A x^(k) + B u^(k). They are computed three at a time,
 //     x^(k+3) = A^3 x^(k) + A^2 B u^(k) + A B u^(k+1) + B u^(k+2),
 // so that few products wait for one another.
 #pragma once
@@ -8,9 +8,9 @@
 #include <array>
 #include <cassert>
 
-#include "linear_rates.hpp"
+#include "inputs.hpp"
 #include "polynomial.hpp"
-#include "signal.hpp"
+#include "rates.hpp"
 
 namespace lostmotion {
 
@@ -26,30 +26,35 @@ inline constexpr std::array<double, Polynomial::degree + 2> over_factorial = [] 
 }();
 
 // The motion about an instant: its derivatives there, as far as a base interval needs them.
+template <class D>
 class Expansion {
  public:
     static constexpr int terms = Polynomial::degree;  // good for a base interval: 0.25^13/13! < 1e-17
+    using Coupled = CoupledOf<D>;
 
-    std::array<std::array<double, n_inputs>, terms + 1> input;  // [k]: their k-th derivative
-    double angle_rate;                                          // of the load angle
-    double turning;                                             // its rate over the load speed
-    std::array<Coupled, terms> coupled;                         // derivatives of the other states, from the first on
+    std::array<InputsOf<D>, terms + 1> input;  // [k]: their k-th derivative
+    std::array<double, D::angles> angle_rate;  // of the angles
+    std::array<double, D::angles> turning;     // their rates over their speeds
+    std::array<Coupled, terms> coupled;        // derivatives of the other states, from the first on
 
     // By how much the state changes over s.
-    [[gnu::always_inline]] Lanes change(double s) const {
+    [[gnu::always_inline]] LanesOf<D> change(double s) const {
         const double s2 = s * s, s4 = s2 * s2;
         const Pack<4> powers = Pack<4>::of({s, s2, s2 * s, s4});
         const std::array<double, Polynomial::parts> lead{1.0, s4, s4 * s4};
-        Coupled sum{};
-        double angle = 0.0;
+        LanesOf<D> sum{};
         for (int part = Polynomial::parts - 1; part >= 0; --part) {  // the small terms first
             const Pack<4> c = lead[part] * powers * four_over_factorial(part);
             const Coupled* v = &coupled[static_cast<std::size_t>(4 * part)];
-            sum = sum + ((c.spread<0>() * v[0] + c.spread<1>() * v[1]) + (c.spread<2>() * v[2] + c.spread<3>() * v[3]));
-            const Pack<4> rates = Pack<4>::of({v[0][load_speed], v[1][load_speed], v[2][load_speed], v[3][load_speed]});
-            angle += (c * four_over_next(part) * rates).sum();
+            sum.coupled = sum.coupled + ((by<0>(c, v[0]) + by<1>(c, v[1])) + (by<2>(c, v[2]) + by<3>(c, v[3])));
+            const Pack<4> next = c * four_over_next(part);
+            for (int j = 0; j < D::angles; ++j) {
+                const int speed = D::first_turning + j;
+                sum.angle[j] += (next * Pack<4>::of({v[0][speed], v[1][speed], v[2][speed], v[3][speed]})).sum();
+            }
         }
-        return {sum, s * (angle_rate + turning * angle)};
+        for (int j = 0; j < D::angles; ++j) sum.angle[j] = s * (angle_rate[j] + turning[j] * sum.angle[j]);
+        return sum;
     }
 
     // By how much the rate of the coupled states changes over s.
@@ -59,19 +64,20 @@ class Expansion {
         return sum;
     }
 
-    // A form of the motion that does not depend on the load angle, as a polynomial in the time [s] from the instant.
-    [[gnu::always_inline]] Polynomial polynomial(const LinearForm& form, double value) const {
-        assert(form.c[load_angle] == 0.0);
+    // A form of the motion that does not depend on an angle, as a polynomial in the time [s] from the instant.
+    [[gnu::always_inline]] Polynomial polynomial(const LinearFormOf<D>& form, double value) const {
+        for (int j = D::coupled; j < D::states; ++j) assert(form.c[j] == 0.0);
         Polynomial p(value);
         const Coupled c = Coupled::load(form.c.data());
-        const double first = form.c[first_input], second = form.c[first_input + 1];
+        bool driven = false;
+        for (int i = 0; i < D::inputs; ++i) driven = driven || form.c[D::first_input + i] != 0.0;
         for (int part = 0; part < Polynomial::parts; ++part) {
             const Coupled* v = &coupled[static_cast<std::size_t>(4 * part)];
             p.part[part] = sums(c * v[0], c * v[1], c * v[2], c * v[3]);
-            if (first != 0.0 || second != 0.0) {
+            if (driven) {
                 const auto* u = &input[static_cast<std::size_t>(4 * part + 1)];
-                const auto of = [&](int k) { return first * u[k][0] + second * u[k][1]; };
-                p.part[part] = p.part[part] + Pack<4>::of({of(0), of(1), of(2), of(3)});
+                p.part[part] = p.part[part] + Pack<4>::of({input_part<D>(form, u[0]), input_part<D>(form, u[1]),
+                                                           input_part<D>(form, u[2]), input_part<D>(form, u[3])});
             }
             p.part[part] = p.part[part] * four_over_factorial(part);
         }
@@ -79,6 +85,14 @@ class Expansion {
     }
 
  private:
+    // A vector times one of four numbers.
+    template <int k>
+    [[gnu::always_inline]] static Coupled by(const Pack<4>& c, const Coupled& v) {
+        if constexpr (D::coupled == 4)
+            return c.spread<k>() * v;
+        else
+            return c[k] * v;
+    }
     // 1/k! and 1/(k + 1) of the four terms of a part.
     static Pack<4> four_over_factorial(int part) {
         return Pack<4>::load(&over_factorial[static_cast<std::size_t>(4 * part + 1)]);
@@ -94,28 +108,44 @@ class Expansion {
 };
 
 // G(h), the integral of exp(A s) from 0 to h.
-struct Integral {
-    Matrix coupled;
-    Column angle{};  // the row of the load angle, but for its own rate
+template <class D>
+struct IntegralOf {
+    using Lanes = LanesOf<D>;
+
+    MatrixOf<D> coupled;
+    std::array<ColumnOf<D>, D::angles> angle{};  // the rows of the angles, but for their own rates
     double length = 0.0;
 
     // By how much the state changes that had this rate.
     [[gnu::always_inline]] Lanes operator*(const Lanes& rate) const {
-        return {coupled * rate.coupled, (load(angle) * rate.coupled).sum() + length * rate.angle};
+        Lanes out{coupled * rate.coupled, {}};
+        for (int j = 0; j < D::angles; ++j)
+            out.angle[j] = (load(angle[j]) * rate.coupled).sum() + length * rate.angle[j];
+        return out;
     }
-    [[gnu::always_inline]] Lanes operator*(const Column& rate) const {
-        return {coupled * rate, (load(angle) * load(rate)).sum()};
+    [[gnu::always_inline]] Lanes operator*(const ColumnOf<D>& rate) const {
+        Lanes out{coupled * rate, {}};
+        for (int j = 0; j < D::angles; ++j) out.angle[j] = (load(angle[j]) * load(rate)).sum();
+        return out;
     }
 };
 
 // What it takes to expand the motions of one regime.
+template <class D>
 class Taylor {
  public:
+    using Coupled = CoupledOf<D>;
+    using Lanes = LanesOf<D>;
+    using Matrix = MatrixOf<D>;
+    using LinearRates = LinearRatesOf<D>;
+    using Integral = IntegralOf<D>;
+    static constexpr int terms = Expansion<D>::terms;
+
     void prepare(const LinearRates& rates) {
         rates_ = &rates;
         squared_ = rates.rate * rates.rate;
         cubed_ = rates.rate * squared_;
-        for (int i = 0; i < n_inputs; ++i) {
+        for (int i = 0; i < D::inputs; ++i) {
             const Coupled B = load(rates.input_column[i]);
             input_[i] = {B, rates.rate * B, squared_ * B};
         }
@@ -124,24 +154,27 @@ class Taylor {
     const LinearRates& rates() const { return *rates_; }
 
     // At an instant with this rate and these inputs.
-    [[gnu::always_inline]] void expand(const Lanes& rate, const InputState& input, Expansion& out) const {
-        input.jet(Expansion::terms + 1, out.input.data());
-        expand(rate, {input.varies(0), input.varies(1)}, out);
+    [[gnu::always_inline]] void expand(const Lanes& rate, const InputState<D>& input, Expansion<D>& out) const {
+        input.jet(terms + 1, out.input.data());
+        Varies varies;
+        for (int i = 0; i < D::inputs; ++i) varies[i] = input.varies(i);
+        expand(rate, varies, out);
     }
     // The answer from rest to a function of the inputs after h.
     Lanes response(const InputBasis& function, double h) const {
-        Expansion e{};
-        for (int k = 1; k <= Expansion::terms; ++k)
-            e.input[static_cast<std::size_t>(k)][function.input] = function.derivative(k);
-        expand({}, {function.input == 0, function.input == 1}, e);
+        Expansion<D> e{};
+        for (int k = 1; k <= terms; ++k) e.input[static_cast<std::size_t>(k)][function.input] = function.derivative(k);
+        Varies varies{};
+        varies[function.input] = true;
+        expand({}, varies, e);
         return e.change(h);
     }
 
     // Of the coupled states.
-    [[gnu::always_inline]] Coupled fourth_derivative(const Coupled& rate, const InputState& input) const {
+    [[gnu::always_inline]] Coupled fourth_derivative(const Coupled& rate, const InputState<D>& input) const {
         Coupled sum = cubed_ * rate;
-        const auto u = input.jet<4>();
-        for (int i = 0; i < n_inputs; ++i)
+        const auto u = input.template jet<4>();
+        for (int i = 0; i < D::inputs; ++i)
             if (input.varies(i)) sum = sum + input_[i].bring(u[1][i], u[2][i], u[3][i]);
         return sum;
     }
@@ -154,21 +187,23 @@ class Taylor {
         three.scale(h * h * h);
         Integral sum{power_series<1>(one, two, three), {}, h};
         sum.coupled.scale(h);
-        // The load angle is turned by the integral of the load speed's row.
-        const Coupled first = Matrix::identity().row(load_speed), second = one.row(load_speed),
-                      third = two.row(load_speed);
-        Coupled row{};
-        for (int k = Expansion::terms - 3; k >= 0; k -= 3)
-            row = three.after(row) +
-                  (over_factorial[k + 2] * first + (over_factorial[k + 3] * second + over_factorial[k + 4] * third));
-        (rates_->turning * h * h * row).store(sum.angle.data());
+        // An angle is turned by the integral of its speed's row.
+        for (int j = 0; j < D::angles; ++j) {
+            const int speed = D::first_turning + j;
+            const Coupled first = Matrix::identity().row(speed), second = one.row(speed), third = two.row(speed);
+            Coupled row{};
+            for (int k = terms - 3; k >= 0; k -= 3)
+                row = three.after(row) + (over_factorial[k + 2] * first +
+                                          (over_factorial[k + 3] * second + over_factorial[k + 4] * third));
+            (rates_->turning[j] * h * h * row).store(sum.angle[j].data());
+        }
         return sum;
     }
 
     // sum_k B^k/(k + shift)!, from the first three powers of B; its norm is at most that of a base interval.
     template <int shift>
     static Matrix power_series(const Matrix& one, const Matrix& two, const Matrix& three) {
-        static_assert(Expansion::terms == 12);
+        static_assert(terms == 12);
         Matrix sum;
         for (int k = 9; k >= 0; k -= 3) {
             if (k < 9) sum = three * sum;
@@ -190,8 +225,9 @@ class Taylor {
         }
     };
 
-    [[gnu::always_inline]] void expand(const Lanes& rate, const std::array<bool, n_inputs>& varies,
-                                       Expansion& out) const {
+    using Varies = std::array<bool, D::inputs>;
+
+    [[gnu::always_inline]] void expand(const Lanes& rate, const Varies& varies, Expansion<D>& out) const {
         out.angle_rate = rate.angle;
         out.turning = rates_->turning;
         const auto recur = [&](auto forced) __attribute__((always_inline)) {
@@ -199,25 +235,34 @@ class Taylor {
             v[0] = rate.coupled;
             v[1] = forced(rates_->rate * v[0], -2);
             v[2] = forced(squared_ * v[0], -1);
-            for (int k = 0; k + 3 < Expansion::terms; ++k) v[k + 3] = forced(cubed_ * v[k], k);
+            for (int k = 0; k + 3 < terms; ++k) v[k + 3] = forced(cubed_ * v[k], k);
         };
         const auto force = [&](Coupled x, int k, int i) __attribute__((always_inline)) {
             const auto u = [&](int j) { return j < 1 ? 0.0 : out.input[static_cast<std::size_t>(j)][i]; };
             return x + input_[i].bring(u(k + 1), u(k + 2), u(k + 3));
         };
-        if (varies[0] && varies[1])
-            recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(force(x, k, 0), k, 1); });
-        else if (varies[0])
-            recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(x, k, 0); });
-        else if (varies[1])
-            recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(x, k, 1); });
-        else
-            recur([](Coupled x, int) __attribute__((always_inline)) { return x; });
+        const auto free = [](Coupled x, int) __attribute__((always_inline)) { return x; };
+        if constexpr (D::inputs == 2) {  // every case by itself, for the sake of speed
+            if (varies[0] && varies[1])
+                recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(force(x, k, 0), k, 1); });
+            else if (varies[0])
+                recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(x, k, 0); });
+            else if (varies[1])
+                recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(x, k, 1); });
+            else
+                recur(free);
+        } else {
+            recur([&](Coupled x, int k) {
+                for (int i = 0; i < D::inputs; ++i)
+                    if (varies[i]) x = force(x, k, i);
+                return x;
+            });
+        }
     }
 
     const LinearRates* rates_ = nullptr;
     Matrix squared_, cubed_;  // A^2, A^3
-    std::array<Forcing, n_inputs> input_;
+    std::array<Forcing, D::inputs> input_;
 };
 
 }  // namespace lostmotion

@@ -21,16 +21,21 @@
 namespace lostmotion {
 
 // Everything needed to step by one length h in one regime.
-struct Step {
-    Integral integral;  // G(h)
-    Matrix growth;      // bound on |exp(A s)|, element by element, for 0 <= s <= h; 1e200 if it is no less
-    Matrix change;      // E(h) = exp(A h) - 1
+template <class D>
+struct StepOf {
+    IntegralOf<D> integral;  // G(h)
+    MatrixOf<D> growth;      // bound on |exp(A s)|, element by element, for 0 <= s <= h; 1e200 if it is no less
+    MatrixOf<D> change;      // E(h) = exp(A h) - 1
 };
 
 // What a pair of functions of the inputs brings over one length.
-struct Response {
+template <class D>
+struct ResponseOf {
+    using Lanes = LanesOf<D>;
+    using Column = ColumnOf<D>;
+
     std::array<Column, 2> change;  // of x
-    std::array<double, 2> angle;
+    std::array<std::array<double, D::angles>, 2> angle;
     std::array<Column, 2> rate;  // of x'
 
     Lanes of(int c) const { return {load(change[c]), angle[c]}; }
@@ -42,16 +47,27 @@ struct Response {
     [[gnu::always_inline]] Lanes operator*(const double* weights) const {
         return weights[0] * of(0) + weights[1] * of(1);
     }
-    [[gnu::always_inline]] Coupled rates(const double* weights) const {
+    [[gnu::always_inline]] CoupledOf<D> rates(const double* weights) const {
         return weights[0] * load(rate[0]) + weights[1] * load(rate[1]);
     }
 };
 
+template <class D>
 class Propagator {
  public:
+    using Coupled = CoupledOf<D>;
+    using Column = ColumnOf<D>;
+    using State = StateOf<D>;
+    using Lanes = LanesOf<D>;
+    using Matrix = MatrixOf<D>;
+    using LinearRates = LinearRatesOf<D>;
+    using Integral = IntegralOf<D>;
+    using Step = StepOf<D>;
+    using Response = ResponseOf<D>;
+
     static constexpr int max_levels = 40;
     static constexpr int usual_levels = 12;
-    static constexpr double unbounded = 1e200;  // growth from here on is no longer reckoned
+    static constexpr double unbounded = 1e200;  // growth from here on is no longer computed
     static constexpr double base_norm = 0.25;   // |A| h of the base interval, in scaled units
 
     // turns: its unit is a length of which some power-of-two multiple or fraction is the base interval.
@@ -62,13 +78,13 @@ class Propagator {
         n_pairs_ = static_cast<int>(turns.basis().size() / 2);
         const double fastest = turns.fastest();
         double norm = fastest;  // of A in scaled units, or the highest input frequency [1/s]
-        for (int r = 0; r < n_states; ++r) {
+        for (int r = 0; r < D::coupled; ++r) {
             double sum = 0.0;
-            for (int c = 0; c < n_coupled; ++c)
-                sum += std::fabs(r == load_angle ? (c == load_speed ? rates.turning : 0.0) : rates.rate(r, c)) *
-                       scale[c] / scale[r];
+            for (int c = 0; c < D::coupled; ++c) sum += std::fabs(rates.rate(r, c)) * scale[c] / scale[r];
             norm = std::fmax(norm, sum);
         }
+        for (int j = 0; j < D::angles; ++j)
+            norm = std::fmax(norm, std::fabs(rates.turning[j]) * scale[D::first_turning + j] / scale[D::coupled + j]);
         base_ = turns.unit();
         exponent_ = 0;
         for (; norm * base_ > base_norm; base_ *= 0.5) --exponent_;
@@ -84,7 +100,7 @@ class Propagator {
     void reset() { levels_ = 0; }
 
     const LinearRates& rates() const { return taylor_.rates(); }
-    const Taylor& taylor() const { return taylor_; }
+    const Taylor<D>& taylor() const { return taylor_; }
 
     const Step& level(int k) {
         while (levels_ <= k) add_doubled();
@@ -137,7 +153,7 @@ class Propagator {
         }
         x = x + (s.integral * rate + forced);
         rate.coupled = s.change * rate.coupled + (rate.coupled + forced_rate);
-        rate.angle = rates().turning * x.coupled[load_speed];
+        rate.angle = rates().angle_rate(x.coupled);
     }
 
     // G(h) for any length: whole levels from the longest down, then the Taylor series.
@@ -145,7 +161,9 @@ class Propagator {
         Integral sum;
         const auto append = [this, &sum](const Matrix& change, const Integral& next) {
             // G(s + h) = G(h) + exp(A h) G(s)
-            (load(sum.angle) + (sum.coupled.after(angle_change(next)) + load(next.angle))).store(sum.angle.data());
+            for (int j = 0; j < D::angles; ++j)
+                (load(sum.angle[j]) + (sum.coupled.after(angle_change(next, j)) + load(next.angle[j])))
+                    .store(sum.angle[j].data());
             sum.coupled.add(1.0, change * sum.coupled);
             sum.coupled.add(1.0, next.coupled);
             sum.length += next.length;
@@ -170,8 +188,10 @@ class Propagator {
         return static_cast<int>(std::bit_cast<std::uint64_t>(positive) >> 52);
     }
 
-    // The row of the load angle in exp(A h) - 1.
-    Coupled angle_change(const Integral& over_h) const { return rates().turning * over_h.coupled.row(load_speed); }
+    // The row of an angle in exp(A h) - 1.
+    Coupled angle_change(const Integral& over_h, int j) const {
+        return rates().turning[j] * over_h.coupled.row(D::first_turning + j);
+    }
 
     // Room for one level more. What an earlier use has left there is written over.
     void make_room() {
@@ -191,10 +211,10 @@ class Propagator {
         s.change = rates().rate * s.integral.coupled;
         // |exp(A s)| from the powers of a matrix without negative entries beside its diagonal.
         Matrix positive = rates().rate.magnitudes();
-        for (int k = 0; k < n_coupled; ++k) positive.column[k][k] = std::fmax(rates().rate.column[k][k], 0.0);
+        for (int k = 0; k < D::coupled; ++k) positive.column[k][k] = std::fmax(rates().rate.column[k][k], 0.0);
         positive.scale(h);
         const Matrix twice = positive * positive;
-        s.growth = Taylor::power_series<0>(positive, twice, positive * twice);
+        s.growth = Taylor<D>::template power_series<0>(positive, twice, positive * twice);
         for (int p = 0; p < n_pairs_; ++p)
             for (int c = 0; c < 2; ++c) {
                 const InputBasis& function = turns_->basis()[static_cast<std::size_t>(2 * p + c)];
@@ -215,7 +235,7 @@ class Propagator {
         const int k = levels_ - 1;
         const Step& a = steps_[static_cast<std::size_t>(k)];
         Step& b = steps_[static_cast<std::size_t>(k + 1)];
-        for (int c = 0; c < n_coupled; ++c) {
+        for (int c = 0; c < D::coupled; ++c) {
             const Column &change = a.change.column[c], &integral = a.integral.coupled.column[c];
             (2.0 * load(change) + a.change * change).store(b.change.column[c].data());
             (2.0 * load(integral) + a.change * integral).store(b.integral.coupled.column[c].data());
@@ -223,11 +243,14 @@ class Propagator {
             const Coupled size = absolute(Matrix::identity().at(c) + load(change));
             least(most(a.growth.at(c), a.growth * size), unbounded).store(b.growth.column[c].data());
         }
-        for (int c = 0; c < n_coupled; ++c)
+        for (int c = 0; c < D::coupled; ++c)
             for (const double bound : b.growth.column[c])
                 if (!(bound < unbounded)) bounded_ = std::min(bounded_, k);
-        const Coupled angle = angle_change(a.integral);
-        (2.0 * load(a.integral.angle) + a.integral.coupled.after(angle)).store(b.integral.angle.data());
+        std::array<Coupled, D::angles> angle;
+        for (int j = 0; j < D::angles; ++j) {
+            angle[j] = angle_change(a.integral, j);
+            (2.0 * load(a.integral.angle[j]) + a.integral.coupled.after(angle[j])).store(b.integral.angle[j].data());
+        }
         b.integral.length = 2.0 * a.integral.length;
         for (int p = 0; p < n_pairs_; ++p) {
             const InputBasis* basis = &turns_->basis()[static_cast<std::size_t>(2 * p)];
@@ -236,7 +259,10 @@ class Propagator {
             const auto held = [&](int input) { return a.integral * rates().input_column[input]; };
             const auto kept = [&](int c) {
                 const Lanes own = from.of(c);
-                return Lanes{own.coupled + a.change * from.change[c], own.angle + (angle * own.coupled).sum()};
+                Lanes out = own;
+                out.coupled = own.coupled + a.change * from.change[c];
+                for (int j = 0; j < D::angles; ++j) out.angle[j] = own.angle[j] + (angle[j] * own.coupled).sum();
+                return out;
             };
             if (basis->kind == InputBasis::cosine) {
                 const Turn turn = turns(k)[p];
@@ -271,7 +297,7 @@ class Propagator {
         }
     }
 
-    Taylor taylor_;
+    Taylor<D> taylor_;
     double base_ = 0.0;  // length of level 0 [s]
     double per_first_ = 0.0;
     int exponent_ = 0;          // of two: base / unit
@@ -280,7 +306,7 @@ class Propagator {
     int n_pairs_ = 0;           // of functions of the inputs
     InputTurns* turns_ = nullptr;
     int levels_ = 0;
-    std::vector<Step> steps_;          // one a level, kept when others are reckoned
+    std::vector<Step> steps_;          // one a level, kept when others are computed
     std::vector<Response> responses_;  // levels x n_pairs
     std::array<const Turn*, max_levels> turns_of_level_{};
 };

@@ -1,4 +1,4 @@
-// Numbers that are reckoned with at once, as many as the instruction set holds in one register.
+// Numbers that are computed with at once, as many as the instruction set holds in one register.
 #pragma once
 
 #ifdef __SSE2__
@@ -6,6 +6,8 @@
 #endif
 
 #include <array>
+#include <type_traits>
+#include <utility>
 
 namespace lostmotion {
 
@@ -33,6 +35,21 @@ template <class V>
 void store(V v, double* to) {
     __builtin_memcpy(to, &v, sizeof v);
 }
+// The sum of n terms, term(0), term(1), ..., in pairs and four at a time, so that few additions wait for one another.
+template <int n, class Term>
+[[gnu::always_inline]] inline auto sum_in_fours(Term&& term) {
+    static_assert(n % 4 == 0);
+    const auto four = [&]<int k>(std::integral_constant<int, k>) __attribute__((always_inline)) {
+        return (term(std::integral_constant<int, k>{}) + term(std::integral_constant<int, k + 1>{})) +
+               (term(std::integral_constant<int, k + 2>{}) + term(std::integral_constant<int, k + 3>{}));
+    };
+    auto sum = four(std::integral_constant<int, 0>{});
+    [&]<int... k>(std::integer_sequence<int, k...>) __attribute__((always_inline)) {
+        ((sum = sum + four(std::integral_constant<int, 4 * (k + 1)>{})), ...);
+    }(std::make_integer_sequence<int, n / 4 - 1>{});
+    return sum;
+}
+
 // n numbers in as many registers as they need.
 template <int n>
 struct Pack {
@@ -56,9 +73,25 @@ struct Pack {
     }
     double operator[](int k) const { return part[k / width][k % width]; }
     void set(int k, double number) { part[k / width][k % width] = number; }
+    // In pairs, four at a time: in the same order in every build.
     double sum() const {
-        static_assert(n == 4);
-        return ((*this)[0] + (*this)[1]) + ((*this)[2] + (*this)[3]);
+        return sum_in_fours<n>([this](auto k) { return (*this)[k]; });
+    }
+    // The k-th four of the numbers.
+    Pack<4> four(int k) const {
+        static_assert(n % 4 == 0);
+        if constexpr (n == 4) {
+            return *this;
+        } else {
+            Pack<4> out;
+            __builtin_memcpy(&out, reinterpret_cast<const char*>(this) + sizeof out * static_cast<std::size_t>(k),
+                             sizeof out);
+            return out;
+        }
+    }
+    void set_four(int k, const Pack<4>& numbers) {
+        __builtin_memcpy(reinterpret_cast<char*>(this) + sizeof numbers * static_cast<std::size_t>(k), &numbers,
+                         sizeof numbers);
     }
     // The k-th number in every place.
     template <int k>
@@ -99,10 +132,12 @@ struct Pack {
 
 // The sums of four packs.
 template <int n>
-[[gnu::always_inline]] inline Pack<n> sums(const Pack<n>& a, const Pack<n>& b, const Pack<n>& c, const Pack<n>& d) {
-    static_assert(n == 4);
-    Pack<n> out;
-    if constexpr (Pack<n>::parts == 1) {
+[[gnu::always_inline]] inline Pack<4> sums(const Pack<n>& a, const Pack<n>& b, const Pack<n>& c, const Pack<n>& d) {
+    Pack<4> out;
+    if constexpr (n > 4) {
+        out = sums(a.four(0), b.four(0), c.four(0), d.four(0));
+        for (int k = 1; k < n / 4; ++k) out = out + sums(a.four(k), b.four(k), c.four(k), d.four(k));
+    } else if constexpr (Pack<n>::parts == 1) {
         const auto pairs = [](auto v, auto w) {
             return __builtin_shufflevector(v, w, 0, 4, 2, 6) + __builtin_shufflevector(v, w, 1, 5, 3, 7);
         };

@@ -9,21 +9,44 @@
 #include <vector>
 
 #include "cursor.hpp"
-#include "reader.hpp"
 
 namespace lostmotion {
 
+// States and inputs at up to `most` instants of one regime, variable by variable.
+template <class D>
+struct InstantsOf {
+    static constexpr int most = 64;
+    static_assert(most % vec_width == 0);
+    using Column = std::array<double, most>;
+
+    alignas(64) std::array<Column, D::states> x{};
+    alignas(64) std::array<Column, D::inputs> u{};
+
+    [[gnu::always_inline]] void set(int k, const LanesOf<D>& state, const InputsOf<D>& input) {
+        for (int j = 0; j < D::coupled; ++j) x[j][k] = state.coupled[j];
+        for (int j = 0; j < D::angles; ++j) x[D::coupled + j][k] = state.angle[j];
+        for (int i = 0; i < D::inputs; ++i) u[i][k] = input[i];
+    }
+};
+
+template <class D>
 class Stride {
  public:
+    static constexpr int n_inputs = D::inputs;
+    using Coupled = CoupledOf<D>;
+    using State = StateOf<D>;
+    using Lanes = LanesOf<D>;
+
     // On a regime, with steps of one level, from where a cursor stands.
-    void place(Propagator& propagator, int level, const Column& constant, const Cursor& from) {
+    void place(Propagator<D>& propagator, int level, const ColumnOf<D>& constant, const Cursor<D>& from) {
         step_ = &propagator.level(level);
         const double length = propagator.length(level);
-        const InputState& input = from.input();
-        const LinearRates& rates = propagator.rates();
-        const Response* responses = propagator.responses(level);
+        const InputState<D>& input = from.input();
+        const LinearRatesOf<D>& rates = propagator.rates();
+        const ResponseOf<D>* responses = propagator.responses(level);
         const Turn* turns = propagator.turns(level);
-        turning_ = rates.turning * step_->integral.coupled.row(load_speed);
+        for (int j = 0; j < D::angles; ++j)
+            turning_[j] = rates.turning[j] * step_->integral.coupled.row(D::first_turning + j);
         x_ = from.x();
         linear_ = input.linear();
         Coupled driving = load(constant), ramp{};
@@ -36,13 +59,13 @@ class Stride {
         growth_ = step_->integral * Lanes{ramp};
         std::size_t sines = 0;
         sines_.resize(static_cast<std::size_t>(input.size() / 2));
-        sines_of_first_ = 0;
+        sines_end_ = {};
         for (int q = 0; q < input.size(); q += 2) {
             const InputBasis& basis = input.basis(q);
-            const Response& response = responses[q / 2];
+            const ResponseOf<D>& response = responses[q / 2];
             const double* weights = input.weights() + q;
             if (basis.kind == InputBasis::cosine) {
-                if (basis.input == 0) ++sines_of_first_;
+                sines_end_[basis.input] = sines + 1;
                 Turning& t = sines_[sines++];  // in place, for the sake of speed
                 t.sine_cosine = Pack<2>::load(weights);
                 t.turn = turns[q / 2];
@@ -56,12 +79,13 @@ class Stride {
     }
 
     // Where the cursor stood and n - 1 steps on from there.
-    void run(int n, Instants& to) {
+    void run(int n, InstantsOf<D>& to) {
         Lanes x = load(x_), forced = forced_;
         for (int k = 0;; ++k) {
-            std::array<double, n_inputs> u = linear_;
-            for (std::size_t q = 0; q < sines_of_first_; ++q) u[0] += sines_[q].sine_cosine[0];
-            for (std::size_t q = sines_of_first_; q < sines_.size(); ++q) u[1] += sines_[q].sine_cosine[0];
+            InputsOf<D> u = linear_;
+            std::size_t q = 0;
+            for (int i = 0; i < n_inputs; ++i)
+                for (; q < sines_end_[i]; ++q) u[i] += sines_[q].sine_cosine[0];
             to.set(k, x, u);
             if (k + 1 == n) {
                 x.store(x_.data());
@@ -72,7 +96,8 @@ class Stride {
                 driven = driven + (t.sine_cosine[0] * t.by_sine + t.sine_cosine[1] * t.by_cosine);
                 t.sine_cosine = t.turn * t.sine_cosine;
             }
-            const Lanes own{step_->change * x.coupled, (turning_ * x.coupled).sum()};
+            Lanes own{step_->change * x.coupled, {}};
+            for (int j = 0; j < D::angles; ++j) own.angle[j] = (turning_[j] * x.coupled).sum();
             x = own + (x + driven);  // so that one sum less waits for the step before
             forced = forced + growth_;
             for (int i = 0; i < n_inputs; ++i) linear_[i] += increase_[i];
@@ -88,13 +113,13 @@ class Stride {
         Lanes by_sine, by_cosine;
     };
 
-    const Step* step_ = nullptr;
-    Coupled turning_;  // the row of the load angle in exp(A h) - 1
+    const StepOf<D>* step_ = nullptr;
+    std::array<Coupled, D::angles> turning_;  // the rows of the angles in exp(A h) - 1
     State x_{};
     Lanes forced_, growth_;
-    std::array<double, n_inputs> linear_{}, increase_{};
-    std::vector<Turning> sines_;  // those of the first input before those of the second
-    std::size_t sines_of_first_ = 0;
+    InputsOf<D> linear_{}, increase_{};
+    std::vector<Turning> sines_;  // input by input
+    std::array<std::size_t, D::inputs> sines_end_{};
 };
 
 }  // namespace lostmotion

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "linear_form.hpp"
+#include "form.hpp"
 
 namespace lostmotion {
 
@@ -52,16 +52,23 @@ struct Signal {
     }
 };
 
-using Signals = std::array<Signal, n_inputs>;  // command, load torque
+template <class D>
+using SignalsOf = std::array<Signal, D::inputs>;
 
-// The first knot of either input after t.
-inline double next_knot(const Signals& s, double t) { return std::min(s[0].next_knot(t), s[1].next_knot(t)); }
+// The first knot of any input after t.
+template <std::size_t n>
+double next_knot(const std::array<Signal, n>& signals, double t) {
+    double next = std::numeric_limits<double>::infinity();
+    for (const Signal& s : signals) next = std::min(next, s.next_knot(t));
+    return next;
+}
 
 // Inputs that will be set to ramps from outside, step by step.
-inline Signals ramped_inputs() {
-    Signals s;
-    for (Signal& signal : s) signal.knots[0].slope = 1.0;
-    return s;
+template <class D>
+SignalsOf<D> ramped_inputs() {
+    SignalsOf<D> signals;
+    for (Signal& s : signals) s.knots[0].slope = 1.0;
+    return signals;
 }
 
 // One function of time by which an input departs from its value at an anchor instant:
@@ -86,7 +93,9 @@ struct InputBasis {
 
 // In pairs: cosine and sine of each sine of the signals, those of the first input first, then the ramps. At least one
 // pair, and if need be with nothing in the last places.
-inline std::vector<InputBasis> input_basis(const Signals& signals) {
+template <std::size_t n>
+std::vector<InputBasis> input_basis(const std::array<Signal, n>& signals) {
+    constexpr int n_inputs = n;
     std::vector<InputBasis> basis;
     for (int i = 0; i < n_inputs; ++i)
         for (const Sine& s : signals[i].sines) {
@@ -114,7 +123,7 @@ struct Turn {
 };
 
 // By how much the functions of a basis turn over lengths of time that are a unit times a power of two. What several
-// regimes ask for is reckoned once.
+// regimes ask for is computed once.
 class InputTurns {
  public:
     InputTurns(double unit, std::vector<InputBasis> basis) : unit_(unit), basis_(std::move(basis)) {}
@@ -146,14 +155,19 @@ class InputTurns {
     std::array<std::vector<Turn>, 2 * reach + 1> turns_;
 };
 
-// The two inputs at one instant, as the state of the linear system that generates them.
+// The inputs at one instant, as the state of the linear system that generates them.
+template <class D>
 class InputState {
  public:
+    static constexpr int n_inputs = D::inputs;
+    using Inputs = InputsOf<D>;
+    using Signals = SignalsOf<D>;
+
     InputState(const Signals& signals, const std::vector<InputBasis>& basis)
         : signals_(&signals), basis_(basis.data()), size_(static_cast<int>(basis.size())) {
         make_room();
-        sines_end_[0] = 2 * static_cast<int>(signals[0].sines.size());
-        sines_end_[1] = sines_end_[0] + 2 * static_cast<int>(signals[1].sines.size());
+        int end = 0;
+        for (int i = 0; i < n_inputs; ++i) sines_end_[i] = end += 2 * static_cast<int>(signals[i].sines.size());
         anchor(0.0);
     }
     InputState(const InputState& o) : signals_(o.signals_), basis_(o.basis_), size_(o.size_), sines_end_(o.sines_end_) {
@@ -209,34 +223,33 @@ class InputState {
     const InputBasis& basis(int q) const { return basis_[q]; }
     const double* weights() const { return weights_; }
 
-    [[gnu::always_inline]] std::array<double, n_inputs> values() const {
+    [[gnu::always_inline]] Inputs values() const {
         return sum(linear_, [this](int q) { return weights_[q]; });
     }
-    [[gnu::always_inline]] std::array<double, n_inputs> rates() const {
+    [[gnu::always_inline]] Inputs rates() const {
         return sum(slope_, [this](int q) { return basis_[q].omega * weights_[q + 1]; });
     }
 
     // Sums of the magnitudes of the parts: what the rounding of the values is relative to.
-    std::array<double, n_inputs> sizes() const {
-        return sum({std::fabs(linear_[0]), std::fabs(linear_[1])},
-                   [this](int q) { return std::fabs(weights_[q]) + std::fabs(weights_[q + 1]); });
+    Inputs sizes() const {
+        return sum(magnitudes(linear_), [this](int q) { return std::fabs(weights_[q]) + std::fabs(weights_[q + 1]); });
     }
-    const std::array<double, n_inputs>& slope() const { return slope_; }
+    const Inputs& slope() const { return slope_; }
     // The piecewise-linear parts alone.
-    const std::array<double, n_inputs>& linear() const { return linear_; }
+    const Inputs& linear() const { return linear_; }
 
     // Value and derivatives up to order N - 1.
     template <int N = n_derivatives>
-    std::array<std::array<double, n_inputs>, N> jet() const {
-        std::array<std::array<double, n_inputs>, N> u;
+    std::array<Inputs, N> jet() const {
+        std::array<Inputs, N> u;
         jet(N, u.data());
         return u;
     }
-    void jet(int n, std::array<double, n_inputs>* u) const {
+    void jet(int n, Inputs* u) const {
         u[0] = linear_;
         if (n > 1) u[1] = slope_;
         for (int k = 2; k < n; ++k) u[k] = {};
-        for (int q = 0; q < sines_end_[1]; q += 2) {
+        for (int q = 0; q < sines_end_[n_inputs - 1]; q += 2) {
             const int i = basis_[q].input;
             const double omega = basis_[q].omega, turned_twice = -omega * omega;
             double even = weights_[q], odd = omega * weights_[q + 1];
@@ -250,13 +263,17 @@ class InputState {
     }
 
     // Whether an input is other than constant.
-    bool varies(int i) const { return slope_[i] != 0.0 || sines_end_[i] > (i == 0 ? 0 : sines_end_[0]); }
+    bool varies(int i) const { return slope_[i] != 0.0 || sines_end_[i] > (i == 0 ? 0 : sines_end_[i - 1]); }
 
-    bool constant() const { return !varies(0) && !varies(1); }
+    bool constant() const {
+        for (int i = 0; i < n_inputs; ++i)
+            if (varies(i)) return false;
+        return true;
+    }
 
     // Bound on the fourth derivative of each input for all time.
-    std::array<double, n_inputs> fourth_derivative_bound() const {
-        std::array<double, n_inputs> bound{};
+    Inputs fourth_derivative_bound() const {
+        Inputs bound{};
         for (int i = 0; i < n_inputs; ++i)
             for (const Sine& s : (*signals_)[i].sines) {
                 const double omega = 2.0 * std::numbers::pi * s.frequency;
@@ -269,7 +286,7 @@ class InputState {
     void turn(double h) {
         time_ += h;
         for (int i = 0; i < n_inputs; ++i) linear_[i] += slope_[i] * h;
-        for (int q = 0; q < sines_end_[1]; q += 2) {
+        for (int q = 0; q < sines_end_[n_inputs - 1]; q += 2) {
             const double a = basis_[q].omega * h, a2 = a * a;
             const bool small = a2 < 1e-6;
             const double cosine = small ? 1.0 - a2 / 2.0 * (1.0 - a2 / 12.0) : std::cos(a);
@@ -297,14 +314,17 @@ class InputState {
     static Pack<2> pair_of(const InputState& s, int q) { return Pack<2>::load(s.weights_ + q); }
     // For each input, what it begins with and the terms of its sines.
     template <class Term>
-    [[gnu::always_inline]] std::array<double, n_inputs> sum(const std::array<double, n_inputs>& begin,
-                                                            Term&& term) const {
-        static_assert(n_inputs == 2);
-        double first = begin[0], second = begin[1];
+    [[gnu::always_inline]] Inputs sum(const Inputs& begin, Term&& term) const {
+        Inputs out;
         int q = 0;
-        for (; q < sines_end_[0]; q += 2) first += term(q);
-        for (; q < sines_end_[1]; q += 2) second += term(q);
-        return {first, second};
+        const auto add = [&](std::size_t i) __attribute__((always_inline)) {
+            double sum = begin[i];
+            for (; q < sines_end_[i]; q += 2) sum += term(q);
+            out[i] = sum;
+        };
+        [&]<std::size_t... i>(std::index_sequence<i...>)
+            __attribute__((always_inline)) { (add(i), ...); }(std::make_index_sequence<n_inputs>{});
+        return out;
     }
 
     const Signals* signals_;
@@ -313,7 +333,7 @@ class InputState {
     std::array<int, n_inputs> sines_end_{};  // of each input
     double time_ = 0.0;
     std::array<const Knot*, n_inputs> knot_{};
-    std::array<double, n_inputs> linear_{}, slope_{};
+    Inputs linear_{}, slope_{};
     double* weights_;  // of cosine: a sin(psi); sine: a cos(psi); ramp: slope
     std::array<double, 4> few_{};
     std::vector<double> many_;  // instead, if they do not fit

@@ -6,17 +6,22 @@
 #pragma once
 
 #include "propagator.hpp"
-#include "signal.hpp"
 
 namespace lostmotion {
 
 // A point that moves along one regime.
+template <class D>
 class Cursor {
  public:
-    explicit Cursor(const InputState& input) : input_(input) {}
+    using Coupled = CoupledOf<D>;
+    using Column = ColumnOf<D>;
+    using State = StateOf<D>;
+    using Lanes = LanesOf<D>;
+
+    explicit Cursor(const InputState<D>& input) : input_(input) {}
 
     // On a regime, at a state; the inputs are those of the instant already. rate: if it is known better than from x.
-    void place(Propagator& propagator, const Column& constant, const State& x, const State* rate = nullptr) {
+    void place(Propagator<D>& propagator, const Column& constant, const State& x, const State* rate = nullptr) {
         propagator_ = &propagator;
         constant_ = &constant;
         carries_rate_ = false;
@@ -32,19 +37,20 @@ class Cursor {
     }
     bool constant_inputs() const { return constant_inputs_; }  // where it was placed
     bool carries_rate() const { return carries_rate_; }
-    // From now on nothing moves but the load angle.
+    // From now on nothing moves but the angles.
     void settle() {
-        rate_ = State{};
-        rate_[load_angle] = propagator_->rates().turning * x_[load_speed];
+        Lanes rate{};
+        rate.angle = propagator_->rates().angle_rate(coupled(x_));
+        rate.store(rate_.data());
         rate_known_ = carries_rate_ = true;
     }
-    InputState& inputs() { return input_; }
+    InputState<D>& inputs() { return input_; }
     // From now on the constant, which is the same, is in another place.
     void keep(const Column& constant) { constant_ = &constant; }
 
     double time() const { return input_.time(); }
     const State& x() const { return x_; }
-    const InputState& input() const { return input_; }
+    const InputState<D>& input() const { return input_; }
     [[gnu::always_inline]] const State& rate() const {
         if (!rate_known_) rate_ = propagator_->rates()(x_, *constant_, input_.values());
         rate_known_ = true;
@@ -83,7 +89,7 @@ class Cursor {
     // To the nearest of the instants that whole levels, but not the shortest, lead to from where another stands; the
     // longest first. Returns what is left of h >= 0, a base interval forward or backward at most.
     [[gnu::always_inline]] double advance_by_levels(const Cursor& from, double h) {
-        Propagator& p = *(propagator_ = from.propagator_);
+        Propagator<D>& p = *(propagator_ = from.propagator_);
         constant_ = from.constant_;
         carries_rate_ = from.carries_rate_;
         input_ = from.input_;
@@ -116,16 +122,16 @@ class Cursor {
     // By one base interval at most, forward or backward; the inputs turn on from where they are.
     void nudge(double s) {
         if (s == 0.0) return;
-        Expansion here;
+        Expansion<D> here;
         expand(here);
         nudge(here, s);
     }
-    void expand(Expansion& out) const { propagator_->taylor().expand(load(rate()), input_, out); }
-    void nudge(const Expansion& here, double s) {
+    void expand(Expansion<D>& out) const { propagator_->taylor().expand(load(rate()), input_, out); }
+    void nudge(const Expansion<D>& here, double s) {
         const Lanes x = load(x_) + here.change(s);
         input_.turn(s);
         if (carries_rate_) {
-            arrive(x, {coupled(rate_) + here.rate_change(s), propagator_->rates().turning * x.coupled[load_speed]});
+            arrive(x, {coupled(rate_) + here.rate_change(s), propagator_->rates().angle_rate(x.coupled)});
         } else {
             x.store(x_.data());
             rate_known_ = false;
@@ -146,16 +152,15 @@ class Cursor {
     }
     // Whether anything but the state itself acts on the coupled states.
     bool driven() const {
-        const LinearRates& rates = propagator_->rates();
-        const auto u = input_.values();
-        const Coupled drive =
-            load(*constant_) + (u[0] * load(rates.input_column[0]) + u[1] * load(rates.input_column[1]));
-        return drive[0] != 0.0 || drive[1] != 0.0 || drive[2] != 0.0 || drive[3] != 0.0;
+        const Coupled drive = load(*constant_) + propagator_->rates().forced(input_.values());
+        for (int k = 0; k < D::coupled; ++k)
+            if (drive[k] != 0.0) return true;
+        return false;
     }
 
-    Propagator* propagator_ = nullptr;
+    Propagator<D>* propagator_ = nullptr;
     const Column* constant_ = nullptr;
-    InputState input_;
+    InputState<D> input_;
     State x_{};
     mutable State rate_{};  // once it has been asked for
     mutable bool rate_known_ = false;

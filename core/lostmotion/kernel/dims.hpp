@@ -1,0 +1,29 @@
+// The sizes of a drive train, known when the kernel is compiled for it.
+#pragma once
+
+#include <array>
+
+namespace lostmotion {
+
+template <int coupled_, int angles_, int inputs_, int memory_, int contacts_, int guards_>
+struct Dims {
+    static constexpr int coupled = coupled_;    // states that act on one another
+    static constexpr int angles = angles_;      // each follows one coupled speed; nothing depends on them
+    static constexpr int inputs = inputs_;      // commands and disturbances
+    static constexpr int memory = memory_;      // torques that are constant within a regime
+    static constexpr int contacts = contacts_;  // dry contacts
+    static constexpr int guards = guards_;      // conditions that end a regime, at most
+
+    static constexpr int states = coupled + angles;
+    static constexpr int first_turning =
+        0;  // the coupled speed that the first angle follows; the others are next to it
+
+    // A linear form has a coefficient for each state, for 1, for the memory and for each input.
+    static constexpr int one = states, first_memory = one + 1, first_input = first_memory + memory,
+                         terms = first_input + inputs;
+
+    using Memory = std::array<double, static_cast<std::size_t>(memory)>;
+    using Contact = int;
+};
+
+}  // namespace lostmotion

@@ -1,0 +1,253 @@
+// States, and linear expressions in what a regime's equations may depend on.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+
+#include "dims.hpp"
+#include "vec.hpp"
+
+namespace lostmotion {
+
+// A linear expression sum_k c[k] * term[k].
+template <int N>
+struct Form {
+    std::array<double, N> c{};
+
+    static constexpr Form unit(int term, double factor = 1.0) {
+        Form f;
+        f.c[term] = factor;
+        return f;
+    }
+    Form& operator+=(const Form& o) {
+        for (int k = 0; k < N; ++k) c[k] += o.c[k];
+        return *this;
+    }
+    Form& operator-=(const Form& o) {
+        for (int k = 0; k < N; ++k) c[k] -= o.c[k];
+        return *this;
+    }
+    Form& operator*=(double a) {
+        for (int k = 0; k < N; ++k) c[k] *= a;
+        return *this;
+    }
+    friend Form operator+(Form a, const Form& b) { return a += b; }
+    friend Form operator-(Form a, const Form& b) { return a -= b; }
+    friend Form operator*(double a, Form f) { return f *= a; }
+    friend Form operator/(Form f, double a) { return f *= 1.0 / a; }
+    friend Form operator-(Form f) { return f *= -1.0; }
+};
+
+template <class D>
+using LinearFormOf = Form<D::terms>;
+
+template <class D>
+using CoupledOf = Pack<D::coupled>;
+template <class D>
+struct alignas(sizeof(typename CoupledOf<D>::Part)) StateOf : std::array<double, D::states> {};
+// The coupled states alone.
+template <class D>
+struct alignas(sizeof(typename CoupledOf<D>::Part)) ColumnOf : std::array<double, D::coupled> {};
+template <class D>
+using InputsOf = std::array<double, D::inputs>;
+
+// A state in registers.
+template <class D>
+struct LanesOf {
+    CoupledOf<D> coupled{};
+    std::array<double, D::angles> angle{};
+
+    static LanesOf load(const double* from) {
+        LanesOf x{CoupledOf<D>::load(from), {}};
+        for (int j = 0; j < D::angles; ++j) x.angle[j] = from[D::coupled + j];
+        return x;
+    }
+    void store(double* to) const {
+        coupled.store(to);
+        for (int j = 0; j < D::angles; ++j) to[D::coupled + j] = angle[j];
+    }
+    friend LanesOf operator+(LanesOf a, const LanesOf& b) {
+        a.coupled = a.coupled + b.coupled;
+        for (int j = 0; j < D::angles; ++j) a.angle[j] += b.angle[j];
+        return a;
+    }
+    friend LanesOf operator*(double a, LanesOf b) {
+        b.coupled = a * b.coupled;
+        for (int j = 0; j < D::angles; ++j) b.angle[j] *= a;
+        return b;
+    }
+};
+template <class D>
+LanesOf<D> load(const StateOf<D>& x) {
+    return LanesOf<D>::load(x.data());
+}
+template <class D>
+CoupledOf<D> load(const ColumnOf<D>& x) {
+    return CoupledOf<D>::load(x.data());
+}
+template <class D>
+CoupledOf<D> coupled(const StateOf<D>& x) {
+    return CoupledOf<D>::load(x.data());
+}
+template <class D>
+void add_scaled(StateOf<D>& y, double a, const StateOf<D>& x) {
+    (load(y) + a * load(x)).store(y.data());
+}
+
+template <std::size_t n>
+[[gnu::always_inline]] inline std::array<double, n> magnitudes(std::array<double, n> v) {
+    for (double& x : v) x = std::fabs(x);
+    return v;
+}
+template <class D>
+[[gnu::always_inline]] inline StateOf<D> magnitudes(const StateOf<D>& x) {
+    LanesOf<D> size = load(x);
+    size.coupled = absolute(size.coupled);
+    for (double& angle : size.angle) angle = std::fabs(angle);
+    StateOf<D> out;
+    size.store(out.data());
+    return out;
+}
+
+// Value and time derivatives of the inputs at one instant: u[k][input] is the k-th derivative.
+inline constexpr int n_derivatives = 6;
+template <class D>
+using InputJetOf = std::array<InputsOf<D>, n_derivatives>;
+
+// All that a regime's equations depend on at one instant.
+template <class D>
+struct InstantOf {
+    double time = 0.0;  // [s]
+    StateOf<D> x{};
+    typename D::Memory memory{};
+    InputJetOf<D> input{};
+    InputsOf<D> input_size{};  // sums of the magnitudes of the inputs' parts
+};
+
+// The part of a form that depends on neither state nor inputs: constant within a regime.
+template <class D>
+double constant_part(const LinearFormOf<D>& f, const typename D::Memory& m) {
+    double sum = f.c[D::one];
+    for (int k = 0; k < D::memory; ++k) sum += f.c[D::first_memory + k] * m[k];
+    return sum;
+}
+
+template <class D>
+double input_part(const LinearFormOf<D>& f, const InputsOf<D>& u) {
+    double sum = f.c[D::first_input] * u[0];
+    for (int i = 1; i < D::inputs; ++i) sum += f.c[D::first_input + i] * u[i];
+    return sum;
+}
+
+template <class D>
+double evaluate(const LinearFormOf<D>& f, const StateOf<D>& x, const typename D::Memory& m, const InputsOf<D>& u) {
+    double own = (CoupledOf<D>::load(f.c.data()) * coupled(x)).sum();
+    for (int j = D::coupled; j < D::states; ++j) own += f.c[j] * x[j];
+    return (constant_part<D>(f, m) + input_part<D>(f, u)) + own;
+}
+
+// Sum of the magnitudes of the terms: rounding in evaluate() is a small multiple of epsilon times this.
+template <class D>
+double magnitude(const LinearFormOf<D>& f, const StateOf<D>& x, const typename D::Memory& m, const InputsOf<D>& u) {
+    double sum = std::fabs(f.c[D::one]);
+    for (int k = 0; k < D::memory; ++k) sum += std::fabs(f.c[D::first_memory + k] * m[k]);
+    for (int i = 0; i < D::inputs; ++i) sum += std::fabs(f.c[D::first_input + i] * u[i]);
+    for (int k = 0; k < D::states; ++k) sum += std::fabs(f.c[k] * x[k]);
+    return sum;
+}
+
+// The same for a time derivative of the form, where the constant terms have dropped out.
+template <class D>
+double evaluate_rate(const LinearFormOf<D>& f, const StateOf<D>& rate, const InputsOf<D>& input_rate) {
+    double sum = input_part<D>(f, input_rate);
+    for (int k = 0; k < D::states; ++k) sum += f.c[k] * rate[k];
+    return sum;
+}
+
+// Up to N forms as columns, so that all are evaluated at once. None may depend on an angle.
+template <class D, int N>
+class FormTable {
+ public:
+    static_assert(N % vec_width == 0);
+    using Values = std::array<double, N>;
+    using LinearForm = LinearFormOf<D>;
+    using State = StateOf<D>;
+    using Inputs = InputsOf<D>;
+    using Memory = typename D::Memory;
+
+    FormTable() { column_[D::one].fill(1.0); }  // forms that are not there are 1
+
+    void set(int row, const LinearForm& f) {
+        for (int j = D::coupled; j < D::states; ++j) assert(f.c[j] == 0.0);
+        for (int k = 0; k < D::terms; ++k) column_[k][row] = f.c[k];
+        rows_ = std::max(rows_, (row + vec_width) / vec_width * vec_width);
+        for (int i = 0; i < D::inputs; ++i) driven_ = driven_ || f.c[D::first_input + i] != 0.0;
+    }
+    int rows() const { return rows_; }  // rounded up to whole vectors
+    double coefficient(int row, int term) const { return column_[term][row]; }
+    LinearForm form(int row) const {
+        LinearForm f;
+        for (int k = 0; k < D::terms; ++k) f.c[k] = column_[k][row];
+        return f;
+    }
+
+    // The parts that depend on neither state nor inputs.
+    void constants(const Memory& m, Values& out) const {
+        for (int g = 0; g < rows_; g += vec_width) {
+            Vec sum = at(D::one, g);
+            for (int k = 0; k < D::memory; ++k) sum += m[k] * at(D::first_memory + k, g);
+            store(sum, &out[g]);
+        }
+    }
+    [[gnu::always_inline]] void evaluate(const Values& constant, const State& x, const Inputs& u, Values& out) const {
+        for (int g = 0; g < rows_; g += vec_width) store(load(&constant[g]) + terms(g, x, u), &out[g]);
+    }
+    // The same with inputs that are asked for their values or rates where the forms depend on them.
+    template <class Input>
+    void evaluate(const Values& constant, const State& x, const Input& input, Values& out) const {
+        evaluate(constant, x, driven_ ? input.values() : Inputs{}, out);
+    }
+    template <class Input>
+    void rates(const State& rate, const Input& input, Values& out) const {
+        rates(rate, driven_ ? input.rates() : Inputs{}, out);
+    }
+    // Sums of the magnitudes of the terms, from magnitudes of what the forms depend on.
+    void sizes(const Memory& m, const State& x, const Inputs& u, Values& out) const {
+        for (int g = 0; g < rows_; g += vec_width) {
+            Vec kept = m[0] * absolute(at(D::first_memory, g));
+            for (int k = 1; k < D::memory; ++k) kept += m[k] * absolute(at(D::first_memory + k, g));
+            store(absolute(at(D::one, g)) + kept + terms<true>(g, x, u), &out[g]);
+        }
+    }
+    template <class Input>
+    void sizes(const Memory& m, const State& x, const Input& input, Values& out) const {
+        sizes(m, x, driven_ ? input.sizes() : Inputs{}, out);
+    }
+    void rate_sizes(const State& rate, const Inputs& input_rate, Values& out) const {
+        for (int g = 0; g < rows_; g += vec_width) store(terms<true>(g, rate, input_rate), &out[g]);
+    }
+    // Time derivatives, from those of state and inputs.
+    [[gnu::always_inline]] void rates(const State& rate, const Inputs& input_rate, Values& out) const {
+        for (int g = 0; g < rows_; g += vec_width) store(terms(g, rate, input_rate), &out[g]);
+    }
+
+ private:
+    Vec at(int term, int g) const { return load(&column_[term][g]); }
+    template <bool magnitudes = false>
+    [[gnu::always_inline]] Vec terms(int g, const State& x, const Inputs& u) const {
+        const auto c = [&](int term) { return magnitudes ? absolute(at(term, g)) : at(term, g); };
+        const Vec sum = sum_in_fours<D::coupled>([&](auto k) { return c(k) * x[k]; });
+        if (!driven_) return sum;
+        Vec forced = c(D::first_input) * u[0];
+        for (int i = 1; i < D::inputs; ++i) forced += c(D::first_input + i) * u[i];
+        return sum + forced;
+    }
+
+    alignas(64) std::array<std::array<double, N>, D::terms> column_{};
+    int rows_ = 0;
+    bool driven_ = false;
+};
+
+}  // namespace lostmotion
