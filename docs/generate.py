@@ -11,7 +11,7 @@ from typer.main import get_command
 
 import lostmotion as lm
 from lostmotion.cli import app
-from lostmotion.inputs.quantities import unit_in_schema
+from lostmotion.inputs.schema import unit_in_schema
 from lostmotion.model import signals
 from lostmotion.simulation.scenario import json_schema
 from lostmotion.simulation.variables import VARIABLES

@@ -1,8 +1,10 @@
 """The rules of the house: one-way imports, quick start-up, stub and docs in step with the code."""
 
 import ast
+import re
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -31,22 +33,24 @@ LAYERS = [
     {"cli"},
     {"__init__", "__main__"},
 ]
-MODULES = sorted(p.relative_to(PACKAGE) for p in PACKAGE.rglob("*.py"))
+MODULES = sorted(p.relative_to(PACKAGE).with_suffix("") for p in PACKAGE.rglob("*.py"))
+HEADERS = sorted((ROOT / "core" / "lostmotion").rglob("*.hpp"))
+
+
+def imports_of(module: Path) -> set[Path]:
+    """Modules of the package from which a module imports anywhere, also inside its functions."""
+    found = set()
+    for node in ast.walk(ast.parse((PACKAGE / module).with_suffix(".py").read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            home = module.parents[node.level - 1] / (node.module or "").replace(".", "/")
+            inner = [home / a.name for a in node.names]
+            found |= {m if (PACKAGE / m).with_suffix(".py").exists() else home for m in inner}
+    return {m / "__init__" if (PACKAGE / m).is_dir() else m for m in found}
 
 
 def room_of(module: Path) -> str:
     """The package of a module, by its path below the root."""
-    return module.parts[0] if len(module.parts) > 1 else module.stem
-
-
-def imports_of(module: Path) -> set[str]:
-    """Packages, other than its own, from which a module imports anywhere, also inside its functions."""
-    found = set()
-    depth = len(module.parts)
-    for node in ast.walk(ast.parse((PACKAGE / module).read_text())):
-        if isinstance(node, ast.ImportFrom) and node.level == depth:
-            found |= {node.module.split(".")[0]} if node.module else {a.name for a in node.names}
-    return found
+    return module.parts[0]
 
 
 def test_every_package_has_its_layer() -> None:
@@ -56,7 +60,18 @@ def test_every_package_has_its_layer() -> None:
 @pytest.mark.parametrize("module", MODULES, ids=str)
 def test_imports_go_to_lower_layers_only(module: Path) -> None:
     layer = next(k for k, names in enumerate(LAYERS) if room_of(module) in names)
-    assert imports_of(module) <= set().union(*LAYERS[:layer])
+    others = {room_of(m) for m in imports_of(module)} - {room_of(module)}
+    assert others <= set().union(*LAYERS[:layer])
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    TopologicalSorter({m: imports_of(m) for m in MODULES}).prepare()  # raises CycleError, which names the circle
+
+
+def test_no_headers_include_each_other_in_a_circle() -> None:
+    includes = {h.name: set(re.findall(r'#include [<"](?:.*/)?(\w+\.hpp)[>"]', h.read_text())) for h in HEADERS}
+    assert sum(map(len, includes.values())) > len(HEADERS) / 2  # the pattern finds them
+    TopologicalSorter(includes).prepare()
 
 
 def test_importing_takes_no_plotting_or_data_library_along() -> None:

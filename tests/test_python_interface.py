@@ -12,7 +12,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT, SCENARIOS
-from lostmotion.inputs.quantities import Part
+from lostmotion.inputs.part import Part
 from lostmotion.reports import plots
 
 SMALL = lm.load("paper-2dof-nl-small")

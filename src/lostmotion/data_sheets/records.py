@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..errors import InputError
-from ..inputs.quantities import Angle, NotNegative, Number, Part, Positive, Temperature
+from ..inputs.part import Part
+from ..inputs.quantities import Angle, NotNegative, Number, Positive, Temperature
 from ..inputs.toml_files import read_toml
 from ..inputs.validation import shown
 from ..model.parts import Gearbox, LinearStiffness, Motor, TorsionCurve

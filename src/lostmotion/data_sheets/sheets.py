@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from ..errors import InputError
+from ..inputs.part import Part
 from ..inputs.quantities import (
     Angle,
     Current,
@@ -18,7 +19,6 @@ from ..inputs.quantities import (
     Limit,
     NotNegative,
     Number,
-    Part,
     Positive,
     Resistance,
     Speed,

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandler, Strict, ValidationError
+from pydantic import BeforeValidator, GetCoreSchemaHandler, Strict
 from pydantic_core import CoreSchema
 
 from ..errors import InputError
 from ..units.conversion import Unit
-from .validation import describe, shown
+from .validation import shown
 
 Number = Annotated[float, Unit("")]
 Torque = Annotated[float, Unit("N*m")]
@@ -67,94 +65,6 @@ Whole = Annotated[int, BeforeValidator(_no_boolean)]
 """a whole number"""
 
 
-class Part(BaseModel):
-    """Immutable; unknown keys, NaN and infinity are refused, with an `InputError` that says what would be right."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
-
-    def __repr_args__(self) -> Iterator[tuple[str, Any]]:
-        """What differs from its default; of long lists the ends."""
-        for name, field in type(self).model_fields.items():
-            value = getattr(self, name)
-            if value != field.default:
-                yield name, abridged(value)
-
-    def _repr_html_(self) -> str:
-        """All values with their units, for notebooks."""
-        from .notebook import table
-
-        return table(self)
-
-    def __init__(self, /, **values: Any) -> None:
-        with self._one_error(values):
-            super().__init__(**values)
-
-    # Parts within parts are made by pydantic itself, so that it knows where in the whole a value stands.
-    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
-
-    @classmethod
-    def model_validate(cls, obj: Any, **options: Any) -> Self:
-        """As the constructor, from a mapping."""
-        with cls._one_error(obj):
-            return super().model_validate(obj, **options)
-
-    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy with changes, which are checked as in the constructor."""
-        if not update:
-            return super().model_copy(deep=deep)
-        return type(self)(**({name: getattr(self, name) for name in self.model_fields_set} | dict(update)))
-
-    @classmethod
-    def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:
-        """As the constructor, from JSON."""
-        with cls._one_error():
-            return super().model_validate_json(json_data, **options)
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name.startswith("_"):  # of the object alone, such as what it keeps for later
-            super().__setattr__(name, value)
-            return
-        raise InputError(f"{self._subject()} is frozen; make a changed one instead of setting {name}")
-
-    @classmethod
-    @contextmanager
-    def _one_error(cls, given: Any = None) -> Iterator[None]:
-        try:
-            yield
-        except ValidationError as error:
-            raise InputError(describe(error, cls._described_by(), cls._subject(), given)) from None
-
-    @classmethod
-    def _described_by(cls) -> dict[str, Any]:
-        """The JSON Schema with all keys that may be written."""
-        return cls.model_json_schema()
-
-    @classmethod
-    def _subject(cls) -> str:
-        """What it is, for messages: the torsion curve."""
-        return "the " + " ".join(re.findall("[A-Z][a-z]*", cls.__name__.split("[")[0])).lower()
-
-
-class _Abridged(str):
-    """Text that stands for itself in a representation."""
-
-    __slots__ = ()
-
-    def __repr__(self) -> str:
-        return str(self)
-
-
-def abridged(value: Any, longest: int = 6) -> Any:
-    """The value; a long list as text with its ends and its length."""
-    if not isinstance(value, tuple):
-        return value
-    if value and isinstance(value[0], tuple):
-        return _Abridged(f"({len(value)} x {len(value[0])} numbers)")
-    if len(value) <= longest:
-        return value
-    return _Abridged(f"({value[0]!r}, {value[1]!r}, ..., {value[-1]!r}; {len(value)} entries)")
-
-
 def argument(name: str, value: Any, unit: str) -> float:
     """A number that is given to a function, in `unit` (SI); as a string with its own unit too.
 
@@ -176,12 +86,3 @@ def arguments(name: str, values: Any, unit: str) -> list[float]:
     """Several such numbers, or one alone."""
     several = values if isinstance(values, Iterable) and not isinstance(values, str) else [values]
     return [argument(name, value, unit) for value in several]
-
-
-def unit_in_schema(node: Mapping[str, Any]) -> str | None:
-    """The SI unit of a field, from its JSON Schema; ``""`` for a pure number, None for what is no quantity."""
-    if "x-unit" in node:
-        return str(node["x-unit"])
-    options = [option for key in ("anyOf", "oneOf", "allOf") for option in node.get(key, [])]
-    options += [node["items"]] if isinstance(node.get("items"), dict) else []
-    return next((unit for option in options if (unit := unit_in_schema(option)) is not None), None)

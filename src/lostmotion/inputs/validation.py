@@ -6,10 +6,11 @@ import datetime
 import difflib
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from .schema import follow
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -86,7 +87,7 @@ class _Problem:
     def __init__(self, problem: Any, schema: Mapping[str, Any], given: Any) -> None:
         self.kind: str = problem["type"]
         self.context = problem.get("ctx", {})
-        self.keys, self.nodes = _follow(schema, problem["loc"], self.kind == "extra_forbidden")
+        self.keys, self.nodes = follow(schema, problem["loc"], self.kind == "extra_forbidden")
         written = _at(given, self.keys)
         self.value = written if isinstance(written, str) else problem["input"]
         self.name = re.sub(r"\.(\[)", r"\1", ".".join(f"[{k}]" if isinstance(k, int) else str(k) for k in self.keys))
@@ -181,43 +182,6 @@ def _one_of(choices: list[str], value: Any = "") -> str:
     return (f"one of {listed}" if len(choices) > 1 else listed) + (f'; did you mean "{near[0]}"?' if near else "")
 
 
-# --- places in a JSON Schema ---
-
-
-def options(schema: Mapping[str, Any], node: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    """A node, and all that it refers to or may be instead."""
-    if "$ref" in node:
-        yield from options(schema, schema["$defs"][node["$ref"].rsplit("/", 1)[1]])
-        return
-    yield node
-    for key in ("anyOf", "oneOf", "allOf"):
-        for option in node.get(key, []):
-            yield from options(schema, option)
-
-
-def _follow(
-    schema: Mapping[str, Any], location: tuple[int | str, ...], unknown_at_end: bool
-) -> tuple[tuple[int | str, ...], list[Mapping[str, Any]]]:
-    """The keys of a location without the names of the choices made on the way, and the nodes where it ends.
-
-    For an unknown key these are the nodes of its table.
-    """
-    keys: list[int | str] = []
-    nodes = list(options(schema, schema))
-    for n, key in enumerate(location):
-        if unknown_at_end and n == len(location) - 1:
-            return (*keys, key), nodes
-        chosen = [m[str(key)] for node in nodes if key in (m := node.get("discriminator", {}).get("mapping", {}))]
-        if chosen:
-            nodes = list(options(schema, {"$ref": chosen[0]}))
-            continue
-        inner = [child for node in nodes if (child := _child(node, key)) is not None]
-        if isinstance(key, int) or inner:
-            keys.append(key)
-            nodes = [option for node in inner for option in options(schema, node)]
-    return tuple(keys), nodes
-
-
 def _at(given: Any, keys: tuple[int | str, ...]) -> Any:
     """What stands at these keys; None if nothing does."""
     for key in keys:
@@ -226,11 +190,3 @@ def _at(given: Any, keys: tuple[int | str, ...]) -> Any:
         except (KeyError, IndexError, TypeError):
             return None
     return given
-
-
-def _child(node: Mapping[str, Any], key: int | str) -> Any:
-    if isinstance(key, int):
-        fixed = node.get("prefixItems", [])
-        return fixed[key] if key < len(fixed) else node.get("items")
-    more = node.get("additionalProperties")
-    return node.get("properties", {}).get(key, more if isinstance(more, Mapping) else None)

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from .. import _core
+from ..inputs.part import Part
 from ..inputs.quantities import (
     Angle,
     Current,
@@ -17,7 +18,6 @@ from ..inputs.quantities import (
     Limit,
     NotNegative,
     Number,
-    Part,
     Positive,
     Resistance,
     Speed,

@@ -13,7 +13,8 @@ from typing import Annotated, Any, Generic, Self, TypeVar
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..inputs.quantities import Angle, Frequency, NotNegative, Number, Part, Positive, Time, Torque, Whole
+from ..inputs.part import Part
+from ..inputs.quantities import Angle, Frequency, NotNegative, Number, Positive, Time, Torque, Whole
 
 V = TypeVar("V")  # the value of the signal, with its unit
 

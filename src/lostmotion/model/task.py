@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from ..inputs.quantities import Angle, Part, Positive, Temperature, Time
+from ..inputs.part import Part
+from ..inputs.quantities import Angle, Positive, Temperature, Time
 
 
 class Task(Part):

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..reports.pages import embed, render_page
 from ..reports.panels import scientific
 from .drive import AMPLITUDES, Constant
-
-if TYPE_CHECKING:
-    from .reproduce import FigureSpec
+from .figures import FigureSpec
 
 
 def render(specs: list[FigureSpec], images: dict[str, bytes], table: list[Constant], facts: dict[str, Any]) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..data_sheets.sheets import Record
-from ..inputs.quantities import unit_in_schema
+from ..inputs.schema import unit_in_schema
 from ..model.parts import Gearbox
 
 # Practical units of data sheets: SI unit -> (unit, factor).

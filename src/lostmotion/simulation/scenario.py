@@ -13,7 +13,8 @@ from pydantic import model_validator
 
 from ..data_sheets.records import Conditions, gearbox_table, motor_table
 from ..errors import InputError
-from ..inputs.quantities import Angle, NotNegative, Part, Positive, Speed, Time, Torque
+from ..inputs.part import Part
+from ..inputs.quantities import Angle, NotNegative, Positive, Speed, Time, Torque
 from ..inputs.toml_files import read_toml
 from ..inputs.validation import shown
 from ..model.parts import Drive, Gearbox, Load, Motor, Rigid

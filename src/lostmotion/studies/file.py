@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
 from ..errors import InputError
-from ..inputs.quantities import Part
+from ..inputs.part import Part
 from ..inputs.toml_files import read_toml
 from ..simulation.scenario import Scenario, find_scenario, load, read_tables
 from ..simulation.variables import VARIABLES

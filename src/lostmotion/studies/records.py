@@ -8,7 +8,7 @@ from typing import Any
 
 from ..data_sheets.records import KINDS, Conditions, catalogue, find
 from ..errors import InputError
-from ..inputs.quantities import unit_in_schema
+from ..inputs.schema import unit_in_schema
 from ..simulation.scenario import Scenario, from_tables
 from .units import in_si
 

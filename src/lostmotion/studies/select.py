@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from ..inputs.quantities import Part
+from ..inputs.part import Part
 from ..sizing.drive_check import RULES
 from .units import in_si
 

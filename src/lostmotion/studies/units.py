@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
-from ..inputs.quantities import unit_in_schema
+from ..inputs.schema import unit_in_schema
 from ..inputs.validation import shown
 from ..simulation.scenario import json_schema
 from ..units.conversion import to_si

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
-from ..inputs.quantities import Part
+from ..inputs.part import Part
 from ..model.signals import Signal
 from ..simulation.scenario import Scenario, list_index
 from .records import CONDITIONS, TABLE_OF, check_names, names_that_fit

@@ -1,14 +1,16 @@
-"""Parts as HTML, for notebooks."""
+"""How a part shows itself: as one line of text, and as HTML in notebooks."""
 
 from __future__ import annotations
 
 import html
 from typing import Any
 
-from .quantities import Part, abridged, unit_in_schema
+from pydantic import BaseModel
+
+from .schema import unit_in_schema
 
 
-def table(part: Part) -> str:
+def table(part: BaseModel) -> str:
     """A table of the values of a part with their units and meanings; parts inside it fold out."""
     fields = type(part).model_json_schema()["properties"]
     rows = []
@@ -16,7 +18,7 @@ def table(part: Part) -> str:
         value = getattr(part, name)
         if value is None or value in ((), ""):
             continue
-        if isinstance(value, Part):
+        if isinstance(value, BaseModel):
             rows.append(
                 f'<tr><td colspan="4"><details><summary><b>{name}</b></summary>{table(value)}</details></td></tr>'
             )
@@ -31,3 +33,23 @@ def _shown(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     return str(abridged(value))
+
+
+class _Abridged(str):
+    """Text that stands for itself in a representation."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def abridged(value: Any, longest: int = 6) -> Any:
+    """The value; a long list as text with its ends and its length."""
+    if not isinstance(value, tuple):
+        return value
+    if value and isinstance(value[0], tuple):
+        return _Abridged(f"({len(value)} x {len(value[0])} numbers)")
+    if len(value) <= longest:
+        return value
+    return _Abridged(f"({value[0]!r}, {value[1]!r}, ..., {value[-1]!r}; {len(value)} entries)")

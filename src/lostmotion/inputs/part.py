@@ -1,0 +1,82 @@
+"""The base of all parts, tables and records that are given: immutable, and refused in one line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, Self
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from ..errors import InputError
+from .display import abridged
+from .validation import describe
+
+
+class Part(BaseModel):
+    """Immutable; unknown keys, NaN and infinity are refused, with an `InputError` that says what would be right."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
+
+    def __repr_args__(self) -> Iterator[tuple[str, Any]]:
+        """What differs from its default; of long lists the ends."""
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            if value != field.default:
+                yield name, abridged(value)
+
+    def _repr_html_(self) -> str:
+        """All values with their units, for notebooks."""
+        from .display import table
+
+        return table(self)
+
+    def __init__(self, /, **values: Any) -> None:
+        with self._one_error(values):
+            super().__init__(**values)
+
+    # Parts within parts are made by pydantic itself, so that it knows where in the whole a value stands.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @classmethod
+    def model_validate(cls, obj: Any, **options: Any) -> Self:
+        """As the constructor, from a mapping."""
+        with cls._one_error(obj):
+            return super().model_validate(obj, **options)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with changes, which are checked as in the constructor."""
+        if not update:
+            return super().model_copy(deep=deep)
+        return type(self)(**({name: getattr(self, name) for name in self.model_fields_set} | dict(update)))
+
+    @classmethod
+    def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:
+        """As the constructor, from JSON."""
+        with cls._one_error():
+            return super().model_validate_json(json_data, **options)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name.startswith("_"):  # of the object alone, such as what it keeps for later
+            super().__setattr__(name, value)
+            return
+        raise InputError(f"{self._subject()} is frozen; make a changed one instead of setting {name}")
+
+    @classmethod
+    @contextmanager
+    def _one_error(cls, given: Any = None) -> Iterator[None]:
+        try:
+            yield
+        except ValidationError as error:
+            raise InputError(describe(error, cls._described_by(), cls._subject(), given)) from None
+
+    @classmethod
+    def _described_by(cls) -> dict[str, Any]:
+        """The JSON Schema with all keys that may be written."""
+        return cls.model_json_schema()
+
+    @classmethod
+    def _subject(cls) -> str:
+        """What it is, for messages: the torsion curve."""
+        return "the " + " ".join(re.findall("[A-Z][a-z]*", cls.__name__.split("[")[0])).lower()
