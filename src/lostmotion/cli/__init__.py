@@ -1,4 +1,4 @@
 """The command `lostmotion`."""
 
-from .commands import app as app
-from .commands import main as main
+from .entry import app as app
+from .entry import main as main

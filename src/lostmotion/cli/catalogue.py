@@ -1,0 +1,53 @@
+"""`lostmotion catalogue`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def catalogue(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME | new]", help="Show one record; `new`: a template for your own.")
+    ] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            "--kind", metavar="KIND", help="gearbox, motor, or a kind of gearbox: strain_wave, planetary, worm, ..."
+        ),
+    ] = None,
+    ratio: Annotated[str | None, typer.Option("--ratio", metavar="MIN..MAX", help="Gear ratio.")] = None,
+    torque: Annotated[str | None, typer.Option("--torque", metavar="MIN..MAX", help="Rated torque [N·m].")] = None,
+    complete: Annotated[bool, typer.Option("--complete", help="Only records that can be simulated.")] = False,
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="With `new`: the file.")] = None,
+) -> None:
+    """List the components, show one with its sources and gaps, or start your own data sheet.
+
+    The list says of each record whether it is a gearbox or a motor, and what it lacks for a simulation.
+
+    \b
+    lostmotion catalogue --kind strain_wave --ratio 50..120 --torque 20..100
+    lostmotion catalogue schaeffler-rt1-h-20-100
+    lostmotion catalogue new -o my-gearbox.toml
+    lostmotion catalogue new --kind motor -o my-motor.toml
+    """
+    from ..reports.listing import list_records, record_text, template
+
+    if name == "new":
+        text = template(kind)
+        if output is None:
+            print(text, end="")
+            return
+        from ..errors import InputError
+        from ..reports.pages import write_text
+
+        if output.exists():
+            raise InputError(f"{output}: exists; name another file")
+        write_text(output, text)
+        print(f"Template written to {output}; fill in what your data sheet says and delete the rest")
+    elif name is not None:
+        print(record_text(name))
+    else:
+        print(list_records(kind, ratio, torque, complete))

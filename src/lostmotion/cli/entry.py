@@ -1,0 +1,93 @@
+"""The application: its commands, and how each way of failing ends."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+from . import catalogue, drive, reproduce, response, rig, run, scenarios, study
+from .terminal import fail
+
+UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # of the parser that typer brings along
+
+app = typer.Typer(
+    name="lostmotion",
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly.",
+    epilog="Exit code 0 only if all went well; errors are one line on stderr.",
+)
+
+
+def main() -> None:
+    """Entry point: known errors end in one line and exit code 1, Ctrl-C in 130."""
+    from ..errors import InputError, MissingLibraryError
+
+    try:
+        code = app(standalone_mode=False)
+    except (InputError, MissingLibraryError) as error:
+        fail(str(error))
+    except UsageError as error:
+        _explain_usage(error)
+    except KeyboardInterrupt:
+        fail("interrupted; nothing was written", 130)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except (RuntimeError, ValueError) as error:
+        # What a solver or a check of a whole scenario reports is a result for the user; anything else is our defect.
+        fail(" ".join(str(error).split()))
+    else:
+        if code == 130:  # typer turns Ctrl-C into this code
+            fail("interrupted; nothing was written", 130)
+        sys.exit(code)
+
+
+def _explain_usage(error: Any) -> NoReturn:
+    """One line for a command that cannot be read, and exit code 2; the help where a command has no arguments at all."""
+    text = str(error.format_message())
+    if "\n" in text:
+        print(text, file=sys.stderr)
+        sys.exit(2)
+    command = error.ctx.command_path if error.ctx else "lostmotion"
+    text = re.sub("^Invalid value for '([^']*)'", r"\1", text).rstrip(".")
+    fail(f"{text}; see `{command.replace('python -m ', '')} --help`", 2)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(version("lostmotion"))
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly."""
+
+
+for command in (
+    reproduce.reproduce,
+    run.run,
+    response.response,
+    rig.rig,
+    catalogue.catalogue,
+    scenarios.scenarios,
+    study.study,
+):
+    app.command()(command)
+drive_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Check a drive against its task.")
+drive_app.command()(drive.check)
+app.add_typer(drive_app, name="drive")
+app.command()(scenarios.schema)

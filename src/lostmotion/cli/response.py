@@ -1,0 +1,120 @@
+"""`lostmotion response`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .arguments import Overrides, SourceArgument, number
+from .targets import try_directory, writing
+from .terminal import busy, progress
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def response(
+    scenario: SourceArgument,
+    amplitudes: Annotated[
+        str,
+        typer.Option(
+            "--amplitudes", metavar="LIST", help="0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many)."
+        ),
+    ] = "0.02..1:6",
+    frequencies: Annotated[
+        str, typer.Option("--frequencies", metavar="LIST", help="[Hz], as the amplitudes.")
+    ] = "0.1..100:60",
+    source: Annotated[
+        str, typer.Option("--input", metavar="NAME", help="command or load_torque: what is a sine.")
+    ] = "command",
+    variable: Annotated[
+        str, typer.Option("--variable", metavar="NAME", help="Which variable's response to draw.")
+    ] = "load_speed",
+    refine: Annotated[
+        float | None,
+        typer.Option("--refine", metavar="DB", parser=number(), help="Add frequencies where a curve bends by more."),
+    ] = None,
+    compare: Annotated[
+        list[str] | None,
+        typer.Option("--compare", metavar="OTHER", help="Overlay the drive of another scenario."),
+    ] = None,
+    overrides: Overrides = None,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
+        "response"
+    ),
+) -> None:
+    """Frequency response over amplitude: each point from a periodic motion, on all cores.
+
+    Of the scenario the drive and the constant parts of command and load torque are taken. Writes Bode figures (bode.png, .svg, .csv), maps of gain, phase, efficiency and distortion over amplitude and
+    frequency (maps.png, .svg), and all numbers (response.csv, characteristics.csv, and response.nc where NetCDF is
+    installed).
+
+    \b
+    lostmotion response drive.toml --amplitudes 0.025,1 --frequencies 0.1..100:60
+    lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
+    """
+    from ..simulation.sources import load
+    from .grids import parse_grid
+
+    wanted, grid = parse_grid(amplitudes, "amplitudes"), parse_grid(frequencies, "frequencies")
+    _check_names(source, variable)
+    try_directory(output)
+    name = Path(scenario).stem
+    loaded = {name: load(scenario, overrides or ())} | {Path(other).stem: load(other) for other in compare or ()}
+    from ..response.harmonic import Source, frequency_response
+
+    responses = {}
+    with progress(len(loaded) * len(wanted) * len(grid), "Response") as step:
+        for title, s in loaded.items():
+            kind: Source = "command" if source == "command" else "load_torque"
+            responses[title] = frequency_response(s, grid, wanted, source=kind, refine=refine, progress=step)
+    first = loaded[name]
+    with writing(output), busy("Drawing"):
+        from ..reports.response import write_response
+
+        figure, found = write_response(output, responses, first.drive(), variable)
+    print(first.title or name)
+    _print_characteristics(found)
+    _print_reasons(responses[name])
+    print(f"Figures and tables are in {figure.parent}")
+    if not (output / "response.nc").exists():
+        print('response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"')
+
+
+def _check_names(source: str, variable: str) -> None:
+    from ..errors import InputError
+    from ..simulation.variables import CHANNEL_NAMES
+
+    if source not in ("command", "load_torque"):
+        raise InputError(f"--input {source}: must be command or load_torque")
+    if variable not in CHANNEL_NAMES:
+        raise InputError(f"--variable {variable}: must be one of {', '.join(CHANNEL_NAMES)}")
+
+
+def _print_characteristics(found: xarray.Dataset) -> None:
+    for a in found["amplitude"].values:
+        band, cross = (float(found[k].sel(amplitude=a)) for k in ("bandwidth", "phase_crossover"))
+        text = [f"-3 dB at {band:.4g} Hz" if math.isfinite(band) else "-3 dB outside the frequencies, or no motion"]
+        text += [f"-180 degrees at {cross:.4g} Hz"] if math.isfinite(cross) else []
+        print(f"  amplitude {a:g}: {', '.join(text)}")
+    print(
+        f"  dead zone: from rest the load moves above a constant command of {found.attrs['dead_zone_forward']:.4g} and "
+        f"below {found.attrs['dead_zone_backward']:.4g}"
+    )
+
+
+def _print_reasons(result: xarray.Dataset) -> None:
+    """How many points were found, and why others were not."""
+    reasons = [r for r in result["reason"].values.ravel() if r]
+    found_points = result["reason"].size - len(reasons)
+    worst = float(result["residual"].where(result["reason"] == "").max())
+    within = f", repeating within {worst:.1e} of their size" if found_points else ""
+    print(f"  {found_points} of {result['reason'].size} motions found{within}")
+    different = list(dict.fromkeys(reasons))
+    for reason in different[:3]:
+        print(f"  not found at {reasons.count(reason)} point(s): {reason}")
+    if len(different) > 3:
+        print(f"  {len(different) - 3} more reasons are in response.csv")

@@ -1,0 +1,75 @@
+"""`lostmotion rig`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .arguments import complete_gearbox
+from .targets import try_directory, writing
+from .terminal import busy, progress
+
+if TYPE_CHECKING:
+    from ..test_rig.rig import RigReport
+
+
+def rig(
+    gearbox: Annotated[
+        str,
+        typer.Argument(
+            metavar="GEARBOX",
+            help="Name in the catalogue, or a file with one record (.toml).",
+            autocompletion=complete_gearbox,
+        ),
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
+        "rig"
+    ),
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help='Change or add a value, e.g. --set temperature="40 degC".'),
+    ] = None,
+) -> None:
+    """Measure a gearbox on the virtual test rig and compare with its data sheet.
+
+    Writes rig.html (a page like one of a catalogue), the figures as PNG and SVG, and the measurements as CSV.
+
+    \b
+    lostmotion rig schaeffler-rt1-h-20-100
+    lostmotion rig my-gearbox.toml -o sheet --set loss_factor=1.3
+    """
+    from ..data_sheets.records import find
+    from ..data_sheets.sheets import GearboxSheet
+    from ..errors import need
+    from ..simulation.scenario import gearbox_from_record
+
+    try_directory(output)
+    need("jinja2", "The page of the rig", "report")
+
+    sheet = find(gearbox, "gearbox")
+    assert isinstance(sheet, GearboxSheet)
+    part, notes = gearbox_from_record(gearbox, overrides or ())
+    from ..test_rig.rig import WORK, measure
+
+    with progress(WORK, "Measuring") as step:
+        report = measure(part, sheet, notes, step)
+    with writing(output), busy("Drawing"):
+        from ..reports.rig import summary_rows, write_sheet
+
+        page = write_sheet(output, sheet.name, report, sheet, notes)
+    print(sheet.title or sheet.name)
+    _print_comparisons(report)
+    for what, value in summary_rows(report):
+        print(f"  {what}: {value}")
+    for note in notes:
+        print(f"  note: {note}")
+    print(f"The data sheet is at {page}")
+
+
+def _print_comparisons(report: RigReport) -> None:
+    for c in report.comparisons:
+        unit = "" if c.unit == "1" else f" {c.unit}"
+        remark = f"  ({c.remark})" if c.remark else ""
+        print(f"  {c.figure:<44} {c.catalogue:>10.5g} {c.rig:>10.5g} {c.difference:>+9.1e}{unit}{remark}")

@@ -1,0 +1,118 @@
+"""`lostmotion run`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .arguments import Overrides, SourceArgument, number
+from .targets import try_file
+from .terminal import busy
+
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def run(
+    scenario: SourceArgument,
+    overrides: Overrides = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Result file: .nc, .csv or .parquet.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", metavar="FILE", help="Figure of the run: .png, .svg or .pdf.")
+    ] = None,
+    explain: Annotated[
+        float | None,
+        typer.Option(
+            "--explain", metavar="TIME", parser=number("s"), help="Say what each contact holds at this instant [s]."
+        ),
+    ] = None,
+    solver: Annotated[
+        str, typer.Option("--solver", metavar="NAME", help="exact, or dormand-prince as a second opinion.")
+    ] = "exact",
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance",
+            metavar="VALUE",
+            parser=number(),
+            help="Relative tolerance of dormand-prince, 1e-15 to 1e-3 (1e-8).",
+        ),
+    ] = None,
+) -> None:
+    """Run a scenario: print, save, draw, explain.
+
+    \b
+    lostmotion run drive.toml
+    lostmotion run paper-2dof-nl-small --plot small.png
+    lostmotion run drive.toml --set command.amplitude=0.1 -o result.csv --plot result.png
+    lostmotion run result.csv --explain 0.25
+    """
+    from ..errors import InputError
+    from ..simulation.sources import load
+
+    _try_files(output, plot)
+    loaded = load(scenario, overrides or ())
+    if explain is not None and not 0.0 <= explain <= loaded.simulation.duration:
+        raise InputError(
+            f"--explain {explain}: must lie between 0 and simulation.duration, {loaded.simulation.duration} s"
+        )
+    _check_solver(solver, tolerance)
+    from ..simulation.run import run as work
+
+    try:
+        with busy("Simulating"):
+            result = work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
+    except RuntimeError as error:
+        raise InputError(f"{scenario}: {error}") from None
+    from ..reports.run import summary
+
+    print(summary(result))
+    if explain is not None:
+        from ..simulation.explanation import explain as explain_instant
+
+        print(explain_instant(loaded, explain))
+    if output is not None:
+        from ..simulation.results import save
+
+        with busy("Writing"):
+            save(result.dataset(), output)
+        print(f"Result written to {output}")
+    if plot is not None:
+        with busy("Drawing"):
+            from ..reports.plots import overview
+            from ..simulation.results import write_whole
+
+            write_whole(plot, overview(result.dataset()).savefig)
+        print(f"Figure written to {plot}")
+
+
+def _try_files(output: Path | None, plot: Path | None) -> None:
+    """See, before the work, that the files can be written."""
+    from ..errors import InputError
+    from ..simulation.results import check_output
+
+    if output is not None:
+        try_file(check_output(output))
+    if plot is not None:
+        if plot.suffix not in PICTURES:
+            raise InputError(
+                f"{plot}: the ending {plot.suffix or '(none)'} is not known; it must be one of {', '.join(PICTURES)}"
+            )
+        try_file(plot)
+
+
+def _check_solver(solver: str, tolerance: float | None) -> None:
+    from ..errors import InputError
+    from ..simulation.run import TOLERANCES
+
+    if solver not in ("exact", "dormand-prince"):
+        raise InputError(f"--solver {solver}: must be exact or dormand-prince")
+    if tolerance is not None and solver == "exact":
+        raise InputError(
+            f"--tolerance {tolerance:g}: the exact solver has none; leave it out, or add --solver dormand-prince"
+        )
+    if tolerance is not None and not TOLERANCES[0] <= tolerance <= TOLERANCES[1]:
+        raise InputError(f"--tolerance {tolerance:g}: must lie between {TOLERANCES[0]:g} and {TOLERANCES[1]:g}")

@@ -1,0 +1,28 @@
+"""`lostmotion scenarios` and `lostmotion schema`."""
+
+from __future__ import annotations
+
+
+def scenarios() -> None:
+    """List the scenarios that come with the package; `run`, `response` and `drive check` take their names."""
+    from ..simulation.scenario import load, shipped_scenarios
+
+    found = shipped_scenarios()
+    width = max(map(len, found))
+    for name in found:
+        print(f"{name:<{width}}  {load(name).title}")
+
+
+def schema() -> None:
+    """Print the JSON Schema of scenario files.
+
+    Editors complete and check scenario files with it.
+
+    \b
+    lostmotion schema > scenario.schema.json
+    """
+    import json
+
+    from ..simulation.scenario import json_schema
+
+    print(json.dumps(json_schema(), indent=2))

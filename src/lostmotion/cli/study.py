@@ -1,0 +1,92 @@
+"""`lostmotion study`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .arguments import count
+from .targets import try_directory, writing
+from .terminal import busy, fail, progress
+from .workers import workers
+
+
+def study(
+    what: Annotated[str, typer.Argument(metavar="STUDY.toml | show", help="Study file; or `show` and a directory.")],
+    shown: Annotated[
+        Path | None, typer.Argument(metavar="[DIR]", help="With `show`: the directory of a study.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Directory; by default the file's name.")
+    ] = None,
+    threads: Annotated[
+        int | None, typer.Option("--threads", metavar="N", parser=count, help="In the core; all cores by default.")
+    ] = None,
+    processes: Annotated[
+        int | None, typer.Option("--processes", metavar="N", parser=count, help="Worker processes in place of threads.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler of a cluster.")
+    ] = None,
+    best: Annotated[
+        str | None,
+        typer.Option(
+            "--best", metavar="COLUMN[:largest]", help="With `show`: the ten runs with the least, or largest."
+        ),
+    ] = None,
+) -> None:
+    """Many runs: vary parameters, store selected results, resume after an interruption.
+
+    Writes a directory of Parquet files, one row a run, that pandas, DuckDB and polars open directly.
+
+    \b
+    lostmotion study tolerance.toml -o tolerance
+    lostmotion study show tolerance --best peak_twist
+    """
+    from ..errors import InputError
+
+    if what == "show":
+        if shown is None:
+            raise InputError("study show: name the directory of a study, as in `lostmotion study show DIR`")
+        _show(shown, best)
+        return
+    if shown is not None:
+        raise InputError(f"study {what} {shown}: too many names; the directory is given by -o")
+    from contextlib import ExitStack
+
+    from ..studies.engine import study as work
+    from ..studies.file import load_study
+
+    loaded = load_study(what)
+    directory = output or Path(Path(what).stem)
+    try_directory(directory)
+    with ExitStack() as stack:
+        executor = stack.enter_context(workers(processes, scheduler)) if processes or scheduler else None
+        report = stack.enter_context(progress(loaded.total, "Runs"))
+        try:
+            with writing(directory, "; what is written stays"):
+                work(loaded, directory, threads=threads, executor=executor, progress=report)
+        except KeyboardInterrupt:
+            fail(f"interrupted; what is in {directory} stays, and the same command resumes it", 130)
+    _print_outcome(directory, loaded.total)
+
+
+def _show(directory: Path, best: str | None) -> None:
+    from ..reports.study import best_lines, show
+
+    found = best_lines(directory, best) if best is not None else []
+    with busy("Drawing"):
+        lines = show(directory)
+    print("\n".join([*lines, *found]))
+
+
+def _print_outcome(directory: Path, total: int) -> None:
+    from ..studies.table import failures
+
+    failed = failures(directory)
+    if failed:
+        print(f"{len(failed)} of {total} runs failed, such as: {failed[0]}", file=sys.stderr)
+    print(f"{total} runs are in {directory}; `lostmotion study show {directory}` shows them")

@@ -1,0 +1,62 @@
+"""Files and directories that commands write to: tried before the work, and what goes wrong as one line."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..errors import InputError
+
+
+def try_file(path: Path) -> None:
+    """See, before the work, that a file can be written; nothing is left behind.
+
+    Raises
+    ------
+    InputError
+    """
+    if path.is_dir():
+        raise InputError(f"{path}: is a directory; name a file")
+    if path.exists() and not path.is_file():  # a device
+        return
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except FileNotFoundError:
+        raise InputError(f"{path}: its directory does not exist; make it first") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def try_directory(path: Path) -> None:
+    """See, before the work, that files can be written into a directory, made if missing; nothing is left behind.
+
+    Raises
+    ------
+    InputError
+    """
+    if path.exists() and not path.is_dir():
+        raise InputError(f"{path}: is a file; -o names a directory")
+    made: list[Path] = []
+    try:
+        for directory in reversed([p for p in (path, *path.parents) if not p.exists()]):
+            directory.mkdir()
+            made.append(directory)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+    finally:
+        for directory in reversed(made):
+            directory.rmdir()
+
+
+@contextmanager
+def writing(directory: Path, then: str = "") -> Iterator[None]:
+    """What goes wrong with a directory that is written to, as one line."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{directory}: cannot be written: {error.strerror}{then}") from None
