@@ -495,7 +495,7 @@ def test_an_old_result_survives_a_failed_write(tmp_path: Path, monkeypatch: pyte
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("lostmotion.simulation.results._header", full)
+    monkeypatch.setattr("lostmotion.simulation.result_files._header", full)
     with pytest.raises(lm.InputError, match="No space left"):
         lm.save(result, target)
     assert target.read_bytes() == old

@@ -12,14 +12,18 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
+from lostmotion.data_sheets.components import gearbox_table
+from lostmotion.data_sheets.gearbox_sheet import GearboxSheet
+from lostmotion.data_sheets.loss_figures import Lubricant
 from lostmotion.data_sheets.loss_map_builder import build_loss_map
-from lostmotion.data_sheets.records import catalogue, find, gearbox_table, parse_sheets
-from lostmotion.data_sheets.sheets import GearboxSheet, Lubricant, MotorSheet
+from lostmotion.data_sheets.motor_sheet import MotorSheet
+from lostmotion.data_sheets.records import catalogue, find, parse_sheets
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
-from lostmotion.simulation.scenario import gearbox_from_record
+from lostmotion.simulation.scenario_files import gearbox_from_record
 from lostmotion.sizing.drive_check import check_drive
-from lostmotion.test_rig.rig import Comparison, TestRig, _compare
+from lostmotion.test_rig.comparison import Comparison, compare
+from lostmotion.test_rig.rig import TestRig
 
 RPM = math.pi / 30.0
 ARCMIN = math.pi / 10800.0
@@ -234,7 +238,7 @@ def test_the_rig_returns_the_figures_of_every_complete_record(family: str):
     assert records
     for record in records:
         table, built = gearbox_table(record.name, {})
-        for c in _compare(TestRig(lm.Gearbox(**table)), record, built.notes):
+        for c in compare(TestRig(lm.Gearbox(**table)), record, built.notes):
             # Printed with two to four digits; a thousandth is finer than half a unit of any of their last ones.
             if c.remark:
                 assert c.figure.startswith("efficiency")

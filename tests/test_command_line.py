@@ -308,7 +308,7 @@ def test_long_work_shows_what_it_does_and_short_work_nothing(tmp_path: Path) -> 
 
 
 def test_the_rig_reports_its_progress_to_the_end() -> None:
-    from lostmotion.test_rig.rig import WORK
+    from lostmotion.test_rig.measurement import WORK
 
     steps: list[None] = []
     gearbox = lm.load(SMALL).gearbox

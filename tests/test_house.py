@@ -19,7 +19,7 @@ PACKAGE = ROOT / "src" / "lostmotion"
 # the data: units -> parts -> scenario -> run -> dataset -> analysis -> figures and reports -> command line.
 LAYERS = [
     {"errors", "_instruction_set"},
-    {"_core"},
+    {"_core", "atomic_writer"},
     {"units"},
     {"inputs"},
     {"model"},

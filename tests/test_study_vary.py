@@ -9,7 +9,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT
-from lostmotion.data_sheets.sheets import GearboxSheet
+from lostmotion.data_sheets.gearbox_sheet import GearboxSheet
 from lostmotion.reports.study import read_table
 from lostmotion.studies.chunk import scenario_of_run
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.data_sheets.records import parse_sheets
-from lostmotion.simulation.scenario import gearbox_from_record
+from lostmotion.simulation.scenario_files import gearbox_from_record
 from lostmotion.studies.units import unit_of_key
 from lostmotion.units.conversion import to_si
 from lostmotion.units.grammar import plain, read_unit, symbols, written

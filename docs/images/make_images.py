@@ -13,7 +13,7 @@ from lostmotion.reports.rig import panels
 from lostmotion.reports.study_selection import pareto_figure
 from lostmotion.studies.selection import candidates, pareto_front
 from lostmotion.studies.table import read_table
-from lostmotion.test_rig.rig import measure
+from lostmotion.test_rig.measurement import measure
 
 HERE = Path(__file__).parent
 

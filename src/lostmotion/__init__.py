@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     __version__: str
     from ._core import SolverError as SolverError
+    from .data_sheets.components import gearbox as gearbox
+    from .data_sheets.components import motor as motor
+    from .data_sheets.gearbox_sheet import GearboxSheet as GearboxSheet
     from .data_sheets.loss_map_builder import BuiltMap as BuiltMap
     from .data_sheets.loss_map_builder import build_loss_map as build_loss_map
+    from .data_sheets.motor_sheet import MotorSheet as MotorSheet
     from .data_sheets.records import catalogue as catalogue
-    from .data_sheets.records import gearbox as gearbox
-    from .data_sheets.records import motor as motor
-    from .data_sheets.sheets import GearboxSheet as GearboxSheet
-    from .data_sheets.sheets import MotorSheet as MotorSheet
-    from .data_sheets.sheets import Source as Source
+    from .data_sheets.sheet import Source as Source
     from .errors import InputError as InputError
     from .errors import MissingLibraryError as MissingLibraryError
     from .model.parts import ConstantEfficiency as ConstantEfficiency
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from .model.signals import CommandSignal as CommandSignal
     from .model.signals import TorqueSignal as TorqueSignal
     from .reports.accessor import ResultAccessor as ResultAccessor
-    from .response.harmonic import bandwidth as bandwidth
-    from .response.harmonic import characteristics as characteristics
+    from .response.bandwidth import bandwidth as bandwidth
+    from .response.bandwidth import characteristics as characteristics
     from .response.harmonic import frequency_response as frequency_response
     from .response.harmonic import to_control as to_control
     from .response.linear import LinearModel as LinearModel
@@ -51,14 +51,14 @@ if TYPE_CHECKING:
     from .simulation.explanation import ContactState as ContactState
     from .simulation.explanation import Explanation as Explanation
     from .simulation.explanation import explain as explain
+    from .simulation.result_files import open_result as open_result
+    from .simulation.result_files import save as save
     from .simulation.results import energy_of as energy_of
-    from .simulation.results import open_result as open_result
-    from .simulation.results import save as save
     from .simulation.results import scenario_of as scenario_of
     from .simulation.run import simulate as simulate
     from .simulation.scenario import Initial as Initial
     from .simulation.scenario import Scenario as Scenario
-    from .simulation.scenario import shipped_scenarios as shipped_scenarios
+    from .simulation.scenario_files import shipped_scenarios as shipped_scenarios
     from .simulation.sources import load as load
     from .simulation.stepping import Simulation as Simulation
     from .simulation.stepping import SimulationState as SimulationState
@@ -70,23 +70,22 @@ if TYPE_CHECKING:
     from .studies.engine import study as study
     from .studies.file import Study as Study
     from .studies.file import load_study as load_study
-    from .test_rig.rig import Comparison as Comparison
-    from .test_rig.rig import Loop as Loop
-    from .test_rig.rig import RigReport as RigReport
+    from .test_rig.comparison import Comparison as Comparison
+    from .test_rig.loop import Loop as Loop
+    from .test_rig.measurement import RigReport as RigReport
+    from .test_rig.measurement import measure as measure
     from .test_rig.rig import TestRig as TestRig
-    from .test_rig.rig import measure as measure
 
 # Where each public name lives; it is imported when first used, so that `import lostmotion` stays quick.
 _HOMES = {
     "_core": ("SolverError",),
-    "reports.accessor": ("ResultAccessor",),
-    "sizing.drive_check": ("Finding", "check_drive"),
-    "errors": ("InputError", "MissingLibraryError"),
-    "simulation.explanation": ("ContactState", "Explanation", "explain"),
-    "data_sheets.sheets": ("GearboxSheet", "MotorSheet", "Source"),
-    "response.harmonic": ("bandwidth", "characteristics", "frequency_response", "to_control"),
-    "response.linear": ("LinearModel", "RigidConstants", "linearize", "rigid_constants"),
+    "data_sheets.components": ("gearbox", "motor"),
+    "data_sheets.gearbox_sheet": ("GearboxSheet",),
     "data_sheets.loss_map_builder": ("BuiltMap", "build_loss_map"),
+    "data_sheets.motor_sheet": ("MotorSheet",),
+    "data_sheets.records": ("catalogue",),
+    "data_sheets.sheet": ("Source",),
+    "errors": ("InputError", "MissingLibraryError"),
     "model.parts": (
         "ConstantEfficiency",
         "Drive",
@@ -101,27 +100,40 @@ _HOMES = {
         "Rigid",
         "TorsionCurve",
     ),
-    "response.shooting": ("periodic_motion", "periodic_motions"),
-    "data_sheets.records": ("catalogue", "gearbox", "motor"),
-    "simulation.results": ("energy_of", "open_result", "save", "scenario_of"),
-    "simulation.scenario": ("Initial", "Scenario", "shipped_scenarios"),
-    "simulation.sources": ("load",),
     "model.signals": ("CommandSignal", "TorqueSignal"),
+    "reports.accessor": ("ResultAccessor",),
+    "response.bandwidth": ("bandwidth", "characteristics"),
+    "response.harmonic": ("frequency_response", "to_control"),
+    "response.linear": ("LinearModel", "RigidConstants", "linearize", "rigid_constants"),
+    "response.shooting": ("periodic_motion", "periodic_motions"),
+    "simulation.explanation": ("ContactState", "Explanation", "explain"),
+    "simulation.result_files": ("open_result", "save"),
+    "simulation.results": ("energy_of", "scenario_of"),
     "simulation.run": ("simulate",),
+    "simulation.scenario": ("Initial", "Scenario"),
+    "simulation.scenario_files": ("shipped_scenarios",),
+    "simulation.sources": ("load",),
     "simulation.stepping": ("Simulation", "SimulationState"),
+    "simulation.switchings": ("switchings_of",),
+    "simulation.variables": ("VARIABLES", "Variable"),
+    "sizing.drive_check": ("Finding", "check_drive"),
     "studies.engine": ("study",),
     "studies.file": ("Study", "load_study"),
-    "simulation.switchings": ("switchings_of",),
-    "test_rig.rig": ("Comparison", "Loop", "RigReport", "TestRig", "measure"),
-    "simulation.variables": ("VARIABLES", "Variable"),
+    "test_rig.comparison": ("Comparison",),
+    "test_rig.loop": ("Loop",),
+    "test_rig.measurement": ("RigReport", "measure"),
+    "test_rig.rig": ("TestRig",),
 }
 # Modules whose functions return datasets: with them comes `result.lm`.
 _WITH_DATASETS = (
+    "response.bandwidth",
     "response.harmonic",
+    "response.shooting",
+    "simulation.result_files",
     "simulation.results",
     "simulation.run",
-    "response.shooting",
     "simulation.switchings",
+    "test_rig.measurement",
     "test_rig.rig",
 )
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}

@@ -49,8 +49,8 @@ def complete_scenario(incomplete: str) -> list[str]:
 
 def complete_gearbox(incomplete: str) -> list[str]:
     """Gearboxes of the catalogue and files."""
+    from ..data_sheets.gearbox_sheet import GearboxSheet
     from ..data_sheets.records import catalogue as records
-    from ..data_sheets.sheets import GearboxSheet
 
     names = [r.name for r in records() if isinstance(r, GearboxSheet)]
     return [*(n for n in names if n.startswith(incomplete)), *_files(incomplete)]

@@ -12,7 +12,7 @@ from .targets import try_directory, writing
 from .terminal import busy, progress
 
 if TYPE_CHECKING:
-    from ..test_rig.rig import RigReport
+    from ..test_rig.measurement import RigReport
 
 
 def rig(
@@ -40,10 +40,10 @@ def rig(
     lostmotion rig schaeffler-rt1-h-20-100
     lostmotion rig my-gearbox.toml -o sheet --set loss_factor=1.3
     """
+    from ..data_sheets.gearbox_sheet import GearboxSheet
     from ..data_sheets.records import find
-    from ..data_sheets.sheets import GearboxSheet
     from ..errors import need
-    from ..simulation.scenario import gearbox_from_record
+    from ..simulation.scenario_files import gearbox_from_record
 
     try_directory(output)
     need("jinja2", "The page of the rig", "report")
@@ -51,7 +51,7 @@ def rig(
     sheet = find(gearbox, "gearbox")
     assert isinstance(sheet, GearboxSheet)
     part, notes = gearbox_from_record(gearbox, overrides or ())
-    from ..test_rig.rig import WORK, measure
+    from ..test_rig.measurement import WORK, measure
 
     with progress(WORK, "Measuring") as step:
         report = measure(part, sheet, notes, step)

@@ -75,15 +75,15 @@ def run(
 
         print(explain_instant(loaded, explain))
     if output is not None:
-        from ..simulation.results import save
+        from ..simulation.result_files import save
 
         with busy("Writing"):
             save(result.dataset(), output)
         print(f"Result written to {output}")
     if plot is not None:
         with busy("Drawing"):
+            from ..atomic_writer import write_whole
             from ..reports.plots import overview
-            from ..simulation.results import write_whole
 
             write_whole(plot, overview(result.dataset()).savefig)
         print(f"Figure written to {plot}")
@@ -92,7 +92,7 @@ def run(
 def _try_files(output: Path | None, plot: Path | None) -> None:
     """See, before the work, that the files can be written."""
     from ..errors import InputError
-    from ..simulation.results import check_output
+    from ..simulation.result_files import check_output
 
     if output is not None:
         try_file(check_output(output))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 def scenarios() -> None:
     """List the scenarios that come with the package; `run`, `response` and `drive check` take their names."""
-    from ..simulation.scenario import load, shipped_scenarios
+    from ..simulation.scenario_files import load, shipped_scenarios
 
     found = shipped_scenarios()
     width = max(map(len, found))

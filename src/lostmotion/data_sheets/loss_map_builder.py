@@ -18,7 +18,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..model.parts import LossMap
-from .sheets import EfficiencyPoint, GearboxSheet, LossFigures
+from .gearbox_sheet import GearboxSheet
+from .loss_figures import EfficiencyPoint, LossFigures
 
 # Where no figure at all says what an unloaded gearbox loses: this share of the loss at rated load.
 ASSUMED_NO_LOAD_SHARE = 0.2

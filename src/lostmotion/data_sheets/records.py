@@ -1,39 +1,26 @@
-"""The component catalogue: shipped and own data sheets, and the parts made of them."""
+"""The records of the catalogue: shipped and own data sheets."""
 
 from __future__ import annotations
 
 import difflib
 import tomllib
 from collections.abc import Mapping
-from contextlib import suppress
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from ..errors import InputError
-from ..inputs.part import Part
-from ..inputs.quantities import Angle, NotNegative, Number, Positive, Temperature
 from ..inputs.toml_files import read_toml
 from ..inputs.validation import shown
-from ..model.parts import Gearbox, LinearStiffness, Motor, TorsionCurve
-from .loss_map_builder import BuiltMap, build_loss_map
-from .sheets import SCALARS, GearboxSheet, MotorSheet
+from .gearbox_sheet import GearboxSheet
+from .motor_sheet import MotorSheet
 
 KINDS: dict[str, type[GearboxSheet] | type[MotorSheet]] = {"gearbox": GearboxSheet, "motor": MotorSheet}
+
+
 # Keys of a sheet file that hold for all of its records.
 COMMON = ("kind", "maker", "note")
-
-
-class Conditions(Part):
-    """Under which conditions a record is used: keys of `[gearbox]` beside `from`."""
-
-    temperature: Temperature | None = None
-    """of the lubricant; left out, that of the figures"""
-    added_backlash: Annotated[Angle, NotNegative] = 0.0
-    """wear"""
-    loss_factor: Annotated[Number, Positive] = 1.0
-    """wear"""
 
 
 @cache
@@ -126,195 +113,3 @@ def find(reference: str, table: str) -> GearboxSheet | MotorSheet:
         other = next(name for name, k in KINDS.items() if isinstance(named[reference], k))
         raise InputError(f"{reference} is a {other}; a {table} is wanted here; `lostmotion catalogue` lists them")
     raise InputError(f"{table} {shown(reference)} is not in the catalogue; {hint}")
-
-
-def gearbox_table(reference: str, changes: Mapping[str, Any]) -> tuple[dict[str, Any], BuiltMap | None]:
-    """Values of `[gearbox]` for a record with `changes`, and the loss map's origin.
-
-    A change takes the place of what it names and of nothing else: the hysteresis stays that of the record as printed,
-    whatever its stiffness is changed to, and wear that adds backlash leaves it as it is.
-
-    Raises
-    ------
-    InputError
-        The record lacks what a run needs and `changes` do not give it; the message says where to read it.
-    """
-    known = sorted({*Gearbox.model_fields, *Conditions.model_fields})
-    for key in changes:
-        if key not in known:
-            near = difflib.get_close_matches(key, known, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"known here: {', '.join(known)}"
-            raise InputError(f"key gearbox.{key}: is not known; {hint}")
-    record = find(reference, "gearbox")
-    assert isinstance(record, GearboxSheet)
-    scalars = {key: value for key, value in changes.items() if key in SCALARS}
-    try:
-        sheet = GearboxSheet(**_given(record) | scalars)
-        conditions = Conditions(**{key: changes[key] for key in Conditions.model_fields if key in changes})
-    except InputError as error:
-        raise InputError(f"gearbox from {shown(reference)}: {error}") from None
-    for key, what in sheet.missing().items():
-        if key not in changes:
-            raise InputError(
-                f"gearbox from {shown(reference)}: the record lacks {key}, {what}; give gearbox.{key} beside `from`"
-            )
-    built = None
-    if not _whole(changes.get("losses")):
-        try:
-            built = build_loss_map(sheet, temperature=conditions.temperature, loss_factor=conditions.loss_factor)
-        except ValueError as error:
-            raise InputError(f"gearbox {error}") from None
-    table: dict[str, Any] = sheet.scalars() | {"limits": sheet.limits().model_dump()}
-    if sheet.stiffness is not None:
-        table["stiffness"] = sheet.torsion_curve().model_dump()
-    if built is not None:
-        table["losses"] = built.losses.model_dump()
-    if notes := [*filter(None, [sheet.note]), *(built.notes if built else ())]:
-        table["note"] = " ".join(notes)
-    _change(table, changes)
-    if "hysteresis" not in changes:
-        table["hysteresis"] = _hysteresis(record, sheet, table["stiffness"])
-    _wear(table, changes, conditions)
-    return table, built
-
-
-def _given(sheet: GearboxSheet | MotorSheet) -> dict[str, Any]:
-    return {name: getattr(sheet, name) for name in sheet.model_fields_set}
-
-
-def _whole(table: Any) -> bool:
-    """Whether a change takes the place of a whole table, as it says its kind."""
-    return isinstance(table, Mapping) and "kind" in table
-
-
-def _change(table: dict[str, Any], changes: Mapping[str, Any]) -> None:
-    """Puts changes into a part's values; a table without a kind changes single keys."""
-    for key, value in changes.items():
-        if key in Conditions.model_fields:
-            continue
-        old = table.get(key)
-        if isinstance(value, Mapping) and isinstance(old, Mapping) and not _whole(value):
-            table[key] = {**old, **value}
-        else:
-            table[key] = value
-
-
-def _hysteresis(record: GearboxSheet, sheet: GearboxSheet, stiffness: Any) -> dict[str, Any] | None:
-    """That of the record as printed; what it lacks for it comes from the changes."""
-    if isinstance(stiffness, Mapping) and stiffness.get("kind") == "rigid":
-        return None
-    figures = sheet if record.rated_output_torque is None else record
-    try:
-        curve = figures.torsion_curve() if figures.stiffness is not None else _curve(stiffness)
-        found = None if curve is None else figures.hysteresis(curve)
-    except ValueError as error:
-        raise InputError(f"gearbox {error}") from None
-    return None if found is None else found.model_dump()
-
-
-def _curve(stiffness: Any) -> TorsionCurve | LinearStiffness | None:
-    """A stiffness as a part; None if it is not valid, which the gearbox then tells with the name of the key."""
-    if not isinstance(stiffness, Mapping):
-        return None
-    with suppress(InputError):
-        return LinearStiffness(**stiffness) if stiffness.get("kind") == "linear" else TorsionCurve(**stiffness)
-    return None
-
-
-def _wear(table: dict[str, Any], changes: Mapping[str, Any], conditions: Conditions) -> None:
-    """Adds the backlash, and refuses conditions that would have no effect."""
-    if "losses" in changes:
-        for key, default in (("loss_factor", 1.0), ("temperature", None)):
-            if getattr(conditions, key) != default:
-                raise InputError(
-                    f"key gearbox.{key}: acts on the record's own losses; leave it out beside gearbox.losses"
-                )
-    if conditions.added_backlash == 0.0:
-        return
-    curve = _curve(table["stiffness"])
-    if isinstance(curve, TorsionCurve):
-        table["stiffness"] = curve.model_dump() | {"backlash": curve.backlash + conditions.added_backlash}
-    elif curve is not None or _whole(table["stiffness"]):
-        raise InputError(
-            'key gearbox.added_backlash: needs a torsion curve; leave it out, or give gearbox.stiffness the kind "curve"'
-        )
-
-
-def gearbox(
-    name: str, *, temperature: float | None = None, added_backlash: float = 0.0, loss_factor: float = 1.0
-) -> Gearbox:
-    """The gearbox of a record.
-
-    Parameters
-    ----------
-    name
-        Of a record in the catalogue, or a file (``.toml``) with one record.
-    temperature
-        Of the lubricant [°C]; left out, that of the figures.
-    added_backlash
-        Wear: added to the printed backlash [rad].
-    loss_factor
-        Wear: multiplies all losses.
-
-    Raises
-    ------
-    InputError
-        There is no such record, or it lacks what a run needs.
-    """
-    changes: dict[str, Any] = {"added_backlash": added_backlash, "loss_factor": loss_factor}
-    if temperature is not None:
-        changes["temperature"] = temperature
-    table, _ = gearbox_table(name, changes)
-    return Gearbox(**table)
-
-
-def motor(name: str, *, voltage_limit: float | None = None) -> Motor:
-    """The motor of a record.
-
-    Parameters
-    ----------
-    name
-        Of a record in the catalogue, or a file (``.toml``) with one record.
-    voltage_limit
-        Largest voltage of the amplifier [V].
-
-    Raises
-    ------
-    InputError
-        There is no such record, or it lacks what a run needs.
-    """
-    changes = {} if voltage_limit is None else {"voltage_limit": voltage_limit}
-    try:
-        return Motor(**motor_table(name, changes))
-    except InputError as error:
-        raise InputError(f"motor {name}: {error}") from None
-
-
-# Keys of `[motor]` that may close a gap of the record, and the name of that gap.
-CLOSES = {
-    "rotor_inertia": "rotor_inertia",
-    "friction_torque": "friction_torque or no_load_current",
-    "electrical_time_constant": "inductance",
-}
-
-
-def motor_table(reference: str, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of `[motor]` for a record with `changes`, each of which takes the place of what it names.
-
-    Raises
-    ------
-    InputError
-        The record lacks what a run needs and `changes` do not give it; the message says where to read it.
-    """
-    record = find(reference, "motor")
-    assert isinstance(record, MotorSheet)
-    missing = record.missing()
-    gaps = {key: changes[key] for key, gap in CLOSES.items() if key in changes and gap in missing}
-    try:
-        table = MotorSheet(**_given(record) | gaps).motor().model_dump()
-    except ValueError as error:
-        keys = [f"motor.{key}" for key, gap in CLOSES.items() if gap in missing and key not in changes]
-        remedy = f"; give {' and '.join(keys)} beside `from`" if keys else ""
-        raise InputError(f"motor from {shown(reference)}: {error}{remedy}") from None
-    _change(table, changes)
-    return table

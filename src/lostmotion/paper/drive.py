@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 from ..errors import InputError
 from ..response.linear import RigidConstants, rigid_constants
-from ..simulation.scenario import Scenario, load
+from ..simulation.scenario import Scenario
+from ..simulation.scenario_files import load
 
 MODELS = ("1-DOF-L", "2-DOF-L", "2-DOF-NL")
 AMPLITUDES = {"large": 1.0275, "small": 0.025}

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
+from ..response.bandwidth import three_decibels_down
 from ..response.linear import rigid_constants
 from ..simulation.results import energy_of
 from .drive import AMPLITUDES, paper_scenario
 from .runs import FREQUENCIES, Results
-
-
-def _bandwidth(frequencies: Any, magnitude: Any) -> float:
-    """Frequency [Hz] at which the magnitude first falls below its first value / sqrt(2), in log-log interpolation."""
-    level = magnitude[0] / math.sqrt(2.0)
-    below = int(np.argmax(magnitude < level))
-    x, y = np.log(frequencies[below - 1 : below + 1]), np.log(magnitude[below - 1 : below + 1])
-    return float(np.exp(np.interp(-math.log(level), -y, x)))
 
 
 def facts(results: Results) -> dict[str, Any]:
@@ -37,7 +29,7 @@ def facts(results: Results) -> dict[str, Any]:
     rigid = rigid_constants(paper_scenario("1-DOF-L", "large").drive())
     out["bandwidth"]["closed"] = rigid.bandwidth
     for amplitude in AMPLITUDES:
-        out["bandwidth"][amplitude] = _bandwidth(FREQUENCIES, np.abs(results.load_response(amplitude)))
+        out["bandwidth"][amplitude] = three_decibels_down(FREQUENCIES, np.abs(results.load_response(amplitude)))
     out["static_gain_small"] = float(
         np.abs(results.load_response("small")[0]) / np.abs(results.load_response("large")[0])
     )

@@ -9,8 +9,9 @@ from typing import get_args
 
 import numpy as np
 
+from ..data_sheets.gearbox_sheet import GearboxSheet
+from ..data_sheets.motor_sheet import MotorSheet
 from ..data_sheets.records import catalogue, find, read_sheets
-from ..data_sheets.sheets import GearboxSheet, MotorSheet
 from ..errors import InputError
 from .sheet_rows import rows_of
 

@@ -10,8 +10,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..atomic_writer import write_bytes
 from ..errors import need
-from ..simulation.results import write_bytes
 
 if TYPE_CHECKING:
     from markupsafe import Markup

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..atomic_writer import write_bytes
 from ..model.parts import Drive
-from ..response.harmonic import characteristics
-from ..simulation.results import write_bytes
+from ..response.bandwidth import characteristics
 from .pages import panels_csv, save_figure, table_csv, write_text
 from .response_figures import bode, bode_figure, maps_figure
 

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..data_sheets.sheets import GearboxSheet
-from ..test_rig.rig import LOST_MOTION_LOAD, RigReport
+from ..data_sheets.gearbox_sheet import GearboxSheet
+from ..test_rig.measurement import RigReport
+from ..test_rig.rig import LOST_MOTION_LOAD
 from . import plots
 from .pages import embed, panels_csv, render_page, save_figure, table_csv, write_text
 from .panels import Curve, Panel

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data_sheets.sheets import Record
+from ..data_sheets.sheet import Record
 from ..inputs.schema import unit_in_schema
 from ..model.parts import Gearbox
 

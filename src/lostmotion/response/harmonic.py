@@ -1,4 +1,4 @@
-"""Frequency response from periodic motions: harmonics, distortion, efficiency, stability, bandwidth."""
+"""Frequency response from periodic motions: harmonics, distortion, efficiency, stability."""
 
 from __future__ import annotations
 
@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..errors import InputError, need
+from ..errors import InputError
 from ..inputs.quantities import arguments
 from ..model.parts import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from ..simulation.scenario import Initial, Scenario, drive_of, mean_inputs
 from ..simulation.variables import CHANNEL_NAMES
-from .linear import _control
+from .linear import python_control
 from .shooting import MAX_PERIODS, SAMPLES_PER_PERIOD, floquet_multipliers, is_stable, reason_of, respond
 
 if TYPE_CHECKING:
     import control
     import xarray
 
-THREE_DECIBELS = math.sqrt(2.0)  # the bandwidth ends where the gain has fallen by this factor
 
 Source = Literal["command", "load_torque"]
 
@@ -106,7 +105,7 @@ def frequency_response(
                     progress()
             seen = done
 
-        points = [(*_signals(source, a, f, *means), 1.0 / f, Initial()) for a in amplitudes for f in new]
+        points = [(*sine_inputs(source, a, f, *means), 1.0 / f, Initial()) for a in amplitudes for f in new]
         r = respond(
             drive,
             points,
@@ -131,9 +130,10 @@ def frequency_response(
     return result
 
 
-def _signals(
+def sine_inputs(
     source: Source, amplitude: float, frequency: float, mean_command: float, mean_load_torque: float
 ) -> tuple[CommandSignal, TorqueSignal]:
+    """Command and load torque of one point: constants, and a sine on the source."""
     command, load_torque = {"mean": mean_command}, {"mean": mean_load_torque}
     (command if source == "command" else load_torque).update(amplitude=amplitude, frequency=frequency)
     return CommandSignal.model_validate(command), TorqueSignal.model_validate(load_torque)
@@ -239,120 +239,6 @@ def _labelled(
     )
 
 
-def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: str = "load_speed") -> xarray.Dataset:
-    """Bandwidth and phase crossover as functions of amplitude, with the dead zone of the drive.
-
-    Parameters
-    ----------
-    response
-        From `frequency_response`.
-    drive
-        The drive, or its scenario.
-    output
-        The result variable that is looked at.
-
-    Returns
-    -------
-    xarray.Dataset
-        Over ``amplitude``: ``bandwidth`` [Hz], where the gain first falls 3 dB below that at the lowest frequency;
-        ``phase_crossover`` [Hz], where the phase first falls through -180 degrees; NaN where that lies outside the
-        frequencies. Attributes ``dead_zone_forward``, ``dead_zone_backward``: constant commands beyond which the load
-        moves from rest.
-    """
-    import xarray as xr
-
-    values = response["response"].sel(output=output).values
-    x = np.log(response["frequency"].values)
-    bandwidth, crossover = [], []
-    for curve in values:
-        size = np.abs(curve)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            gain = 20.0 * np.log10(size / size[0])
-            phase = np.degrees(np.unwrap(np.angle(curve)))
-        bandwidth.append(_falls_through(x, gain, -20.0 * math.log10(THREE_DECIBELS)))
-        crossover.append(_falls_through(x, phase, -180.0))
-    core = drive_of(drive).core()
-    forward, backward = (core.smallest_command(0.0, 0.0, s) for s in (+1, -1))
-    return xr.Dataset(
-        {
-            "bandwidth": ("amplitude", bandwidth, {"units": "Hz", "long_name": "-3 dB against the lowest frequency"}),
-            "phase_crossover": ("amplitude", crossover, {"units": "Hz", "long_name": "phase of -180 degrees"}),
-        },
-        coords={"amplitude": response["amplitude"]},
-        attrs={"dead_zone_forward": forward, "dead_zone_backward": backward},
-    )
-
-
-def _falls_through(x: np.ndarray, y: np.ndarray, level: float) -> float:
-    below = np.flatnonzero((y[:-1] >= level) & (y[1:] < level))
-    if len(below) == 0:
-        return math.nan
-    k = below[0]
-    return float(np.exp(x[k] + (level - y[k]) / (y[k + 1] - y[k]) * (x[k + 1] - x[k])))
-
-
-def bandwidth(
-    drive: Drive | Scenario,
-    amplitude: float,
-    *,
-    output: str = "load_speed",
-    mean_command: float | None = None,
-    mean_load_torque: float | None = None,
-    lowest: float = 0.1,
-    highest: float = 1000.0,
-) -> float:
-    """Frequency [Hz] at which the gain from the command first falls 3 dB below that at the lowest frequency.
-
-    Gains come from periodic motions, as in `frequency_response`. They are computed half an octave apart, and the fall is
-    then located between two of them.
-
-    Parameters
-    ----------
-    drive
-        A drive, or a scenario, of which the drive and the constant parts of command and load torque are taken.
-    amplitude
-        Of the command, E_CA [-].
-    mean_command, mean_load_torque
-        Constant parts of E_C [-] and M_Z [N·m]; left out, those of the scenario, or 0.
-    lowest, highest
-        [Hz]. Where the gain has not fallen at the highest, the bandwidth is NaN.
-
-    Raises
-    ------
-    InputError
-        The amplitude is not positive.
-    RuntimeError
-        No periodic motion was found, or the output does not move at the lowest frequency.
-    """
-    need("scipy", "The bandwidth", "control")
-    from scipy.optimize import brentq
-
-    if not amplitude > 0.0:
-        raise InputError(f"no bandwidth: the amplitude {amplitude:g} of the command must be positive")
-    channel = CHANNEL_NAMES.index(output)
-    means = mean_inputs(drive, mean_command, mean_load_torque)
-    drive = drive_of(drive)
-
-    def gain(frequency: float) -> float:
-        point = (*_signals("command", amplitude, frequency, *means), 1.0 / frequency, Initial())
-        r = respond(drive, [point], harmonics=1, keep_table=False, max_periods=MAX_PERIODS, threads=1, progress=None)
-        if reason := reason_of(r, 0):
-            raise RuntimeError(f"no bandwidth: at {frequency:.4g} Hz {reason}")
-        return math.hypot(*r["harmonics"][0, channel, 1]) / amplitude
-
-    level = gain(lowest) / THREE_DECIBELS
-    if level == 0.0:
-        raise RuntimeError(f"no bandwidth: {output} does not move at an amplitude of {amplitude:g}")
-    below = lowest
-    while below < highest:
-        above = min(below * math.sqrt(2.0), highest)
-        if gain(above) < level:
-            found = brentq(lambda x: gain(math.exp(x)) - level, math.log(below), math.log(above), xtol=1e-9)
-            return math.exp(found)
-        below = above
-    return math.nan
-
-
 def to_control(response: xarray.Dataset, amplitude: float, output: str = "load_speed") -> control.FrequencyResponseData:
     """One curve of a response for python-control, as data over frequency.
 
@@ -364,4 +250,4 @@ def to_control(response: xarray.Dataset, amplitude: float, output: str = "load_s
         The response has no such amplitude or output.
     """
     curve = response["response"].sel(output=output, amplitude=amplitude)
-    return _control().frd(curve.values, 2.0 * np.pi * curve["frequency"].values)
+    return python_control().frd(curve.values, 2.0 * np.pi * curve["frequency"].values)

@@ -99,7 +99,7 @@ class LinearModel:
         MissingLibraryError
             python-control is not installed.
         """
-        return _control().ss(
+        return python_control().ss(
             self.A,
             self.B,
             self.C,
@@ -123,7 +123,8 @@ class LinearModel:
         return scipy.signal.StateSpace(self.A, self.B, self.C, self.D)
 
 
-def _control() -> Any:
+def python_control() -> Any:
+    """The library python-control, where it is installed."""
     need("control", "This conversion", "control")
     import control
 

@@ -9,9 +9,10 @@ from typing import Any
 
 from ..errors import InputError
 from ..inputs.validation import shown
-from . import scenario
-from .results import FORMATS, open_result
-from .scenario import Scenario, changed, override
+from . import scenario_files
+from .result_files import FORMATS, open_result
+from .scenario import Scenario
+from .scenario_files import changed, override
 
 
 def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
@@ -35,7 +36,7 @@ def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) 
         raise InputError(f"{shown(source)} must be the name of a scenario, or of a file with a scenario or a result")
     path = Path(source)
     if path.suffix not in FORMATS:
-        return scenario.load(source, overrides)
+        return scenario_files.load(source, overrides)
     result = open_result(path)
     if "scenario" not in result.attrs:
         raise InputError(f"{path}: is no result of a run; it carries no scenario that could be run again")

@@ -8,8 +8,8 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExec
 from pathlib import Path
 from typing import Any
 
+from ..atomic_writer import write_bytes
 from ..errors import InputError, need
-from ..simulation.results import write_bytes
 from .chunk import as_parquet, compute_chunk, parsed, pieces, run_piece, tabulate
 from .design import CHUNK
 from .file import Study, from_json, to_json

@@ -14,7 +14,8 @@ from pydantic import Field, PrivateAttr, model_validator
 from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.toml_files import read_toml
-from ..simulation.scenario import Scenario, find_scenario, load, read_tables
+from ..simulation.scenario import Scenario
+from ..simulation.scenario_files import find_scenario, load, read_tables
 from ..simulation.variables import VARIABLES
 from .design import unit_cube
 from .expressions import Expression, read_expression

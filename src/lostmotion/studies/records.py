@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from typing import Any
 
-from ..data_sheets.records import KINDS, Conditions, catalogue, find
+from ..data_sheets.components import Conditions
+from ..data_sheets.records import KINDS, catalogue, find
 from ..errors import InputError
 from ..inputs.schema import unit_in_schema
 from ..simulation.scenario import Scenario, from_tables

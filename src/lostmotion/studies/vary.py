@@ -11,7 +11,8 @@ from pydantic import BaseModel, Field, model_validator
 
 from ..inputs.part import Part
 from ..model.signals import Signal
-from ..simulation.scenario import Scenario, list_index
+from ..simulation.keys import list_index
+from ..simulation.scenario import Scenario
 from .records import CONDITIONS, TABLE_OF, check_names, names_that_fit
 from .units import in_si, unit_of_key
 

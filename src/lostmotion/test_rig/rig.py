@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..data_sheets.sheets import GearboxSheet
 from ..errors import InputError
 from ..model.parts import Drive, Gearbox, Load, Motor, Rigid
 from ..model.signals import CommandSignal, Samples, TorqueSignal
@@ -23,62 +21,25 @@ from ..simulation.switchings import switchings_of
 
 if TYPE_CHECKING:
     import xarray
-
-T = TypeVar("T")
+from .loop import Loop
 
 FLYWHEEL = 1e9  # [kg m2] on the input: keeps its speed, or stands still, whatever the gearbox does
+
+
 RIG_FREQUENCY = 20.0  # [Hz] of the load on the stiffest segment of the curve, damped critically
+
+
 SETTLING = 4.0  # [s] until a steady state is read
+
+
 RAMP = 400.0  # [s] of a slow ramp
+
+
 LOST_MOTION_LOAD = 0.03  # of rated torque, where lost motion is read
 
 
 class RigError(ValueError):
     """A measurement did not settle."""
-
-
-@dataclass(frozen=True)
-class Loop:
-    """One closed torsion loop: twist [rad] and torque [N·m] over a slow cycle between -amplitude and amplitude."""
-
-    amplitude: float
-    twist: Any
-    torque: Any
-
-    @property
-    def width(self) -> float:
-        """Twist between the branches where the torque has just gone to zero, backlash included [rad]."""
-        half = len(self.torque) // 2
-        return abs(self._end(slice(0, half + 1), +1.0) - self._end(slice(half, None), -1.0))
-
-    def _end(self, branch: slice, sign: float) -> float:
-        """Where a branch that unloads from this sign reaches zero torque, by its last two points before."""
-        twist, torque = self.twist[branch], sign * self.torque[branch]
-        k = np.flatnonzero(torque > 1e-3 * self.amplitude)
-        run = k[: np.argmax(np.diff(k, append=len(twist) + 1) > 1) + 1][-2:] if len(k) > 2 else k
-        (d0, d1), (T0, T1) = twist[run], torque[run]
-        return float(d1 - T1 * (d1 - d0) / (T1 - T0))
-
-    @property
-    def area(self) -> float:
-        """Energy lost in one cycle [J]."""
-        return abs(float(np.trapezoid(self.torque, self.twist)))
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """One figure of the data sheet beside the rig's."""
-
-    figure: str
-    unit: str
-    catalogue: float
-    rig: float
-    remark: str = ""
-
-    @property
-    def difference(self) -> float:
-        """Relative."""
-        return self.rig / self.catalogue - 1.0
 
 
 class TestRig:
@@ -271,110 +232,3 @@ class TestRig:
             raise RigError("the input shaft never started to turn")
         k = events[0]
         return float(switchings["instant"][k]), float(switchings["output_torque_before"][k])
-
-
-@dataclass(frozen=True)
-class RigReport:
-    """All measurements of one gearbox."""
-
-    gearbox: Gearbox
-    map: xarray.Dataset
-    """efficiency and loss torque, motor driving"""
-    no_load: tuple[Any, Any]
-    """input speeds [rad/s], torques [N·m]"""
-    virgin: tuple[Any, Any]
-    """twist [rad], torque [N·m] of the first loading"""
-    loops: tuple[Loop, ...]
-    """at falling amplitudes, the largest at rated torque"""
-    starting_torque: float
-    backdriving_torque: float | None
-    lost_motion: float
-    comparisons: tuple[Comparison, ...] = field(default=())
-
-
-# What the rig measures beside its comparisons: parts of rated speed, and relative loads.
-SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
-LOADS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5)
-LOOPS = (1.0, 0.6, 0.3)
-WORK = len(LOADS) + len(LOOPS) + 6  # how often `measure` reports progress
-
-
-def measure(
-    gearbox: Gearbox,
-    sheet: GearboxSheet | None = None,
-    notes: Iterable[str] = (),
-    progress: Callable[[], None] = lambda: None,
-) -> RigReport:
-    """Measure all figures of a gearbox.
-
-    Parameters
-    ----------
-    sheet
-        Figures to compare with.
-    notes
-        Of the loss map's making; a contradiction among the figures is pointed out beside them.
-    progress
-        Called `WORK` times.
-    """
-    rig = TestRig(gearbox)
-    T_2R, n_1R = gearbox.rated_output_torque, gearbox.rated_input_speed
-    speeds = n_1R * np.array(SPEEDS)
-
-    def done(measured: T) -> T:
-        progress()
-        return measured
-
-    return RigReport(
-        gearbox=gearbox,
-        map=rig.efficiency_map(speeds, LOADS, progress),
-        no_load=(speeds, done(np.array([rig.no_load_torque(n) for n in speeds]))),
-        virgin=done(rig.virgin_curve(1.2 * T_2R)),
-        loops=tuple(done(rig.loop(share * T_2R)) for share in LOOPS),
-        starting_torque=done(rig.starting_torque()),
-        backdriving_torque=done(rig.backdriving_torque()),
-        lost_motion=done(rig.lost_motion()),
-        comparisons=done(() if sheet is None else tuple(_compare(rig, sheet, tuple(notes)))),
-    )
-
-
-def _compare(rig: TestRig, sheet: GearboxSheet, notes: tuple[str, ...]) -> Iterable[Comparison]:
-    """Each figure of the sheet beside the same measured."""
-    contradiction = "contradicts the no-load torque; see note" if any("Contradiction" in n for n in notes) else ""
-    figures = sheet.losses
-    rpm = 30.0 / np.pi
-
-    def here(temperature: float | None) -> bool:
-        """Whether a figure is of the temperature that the gearbox was made for."""
-        return temperature in (None, figures.temperature)
-
-    for p in filter(lambda p: here(p.temperature), figures.all_efficiencies()):
-        what = f"efficiency at {rpm * p.input_speed:.0f} rpm, load {p.load:g}"
-        yield Comparison(what, "1", p.efficiency, rig.efficiency(p.input_speed, p.load), contradiction)
-    for p in filter(lambda p: here(p.temperature), figures.backdrive_efficiency):
-        what = f"back-drive efficiency at {rpm * p.input_speed:.0f} rpm, load {p.load:g}"
-        yield Comparison(what, "1", p.efficiency, rig.efficiency(p.input_speed, -p.load), contradiction)
-    for q in filter(lambda q: here(q.temperature), figures.no_load_torque):
-        what = f"no-load torque at {rpm * q.input_speed:.0f} rpm"
-        yield Comparison(what, "N·m", q.torque, rig.no_load_torque(q.input_speed))
-    if figures.starting_torque is not None and here(figures.starting_temperature):
-        yield Comparison("starting torque", "N·m", figures.starting_torque, rig.starting_torque())
-    if figures.backdriving_torque is not None and here(figures.backdriving_temperature):
-        yield Comparison("back-driving torque", "N·m", figures.backdriving_torque, rig.backdriving_torque() or np.inf)
-    if figures.static_efficiency is not None:
-        eta = rig.gearbox.rated_output_torque / (rig.gearbox.ratio * rig.starting_torque(1.0))
-        yield Comparison("static efficiency at rated load", "1", figures.static_efficiency, eta)
-    if sheet.stiffness is not None:
-        torques = sheet.stiffness.torques
-        largest = max(1.5 * (torques[-1] if torques else 0.0), rig.gearbox.rated_output_torque)
-        measured = rig.stiffness(torques, largest)
-        for k, (printed, value) in enumerate(zip(sheet.stiffness.slopes, measured, strict=True)):
-            yield Comparison(f"torsional stiffness K{k + 1}", "N·m/rad", printed, value)
-    if sheet.backlash:
-        first = sheet.stiffness.torques[0] if sheet.stiffness and sheet.stiffness.torques else 0.0
-        value = rig.backlash(first or 0.5 * rig.gearbox.rated_output_torque)
-        yield Comparison("backlash", "arcmin", np.degrees(sheet.backlash) * 60.0, np.degrees(value) * 60.0)
-    if sheet.hysteresis_loss is not None:
-        value = rig.loop(rig.gearbox.rated_output_torque).width
-        yield Comparison(
-            "hysteresis loss", "arcmin", np.degrees(sheet.hysteresis_loss) * 60.0, np.degrees(value) * 60.0
-        )

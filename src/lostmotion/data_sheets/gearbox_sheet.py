@@ -1,0 +1,150 @@
+"""The data sheet of a gearbox, as manufacturers print it, and the parts that follow from it."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from ..errors import InputError
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Angle,
+    Inertia,
+    NotNegative,
+    Number,
+    Positive,
+    Speed,
+    Stiffness,
+    Torque,
+    ViscousFriction,
+)
+from ..model.parts import GearboxLimits, Hysteresis, LinearStiffness, TorsionCurve
+from .loss_figures import Efficiency, LossFigures
+from .sheet import Record
+
+# Figures of a gearbox that `[gearbox]` has too, under the same names.
+SCALARS = ("ratio", "inertia", "viscous_friction", "rated_input_speed", "rated_output_torque")
+
+
+class StiffnessFigures(Part):
+    """Torsional stiffness by segments, as manufacturers print it: K1 up to torque T1, K2 up to T2, K3 beyond."""
+
+    slopes: tuple[Annotated[Stiffness, Positive], ...] = Field(min_length=1)
+    """K1, K2, ..."""
+    torques: tuple[Annotated[Torque, Positive], ...] = ()
+    """T1, T2, ...: one fewer"""
+    scatter: Annotated[Number, NotNegative] | None = None
+    """relative, from unit to unit"""
+
+    @model_validator(mode="after")
+    def _matches(self) -> Self:
+        if len(self.torques) != len(self.slopes) - 1:
+            raise ValueError(
+                f"has {len(self.slopes)} slopes and {len(self.torques)} torques; it needs one torque fewer"
+            )
+        for a, b in itertools.pairwise(self.torques):
+            if b <= a:
+                raise ValueError(f"has torques that do not rise: {b} N*m follows {a} N*m")
+        return self
+
+    def breaks(self) -> tuple[float, ...]:
+        """Twists [rad] at which the stiffness changes."""
+        out, twist, previous = [], 0.0, 0.0
+        for torque, slope in zip(self.torques, self.slopes, strict=False):
+            twist += (torque - previous) / slope
+            out.append(twist)
+            previous = torque
+        return tuple(out)
+
+
+class GearboxSheet(Record):
+    """Data sheet of a gearbox."""
+
+    kind: Literal["strain_wave", "planetary", "worm", "cycloidal", "other"]
+    ratio: Annotated[Number, Positive]
+    """input speed / output speed"""
+    rated_output_torque: Annotated[Torque, Positive] | None = None
+    rated_input_speed: Annotated[Speed, Positive] | None = None
+    """at which the rated torque and the efficiency hold"""
+    average_output_torque: Annotated[Torque, Positive] | None = None
+    peak_output_torque: Annotated[Torque, Positive] | None = None
+    """repeated, as in acceleration"""
+    momentary_output_torque: Annotated[Torque, Positive] | None = None
+    """in an emergency stop"""
+    average_input_speed: Annotated[Speed, Positive] | None = None
+    """for the mean over a duty cycle"""
+    max_input_speed: Annotated[Speed, Positive] | None = None
+    inertia: Annotated[Inertia, NotNegative] | None = None
+    """on the input shaft"""
+    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
+    """on the input shaft, beside the losses"""
+    stiffness: StiffnessFigures | None = None
+    backlash: Annotated[Angle, NotNegative] | None = None
+    """total gap at the output"""
+    hysteresis_loss: Annotated[Angle, Positive] | None = None
+    """width of the loop at zero torque after loading to rated torque in both directions"""
+    hysteresis_efficiency: Efficiency | None = None
+    """eta_H of (16), where the loop itself is known"""
+    losses: LossFigures = LossFigures()
+
+    @model_validator(mode="after")
+    def _one_hysteresis(self) -> Self:
+        if self.hysteresis_loss is not None and self.hysteresis_efficiency is not None:
+            raise ValueError("has hysteresis_loss and hysteresis_efficiency; they say the same, so give one")
+        return self
+
+    def missing(self) -> dict[str, str]:
+        """What a run needs and the record lacks: the key of `[gearbox]`, and what to look for."""
+        out = {}
+        if self.rated_output_torque is None:
+            out["rated_output_torque"] = f"see {self.where('rated_output_torque')}"
+        if self.rated_input_speed is None:
+            out["rated_input_speed"] = f"see {self.where('rated_input_speed')}"
+        if self.inertia is None:
+            out["inertia"] = f"moment of inertia on the input shaft; see {self.where('inertia')}"
+        if self.stiffness is None:
+            out["stiffness"] = f"torsional stiffness; see {self.where('stiffness')}"
+        if self.losses.empty:
+            out["losses"] = f"an efficiency or a loss table; see {self.where('losses.efficiency')}"
+        return out
+
+    def torsion_curve(self) -> TorsionCurve:
+        """The torsion curve, with the backlash as its first segment."""
+        assert self.stiffness is not None
+        return TorsionCurve(slopes=self.stiffness.slopes, breaks=self.stiffness.breaks(), backlash=self.backlash or 0.0)
+
+    def hysteresis(self, curve: TorsionCurve | LinearStiffness) -> Hysteresis | None:
+        """eta_H of (16), from itself or from the width of the loop.
+
+        On the loop that turns at rated torque T_R, P = T_R - h at the turning points and h = (1 - eta_H)/2 P; it
+        crosses zero torque where P = h. So the width gives h, and h gives eta_H.
+        """
+        if self.hysteresis_efficiency is not None:
+            return Hysteresis(efficiency=self.hysteresis_efficiency)
+        if self.hysteresis_loss is None:
+            return None
+        assert self.rated_output_torque is not None
+        h = curve.core().torque(0.5 * self.hysteresis_loss)
+        q = h / (self.rated_output_torque - h)
+        if not 0.0 <= q < 0.5:
+            raise InputError(
+                f"{self.name}: has hysteresis_loss = {self.hysteresis_loss:.4g} rad, which with this stiffness means a loop of half of "
+                "the rated torque or more; check both figures and their units"
+            )
+        return Hysteresis(efficiency=1.0 - 2.0 * q)
+
+    def limits(self) -> GearboxLimits:
+        """What the drive check compares with."""
+        return GearboxLimits(
+            average_output_torque=self.average_output_torque,
+            peak_output_torque=self.peak_output_torque,
+            momentary_output_torque=self.momentary_output_torque,
+            average_input_speed=self.average_input_speed,
+            max_input_speed=self.max_input_speed,
+        )
+
+    def scalars(self) -> dict[str, Any]:
+        """Those keys of `[gearbox]` that are figures of the sheet."""
+        return {name: getattr(self, name) for name in SCALARS if getattr(self, name) is not None}

@@ -1,0 +1,138 @@
+"""What a data sheet says of the losses of a gearbox."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Self
+
+from pydantic import model_validator
+
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    KinematicViscosity,
+    Limit,
+    NotNegative,
+    Number,
+    Positive,
+    Speed,
+    Temperature,
+    Torque,
+)
+from ..model.parts import LossMap
+
+Efficiency = Annotated[Number, Limit(gt=0.0, le=1.0)]
+
+
+class EfficiencyPoint(Part):
+    """Efficiency at one speed and load."""
+
+    input_speed: Annotated[Speed, Positive]
+    load: Annotated[Number, Positive] = 1.0
+    """output torque / rated output torque"""
+    efficiency: Efficiency
+    temperature: Temperature | None = None
+
+
+class NoLoadPoint(Part):
+    """Torque at the input shaft that turns the unloaded gearbox."""
+
+    input_speed: Annotated[Speed, Positive]
+    torque: Annotated[Torque, NotNegative]
+    temperature: Temperature | None = None
+
+
+class Lubricant(Part):
+    """Kinematic viscosity at two temperatures, as lubricants are specified."""
+
+    viscosity_40: Annotated[KinematicViscosity, Positive]
+    viscosity_100: Annotated[KinematicViscosity, Positive]
+
+    @model_validator(mode="after")
+    def _thins(self) -> Self:
+        if self.viscosity_100 >= self.viscosity_40:
+            raise ValueError(
+                f"has viscosity_100 = {self.viscosity_100} m^2/s, not below viscosity_40; oil thins when hot"
+            )
+        return self
+
+    def viscosity(self, temperature: float) -> float:
+        """Kinematic viscosity [m^2/s] at a temperature [°C], by Ubbelohde and Walther (ASTM D341)."""
+
+        def w(nu: float) -> float:
+            return math.log10(math.log10(nu * 1e6 + 0.7))
+
+        t40, t100 = math.log10(313.15), math.log10(373.15)
+        slope = (w(self.viscosity_100) - w(self.viscosity_40)) / (t100 - t40)
+        exponent = w(self.viscosity_40) + slope * (math.log10(temperature + 273.15) - t40)
+        return float(10.0 ** (10.0**exponent) - 0.7) * 1e-6
+
+
+class LossFigures(Part):
+    """All that a data sheet may say about losses. Torques at the input shaft unless said otherwise."""
+
+    efficiency: tuple[EfficiencyPoint, ...] = ()
+    """while the motor drives"""
+    load_correction: tuple[tuple[Annotated[Number, Positive], Annotated[Number, Positive]], ...] = ()
+    """(load, factor on the efficiency at rated load), for manufacturers who print one efficiency and a curve of factors"""
+    backdrive_efficiency: tuple[EfficiencyPoint, ...] = ()
+    """while the load drives"""
+    no_load_torque: tuple[NoLoadPoint, ...] = ()
+    starting_torque: Annotated[Torque, Positive] | None = None
+    """at the input, breaks the unloaded gearbox loose"""
+    starting_temperature: Temperature | None = None
+    backdriving_torque: Annotated[Torque, Positive] | None = None
+    """at the output, breaks the gearbox with a free input loose"""
+    backdriving_temperature: Temperature | None = None
+    static_efficiency: Efficiency | None = None
+    """when breaking loose under load, as printed for worm gears"""
+    temperature: Temperature = 20.0
+    """of all figures that name no other"""
+    lubricant: Lubricant | None = None
+    static_load_factor: Annotated[Number, Positive] = 1.2
+    """load-dependent loss at standstill / that in motion, where no static or back-driving figure says it"""
+    table: LossMap | None = None
+    """a whole loss map, which makes all others superfluous"""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        figures = ("efficiency", "no_load_torque", "starting_torque", "static_efficiency", "backdriving_torque")
+        given = [name for name in figures if getattr(self, name) not in (None, ())]
+        if self.table is not None and given:
+            raise ValueError(f"has a table and {given[0]}; the table says all, so give one or the other")
+        if self.load_correction and len([p for p in self.efficiency if p.load == 1.0]) != 1:
+            raise ValueError("has a load_correction, which needs exactly one efficiency at load 1 to act on")
+        for name, points in (
+            ("efficiency", self.all_efficiencies()),
+            ("backdrive_efficiency", self.backdrive_efficiency),
+        ):
+            seen = set()
+            for p in points:
+                if p.efficiency > 1.0:
+                    raise ValueError(
+                        f"has a load_correction that makes the efficiency at load {p.load} {p.efficiency:.3f}, above 1"
+                    )
+                key = (p.input_speed, p.load, p.temperature)
+                if key in seen:
+                    raise ValueError(f"has {name} twice at {p.input_speed:.6g} rad/s and load {p.load}; keep one")
+                seen.add(key)
+        return self
+
+    def all_efficiencies(self) -> tuple[EfficiencyPoint, ...]:
+        """The efficiencies with those that the load correction adds."""
+        extra = []
+        for load, factor in self.load_correction:
+            rated = next(p for p in self.efficiency if p.load == 1.0)
+            if load != 1.0:
+                extra.append(
+                    EfficiencyPoint.model_construct(
+                        input_speed=rated.input_speed,
+                        load=load,
+                        efficiency=rated.efficiency * factor,
+                        temperature=rated.temperature,
+                    )
+                )
+        return (*self.efficiency, *extra)
+
+    @property
+    def empty(self) -> bool:
+        return self.table is None and not (self.efficiency or self.static_efficiency is not None)

@@ -1,0 +1,183 @@
+"""Files of results: NetCDF, CSV, Parquet. Each carries its scenario and can be run again."""
+
+from __future__ import annotations
+
+import errno
+import io
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError, need
+from .switchings import ATTRIBUTE as SWITCHINGS
+from .switchings import packed_again, switchings_of
+from .variables import VARIABLES
+
+if TYPE_CHECKING:
+    import xarray
+from ..atomic_writer import write_whole
+from .results import labelled
+
+FORMATS = {".nc": "NetCDF", ".csv": "CSV", ".parquet": "Parquet"}
+
+
+def check_output(path: str | Path) -> Path:
+    """The path, if a result can be written there by its ending and its directory.
+
+    Raises
+    ------
+    InputError
+    """
+    path = Path(path)
+    if path.suffix not in FORMATS:
+        endings = ", ".join(f"{ending} ({name})" for ending, name in FORMATS.items())
+        raise InputError(f"{path}: the ending {path.suffix or '(none)'} is not known; it must be one of {endings}")
+    if path.is_dir():
+        raise InputError(f"{path}: is a directory; name a file")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: its directory does not exist; make it first")
+    _need_library(path)
+    return path
+
+
+def _need_library(path: Path) -> None:
+    if path.suffix == ".nc":
+        need("h5netcdf", f"{path}: a NetCDF file", "netcdf")
+    elif path.suffix == ".parquet":
+        need("pyarrow", f"{path}: a Parquet file", "study")
+
+
+def save(dataset: xarray.Dataset, path: str | Path) -> None:
+    """Write a result as ``.nc``, ``.csv`` or ``.parquet``; `open_result` reads each back unchanged.
+
+    Raises
+    ------
+    InputError
+        Unknown ending, or the file cannot be written; nothing half-written remains.
+    """
+    path = check_output(path)
+    writers = {".nc": _write_netcdf, ".csv": _write_csv, ".parquet": _write_parquet}
+    write_whole(path, lambda target: writers[path.suffix](dataset, target))
+
+
+def open_result(path: str | Path) -> xarray.Dataset:
+    """Read a result that `save` wrote.
+
+    Raises
+    ------
+    InputError
+        The file is not such a result.
+    """
+    path = Path(path)
+    readers = {".nc": _read_netcdf, ".csv": _read_csv, ".parquet": _read_parquet}
+    if path.suffix not in readers:
+        raise InputError(
+            f"{path}: the ending {path.suffix or '(none)'} is not known; it must be one of {', '.join(readers)}"
+        )
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; check the name")
+    _need_library(path)
+    try:
+        return readers[path.suffix](path)
+    except InputError:
+        raise
+    except OSError as error:
+        if error.strerror and error.errno in (errno.EACCES, errno.EPERM):
+            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        raise InputError(_damaged(path)) from None
+    except Exception:  # whatever the format's library makes of a damaged file
+        raise InputError(_damaged(path)) from None
+
+
+def _damaged(path: Path) -> str:
+    return f"{path}: is no {FORMATS[path.suffix]} file of a result, or is damaged or cut off; run the scenario again"
+
+
+def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
+    """The result, and its switchings, if it has any, in a group of their own; periodic motions have none."""
+    plain = dataset.drop_attrs(deep=False).assign_attrs({k: v for k, v in dataset.attrs.items() if k != SWITCHINGS})
+    with io.BytesIO() as memory:  # the library's own writer leaves a half-open file behind when the disk is full
+        plain.to_netcdf(memory, engine="h5netcdf", mode="w")
+        if SWITCHINGS in dataset.attrs:
+            switchings_of(dataset).to_netcdf(memory, engine="h5netcdf", mode="a", group=SWITCHINGS)
+        path.write_bytes(memory.getvalue())
+
+
+def _read_netcdf(path: Path) -> xarray.Dataset:
+    import h5netcdf
+    import xarray as xr
+
+    with xr.open_dataset(path, engine="h5netcdf") as opened:
+        result = opened.load()
+    with h5netcdf.File(path) as file:
+        has_group = SWITCHINGS in file.groups
+    if not has_group:
+        return result
+    with xr.open_dataset(path, engine="h5netcdf", group=SWITCHINGS) as opened:
+        columns = {str(name): v for name, v in opened.load().items()}
+    return result.assign_attrs({SWITCHINGS: packed_again(columns)})
+
+
+def _header(dataset: xarray.Dataset) -> str:
+    """All but the samples, as JSON: attributes, and the switchings by columns."""
+    attributes = {k: v for k, v in dataset.attrs.items() if k != SWITCHINGS}
+    if SWITCHINGS not in dataset.attrs:
+        return json.dumps({"attributes": attributes})
+    columns = {str(name): v.values.tolist() for name, v in switchings_of(dataset).items()}
+    return json.dumps({"attributes": attributes, SWITCHINGS: columns})
+
+
+def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Dataset:
+    try:
+        meta = json.loads(header)
+        time = columns.pop("time")
+    except (json.JSONDecodeError, KeyError):
+        raise InputError(f"{path}: is no result of lostmotion; its header or its time column is missing") from None
+    switchings = {SWITCHINGS: packed_again(meta[SWITCHINGS])} if SWITCHINGS in meta else {}
+    return labelled(time, columns, meta["attributes"] | switchings)
+
+
+def _columns(dataset: xarray.Dataset) -> dict[str, Any]:
+    return {"time": dataset["time"].values} | {v.name: dataset[v.name].values for v in VARIABLES if v.name in dataset}
+
+
+def _write_csv(dataset: xarray.Dataset, path: Path) -> None:
+    columns = _columns(dataset)
+    units = {v.name: v.unit for v in VARIABLES} | {"time": "s"}
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(f"# lostmotion {_header(dataset)}\n")
+        file.write(",".join(f"{name} [{units[name]}]" for name in columns) + "\n")
+        for row in zip(*(c.tolist() for c in columns.values()), strict=True):
+            file.write(",".join(map(repr, row)) + "\n")
+
+
+def _read_csv(path: Path) -> xarray.Dataset:
+    with path.open(encoding="utf-8") as file:
+        first = file.readline()
+        names = [cell.split(" [")[0] for cell in file.readline().strip().split(",")]
+        if not first.startswith("# lostmotion "):
+            raise InputError(f"{path}: is no result of lostmotion; its first line does not say so")
+        lines = file.readlines()
+        if not lines or not lines[-1].endswith("\n"):
+            raise InputError(_damaged(path))
+        table = np.loadtxt(lines, delimiter=",", ndmin=2)
+    return _assemble(first.removeprefix("# lostmotion "), dict(zip(names, table.T.copy(), strict=True)), path)
+
+
+def _write_parquet(dataset: xarray.Dataset, path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.table(_columns(dataset)).replace_schema_metadata({"lostmotion": _header(dataset)})
+    with path.open("wb") as file:
+        pq.write_table(table, file)
+
+
+def _read_parquet(path: Path) -> xarray.Dataset:
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(path)
+    header = (table.schema.metadata or {}).get(b"lostmotion", b"")
+    return _assemble(header.decode(), {name: table[name].to_numpy() for name in table.column_names}, path)

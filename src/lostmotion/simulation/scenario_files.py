@@ -1,0 +1,181 @@
+"""Scenario files: found, read with what they are based on, and changed by dotted key."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from ..data_sheets.components import gearbox_table
+from ..errors import InputError
+from ..inputs.toml_files import read_toml
+from ..inputs.validation import shown
+from ..model.parts import Gearbox
+from .keys import parse_override, set_values
+from .scenario import Scenario, from_tables
+from .series_files import read_series
+
+
+def shipped_scenarios() -> dict[str, Path]:
+    """The scenarios that come with the package: name -> file."""
+    directory = files("lostmotion") / "scenarios"
+    return {f.name.removesuffix(".toml"): Path(str(f)) for f in sorted(directory.iterdir(), key=lambda f: f.name)}
+
+
+def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
+    """The file that is meant: a path relative to `directory`, or the name of a shipped scenario.
+
+    Raises
+    ------
+    InputError
+        It is neither; the message names what is near.
+    """
+    path = directory / name
+    shipped = shipped_scenarios() if len(Path(name).parts) == 1 else {}
+    if path.is_file() or not shipped:
+        return path
+    if str(name) in shipped:
+        return shipped[str(name)]
+    if Path(name).stem in shipped and not path.exists():
+        raise InputError(
+            f"{path}: there is no such file; the shipped scenario is called {Path(name).stem}, without ending"
+        )
+    if path.suffix or path.exists():
+        return path
+    near = difflib.get_close_matches(str(name), shipped, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"the scenarios that come with the package are {', '.join(shipped)}"
+    raise InputError(f"{name}: there is no such file (.toml) and no such scenario; {hint}")
+
+
+def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
+    """Read a scenario file.
+
+    Parameters
+    ----------
+    path
+        TOML file, or the name of a scenario that comes with the package, such as ``"paper-2dof-nl-small"``. The key
+        `base` of a file may name another one (relative to it, or shipped) that this one changes.
+    overrides
+        ``{"command.amplitude": 0.1}`` or ``["command.amplitude=0.1"]``, as by ``--set``.
+
+    Raises
+    ------
+    InputError
+        With one line that names the file, the key, the value and the remedy.
+    """
+    path = find_scenario(path)
+    return changed(read_tables(path, overrides), path)
+
+
+def changed(tables: dict[str, Any], path: Path) -> Scenario:
+    """The scenario of the tables of a file, whose name stands in messages.
+
+    Raises
+    ------
+    InputError
+        With one line that names the file, the key, the value and the remedy.
+    """
+    try:
+        return from_tables(tables)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def read_tables(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> dict[str, Any]:
+    """The tables of a scenario file with those of its `base` and the overrides, records still as `from`.
+
+    Raises
+    ------
+    InputError
+    """
+    path = find_scenario(path)
+    data = _read(path, ())
+    override(data, overrides, path)
+    return data
+
+
+def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str], path: Path) -> None:
+    """Changes tables of a file by dotted key.
+
+    Raises
+    ------
+    InputError
+    """
+    overrides = [overrides] if isinstance(overrides, str) else overrides
+    items = overrides.items() if isinstance(overrides, Mapping) else [parse_override(text) for text in overrides]
+    try:
+        set_values(data, items)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
+    if path.resolve() in including:
+        raise InputError(f"{path}: key base: leads back to this file; break the circle")
+    data = read_toml(path, "a scenario")
+    _read_series(data, path, ())
+    for table in ("gearbox", "motor"):
+        if isinstance(data.get(table), str):
+            data[table] = {"from": data[table]}
+        record = data.get(table, {}).get("from") if isinstance(data.get(table), dict) else None
+        if isinstance(record, str) and record.endswith(".toml"):
+            data[table]["from"] = str(path.parent / record)
+    if "base" not in data:
+        return data
+    base = data.pop("base")
+    if not isinstance(base, str):
+        raise InputError(f"{path}: key base: {shown(base)} must be the name of a scenario file")
+    return _merge(_read(find_scenario(base, path.parent), (*including, path.resolve())), data)
+
+
+def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...]) -> None:
+    """Puts the points of `samples.file`, a CSV file beside the scenario, in its place."""
+    for key, value in data.items():
+        if not isinstance(value, dict):
+            continue
+        where = (*keys, key)
+        if key != "samples" or "file" not in value:
+            _read_series(value, path, where)
+            continue
+        name = value.pop("file")
+        problem = f"{path}: key {'.'.join(where)}.file: {shown(name)}"
+        if value:
+            raise InputError(f"{problem} leaves no room for {', '.join(value)}; give the file alone")
+        if not isinstance(name, str):
+            raise InputError(f"{problem} must be the name of a CSV file with columns time [s] and value")
+        try:
+            value["times"], value["values"] = read_series(path.parent / name, "" if where[0] == "command" else "N*m")
+        except InputError as error:
+            raise InputError(f"{path}: key {'.'.join(where)}.file: {error}") from None
+
+
+def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Tables are merged; one of another `kind`, or `from` a record, takes the place of the old one."""
+    merged = dict(base)
+    for key, value in changes.items():
+        old = base.get(key)
+        if not isinstance(value, dict) or not isinstance(old, dict) or "from" in value:
+            merged[key] = value
+        elif value.get("kind", old.get("kind")) == old.get("kind"):
+            merged[key] = _merge(old, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[Gearbox, tuple[str, ...]]:
+    """A record's gearbox with ``KEY=VALUE`` changes, as in `[gearbox]`, and the notes of its loss map.
+
+    Raises
+    ------
+    InputError
+    """
+    changes: dict[str, Any] = {}
+    set_values(changes, ((key.removeprefix("gearbox."), value) for key, value in map(parse_override, overrides)))
+    values, built = gearbox_table(reference, changes)
+    try:
+        return Gearbox(**values), built.notes if built else ()
+    except InputError as error:
+        raise InputError(f"gearbox {reference}: {error}") from None

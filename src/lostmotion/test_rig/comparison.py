@@ -1,0 +1,74 @@
+"""What the rig measures beside what the data sheet says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..data_sheets.gearbox_sheet import GearboxSheet
+
+if TYPE_CHECKING:
+    pass
+from .rig import TestRig
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One figure of the data sheet beside the rig's."""
+
+    figure: str
+    unit: str
+    catalogue: float
+    rig: float
+    remark: str = ""
+
+    @property
+    def difference(self) -> float:
+        """Relative."""
+        return self.rig / self.catalogue - 1.0
+
+
+def compare(rig: TestRig, sheet: GearboxSheet, notes: tuple[str, ...]) -> Iterable[Comparison]:
+    """Each figure of the sheet beside the same measured."""
+    contradiction = "contradicts the no-load torque; see note" if any("Contradiction" in n for n in notes) else ""
+    figures = sheet.losses
+    rpm = 30.0 / np.pi
+
+    def here(temperature: float | None) -> bool:
+        """Whether a figure is of the temperature that the gearbox was made for."""
+        return temperature in (None, figures.temperature)
+
+    for p in filter(lambda p: here(p.temperature), figures.all_efficiencies()):
+        what = f"efficiency at {rpm * p.input_speed:.0f} rpm, load {p.load:g}"
+        yield Comparison(what, "1", p.efficiency, rig.efficiency(p.input_speed, p.load), contradiction)
+    for p in filter(lambda p: here(p.temperature), figures.backdrive_efficiency):
+        what = f"back-drive efficiency at {rpm * p.input_speed:.0f} rpm, load {p.load:g}"
+        yield Comparison(what, "1", p.efficiency, rig.efficiency(p.input_speed, -p.load), contradiction)
+    for q in filter(lambda q: here(q.temperature), figures.no_load_torque):
+        what = f"no-load torque at {rpm * q.input_speed:.0f} rpm"
+        yield Comparison(what, "N·m", q.torque, rig.no_load_torque(q.input_speed))
+    if figures.starting_torque is not None and here(figures.starting_temperature):
+        yield Comparison("starting torque", "N·m", figures.starting_torque, rig.starting_torque())
+    if figures.backdriving_torque is not None and here(figures.backdriving_temperature):
+        yield Comparison("back-driving torque", "N·m", figures.backdriving_torque, rig.backdriving_torque() or np.inf)
+    if figures.static_efficiency is not None:
+        eta = rig.gearbox.rated_output_torque / (rig.gearbox.ratio * rig.starting_torque(1.0))
+        yield Comparison("static efficiency at rated load", "1", figures.static_efficiency, eta)
+    if sheet.stiffness is not None:
+        torques = sheet.stiffness.torques
+        largest = max(1.5 * (torques[-1] if torques else 0.0), rig.gearbox.rated_output_torque)
+        measured = rig.stiffness(torques, largest)
+        for k, (printed, value) in enumerate(zip(sheet.stiffness.slopes, measured, strict=True)):
+            yield Comparison(f"torsional stiffness K{k + 1}", "N·m/rad", printed, value)
+    if sheet.backlash:
+        first = sheet.stiffness.torques[0] if sheet.stiffness and sheet.stiffness.torques else 0.0
+        value = rig.backlash(first or 0.5 * rig.gearbox.rated_output_torque)
+        yield Comparison("backlash", "arcmin", np.degrees(sheet.backlash) * 60.0, np.degrees(value) * 60.0)
+    if sheet.hysteresis_loss is not None:
+        value = rig.loop(rig.gearbox.rated_output_torque).width
+        yield Comparison(
+            "hysteresis loss", "arcmin", np.degrees(sheet.hysteresis_loss) * 60.0, np.degrees(value) * 60.0
+        )

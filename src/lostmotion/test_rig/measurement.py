@@ -1,0 +1,90 @@
+"""All that the rig measures of one gearbox."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from ..data_sheets.gearbox_sheet import GearboxSheet
+from ..model.parts import Gearbox
+
+if TYPE_CHECKING:
+    import xarray
+from .comparison import Comparison, compare
+from .loop import Loop
+from .rig import TestRig
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class RigReport:
+    """All measurements of one gearbox."""
+
+    gearbox: Gearbox
+    map: xarray.Dataset
+    """efficiency and loss torque, motor driving"""
+    no_load: tuple[Any, Any]
+    """input speeds [rad/s], torques [N·m]"""
+    virgin: tuple[Any, Any]
+    """twist [rad], torque [N·m] of the first loading"""
+    loops: tuple[Loop, ...]
+    """at falling amplitudes, the largest at rated torque"""
+    starting_torque: float
+    backdriving_torque: float | None
+    lost_motion: float
+    comparisons: tuple[Comparison, ...] = field(default=())
+
+
+# What the rig measures beside its comparisons: parts of rated speed, and relative loads.
+SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
+
+
+LOADS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5)
+
+
+LOOPS = (1.0, 0.6, 0.3)
+
+
+WORK = len(LOADS) + len(LOOPS) + 6  # how often `measure` reports progress
+
+
+def measure(
+    gearbox: Gearbox,
+    sheet: GearboxSheet | None = None,
+    notes: Iterable[str] = (),
+    progress: Callable[[], None] = lambda: None,
+) -> RigReport:
+    """Measure all figures of a gearbox.
+
+    Parameters
+    ----------
+    sheet
+        Figures to compare with.
+    notes
+        Of the loss map's making; a contradiction among the figures is pointed out beside them.
+    progress
+        Called `WORK` times.
+    """
+    rig = TestRig(gearbox)
+    T_2R, n_1R = gearbox.rated_output_torque, gearbox.rated_input_speed
+    speeds = n_1R * np.array(SPEEDS)
+
+    def done(measured: T) -> T:
+        progress()
+        return measured
+
+    return RigReport(
+        gearbox=gearbox,
+        map=rig.efficiency_map(speeds, LOADS, progress),
+        no_load=(speeds, done(np.array([rig.no_load_torque(n) for n in speeds]))),
+        virgin=done(rig.virgin_curve(1.2 * T_2R)),
+        loops=tuple(done(rig.loop(share * T_2R)) for share in LOOPS),
+        starting_torque=done(rig.starting_torque()),
+        backdriving_torque=done(rig.backdriving_torque()),
+        lost_motion=done(rig.lost_motion()),
+        comparisons=done(() if sheet is None else tuple(compare(rig, sheet, tuple(notes)))),
+    )
