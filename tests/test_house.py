@@ -74,6 +74,17 @@ def test_no_headers_include_each_other_in_a_circle() -> None:
     TopologicalSorter(includes).prepare()
 
 
+SCREEN = 50  # lines of a function, without its heading and docstring
+
+
+@pytest.mark.parametrize("module", MODULES, ids=str)
+def test_every_function_fits_on_a_screen(module: Path) -> None:
+    for node in ast.walk(ast.parse((PACKAGE / module).with_suffix(".py").read_text())):
+        if isinstance(node, ast.FunctionDef):
+            body = node.body[1:] if ast.get_docstring(node) else node.body
+            assert not body or (node.end_lineno or 0) - body[0].lineno < SCREEN, node.name
+
+
 def test_importing_takes_no_plotting_or_data_library_along() -> None:
     script = "import sys, lostmotion; print([m for m in ('matplotlib', 'xarray', 'pydantic', 'pint', 'numpy') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)

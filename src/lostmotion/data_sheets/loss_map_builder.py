@@ -18,6 +18,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..model.parts import LossMap
+from ..units.practical import RPM
 from .gearbox_sheet import GearboxSheet
 from .loss_figures import EfficiencyPoint, LossFigures
 
@@ -262,10 +263,9 @@ class _Builder:
     def _contradiction(self, p: EfficiencyPoint, name: str, total: float, without: float) -> None:
         sheet = self.sheet
         torque = without * self.T_2R / sheet.ratio
-        rpm = p.input_speed * 30.0 / np.pi
         becomes = p.load / (p.load + without + total) if name == "efficiency" else 1.0 - (without + total) / p.load
         self.notes.append(
-            f"Contradiction at {rpm:.0f} rpm: without load the input takes {torque:.3g} N·m, {without:.3g} of rated torque; "
+            f"Contradiction at {RPM * p.input_speed:.0f} rpm: without load the input takes {torque:.3g} N·m, {without:.3g} of rated torque; "
             f"the {name} {p.efficiency:g} at load {p.load:g} leaves no more than {total:.3g} for all losses. The no-load torque "
             f"is kept and the {name} taken for what the load adds; in the map it becomes {becomes:.3g} at this load."
         )

@@ -31,6 +31,7 @@ from ..inputs.quantities import (
     ViscousFriction,
     Voltage,
 )
+from ..units.practical import practical
 
 MAX_PIECES = 100  # of a torsion curve, on each side
 
@@ -92,7 +93,7 @@ class Motor(Part):
         if self.rated_speed is None:
             rated = f"torque source, rated {self.rated_torque:.4g} N·m"
         else:
-            rated = f"dc, {self.rated_torque:.4g} N·m at {_rpm(self.rated_speed)}"
+            rated = f"dc, {self.rated_torque:.4g} N·m at {practical(self.rated_speed, 'rad/s', 4)}"
         return f"Motor({rated}, rotor {self.rotor_inertia:.4g} kg·m²)"
 
     @property
@@ -279,7 +280,7 @@ class Gearbox(Part):
 
     def __repr__(self) -> str:
         laws = f"stiffness {self.stiffness.kind}, losses {self.losses.kind}"
-        rated = f"{self.rated_output_torque:.4g} N·m at {_rpm(self.rated_input_speed)}"
+        rated = f"{self.rated_output_torque:.4g} N·m at {practical(self.rated_input_speed, 'rad/s', 4)}"
         return f"Gearbox({self.ratio:g}:1, {rated}, {laws})"
 
     @model_validator(mode="after")
@@ -327,10 +328,6 @@ class Drive(Part):
     def core(self) -> _core.Drive:
         """The solver's drive; the last ones are kept for equal parts."""
         return _core_drive(self)
-
-
-def _rpm(speed: float) -> str:
-    return f"{speed * 30.0 / math.pi:.4g} rpm"
 
 
 def _plain(part: Any, *names: str) -> dict[str, float]:

@@ -13,6 +13,7 @@ from ..data_sheets.gearbox_sheet import GearboxSheet
 from ..data_sheets.motor_sheet import MotorSheet
 from ..data_sheets.records import catalogue, find, read_sheets
 from ..errors import InputError
+from ..units.practical import RPM
 from .sheet_rows import rows_of
 
 
@@ -80,7 +81,7 @@ def _line(record: GearboxSheet | MotorSheet) -> str:
     torque = _rated_torque(record)
     speed = record.rated_input_speed if isinstance(record, GearboxSheet) else record.rated_speed
     rated = f"{torque:9.4g}" if torque else "        ?"
-    rpm = f"{speed * 30.0 / np.pi:6.0f}" if speed else "     ?"
+    rpm = f"{RPM * speed:6.0f}" if speed else "     ?"
     missing = ", ".join(record.missing())
     state = "yes" if not missing else f"no, lacks {missing}"
     return f"{record.name:<34} {_table(record):<8} {record.kind:<12} {ratio} {rated} {rpm}  {state}"
@@ -115,11 +116,10 @@ def record_text(name: str) -> str:
     lines = [f"{record.name}: {table}, {record.maker} {record.title}".strip(), ""]
     lines += [f"  {what:<52} {value:<26} {status}" for what, value, status in rows]
     if isinstance(record, MotorSheet) and not record.missing() and record.no_load_speed is not None:
-        rpm = 30.0 / np.pi
         lines += [
             "",
-            f"  The model keeps rated point and stall torque; its no-load speed is {rpm * record.no_load_speed_of_model():.0f} rpm, "
-            f"the sheet's {rpm * record.no_load_speed:.0f} rpm.",
+            f"  The model keeps rated point and stall torque; its no-load speed is {RPM * record.no_load_speed_of_model():.0f} rpm, "
+            f"the sheet's {RPM * record.no_load_speed:.0f} rpm.",
         ]
     lines += ["", "Sources"]
     lines += [f"  {s.status}: {s.text} [{', '.join(s.figures)}]" for s in record.sources]

@@ -11,10 +11,11 @@ import numpy as np
 from ..data_sheets.gearbox_sheet import GearboxSheet
 from ..test_rig.measurement import RigReport
 from ..test_rig.rig import LOST_MOTION_LOAD
+from ..units.practical import RPM, practical
 from . import plots
 from .pages import embed, panels_csv, render_page, save_figure, table_csv, write_text
 from .panels import Curve, Panel
-from .sheet_rows import rows_of, rows_of_part, shown
+from .sheet_rows import rows_of, rows_of_part
 
 CATALOGUE_POINT: dict[str, Any] = {"color": "#d9730d", "linestyle": "none", "marker": "o", "markersize": 7}
 SHADES = ("#0b3c5d", "#3a7ca5", "#7fae3f", "#b8b8b8")
@@ -22,69 +23,70 @@ SHADES = ("#0b3c5d", "#3a7ca5", "#7fae3f", "#b8b8b8")
 
 def panels(report: RigReport, sheet: GearboxSheet | None) -> list[Panel]:
     """The six panels of the sheet."""
-    g, table = report.gearbox, report.map
-    rpm = table["input_speed"].values * 30.0 / np.pi
-    load = table["load"].values
-    picked = [1, 3, 5, 7]  # 5, 20, 50, 100 % of rated speed
-
-    def line(shade: str, style: str = "-") -> dict[str, Any]:
-        return {"color": shade, "linestyle": style, "linewidth": 1.5}
-
-    def over_load(name: str, factor: float) -> list[Curve]:
-        return [
-            Curve(f"{rpm[k]:.0f} rpm", load, factor * table[name].values[:, k], line(shade))
-            for k, shade in zip(picked, SHADES, strict=True)
-        ]
-
-    efficiency = over_load("efficiency", 1.0)
-    no_load = [Curve("rig", rpm, report.no_load[1], line(SHADES[0]))]
+    efficiency, lost = _over_load(report, "efficiency"), _over_load(report, "loss_torque")
+    rpm, no_load = RPM * report.map["input_speed"].values, report.no_load[1]
     twist, torque = report.virgin
-    torsion = [Curve("rig, first loading", 1e3 * twist, torque, line(SHADES[0]))]
+    running = [Curve("rig", rpm, no_load, _line(SHADES[0]))]
+    torsion = [Curve("rig, first loading", 1e3 * twist, torque, _line(SHADES[0]))]
     if sheet is not None:
-        points = sheet.losses.all_efficiencies()
-        if points:
-            x, y = np.array([p.load for p in points]), np.array([p.efficiency for p in points])
-            efficiency.append(Curve("catalogue", x, y, CATALOGUE_POINT))
-        speeds = np.array(
-            [0.0] * (sheet.losses.starting_torque is not None) + [q.input_speed for q in sheet.losses.no_load_torque]
-        )
-        torques = [sheet.losses.starting_torque] if sheet.losses.starting_torque is not None else []
-        torques += [q.torque for q in sheet.losses.no_load_torque]
-        if torques:
-            no_load.append(
-                Curve("catalogue (at 0: starting torque)", speeds * 30.0 / np.pi, np.array(torques), CATALOGUE_POINT)
-            )
-        if sheet.stiffness is not None and sheet.stiffness.torques:
-            gap = 0.5 * (sheet.backlash or 0.0)
-            d, T = 1e3 * (gap + np.array(sheet.stiffness.breaks())), np.array(sheet.stiffness.torques)
-            torsion.append(Curve("catalogue T1, T2", d, T, CATALOGUE_POINT))
+        efficiency += _printed_efficiency(sheet)
+        running += _printed_no_load_torque(sheet)
+        torsion += _printed_torsion(sheet)
     loops = [
-        Curve(f"±{loop.amplitude:.3g} N·m", 1e3 * loop.twist, loop.torque, line(shade))
+        Curve(f"±{loop.amplitude:.3g} N·m", 1e3 * loop.twist, loop.torque, _line(shade))
         for loop, shade in zip(report.loops, SHADES, strict=False)
     ]
+    load, values = report.map["load"].values, report.map["efficiency"].values
     across = [
-        Curve(f"load {load[j]:g}", rpm, table["efficiency"].values[j], line(shade))
+        Curve(f"load {load[j]:g}", rpm, values[j], _line(shade))
         for j, shade in zip((2, 4, 5, 7), SHADES[::-1], strict=True)
     ]
+    relative, share, at_input = "relative load [-]", "efficiency [-]", "at the input [N·m]"
+    angle, output, rated = "twist [mrad]", "output torque [N·m]", report.gearbox.rated_output_torque
     return [
-        Panel(
-            "efficiency over load (motor drives)",
-            "relative load [-]",
-            "efficiency [-]",
-            tuple(efficiency),
-            y_range=(0.0, 1.0),
-        ),
-        Panel("efficiency over speed", "input speed [rpm]", "efficiency [-]", tuple(across), y_range=(0.0, 1.0)),
-        Panel("torque lost", "relative load [-]", "at the input [N·m]", tuple(over_load("loss_torque", 1.0))),
-        Panel("no-load running torque", "input speed [rpm]", "at the input [N·m]", tuple(no_load)),
-        Panel("torsion, input locked", "twist [mrad]", "output torque [N·m]", tuple(torsion)),
-        Panel(
-            f"hysteresis loops (rated {g.rated_output_torque:g} N·m)",
-            "twist [mrad]",
-            "output torque [N·m]",
-            tuple(loops),
-        ),
+        Panel("efficiency over load (motor drives)", relative, share, tuple(efficiency), y_range=(0.0, 1.0)),
+        Panel("efficiency over speed", "input speed [rpm]", share, tuple(across), y_range=(0.0, 1.0)),
+        Panel("torque lost", relative, at_input, tuple(lost)),
+        Panel("no-load running torque", "input speed [rpm]", at_input, tuple(running)),
+        Panel("torsion, input locked", angle, output, tuple(torsion)),
+        Panel(f"hysteresis loops (rated {rated:g} N·m)", angle, output, tuple(loops)),
     ]
+
+
+def _line(shade: str) -> dict[str, Any]:
+    return {"color": shade, "linestyle": "-", "linewidth": 1.5}
+
+
+def _over_load(report: RigReport, name: str) -> list[Curve]:
+    """A quantity of the map over the load, at 5, 20, 50 and 100 % of rated speed."""
+    rpm, load = RPM * report.map["input_speed"].values, report.map["load"].values
+    return [
+        Curve(f"{rpm[k]:.0f} rpm", load, report.map[name].values[:, k], _line(shade))
+        for k, shade in zip((1, 3, 5, 7), SHADES, strict=True)
+    ]
+
+
+def _printed_efficiency(sheet: GearboxSheet) -> list[Curve]:
+    points = sheet.losses.all_efficiencies()
+    x, y = np.array([p.load for p in points]), np.array([p.efficiency for p in points])
+    return [Curve("catalogue", x, y, CATALOGUE_POINT)] if points else []
+
+
+def _printed_no_load_torque(sheet: GearboxSheet) -> list[Curve]:
+    points = [(q.input_speed, q.torque) for q in sheet.losses.no_load_torque]
+    if sheet.losses.starting_torque is not None:
+        points.insert(0, (0.0, sheet.losses.starting_torque))
+    if not points:
+        return []
+    speeds, torques = np.array(points).T
+    return [Curve("catalogue (at 0: starting torque)", RPM * speeds, torques, CATALOGUE_POINT)]
+
+
+def _printed_torsion(sheet: GearboxSheet) -> list[Curve]:
+    if sheet.stiffness is None or not sheet.stiffness.torques:
+        return []
+    twist = 0.5 * (sheet.backlash or 0.0) + np.array(sheet.stiffness.breaks())
+    return [Curve("catalogue T1, T2", 1e3 * twist, np.array(sheet.stiffness.torques), CATALOGUE_POINT)]
 
 
 def summary_rows(report: RigReport) -> list[tuple[str, str]]:
@@ -97,8 +99,8 @@ def summary_rows(report: RigReport) -> list[tuple[str, str]]:
             "back-driving torque at the output",
             f"{back:.4g} N·m" if back is not None else "none up to three times rated torque: self-locking",
         ),
-        (f"lost motion at ±{100 * LOST_MOTION_LOAD:.0f} % of rated torque", shown(report.lost_motion, "rad")),
-        ("width of the loop at zero torque, rated torque in both directions", shown(loop.width, "rad")),
+        (f"lost motion at ±{100 * LOST_MOTION_LOAD:.0f} % of rated torque", practical(report.lost_motion, "rad")),
+        ("width of the loop at zero torque, rated torque in both directions", practical(loop.width, "rad")),
         ("energy lost in that loop", f"{loop.area:.4g} J"),
     ]
 
@@ -126,7 +128,7 @@ def write_sheet(
     )
     table = report.map
     rows = [
-        [float(mu), float(n) * 30.0 / np.pi, float(eta), float(loss)]
+        [float(mu), RPM * float(n), float(eta), float(loss)]
         for mu, etas, losses in zip(
             table["load"].values, table["efficiency"].values, table["loss_torque"].values, strict=True
         )

@@ -4,31 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from ..data_sheets.sheet import Record
 from ..inputs.schema import unit_in_schema
 from ..model.parts import Gearbox
-
-# Practical units of data sheets: SI unit -> (unit, factor).
-PRACTICAL = {
-    "rad/s": ("rpm", 30.0 / np.pi),
-    "rad": ("arcmin", 10800.0 / np.pi),
-    "kg*m^2": ("kg·cm²", 1e4),
-    "s": ("ms", 1e3),
-    "H": ("mH", 1e3),
-    "degC": ("°C", 1.0),
-    "ohm": ("Ω", 1.0),
-}
-
-
-def shown(value: Any, unit: str) -> str:
-    """A figure in the units that data sheets use."""
-    if isinstance(value, str):
-        return value
-    name, factor = PRACTICAL.get(unit, (unit.replace("*", "·"), 1.0))
-    text = ", ".join(f"{factor * v:.5g}" for v in (value if isinstance(value, tuple) else (value,)))
-    return f"{text} {name}".strip()
+from ..units.practical import practical
 
 
 def rows_of(record: Record) -> list[tuple[str, str, str]]:
@@ -54,17 +33,17 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
         elif name == "losses":
             _add_losses(value, add)
         else:
-            add(name, label, shown(value, unit_in_schema(fields[name]) or ""))
+            add(name, label, practical(value, unit_in_schema(fields[name]) or ""))
     return out
 
 
 def _add_losses(losses: Any, add: Any) -> None:
     for key in ("efficiency", "backdrive_efficiency"):
         for p in getattr(losses, key):
-            where = f"{key.replace('_', ' ')} at {shown(p.input_speed, 'rad/s')}, load {p.load:g}"
+            where = f"{key.replace('_', ' ')} at {practical(p.input_speed, 'rad/s')}, load {p.load:g}"
             add(f"losses.{key}", where, f"{p.efficiency:g}")
     for q in losses.no_load_torque:
-        at = f"no-load torque at {shown(q.input_speed, 'rad/s')}" + (
+        at = f"no-load torque at {practical(q.input_speed, 'rad/s')}" + (
             f", {q.temperature:g} °C" if q.temperature is not None else ""
         )
         add("losses.no_load_torque", at, f"{q.torque:g} N·m")
@@ -86,5 +65,5 @@ def _add_losses(losses: Any, add: Any) -> None:
 def rows_of_part(g: Gearbox) -> list[tuple[str, str, str]]:
     """The figures of a gearbox that has no sheet."""
     names = (("rated_output_torque", "N*m"), ("rated_input_speed", "rad/s"), ("inertia", "kg*m^2"))
-    plain = [(name.replace("_", " "), shown(getattr(g, name), unit), "own figure") for name, unit in names]
+    plain = [(name.replace("_", " "), practical(getattr(g, name), unit), "own figure") for name, unit in names]
     return [("ratio", f"{g.ratio:g}", "own figure"), *plain]

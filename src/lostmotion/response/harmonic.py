@@ -82,16 +82,7 @@ def frequency_response(
     InputError
         An argument cannot be used.
     """
-    frequencies = sorted(set(arguments("frequencies", frequencies, "Hz")))
-    amplitudes = arguments("amplitudes", amplitudes, "" if source == "command" else "N*m")
-    if not frequencies or frequencies[0] <= 0.0:
-        raise InputError("frequencies must be positive; give at least one")
-    if not amplitudes or min(amplitudes) <= 0.0:
-        raise InputError("amplitudes must be positive; give at least one")
-    if source not in ("command", "load_torque"):
-        raise InputError(f"source {source!r} is not known; it must be command or load_torque")
-    if harmonics < 1:
-        raise InputError(f"harmonics {harmonics} must be 1 or more")
+    frequencies, amplitudes = _checked(frequencies, amplitudes, source, harmonics)
     means = mean_inputs(drive, mean_command, mean_load_torque)
     drive = drive_of(drive)
 
@@ -130,6 +121,23 @@ def frequency_response(
     return result
 
 
+def _checked(
+    frequencies: Sequence[float] | float, amplitudes: Sequence[float] | float, source: Source, harmonics: int
+) -> tuple[list[float], list[float]]:
+    """Frequencies [Hz], rising, and amplitudes."""
+    frequencies = sorted(set(arguments("frequencies", frequencies, "Hz")))
+    amplitudes = arguments("amplitudes", amplitudes, "" if source == "command" else "N*m")
+    if not frequencies or frequencies[0] <= 0.0:
+        raise InputError("frequencies must be positive; give at least one")
+    if not amplitudes or min(amplitudes) <= 0.0:
+        raise InputError("amplitudes must be positive; give at least one")
+    if source not in ("command", "load_torque"):
+        raise InputError(f"source {source!r} is not known; it must be command or load_torque")
+    if harmonics < 1:
+        raise InputError(f"harmonics {harmonics} must be 1 or more")
+    return frequencies, amplitudes
+
+
 def sine_inputs(
     source: Source, amplitude: float, frequency: float, mean_command: float, mean_load_torque: float
 ) -> tuple[CommandSignal, TorqueSignal]:
@@ -159,35 +167,32 @@ def _bends(result: xarray.Dataset, tolerance: float) -> list[float]:
     return sorted(new)
 
 
+# What a response says of each point, over amplitude and frequency: name -> unit and meaning.
+OF_EACH_POINT = {
+    "efficiency": ("1", "mean power out of the gear / mean motor power"),
+    "motor_power": ("W", "mean mechanical power of the motor"),
+    "load_power": ("W", "mean power on the load's side of the gear"),
+    "gear_loss": ("W", "mean power lost in the gear, torsion included"),
+    "drift": ("rad", "of the load angle over one period"),
+    "residual": ("1", "change of a state over one period"),
+    "periods": ("1", "periods followed"),
+    "newton_steps": ("1", "steps of Newton's method"),
+    "multiplier": ("1", "largest Floquet multiplier"),
+}
+
+
 def _labelled(
     r: dict[str, Any], amplitudes: Sequence[float], frequencies: Sequence[float], source: Source, harmonics: int
 ) -> xarray.Dataset:
     import xarray as xr
 
     shape = (len(amplitudes), len(frequencies))
-    names = list(CHANNEL_NAMES)
     reasons = np.array([reason_of(r, k) for k in range(shape[0] * shape[1])], dtype=object).reshape(shape)
     found = reasons == ""
-    c = (r["harmonics"][..., 0] + 1j * r["harmonics"][..., 1]).reshape(*shape, len(names), harmonics + 1)
-    c = np.where(found[..., None, None], c, np.nan)
-    first = c[..., 1]
-    above = r["mean_square"].reshape(*shape, -1) - np.abs(c[..., 0]) ** 2 - 0.5 * np.abs(first) ** 2
-    drive_in = first[..., names.index(source)]
-    power = {k: np.where(found, r[k].reshape(shape), np.nan) for k in ("motor_power", "load_power", "gear_loss")}
-    with np.errstate(divide="ignore", invalid="ignore"):
-        response = first / drive_in[..., None]
-        distortion = np.sqrt(np.maximum(above, 0.0)) / (np.abs(first) / math.sqrt(2.0))
-        efficiency = np.where(power["motor_power"] > 0.0, power["load_power"] / power["motor_power"], np.nan)
-    multipliers = [floquet_multipliers(j) for j in r["jacobian"]]
-    largest = np.array([abs(m[0]) for m in multipliers]).reshape(shape)
-    stable = np.array([is_stable(m) for m in multipliers]).reshape(shape)
+    c, response, distortion = _harmonics(r, found, source, harmonics)
+    points, stable = _of_each_point(r, found)
     grid, each = ("amplitude", "frequency"), ("output", "amplitude", "frequency")
-
-    def plain(name: str) -> np.ndarray:
-        return np.where(found, r[name].reshape(shape), np.nan)
-
     unit = "1" if source == "command" else "N*m"
-    watt = {"units": "W"}
     return xr.Dataset(
         {
             "response": (each, np.moveaxis(response, -1, 0), {"long_name": f"first harmonic / that of the {source}"}),
@@ -197,46 +202,49 @@ def _labelled(
                 np.moveaxis(distortion, -1, 0),
                 {"units": "1", "long_name": "harmonics above the first / first"},
             ),
-            "efficiency": (
-                grid,
-                efficiency,
-                {"units": "1", "long_name": "mean power out of the gear / mean motor power"},
-            ),
-            "motor_power": (grid, power["motor_power"], watt | {"long_name": "mean mechanical power of the motor"}),
-            "load_power": (
-                grid,
-                power["load_power"],
-                watt | {"long_name": "mean power on the load's side of the gear"},
-            ),
-            "gear_loss": (
-                grid,
-                power["gear_loss"],
-                watt | {"long_name": "mean power lost in the gear, torsion included"},
-            ),
-            "drift": (grid, plain("drift"), {"units": "rad", "long_name": "of the load angle over one period"}),
-            "residual": (
-                grid,
-                r["residual"].reshape(shape),
-                {"units": "1", "long_name": "change of a state over one period"},
-            ),
-            "periods": (grid, r["periods"].reshape(shape), {"units": "1", "long_name": "periods followed"}),
-            "newton_steps": (grid, r["newton_steps"].reshape(shape), {"units": "1"}),
-            "multiplier": (
-                grid,
-                np.where(found, largest, np.nan),
-                {"units": "1", "long_name": "largest Floquet multiplier"},
-            ),
-            "stable": (grid, found & stable),
+            **{
+                name: (grid, points[name], {"units": unit_, "long_name": meaning})
+                for name, (unit_, meaning) in OF_EACH_POINT.items()
+            },
+            "stable": (grid, stable),
             "reason": (grid, reasons, {"long_name": "why there is no periodic motion"}),
         },
         coords={
             "amplitude": ("amplitude", list(amplitudes), {"units": unit, "long_name": f"amplitude of the {source}"}),
             "frequency": ("frequency", list(frequencies), {"units": "Hz", "long_name": "frequency"}),
-            "output": ("output", names),
+            "output": ("output", list(CHANNEL_NAMES)),
             "harmonic": ("harmonic", np.arange(harmonics + 1)),
         },
         attrs={"source": source, "samples_per_period": SAMPLES_PER_PERIOD},
     )
+
+
+def _harmonics(
+    r: dict[str, Any], found: np.ndarray, source: Source, harmonics: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Complex amplitudes of all outputs, the first of them / that of the source, and the distortion."""
+    c = (r["harmonics"][..., 0] + 1j * r["harmonics"][..., 1]).reshape(*found.shape, len(CHANNEL_NAMES), harmonics + 1)
+    c = np.where(found[..., None, None], c, np.nan)
+    first = c[..., 1]
+    above = r["mean_square"].reshape(*found.shape, -1) - np.abs(c[..., 0]) ** 2 - 0.5 * np.abs(first) ** 2
+    drive_in = first[..., CHANNEL_NAMES.index(source)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distortion = np.sqrt(np.maximum(above, 0.0)) / (np.abs(first) / math.sqrt(2.0))
+        return c, first / drive_in[..., None], distortion
+
+
+def _of_each_point(r: dict[str, Any], found: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The values of `OF_EACH_POINT`, and whether the motion is stable."""
+    points = {name: r[name].reshape(found.shape) for name in ("residual", "periods", "newton_steps")}
+    for name in ("motor_power", "load_power", "gear_loss", "drift"):
+        points[name] = np.where(found, r[name].reshape(found.shape), np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        efficiency = points["load_power"] / points["motor_power"]
+    points["efficiency"] = np.where(points["motor_power"] > 0.0, efficiency, np.nan)
+    multipliers = [floquet_multipliers(j) for j in r["jacobian"]]
+    largest = np.array([abs(m[0]) for m in multipliers]).reshape(found.shape)
+    points["multiplier"] = np.where(found, largest, np.nan)
+    return points, found & np.array([is_stable(m) for m in multipliers]).reshape(found.shape)
 
 
 def to_control(response: xarray.Dataset, amplitude: float, output: str = "load_speed") -> control.FrequencyResponseData:

@@ -136,8 +136,6 @@ def periodic_motion(
     RuntimeError
         None was found; the message says why.
     """
-    import xarray as xr
-
     if isinstance(drive, Scenario):
         command = drive.command if command is None else command
         load_torque = drive.load.torque if load_torque is None else load_torque
@@ -159,6 +157,13 @@ def periodic_motion(
     )
     if reason := reason_of(r, 0):
         raise RuntimeError(f"no periodic motion was found: {reason}")
+    return _motion(r, drive, period)
+
+
+def _motion(r: dict[str, Any], drive: Drive, period: float) -> xarray.Dataset:
+    """The dataset of the one motion that `respond` has found."""
+    import xarray as xr
+
     data = dict(zip(CHANNEL_NAMES, r["table"][0], strict=True))
     add_derived(data, drive.gearbox.ratio)
     multipliers = floquet_multipliers(r["jacobian"][0])

@@ -12,6 +12,7 @@ from ..model.parts import Gearbox, Rigid
 from ..simulation.run import simulate
 from ..simulation.scenario import Scenario
 from ..test_rig.rig import LOST_MOTION_LOAD, TestRig
+from ..units.practical import ARCMIN, RPM
 from .duty_cycle import DutyCycle, duty_cycle
 from .holding import holding
 
@@ -31,8 +32,6 @@ MOST_IDLE = (
 MEANS = ("average_output_torque", "average_input_speed", "motor_torque", "winding_temperature")
 
 Verdict = Literal["ok", "warning", "unknown"]
-ARCMIN = 10800.0 / math.pi
-RPM = 30.0 / math.pi
 
 # Each rule of the check and where it comes from.
 RULES = {

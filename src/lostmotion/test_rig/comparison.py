@@ -12,6 +12,7 @@ from ..data_sheets.gearbox_sheet import GearboxSheet
 
 if TYPE_CHECKING:
     pass
+from ..units.practical import ARCMIN, RPM
 from .rig import TestRig
 
 
@@ -35,20 +36,19 @@ def compare(rig: TestRig, sheet: GearboxSheet, notes: tuple[str, ...]) -> Iterab
     """Each figure of the sheet beside the same measured."""
     contradiction = "contradicts the no-load torque; see note" if any("Contradiction" in n for n in notes) else ""
     figures = sheet.losses
-    rpm = 30.0 / np.pi
 
     def here(temperature: float | None) -> bool:
         """Whether a figure is of the temperature that the gearbox was made for."""
         return temperature in (None, figures.temperature)
 
     for p in filter(lambda p: here(p.temperature), figures.all_efficiencies()):
-        what = f"efficiency at {rpm * p.input_speed:.0f} rpm, load {p.load:g}"
+        what = f"efficiency at {RPM * p.input_speed:.0f} rpm, load {p.load:g}"
         yield Comparison(what, "1", p.efficiency, rig.efficiency(p.input_speed, p.load), contradiction)
     for p in filter(lambda p: here(p.temperature), figures.backdrive_efficiency):
-        what = f"back-drive efficiency at {rpm * p.input_speed:.0f} rpm, load {p.load:g}"
+        what = f"back-drive efficiency at {RPM * p.input_speed:.0f} rpm, load {p.load:g}"
         yield Comparison(what, "1", p.efficiency, rig.efficiency(p.input_speed, -p.load), contradiction)
     for q in filter(lambda q: here(q.temperature), figures.no_load_torque):
-        what = f"no-load torque at {rpm * q.input_speed:.0f} rpm"
+        what = f"no-load torque at {RPM * q.input_speed:.0f} rpm"
         yield Comparison(what, "N·m", q.torque, rig.no_load_torque(q.input_speed))
     if figures.starting_torque is not None and here(figures.starting_temperature):
         yield Comparison("starting torque", "N·m", figures.starting_torque, rig.starting_torque())
@@ -66,9 +66,7 @@ def compare(rig: TestRig, sheet: GearboxSheet, notes: tuple[str, ...]) -> Iterab
     if sheet.backlash:
         first = sheet.stiffness.torques[0] if sheet.stiffness and sheet.stiffness.torques else 0.0
         value = rig.backlash(first or 0.5 * rig.gearbox.rated_output_torque)
-        yield Comparison("backlash", "arcmin", np.degrees(sheet.backlash) * 60.0, np.degrees(value) * 60.0)
+        yield Comparison("backlash", "arcmin", ARCMIN * sheet.backlash, ARCMIN * value)
     if sheet.hysteresis_loss is not None:
         value = rig.loop(rig.gearbox.rated_output_torque).width
-        yield Comparison(
-            "hysteresis loss", "arcmin", np.degrees(sheet.hysteresis_loss) * 60.0, np.degrees(value) * 60.0
-        )
+        yield Comparison("hysteresis loss", "arcmin", ARCMIN * sheet.hysteresis_loss, ARCMIN * value)
