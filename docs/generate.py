@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from typer.main import get_command
 
 import lostmotion as lm
 from lostmotion.cli import app
-from lostmotion.inputs.schema import unit_in_schema
+from lostmotion.inputs.schema import options, unit_in_schema
 from lostmotion.model import signals
 from lostmotion.simulation.scenario import json_schema
 from lostmotion.simulation.variables import VARIABLES
@@ -20,11 +20,7 @@ from lostmotion.units.grammar import PREFIXED, SPELLINGS
 OUT = Path(__file__).parent / "_generated"
 
 
-def resolve(node: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
-    return schema["$defs"][node["$ref"].rsplit("/", 1)[1]] | {"name": node["$ref"]} if "$ref" in node else node
-
-
-def purpose_of(table: dict[str, Any]) -> str:
+def purpose_of(table: Mapping[str, Any]) -> str:
     """First paragraph of the docstring of the part that a table is read into."""
     generic = getattr(signals, table.get("title", "").split("[")[0], None)  # a generic class keeps its docstring
     text = table.get("description") or (generic.__doc__ if generic else "") or ""
@@ -46,16 +42,14 @@ def limits_of(node: dict[str, Any]) -> str:
     return ", ".join(dict.fromkeys(found))
 
 
-def tables_in(node: dict[str, Any], schema: dict[str, Any]) -> list[dict[str, Any]]:
+def tables_in(node: dict[str, Any], schema: dict[str, Any]) -> list[Mapping[str, Any]]:
     """The tables that a key may hold."""
-    options = [node, *node.get("anyOf", []), *node.get("oneOf", []), *node.get("allOf", [])]
-    if isinstance(node.get("items"), dict):
-        options.append(node["items"])
-    found = [resolve(o, schema) for o in options if isinstance(o, dict)]
-    return [t for t in found if "properties" in t]
+    entries = [option["items"] for option in options(schema, node) if isinstance(option.get("items"), dict)]
+    found = [table for place in (node, *entries) for table in options(schema, place)]
+    return [table for table in found if "properties" in table]
 
 
-def write_table(title: str, table: dict[str, Any], schema: dict[str, Any], lines: list[str], done: set[str]) -> None:
+def write_table(title: str, table: Mapping[str, Any], schema: dict[str, Any], lines: list[str], done: set[str]) -> None:
     lines += [
         f"## `[{title}]`" if title != "top level" else "## The whole file",
         "",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Annotated, Any
@@ -10,7 +9,7 @@ from typing import Annotated, Any
 from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Number, Positive, Temperature
-from ..inputs.validation import shown
+from ..inputs.validation import shown, unknown_key
 from ..model.parts import Gearbox, LinearStiffness, Motor, TorsionCurve
 from .gearbox_sheet import SCALARS, GearboxSheet
 from .loss_map_builder import BuiltMap, build_loss_map
@@ -40,12 +39,10 @@ def gearbox_table(reference: str, changes: Mapping[str, Any]) -> tuple[dict[str,
     InputError
         The record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """
-    known = sorted({*Gearbox.model_fields, *Conditions.model_fields})
+    known = {*Gearbox.model_fields, *Conditions.model_fields}
     for key in changes:
         if key not in known:
-            near = difflib.get_close_matches(key, known, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"known here: {', '.join(known)}"
-            raise InputError(f"key gearbox.{key}: is not known; {hint}")
+            raise InputError(f"key gearbox.{key}: {unknown_key(key, known)}")
     record = find(reference, "gearbox")
     assert isinstance(record, GearboxSheet)
     scalars = {key: value for key, value in changes.items() if key in SCALARS}

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..inputs.toml_files import read_toml
-from ..inputs.validation import shown
+from ..inputs.validation import shown, unknown_key
 from .gearbox_sheet import GearboxSheet
 from .motor_sheet import MotorSheet
 
@@ -50,9 +50,7 @@ def parse_sheets(data: dict[str, Any], where: str) -> list[GearboxSheet | MotorS
     known = {*KINDS, *COMMON, "source", "gap"}
     for key in data:
         if key not in known:
-            near = difflib.get_close_matches(key, sorted(known), n=1)
-            hint = f"did you mean {near[0]}?" if near else f"known here: {', '.join(sorted(known))}"
-            raise InputError(f"{where}: key {key}: is not known; {hint}")
+            raise InputError(f"{where}: key {key}: {unknown_key(key, known)}")
     records: list[GearboxSheet | MotorSheet] = []
     common = {key: data[key] for key in COMMON if key in data}
     for table, kind in KINDS.items():

@@ -18,7 +18,7 @@ def options(schema: Mapping[str, Any], node: Mapping[str, Any]) -> Iterator[Mapp
 
 
 def follow(
-    schema: Mapping[str, Any], location: tuple[int | str, ...], unknown_at_end: bool
+    schema: Mapping[str, Any], location: tuple[int | str, ...], unknown_at_end: bool = False
 ) -> tuple[tuple[int | str, ...], list[Mapping[str, Any]]]:
     """The keys of a location without the names of the choices made on the way, and the nodes where it ends.
 

@@ -6,7 +6,7 @@ import datetime
 import difflib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
@@ -59,6 +59,13 @@ def describe(error: ValidationError, schema: Mapping[str, Any], subject: str, gi
     return "; ".join(texts[:MOST]) + more
 
 
+def unknown_key(key: str, known: Iterable[str]) -> str:
+    """What is said of a key that is none of those that are known."""
+    known = sorted(known)
+    near = difflib.get_close_matches(key, known, n=1)
+    return f"is not known; did you mean {near[0]}?" if near else f"is not known; known here: {', '.join(known)}"
+
+
 def shown(value: Any) -> str:
     """A value as a TOML file has it, shortened if it is long."""
     text = _toml(value)
@@ -108,12 +115,7 @@ class _Problem:
 
     def _text(self) -> str:
         if self.kind == "extra_forbidden":
-            near = self.near()
-            return (
-                f"is not known; did you mean {near}?"
-                if near
-                else f"is not known; known here: {', '.join(self.known())}"
-            )
+            return unknown_key(str(self.keys[-1]), self.known())
         if self.kind in ("value_error", "assertion_error"):
             text = str(self.context["error"])
             return (

@@ -2,46 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
-from ..inputs.schema import unit_in_schema
+from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
 from ..simulation.scenario import json_schema
 from ..units.conversion import to_si
 
 
 @cache
-def _schema() -> dict[str, Any]:
-    return json_schema()
-
-
-def _options(node: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """A node of a JSON Schema, or what it may be instead."""
-    if "$ref" in node:
-        yield from _options(_schema()["$defs"][node["$ref"].rsplit("/", 1)[1]])
-    elif any(key in node for key in ("anyOf", "oneOf", "allOf")) and "x-unit" not in node:
-        for key in ("anyOf", "oneOf", "allOf"):
-            for option in node.get(key, []):
-                yield from _options(option)
-    else:
-        yield node
-
-
-@cache
 def unit_of_key(key: str) -> str | None:
     """SI unit of a dotted key of the scenario; empty for a plain number, None if it is no quantity or not known."""
-    nodes = [_schema()]
-    for part in key.split("."):
-        inner = [
-            node["items"] if part.isdigit() and "items" in node else node.get("properties", {}).get(part)
-            for node in nodes
-        ]
-        nodes = [option for node in inner if node is not None for option in _options(node)]
+    place = tuple(int(part) if part.isdecimal() else part for part in key.split("."))
+    found, nodes = follow(_schema(), place)
+    if found != place:
+        return None
     if any({"mean", "sines"} <= node.get("properties", {}).keys() for node in nodes):
         return unit_of_key(f"{key}.mean")  # a signal, which one value makes constant
     return next((unit for node in nodes if (unit := unit_in_schema(node)) is not None), None)
+
+
+@cache
+def _schema() -> dict[str, Any]:
+    return json_schema()
 
 
 def in_si(value: Any, unit: str | None) -> Any:
