@@ -1,4 +1,4 @@
-"""From the figures of a data sheet to the motion of the load (see the tutorial)."""
+"""From the data of a data sheet to the motion of the load (see the tutorial)."""
 
 import math
 
@@ -23,7 +23,7 @@ sheet = lm.GearboxSheet(
     },
 )
 built = lm.build_loss_map(sheet)
-print(*built.notes)  # these two figures contradict each other, as they often do
+print(*built.notes)  # these two data contradict each other, as they often do
 
 gearbox = lm.gearbox("wittenstein-tp010-mf-10")  # the same from the catalogue
 assert gearbox.losses == built.losses

@@ -42,7 +42,7 @@ TOLERANCE = 1e-7
 STEADY = ("load_speed", "twist", "output_torque")
 STEPPED = ("paper-2dof-nl-small", "step-to-standstill")
 FREQUENCIES, AMPLITUDES = (0.5, 2.0, 10.0, 40.0), (0.025, 0.3)  # Hz, relative voltage
-MEANS = ("motor_power", "load_power", "gear_loss", "drift", "residual")
+MEANS = ("motor_power", "load_power", "gear_loss", "angle_advance", "residual")
 
 Values = dict[str, Any]  # name -> number, array (held to the bit) or list (within the tolerance)
 Groups = dict[str, Values]
@@ -82,7 +82,7 @@ def of_run(scenario: lm.Scenario) -> Groups:
 
 def of_periodic_motion(scenario: lm.Scenario) -> Values:
     motion = lm.periodic_motion(scenario)
-    exact = {n: v for n, v in motion.attrs.items() if n.startswith("start_") or n in ("residual", "drift")}
+    exact = {n: v for n, v in motion.attrs.items() if n.startswith("start_") or n in ("residual", "angle_advance")}
     moduli = np.hypot(motion.attrs["multipliers_real"], motion.attrs["multipliers_imag"])
     return (
         exact

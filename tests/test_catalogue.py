@@ -1,6 +1,7 @@
 """Component catalogue, loss maps from data sheets, virtual test rig, drive check."""
 
 import math
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from conftest import ROOT
 from lostmotion.cli import app
 from lostmotion.data_sheets.components import gearbox_table
 from lostmotion.data_sheets.gearbox_sheet import GearboxSheet
-from lostmotion.data_sheets.loss_figures import Lubricant
+from lostmotion.data_sheets.loss_data import Lubricant
 from lostmotion.data_sheets.loss_map_builder import build_loss_map
 from lostmotion.data_sheets.motor_sheet import MotorSheet
 from lostmotion.data_sheets.records import catalogue, find, parse_sheets
@@ -62,7 +63,7 @@ def gearbox_of(record: GearboxSheet) -> lm.Gearbox:
 
 def test_every_figure_of_every_record_has_a_source():
     for record in catalogue():
-        for figure in record.figures():
+        for figure in record.given():
             assert record.source_of(figure) is not None, (record.name, figure)
 
 
@@ -241,7 +242,7 @@ def test_the_rig_returns_the_figures_of_every_complete_record(family: str):
         for c in compare(TestRig(lm.Gearbox(**table)), record, built.notes):
             # Printed with two to four digits; a thousandth is finer than half a unit of any of their last ones.
             if c.remark:
-                assert c.figure.startswith("efficiency")
+                assert c.quantity.startswith("efficiency")
                 assert any("Contradiction" in n for n in built.notes)
             else:
                 assert abs(c.difference) < 1e-3, (record.name, c)
@@ -250,7 +251,7 @@ def test_the_rig_returns_the_figures_of_every_complete_record(family: str):
 def test_stiffness_from_a_data_book():
     # A strain-wave gear of size 32, ratio 100: 60 N·m give 7.15e-4 rad (2.46 arcmin).
     record = sheet(stiffness={"slopes": [6.7e4, 1.1e5], "torques": [29]})
-    twist, torque = TestRig(gearbox_of(record)).virgin_curve(60.0)
+    twist, torque = TestRig(gearbox_of(record)).initial_loading_curve(60.0)
     assert float(np.interp(60.0, torque, twist)) == pytest.approx(7.15e-4, abs=0.5e-6)
     assert float(np.interp(60.0, torque, twist)) / ARCMIN == pytest.approx(2.46, abs=5e-3)
 
@@ -699,3 +700,16 @@ def test_changed_parts_are_those_that_the_rig_measures(tmp_path: Path):
     part, _ = gearbox_from_record("paper-gearbox", ["gearbox.ratio=80", "stiffness.slopes=[3e3, 2e4, 3e4]"])
     assert part.ratio == 80
     assert part.stiffness.slopes == (3e3, 2e4, 3e4)
+
+
+def test_a_sheet_that_says_maker_for_the_manufacturer_is_read_as_before(tmp_path: Path):
+    text = (ROOT / "src" / "lostmotion" / "catalogue" / "worm-nord-si50.toml").read_text()
+    former = text.replace("manufacturer =", "maker =").replace('"manufacturer"', '"maker"')
+    assert former.count('maker = "NORD"') == former.count('status = "maker"') == 1
+    records = parse_sheets(tomllib.loads(former), "former.toml")
+    assert records == parse_sheets(tomllib.loads(text), "now.toml")
+    assert {(r.manufacturer, r.sources[-1].status) for r in records} == {("NORD", "manufacturer")}
+    with pytest.raises(lm.InputError, match="key maker: is not known"):
+        parse_sheets(
+            tomllib.loads('maker = "A"\nmanufacturer = "B"\n' + former.replace('maker = "NORD"', "")), "both.toml"
+        )

@@ -82,7 +82,7 @@ def test_a_directory_does_not_hide_a_shipped_scenario_and_its_file_name_leads_to
 
 
 def test_a_file_that_is_no_result_of_a_run_is_refused(tmp_path: Path) -> None:
-    response = lm.frequency_response(lm.load(SMALL), [1.0], 0.1)[["efficiency", "drift"]]
+    response = lm.frequency_response(lm.load(SMALL), [1.0], 0.1)[["efficiency", "angle_advance"]]
     response.to_netcdf(tmp_path / "response.nc", engine="h5netcdf")
     (tmp_path / "table.csv").write_text("a,b\n1,2\n")
     for name, words in (
@@ -327,6 +327,6 @@ def test_a_run_of_a_million_samples_is_drawn_in_seconds() -> None:
     assert time.process_time() - begin < 5.0
     for axes in figure.axes:
         for line in axes.lines:
-            assert len(line.get_xdata()) <= plots.MOST_POINTS + 10
+            assert len(line.get_xdata()) <= plots.MAX_POINTS + 10
     drawn = figure.axes[4].lines[0].get_ydata()
     assert np.max(drawn) == pytest.approx(1e3 * float(result["twist"].max()), rel=1e-15)

@@ -148,7 +148,7 @@ def test_long_curves_are_drawn_from_few_points_that_keep_every_peak() -> None:
     y = np.sin(40.0 * x)
     y[123_457], y[777_777], y[500_000] = 5.0, -7.0, np.nan
     thin_x, thin_y = plots.thinned(x, y)
-    assert len(thin_x) == len(thin_y) <= plots.MOST_POINTS + 10
+    assert len(thin_x) == len(thin_y) <= plots.MAX_POINTS + 10
     assert np.nanmax(thin_y) == 5.0
     assert np.nanmin(thin_y) == -7.0
     assert thin_x[0] == 0.0
@@ -245,7 +245,7 @@ def returned_by(thing: object) -> set[str]:
 def test_what_functions_return_is_exported() -> None:
     own = {
         name
-        for module in (ROOT / "src" / "lostmotion").glob("*.py")
+        for module in (ROOT / "src" / "lostmotion").rglob("*.py")
         for name in re.findall(r"^class (\w+)", module.read_text(), re.M)
     }
     page = (ROOT / "docs" / "api.md").read_text()

@@ -29,7 +29,7 @@ def frictionless(model: str) -> lm.Drive:
 
 
 def oscillator(*, stiffness=4.0, inertia=0.01, friction=0.0, damping=0.0, backlash=0.0) -> lm.Drive:
-    """A load on a spring: the input is a flywheel that stands still."""
+    """A load on a spring: the input is a flywheel at rest."""
     return lm.Drive(
         motor=lm.Motor(kind="torque_source", rotor_inertia=1e12),
         gearbox=lm.Gearbox(
@@ -231,12 +231,12 @@ def test_stuck_all_period_is_a_solution_with_no_response():
     assert lm.characteristics(response, NONLINEAR).attrs["dead_zone_forward"] > 0.01
 
 
-def test_a_drifting_load_is_periodic_all_the_same():
+def test_a_load_that_advances_each_period_is_periodic_all_the_same():
     command = lm.CommandSignal(mean=0.5, amplitude=0.1, frequency=2.0)
     motion = lm.periodic_motion(NONLINEAR, command)
     assert motion.attrs["residual"] < 1e-12
-    assert motion.attrs["drift"] == pytest.approx(float(motion["load_speed"].mean()) * 0.5, rel=1e-9)
-    assert motion.attrs["drift"] > 0.1
+    assert motion.attrs["angle_advance"] == pytest.approx(float(motion["load_speed"].mean()) * 0.5, rel=1e-9)
+    assert motion.attrs["angle_advance"] > 0.1
 
 
 def test_coexisting_motions_and_subharmonics_of_a_load_in_backlash():
@@ -285,7 +285,7 @@ def test_den_hartogs_oscillator_with_dry_friction(r: float):
 
 
 def stops(share: float) -> tuple[int, lm.Drive, "object"]:
-    """Number of stretches in which a free mass under P sin(wt) stands still, with friction F = share P."""
+    """Number of stretches in which a free mass under P sin(wt) is at rest, with friction F = share P."""
     drive = oscillator(stiffness=1e-9, friction=share)
     drive = drive.model_copy(
         update={"gearbox": drive.gearbox.model_copy(update={"stiffness": lm.TorsionCurve(slopes=(1e-9,))})}
@@ -329,7 +329,7 @@ def test_motions_of_the_response_repeat_to_rounding():
     assert np.all(response["reason"].values == "")
     assert float(response["residual"].max()) < 1e-12
     assert np.all(response["stable"].values)
-    assert np.all(np.abs(response["drift"].values) < 1e-9)
+    assert np.all(np.abs(response["angle_advance"].values) < 1e-9)
 
 
 def test_response_depends_on_amplitude_as_in_the_paper():

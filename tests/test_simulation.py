@@ -293,11 +293,11 @@ def test_stepping_and_sampled_constants_change_nothing_at_constant_speed():
 
 def test_thousands_of_steps_are_summed_as_one_by_one():
     steps = [{"time": 1e-3 * k, "height": 0.001 * (-1) ** k * (k % 7)} for k in range(1, 4000)]
-    knots = lm.CommandSignal(mean=0.5, steps=steps).knot_list()
+    breakpoints = lm.CommandSignal(mean=0.5, steps=steps).breakpoint_list()
     total = 0.5 + np.cumsum([s["height"] for s in steps])
-    assert [t for t, _, _ in knots[1:]] == [s["time"] for s in steps]
-    np.testing.assert_allclose([v for _, v, _ in knots[1:]], total, rtol=0, atol=1e-12)
-    assert all(slope == 0.0 for _, _, slope in knots)
+    assert [t for t, _, _ in breakpoints[1:]] == [s["time"] for s in steps]
+    np.testing.assert_allclose([v for _, v, _ in breakpoints[1:]], total, rtol=0, atol=1e-12)
+    assert all(slope == 0.0 for _, _, slope in breakpoints)
 
 
 def test_ramps_that_overlap_are_added():
@@ -308,7 +308,7 @@ def test_ramps_that_overlap_are_added():
         ],
         steps=[{"time": 1.5, "height": 0.25}],
     )
-    for t, value, slope in signal.knot_list():
+    for t, value, slope in signal.breakpoint_list():
         first, second = min(t, 2.0) / 2.0, -0.25 * min(max(t - 1.0, 0.0), 2.0)
         assert value == pytest.approx(first + second + (0.25 if t >= 1.5 else 0.0), abs=1e-15)
         assert slope == pytest.approx((0.5 if t < 2.0 else 0.0) - (0.25 if 1.0 <= t < 3.0 else 0.0))

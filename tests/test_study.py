@@ -114,7 +114,7 @@ def test_long_runs_are_made_in_pieces(tmp_path: Path, monkeypatch: pytest.Monkey
     study = make(trajectories={"variables": ["load_speed"], "every": 10})
     rows = rows_of(lm.study(study, tmp_path / "one"))
     assert pieces(study, 0, 32) == [(0, 32)]
-    monkeypatch.setattr(study_chunk, "MOST_NUMBERS", 13 * SHORT.simulation.samples * 7)
+    monkeypatch.setattr(study_chunk, "MAX_NUMBERS", 13 * SHORT.simulation.samples * 7)
     assert pieces(study, 0, 32) == [(0, 7), (7, 14), (14, 21), (21, 28), (28, 32)]
     assert rows_of(lm.study(study, tmp_path / "many")) == rows
     with ThreadPoolExecutor(1) as pool:

@@ -140,7 +140,7 @@ def test_runs_that_fail_are_counted_on_the_command_line(tmp_path: Path):
         [sys.executable, "-m", "lostmotion", "study", str(path)],
         cwd=tmp_path, capture_output=True, text=True, check=True,
     )  # fmt: skip
-    assert "1 of 2 runs failed, such as: gearbox schaeffler-rt1-h-20-100: has figures for 20 °C only" in done.stderr
+    assert "1 of 2 runs failed, such as: gearbox schaeffler-rt1-h-20-100: has data for 20 °C only" in done.stderr
 
 
 def test_the_catalogue_is_filtered_by_figures(tmp_path: Path):
@@ -153,7 +153,7 @@ def test_the_catalogue_is_filtered_by_figures(tmp_path: Path):
         for r in lm.catalogue()
         if isinstance(r, GearboxSheet)
         and r.kind == "strain_wave"
-        and r.maker.startswith("Schae")
+        and r.manufacturer.startswith("Schae")
         and 90 <= r.ratio <= 110
         and r.rated_output_torque is not None
         and 20 <= r.rated_output_torque <= 60
@@ -234,8 +234,8 @@ values = [1.0, 1.2]
         ('key = "gearbox"\nuniform = [0, 1]', "needs? .*values or catalogue"),
         ('key = "gearbox"\nrelative = true\nvalues = ["schaeffler-rt1-h-20-100"]', "a key of their own"),
         ('keys = ["gearbox", "load.inertia"]\nvalues = ["schaeffler-rt1-h-20-100"]', "a key of their own"),
-        ('key = "gearbox"\ncatalogue = { colour = "red" }', "colour, which is no figure of a gearbox"),
-        ('key = "gearbox"\ncatalogue = { ratio = 100 }', "list of least and largest"),
+        ('key = "gearbox"\ncatalogue = { colour = "red" }', "colour, which is no datum of a gearbox"),
+        ('key = "gearbox"\ncatalogue = { ratio = 100 }', "list of minimum and maximum"),
         ('key = "gearbox"\ncatalogue = { ratio = ["1 N", "2 N"] }', "ratio"),
         ('key = "gearbox"\ncatalogue = { kind = "belt" }', "no gearbox fits"),
         ('key = "gearbox"\ncatalogue = { kind = 1 }', "must be a text"),

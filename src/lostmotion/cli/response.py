@@ -111,7 +111,7 @@ def _print_reasons(result: xarray.Dataset) -> None:
     reasons = [r for r in result["reason"].values.ravel() if r]
     found_points = result["reason"].size - len(reasons)
     worst = float(result["residual"].where(result["reason"] == "").max())
-    within = f", repeating within {worst:.1e} of their size" if found_points else ""
+    within = f", repeating within {worst:.1e} of their magnitude" if found_points else ""
     print(f"  {found_points} of {result['reason'].size} motions found{within}")
     different = list(dict.fromkeys(reasons))
     for reason in different[:3]:

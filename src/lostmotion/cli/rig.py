@@ -72,4 +72,4 @@ def _print_comparisons(report: RigReport) -> None:
     for c in report.comparisons:
         unit = "" if c.unit == "1" else f" {c.unit}"
         remark = f"  ({c.remark})" if c.remark else ""
-        print(f"  {c.figure:<44} {c.catalogue:>10.5g} {c.rig:>10.5g} {c.difference:>+9.1e}{unit}{remark}")
+        print(f"  {c.quantity:<44} {c.catalogue:>10.5g} {c.rig:>10.5g} {c.difference:>+9.1e}{unit}{remark}")

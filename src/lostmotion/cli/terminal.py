@@ -16,7 +16,7 @@ def fail(text: str, code: int = 1) -> NoReturn:
 
 
 class Step(Protocol):
-    """Tells a progress bar of one more piece of work, or of how many are done."""
+    """Notifies a progress bar of one more piece of work, or of how many are done."""
 
     def __call__(self, done: int | None = None) -> None: ...
 

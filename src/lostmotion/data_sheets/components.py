@@ -21,7 +21,7 @@ class Conditions(Part):
     """Under which conditions a record is used: keys of `[gearbox]` beside `from`."""
 
     temperature: Temperature | None = None
-    """of the lubricant; left out, that of the figures"""
+    """of the lubricant; left out, that of the data"""
     added_backlash: Annotated[Angle, NotNegative] = 0.0
     """wear"""
     loss_factor: Annotated[Number, Positive] = 1.0
@@ -101,17 +101,17 @@ def _hysteresis(record: GearboxSheet, sheet: GearboxSheet, stiffness: Any) -> di
     """That of the record as printed; what it lacks for it comes from the changes."""
     if isinstance(stiffness, Mapping) and stiffness.get("kind") == "rigid":
         return None
-    figures = sheet if record.rated_output_torque is None else record
+    printed = sheet if record.rated_output_torque is None else record
     try:
-        curve = figures.torsion_curve() if figures.stiffness is not None else _curve(stiffness)
-        found = None if curve is None else figures.hysteresis(curve)
+        curve = printed.torsion_curve() if printed.stiffness is not None else _curve(stiffness)
+        found = None if curve is None else printed.hysteresis(curve)
     except ValueError as error:
         raise InputError(f"gearbox {error}") from None
     return None if found is None else found.model_dump()
 
 
 def _curve(stiffness: Any) -> TorsionCurve | LinearStiffness | None:
-    """A stiffness as a part; None if it is not valid, which the gearbox then tells with the name of the key."""
+    """A stiffness as a part; None if it is not valid, which the gearbox then reports with the name of the key."""
     if not isinstance(stiffness, Mapping):
         return None
     with suppress(InputError):
@@ -148,7 +148,7 @@ def gearbox(
     name
         Of a record in the catalogue, or a file (``.toml``) with one record.
     temperature
-        Of the lubricant [°C]; left out, that of the figures.
+        Of the lubricant [°C]; left out, that of the data.
     added_backlash
         Wear: added to the printed backlash [rad].
     loss_factor

@@ -21,14 +21,14 @@ from ..inputs.quantities import (
     ViscousFriction,
 )
 from ..model.parts import GearboxLimits, Hysteresis, LinearStiffness, TorsionCurve
-from .loss_figures import Efficiency, LossFigures
+from .loss_data import Efficiency, LossData
 from .sheet import Record
 
-# Figures of a gearbox that `[gearbox]` has too, under the same names.
+# Data of a gearbox that `[gearbox]` has too, under the same names.
 SCALARS = ("ratio", "inertia", "viscous_friction", "rated_input_speed", "rated_output_torque")
 
 
-class StiffnessFigures(Part):
+class StiffnessData(Part):
     """Torsional stiffness by segments, as manufacturers print it: K1 up to torque T1, K2 up to T2, K3 beyond."""
 
     slopes: tuple[Annotated[Stiffness, Positive], ...] = Field(min_length=1)
@@ -80,14 +80,14 @@ class GearboxSheet(Record):
     """on the input shaft"""
     viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
     """on the input shaft, beside the losses"""
-    stiffness: StiffnessFigures | None = None
+    stiffness: StiffnessData | None = None
     backlash: Annotated[Angle, NotNegative] | None = None
     """total gap at the output"""
     hysteresis_loss: Annotated[Angle, Positive] | None = None
     """width of the loop at zero torque after loading to rated torque in both directions"""
     hysteresis_efficiency: Efficiency | None = None
     """eta_H of (16), where the loop itself is known"""
-    losses: LossFigures = LossFigures()
+    losses: LossData = LossData()
 
     @model_validator(mode="after")
     def _one_hysteresis(self) -> Self:
@@ -131,7 +131,7 @@ class GearboxSheet(Record):
         if not 0.0 <= q < 0.5:
             raise InputError(
                 f"{self.name}: has hysteresis_loss = {self.hysteresis_loss:.4g} rad, which with this stiffness means a loop of half of "
-                "the rated torque or more; check both figures and their units"
+                "the rated torque or more; check both values and their units"
             )
         return Hysteresis(efficiency=1.0 - 2.0 * q)
 
@@ -146,5 +146,5 @@ class GearboxSheet(Record):
         )
 
     def scalars(self) -> dict[str, Any]:
-        """Those keys of `[gearbox]` that are figures of the sheet."""
+        """Those keys of `[gearbox]` that the sheet has too."""
         return {name: getattr(self, name) for name in SCALARS if getattr(self, name) is not None}

@@ -1,4 +1,4 @@
-"""From the loss figures of a data sheet to the loss map m_2B(mu, v), with the origin of every node.
+"""From the loss data of a data sheet to the loss map m_2B(mu, v), with the origin of every node.
 
 Load mu = T_2 sign(w_M)/T_2R and speed v = |w_M|/n_1R are relative, mu > 0 where the motor drives. The map is put
 together as
@@ -6,7 +6,7 @@ together as
     m_2B(mu, v) = m_0(v) + L(mu, v),      L(0, v) = 0,
 
 the part that is lost without load, and what the load adds. The paper's four areas are: 1 efficiencies, 2 no-load running
-torque, 3 starting torque, 4 standstill under load. docs/catalogue-figures.md explains the rules.
+torque, 3 starting torque, 4 standstill under load. docs/catalogue-data.md explains the rules.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from ..errors import InputError
 from ..model.parts import LossMap
 from ..units.practical import RPM
 from .gearbox_sheet import GearboxSheet
-from .loss_figures import EfficiencyPoint, LossFigures
+from .loss_data import EfficiencyPoint, LossData
 
-# Where no figure at all says what an unloaded gearbox loses: this share of the loss at rated load.
+# Where no datum at all says what an unloaded gearbox loses: this share of the loss at rated load.
 ASSUMED_NO_LOAD_SHARE = 0.2
 # Friction of standstill gives way to that of motion within this relative speed.
 STATIC_TO_RUNNING = 0.01
@@ -48,7 +48,7 @@ def build_loss_map(sheet: GearboxSheet, *, temperature: float | None = None, los
     Parameters
     ----------
     temperature
-        Of the lubricant [°C]; that of the figures if left out. It changes the part that is lost without load, by the
+        Of the lubricant [°C]; that of the data if left out. It changes the part that is lost without load, by the
         given curves where the sheet has them at several temperatures, else by the viscosity of its lubricant.
     loss_factor
         All losses are multiplied by it, for wear.
@@ -56,24 +56,24 @@ def build_loss_map(sheet: GearboxSheet, *, temperature: float | None = None, los
     Raises
     ------
     InputError
-        The figures do not suffice, or contradict each other beyond repair; the message names both.
+        The data do not suffice, or contradict each other beyond repair; the message names both.
     """
     if loss_factor <= 0.0:
         raise InputError(f"loss_factor {loss_factor} must be greater than 0")
-    figures = sheet.losses
+    losses = sheet.losses
     for key, what in sheet.missing().items():
         if key.startswith("rated_"):
             raise InputError(f"{sheet.name}: lacks {key}; {what}")
-    if figures.table is not None:
-        if temperature not in (None, figures.temperature):
+    if losses.table is not None:
+        if temperature not in (None, losses.temperature):
             raise InputError(
-                f"{sheet.name}: has a whole loss table, which holds for {figures.temperature:g} °C; leave temperature out"
+                f"{sheet.name}: has a whole loss table, which holds for {losses.temperature:g} °C; leave temperature out"
             )
-        speeds, loads, values = figures.table.whole()
+        speeds, loads, values = losses.table.whole()
         scaled = [[loss_factor * x for x in row] for row in values]
-        losses = LossMap(speeds=tuple(speeds), loads=tuple(loads), values=tuple(map(tuple, scaled)))
-        return BuiltMap(losses, tuple(tuple("given table" for _ in speeds) for _ in loads))
-    if figures.empty:
+        table = LossMap(speeds=tuple(speeds), loads=tuple(loads), values=tuple(map(tuple, scaled)))
+        return BuiltMap(table, tuple(tuple("given table" for _ in speeds) for _ in loads))
+    if losses.empty:
         raise InputError(
             f"{sheet.name}: lacks an efficiency, without which no loss map can be made; see "
             f"{sheet.where('losses.efficiency')}"
@@ -130,20 +130,20 @@ class _Builder:
         self.T_2R, self.n_1R = self.sheet.rated_output_torque, self.sheet.rated_input_speed
 
     def build(self, loss_factor: float) -> BuiltMap:
-        figures = self.sheet.losses
-        efficiencies = self._of_one_temperature(figures.all_efficiencies())
-        backdrive = self._of_one_temperature(figures.backdrive_efficiency)
-        self._no_load_part(figures)
+        losses = self.sheet.losses
+        efficiencies = self._of_one_temperature(losses.all_efficiencies())
+        backdrive = self._of_one_temperature(losses.backdrive_efficiency)
+        self._no_load_part(losses)
         driving = self._load_parts(efficiencies, lambda p: p.load * (1.0 / p.efficiency - 1.0), "efficiency")
-        static = self._static_part(figures, driving)
+        static = self._static_part(losses, driving)
         if not driving:
-            driving = {1.0: static.scaled(1.0 / figures.static_load_factor, "filled in: from the static efficiency")}
+            driving = {1.0: static.scaled(1.0 / losses.static_load_factor, "filled in: from the static efficiency")}
         if backdrive:
             overrunning = self._load_parts(backdrive, lambda p: p.load * (1.0 - p.efficiency), "back-drive efficiency")
         else:
             mirrored = "filled in: as while the motor drives"
             overrunning = {v: L.scaled(1.0, mirrored) for v, L in driving.items()}
-        static_back = self._static_overrunning(figures, static)
+        static_back = self._static_overrunning(losses, static)
         return self._tabulate(driving, overrunning, static, static_back, loss_factor)
 
     def _relative(self, speed: float) -> float:
@@ -160,31 +160,31 @@ class _Builder:
 
     # --- what is lost without load: areas 2 and 3 ---
 
-    def _no_load_part(self, figures: LossFigures) -> None:
+    def _no_load_part(self, losses: LossData) -> None:
         """Reads m_0 from the sheet, for `_unloaded` to give at any temperature."""
         per_torque = self.sheet.ratio / self.T_2R
         self.curves: dict[float, dict[float, float]] = {}
-        for p in figures.no_load_torque:
+        for p in losses.no_load_torque:
             self.curves.setdefault(self._at(p.temperature), {})[self._relative(p.input_speed)] = per_torque * p.torque
-        self.standing = None if figures.starting_torque is None else per_torque * figures.starting_torque
-        self.standing_temperature = self._at(figures.starting_temperature)
+        self.at_rest = None if losses.starting_torque is None else per_torque * losses.starting_torque
+        self.at_rest_temperature = self._at(losses.starting_temperature)
         self.start_origin = "starting torque (area 3)"
         self.no_load_origin = "no-load torque (area 2)"
         if not self.curves:
-            if self.standing is None:
-                self.standing = self._assumed_level(figures)
+            if self.at_rest is None:
+                self.at_rest = self._assumed_level(losses)
                 self.start_origin = self.no_load_origin = "filled in: assumed share of the loss under load"
             else:
                 self.no_load_origin = "filled in: as the starting torque"
-            self.curves = {self.standing_temperature: {1.0: self.standing}}
-        elif self.standing is None:
+            self.curves = {self.at_rest_temperature: {1.0: self.at_rest}}
+        elif self.at_rest is None:
             self.start_origin = "filled in: as the no-load torque at the lowest speed"
         wanted = self._at(self.temperature)
         self.unloaded = self._unloaded(wanted)
-        if wanted != figures.temperature:
-            factor = self.unloaded.start / self._unloaded(figures.temperature).start
+        if wanted != losses.temperature:
+            factor = self.unloaded.start / self._unloaded(losses.temperature).start
             self.notes.append(
-                f"At {wanted:g} °C the part that is lost without load is {factor:.3g} times that at {figures.temperature:g} °C."
+                f"At {wanted:g} °C the part that is lost without load is {factor:.3g} times that at {losses.temperature:g} °C."
             )
 
     def _at(self, temperature: float | None) -> float:
@@ -193,15 +193,15 @@ class _Builder:
     def _unloaded(self, temperature: float) -> _Unloaded:
         """m_0 at a temperature [°C], by the curves of the sheet, or by the viscosity from the only one."""
         curve = self._curve_at(temperature)
-        if self.standing is None:
+        if self.at_rest is None:
             return _Unloaded(curve, next(iter(curve.values())))
         # The starting torque changes as the slowest running torque does.
-        then = next(iter(self._curve_at(self.standing_temperature).values()))
-        return _Unloaded(curve, self.standing * (next(iter(curve.values())) / then if then > 0.0 else 1.0))
+        then = next(iter(self._curve_at(self.at_rest_temperature).values()))
+        return _Unloaded(curve, self.at_rest * (next(iter(curve.values())) / then if then > 0.0 else 1.0))
 
-    def _assumed_level(self, figures: LossFigures) -> float:
-        points = figures.all_efficiencies()
-        eta = points[0].efficiency if points else figures.static_efficiency
+    def _assumed_level(self, losses: LossData) -> float:
+        points = losses.all_efficiencies()
+        eta = points[0].efficiency if points else losses.static_efficiency
         load = points[0].load if points else 1.0
         assert eta is not None
         level = ASSUMED_NO_LOAD_SHARE * load * (1.0 / eta - 1.0)
@@ -221,7 +221,7 @@ class _Builder:
         if not known[0] <= temperature <= known[-1]:
             raise InputError(
                 f"{self.sheet.name}: has no_load_torque from {known[0]:g} to {known[-1]:g} °C, not at {temperature:g} °C; "
-                "choose a temperature between, or add figures"
+                "choose a temperature between, or add data"
             )
         out = {}
         for v in sorted({v for curve in self.curves.values() for v in curve}):
@@ -229,22 +229,20 @@ class _Builder:
             out[v] = float(np.interp(temperature, known, at))
         return out
 
-    def _viscosity_factor(self, figures: LossFigures, reference: float, wanted: float) -> float:
+    def _viscosity_factor(self, losses: LossData, reference: float, wanted: float) -> float:
         if wanted == reference:
             return 1.0
-        if figures.lubricant is None:
+        if losses.lubricant is None:
             raise InputError(
-                f"{self.sheet.name}: has figures for {reference:g} °C only; for {wanted:g} °C it also needs losses.lubricant "
+                f"{self.sheet.name}: has data for {reference:g} °C only; for {wanted:g} °C it also needs losses.lubricant "
                 "(viscosity_40, viscosity_100) or no_load_torque at several temperatures"
             )
-        return float(
-            (figures.lubricant.viscosity(wanted) / figures.lubricant.viscosity(reference)) ** VISCOSITY_EXPONENT
-        )
+        return float((losses.lubricant.viscosity(wanted) / losses.lubricant.viscosity(reference)) ** VISCOSITY_EXPONENT)
 
     # --- what the load adds: areas 1 and 4 ---
 
     def _load_parts(self, points: tuple[EfficiencyPoint, ...], loss: Any, name: str) -> dict[float, _LoadPart]:
-        """L at each speed at which there is a figure."""
+        """L at each speed at which there is a datum."""
         parts: dict[float, _LoadPart] = {}
         for p in sorted(points, key=lambda p: (p.input_speed, p.load)):
             v = self._relative(p.input_speed)
@@ -270,32 +268,32 @@ class _Builder:
             f"is kept and the {name} taken for what the load adds; in the map it becomes {becomes:.3g} at this load."
         )
 
-    def _static_part(self, figures: LossFigures, driving: dict[float, _LoadPart]) -> _LoadPart:
+    def _static_part(self, losses: LossData, driving: dict[float, _LoadPart]) -> _LoadPart:
         """L at standstill, for starting in the direction of the motor."""
-        if figures.static_efficiency is None:
+        if losses.static_efficiency is None:
             slowest = driving[min(driving)]
-            return slowest.scaled(figures.static_load_factor, "filled in: static load factor (area 4)")
-        total = 1.0 / figures.static_efficiency - 1.0
-        start = self._unloaded(figures.temperature).start
+            return slowest.scaled(losses.static_load_factor, "filled in: static load factor (area 4)")
+        total = 1.0 / losses.static_efficiency - 1.0
+        start = self._unloaded(losses.temperature).start
         rise = total - start
         if rise < 0.0:
             self.notes.append(
                 f"Contradiction at standstill: the starting torque alone is {start:.3g} of rated torque, the "
-                f"static efficiency {figures.static_efficiency:g} leaves {total:.3g}. The starting torque is kept and the "
+                f"static efficiency {losses.static_efficiency:g} leaves {total:.3g}. The starting torque is kept and the "
                 "static efficiency taken for what the load adds."
             )
             rise = total
         return _LoadPart([1.0], [rise], ["static efficiency (area 4)"])
 
-    def _static_overrunning(self, figures: LossFigures, static: _LoadPart) -> _LoadPart:
+    def _static_overrunning(self, losses: LossData, static: _LoadPart) -> _LoadPart:
         """L at standstill, for starting where the load pulls. The gear holds while m_2B(-mu, 0) >= mu."""
-        if figures.backdriving_torque is None:
+        if losses.backdriving_torque is None:
             return static.scaled(1.0, "filled in: as while the motor drives (area 4)")
-        mu = figures.backdriving_torque / self.T_2R
-        start = self._unloaded(self._at(figures.backdriving_temperature)).start
+        mu = losses.backdriving_torque / self.T_2R
+        start = self._unloaded(self._at(losses.backdriving_temperature)).start
         if mu < start:
             self.notes.append(
-                f"Contradiction at standstill: a back-driving torque of {figures.backdriving_torque:g} N·m is less than the "
+                f"Contradiction at standstill: a back-driving torque of {losses.backdriving_torque:g} N·m is less than the "
                 f"starting torque times the ratio, {start * self.T_2R:.4g} N·m. Both are "
                 "kept, so the loss falls a little between them."
             )
@@ -313,7 +311,7 @@ class _Builder:
     ) -> BuiltMap:
         sheet = self.sheet
         torques = (sheet.average_output_torque, sheet.peak_output_torque)
-        most = max([1.5, *(t / self.T_2R for t in torques if t is not None)])
+        top = max([1.5, *(t / self.T_2R for t in torques if t is not None)])
         fastest = max(1.2, self._relative(sheet.max_input_speed or 0.0))
         measured = {*self.unloaded.curve, *driving, *overrunning}
         slow = min([STATIC_TO_RUNNING, *(0.5 * v for v in measured)])
@@ -322,7 +320,7 @@ class _Builder:
 
         def axis(parts: dict[float, _LoadPart], standing: _LoadPart) -> list[float]:
             nodes = {x for L in (*parts.values(), standing) for x in L.loads}
-            return sorted({*nodes, 1.0, max(most, *nodes)})
+            return sorted({*nodes, 1.0, max(top, *nodes)})
 
         up, down = axis(driving, static), axis(overrunning, static_back)
         loads = [-mu for mu in reversed(down)] + [0.0] + up

@@ -67,7 +67,7 @@ class MotorSheet(Record):
     def motor(self) -> Motor:
         """Parameters of eq. (2).
 
-        The rated point and the stall torque of the sheet are kept. So no-load speed is a result; manufacturers' figures are
+        The rated point and the stall torque of the sheet are kept. So no-load speed is a result; manufacturers' data are
         often not consistent with each other, and `no_load_speed_of_model` says by how much.
         """
         missing = self.missing()

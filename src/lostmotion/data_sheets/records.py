@@ -15,12 +15,13 @@ from ..inputs.toml_files import read_toml
 from ..inputs.validation import shown, unknown_key
 from .gearbox_sheet import GearboxSheet
 from .motor_sheet import MotorSheet
+from .sheet import in_current_words
 
 KINDS: dict[str, type[GearboxSheet] | type[MotorSheet]] = {"gearbox": GearboxSheet, "motor": MotorSheet}
 
 
 # Keys of a sheet file that hold for all of its records.
-COMMON = ("kind", "maker", "note")
+COMMON = ("kind", "manufacturer", "note")
 
 
 @cache
@@ -48,6 +49,7 @@ def read_sheets(path: Path) -> list[GearboxSheet | MotorSheet]:
 def parse_sheets(data: dict[str, Any], where: str) -> list[GearboxSheet | MotorSheet]:
     """Records from the contents of a sheet file."""
     known = {*KINDS, *COMMON, "source", "gap"}
+    data = in_current_words(data)
     for key in data:
         if key not in known:
             raise InputError(f"{where}: key {key}: {unknown_key(key, known)}")
@@ -55,7 +57,7 @@ def parse_sheets(data: dict[str, Any], where: str) -> list[GearboxSheet | MotorS
     common = {key: data[key] for key in COMMON if key in data}
     for table, kind in KINDS.items():
         for entry in _tables(data, table, where):
-            own = dict(entry)
+            own = in_current_words(entry)
             which = f"{where}: {table} {own.get('name', '(no name)')}"
             fields = common | own
             for key in ("source", "gap"):  # those of the record, then those of the whole file

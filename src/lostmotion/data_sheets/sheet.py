@@ -1,27 +1,38 @@
-"""What every record of a data sheet has: sources of its figures, and gaps."""
+"""What every record of a data sheet has: sources of its data, and gaps."""
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from ..inputs.part import Part
-from .loss_figures import LossFigures
+from .loss_data import LossData
+
+
+def current_word(word: Any) -> Any:
+    """A key or a status as it is called now: sheets written before may say `maker` for the manufacturer."""
+    return "manufacturer" if word == "maker" else word
+
+
+def in_current_words(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with its keys as they are called now; a key that is given in both words stays, and is refused as unknown."""
+    return {key if current_word(key) in table else current_word(key): value for key, value in table.items()}
 
 
 class Source(Part):
-    """Where figures come from."""
+    """Where data come from."""
 
     figures: tuple[str, ...]
     """keys of the record that it covers"""
-    status: Literal["maker", "transcription", "inferred"]
-    """read in the manufacturer's own text, in somebody's transcription of it, or concluded from other figures"""
+    status: Annotated[Literal["manufacturer", "transcription", "inferred"], BeforeValidator(current_word)]
+    """read in the manufacturer's own text, in somebody's transcription of it, or concluded from other data"""
     text: str
 
 
 class Gap(Part):
-    """A figure that the record lacks."""
+    """A datum that the record lacks."""
 
     figure: str
     where: str
@@ -33,7 +44,7 @@ class Record(Part):
 
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9.-]*$")
     """lower-case letters, digits, dots and dashes"""
-    maker: str = ""
+    manufacturer: str = ""
     title: str = ""
     """as the manufacturer calls it"""
     note: str = ""
@@ -41,25 +52,25 @@ class Record(Part):
     sources: tuple[Source, ...] = ()
     gaps: tuple[Gap, ...] = ()
 
-    def figures(self) -> list[str]:
-        """Dotted keys of all figures that are given."""
+    def given(self) -> list[str]:
+        """Dotted keys of all data that are given."""
         plain = {*Record.model_fields, "kind"}
         out = []
         for name in self.model_fields_set - plain:
             value = getattr(self, name)
-            if isinstance(value, LossFigures):
+            if isinstance(value, LossData):
                 out += [f"losses.{k}" for k in sorted(value.model_fields_set)]
             else:
                 out.append(name)
         return sorted(out)
 
-    def source_of(self, figure: str) -> Source | None:
-        """The source that covers a figure."""
+    def source_of(self, datum: str) -> Source | None:
+        """The source that covers a datum."""
         for source in self.sources:
-            if figure in source.figures or figure.split(".", maxsplit=1)[0] in source.figures:
+            if datum in source.figures or datum.split(".", maxsplit=1)[0] in source.figures:
                 return source
         return None
 
-    def where(self, figure: str) -> str:
-        """Where one would read a figure that is missing."""
-        return next((gap.where for gap in self.gaps if gap.figure == figure), "the manufacturer's data sheet")
+    def where(self, datum: str) -> str:
+        """Where one would read a datum that is missing."""
+        return next((gap.where for gap in self.gaps if gap.figure == datum), "the manufacturer's data sheet")

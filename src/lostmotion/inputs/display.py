@@ -44,12 +44,12 @@ class _Abridged(str):
         return str(self)
 
 
-def abridged(value: Any, longest: int = 6) -> Any:
+def abridged(value: Any, max_entries: int = 6) -> Any:
     """The value; a long list as text with its ends and its length."""
     if not isinstance(value, tuple):
         return value
     if value and isinstance(value[0], tuple):
         return _Abridged(f"({len(value)} x {len(value[0])} numbers)")
-    if len(value) <= longest:
+    if len(value) <= max_entries:
         return value
     return _Abridged(f"({value[0]!r}, {value[1]!r}, ..., {value[-1]!r}; {len(value)} entries)")

@@ -41,7 +41,7 @@ class Limit:
     le: float | None = None
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        # Into the number itself, behind the reading of units, so that the JSON Schema tells it too.
+        # Into the number itself, behind the reading of units, so that the JSON Schema has it too.
         schema: Any = handler(source)
         schema["schema"].update({name: value for name, value in asdict(self).items() if value is not None})
         return schema  # type: ignore[no-any-return]

@@ -15,8 +15,8 @@ from .schema import follow
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-MOST = 5  # problems that one line tells in full
-LONGEST = 60  # characters of a value that is shown
+MAX_PROBLEMS = 5  # problems that one line names in full
+MAX_LENGTH = 60  # characters of a value that is shown
 
 
 def describe(error: ValidationError, schema: Mapping[str, Any], subject: str, given: Any = None) -> str:
@@ -55,8 +55,8 @@ def describe(error: ValidationError, schema: Mapping[str, Any], subject: str, gi
             else f"keys {', '.join(missing)}: are missing; add them"
         )
     texts += [p.sentence(subject) for p in others]
-    more = f"; and {len(texts) - MOST} more" if len(texts) > MOST else ""
-    return "; ".join(texts[:MOST]) + more
+    more = f"; and {len(texts) - MAX_PROBLEMS} more" if len(texts) > MAX_PROBLEMS else ""
+    return "; ".join(texts[:MAX_PROBLEMS]) + more
 
 
 def unknown_key(key: str, known: Iterable[str]) -> str:
@@ -69,7 +69,7 @@ def unknown_key(key: str, known: Iterable[str]) -> str:
 def shown(value: Any) -> str:
     """A value as a TOML file has it, shortened if it is long."""
     text = _toml(value)
-    return text if len(text) < LONGEST else text[: LONGEST - 3] + "..."
+    return text if len(text) < MAX_LENGTH else text[: MAX_LENGTH - 3] + "..."
 
 
 def _toml(value: Any) -> str:

@@ -18,7 +18,7 @@ from ..inputs.quantities import Angle, Frequency, NotNegative, Number, Positive,
 
 V = TypeVar("V")  # the value of the signal, with its unit
 
-Knot = tuple[float, float, float]  # from a time [s] on: value, slope
+Breakpoint = tuple[float, float, float]  # from a time [s] on: value, slope
 
 
 class Sine(Part, Generic[V]):
@@ -35,7 +35,7 @@ class Step(Part, Generic[V]):
     height: V
     time: Annotated[Time, NotNegative] = 0.0
 
-    def knots(self) -> list[Knot]:
+    def breakpoints(self) -> list[Breakpoint]:
         return [(self.time, float(self.height), 0.0)]  # type: ignore[arg-type]
 
 
@@ -46,7 +46,7 @@ class Ramp(Part, Generic[V]):
     duration: Annotated[Time, Positive]
     begin: Annotated[Time, NotNegative] = 0.0
 
-    def knots(self) -> list[Knot]:
+    def breakpoints(self) -> list[Breakpoint]:
         rise = float(self.rise)  # type: ignore[arg-type]
         return [(self.begin, 0.0, rise / self.duration), (self.begin + self.duration, rise, 0.0)]
 
@@ -65,7 +65,7 @@ class Chirp(Part, Generic[V]):
     begin: Annotated[Time, NotNegative] = 0.0
     points_per_period: Annotated[Whole, Field(ge=8, le=1000)] = 64
 
-    def knots(self) -> list[Knot]:
+    def breakpoints(self) -> list[Breakpoint]:
         fastest = max(self.begin_frequency, self.end_frequency)
         n = max(2, math.ceil(self.duration * fastest * self.points_per_period))
         rate = (self.end_frequency - self.begin_frequency) / self.duration
@@ -99,7 +99,7 @@ class Samples(Part, Generic[V]):
                 raise ValueError(f"times must rise, but times[{k + 1}] = {b} follows {a}")
         return self
 
-    def knots(self) -> list[Knot]:
+    def breakpoints(self) -> list[Breakpoint]:
         values = [float(v) for v in self.values]  # type: ignore[arg-type]
         lines = _polyline(self.times, values)
         return lines if self.times[0] == 0.0 else [(0.0, values[0], 0.0), *lines]
@@ -141,22 +141,24 @@ class Signal(Part, Generic[V]):
         own = [] if self.amplitude is None else [(self.amplitude, self.frequency, self.phase)]
         return [*own, *((s.amplitude, s.frequency, s.phase) for s in self.sines)]  # type: ignore[list-item]
 
-    def knot_list(self) -> list[Knot]:
+    def breakpoint_list(self) -> list[Breakpoint]:
         """The piecewise-linear part, from t = 0 on."""
-        pieces = [part.knots() for part in (*self.steps, *self.ramps, self.chirp, self.samples) if part is not None]
+        pieces = [
+            part.breakpoints() for part in (*self.steps, *self.ramps, self.chirp, self.samples) if part is not None
+        ]
         mean = float(self.mean)  # type: ignore[arg-type]
-        knots = []
+        breakpoints = []
         waiting = deque(sorted(pieces, key=lambda piece: piece[0][0]))
-        active: list[list[Knot]] = []
-        final = 0.0  # sum of the pieces that are past their last knot and constant from there on
+        active: list[list[Breakpoint]] = []
+        final = 0.0  # sum of the pieces that are past their last breakpoint and constant from there on
         for time in sorted({0.0, *(t for piece in pieces for t, _, _ in piece)}):
             while waiting and waiting[0][0][0] <= time:
                 active.append(waiting.popleft())
             here = [_at(piece, time) for piece in active]
-            knots.append((time, mean + sum((value for value, _ in here), final), sum(slope for _, slope in here)))
+            breakpoints.append((time, mean + sum((value for value, _ in here), final), sum(slope for _, slope in here)))
             final += sum(value for piece, (value, _) in zip(active, here, strict=True) if time >= piece[-1][0])
             active = [piece for piece in active if time < piece[-1][0]]
-        return knots
+        return breakpoints
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The classes of the parts are generic, and as such have no name by which they could be pickled.
@@ -193,19 +195,19 @@ class Signal(Part, Generic[V]):
 
 @lru_cache(maxsize=256)
 def _core_signal(signal: Signal[Any]) -> _core.Signal:
-    return _core.Signal(signal.knot_list(), signal.sine_list())
+    return _core.Signal(signal.breakpoint_list(), signal.sine_list())
 
 
-def _at(piece: list[Knot], time: float) -> tuple[float, float]:
-    """Value and slope at `time` (right limit); 0 before the first knot."""
-    k = bisect.bisect_right(piece, time, key=lambda knot: knot[0]) - 1
+def _at(piece: list[Breakpoint], time: float) -> tuple[float, float]:
+    """Value and slope at `time` (right limit); 0 before the first breakpoint."""
+    k = bisect.bisect_right(piece, time, key=lambda point: point[0]) - 1
     if k < 0:
         return 0.0, 0.0
     begin, value, slope = piece[k]
     return value + slope * (time - begin), slope
 
 
-def _polyline(times: Any, values: list[float]) -> list[Knot]:
+def _polyline(times: Any, values: list[float]) -> list[Breakpoint]:
     points = list(zip(times, values, strict=True))
     lines = [(t0, v0, (v1 - v0) / (t1 - t0)) for (t0, v0), (t1, v1) in itertools.pairwise(points)]
     return [*lines, (times[-1], values[-1], 0.0)]

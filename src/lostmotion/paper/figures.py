@@ -138,7 +138,7 @@ def _motion_specs(results: Results) -> Iterator[FigureSpec]:
     yield FigureSpec(
         "12",
         "Load speed and output torque, detail",
-        "The reversal of figure 11 enlarged: the load swings on within the zone of low stiffness while the motor stands still.",
+        "The reversal of figure 11 enlarged: the load swings on within the zone of low stiffness while the motor is at rest.",
         _speed_and_load(results, x_range=(1.4, 1.7)),
     )
 
@@ -150,7 +150,7 @@ def _gearbox_specs(results: Results) -> Iterator[FigureSpec]:
     yield FigureSpec(
         "13",
         "Loss coefficient along the motion",
-        "m_2B at each instant. It never falls to zero; where the shaft stands it is the start-up value.",
+        "m_2B at each instant. It never falls to zero; where the shaft is at rest it is the start-up value.",
         tuple(
             _pairs(
                 results,

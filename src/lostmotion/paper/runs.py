@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 FREQUENCIES = np.geomspace(0.1, 100.0, 61)  # [Hz], twenty a decade
 
-WORK = len(MODELS) * len(AMPLITUDES) + 2 * len(FREQUENCIES)  # how often `compute` tells its progress
+WORK = len(MODELS) * len(AMPLITUDES) + 2 * len(FREQUENCIES)  # how often `compute` reports its progress
 
 
 @dataclass

@@ -98,7 +98,7 @@ def _counts(records: list[GearboxSheet | MotorSheet]) -> str:
 
 
 def record_text(name: str) -> str:
-    """One record: figures with the status of their source, sources, gaps.
+    """One record: data with the status of their source, sources, gaps.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def record_text(name: str) -> str:
     table = kinds.get(name) or _table(read_sheets(Path(name))[0])
     record = find(name, table)
     rows = rows_of(record)
-    lines = [f"{record.name}: {table}, {record.maker} {record.title}".strip(), ""]
+    lines = [f"{record.name}: {table}, {record.manufacturer} {record.title}".strip(), ""]
     lines += [f"  {what:<52} {value:<26} {status}" for what, value, status in rows]
     if isinstance(record, MotorSheet) and not record.missing() and record.no_load_speed is not None:
         lines += [

@@ -54,16 +54,16 @@ class Picture(Figure):
         return png.getvalue()
 
 
-MOST_POINTS = 10_000  # of a curve that is drawn; more than twice the pixels across any figure
+MAX_POINTS = 10_000  # of a curve that is drawn; more than twice the pixels across any figure
 
 
-def thinned(x: Any, y: Any, most: int = MOST_POINTS) -> tuple[Any, Any]:
+def thinned(x: Any, y: Any, max_points: int = MAX_POINTS) -> tuple[Any, Any]:
     """Points of a curve that look the same: of each run of neighbours the first and the extremes of both coordinates."""
     n = len(y)
-    if n <= most:
+    if n <= max_points:
         return x, y
     x, y = np.asarray(x), np.asarray(y)
-    width = -(-n * 5 // most)
+    width = -(-n * 5 // max_points)
     whole = n // width * width
     firsts = np.arange(0, whole, width)
     kept: list[Any] = [firsts, np.arange(whole, n), [n - 1]]

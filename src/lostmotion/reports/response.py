@@ -38,11 +38,12 @@ def points_csv(response: xarray.Dataset, output: str) -> str:
             value = complex(p["response"].sel(output=output))
             numbers = [abs(value), np.degrees(np.angle(value)), float(p["distortion"].sel(output=output))]
             numbers += [
-                float(p[k]) for k in ("efficiency", "motor_power", "gear_loss", "drift", "residual", "multiplier")
+                float(p[k])
+                for k in ("efficiency", "motor_power", "gear_loss", "angle_advance", "residual", "multiplier")
             ]
             rows.append([a, f, *numbers, str(p["reason"].item())])
     header = ["amplitude", "frequency [Hz]", "gain", "phase [degrees]", "distortion", "efficiency", "motor_power [W]"]
-    return table_csv([*header, "gear_loss [W]", "drift [rad]", "residual", "multiplier", "reason"], rows)
+    return table_csv([*header, "gear_loss [W]", "angle advance [rad]", "residual", "multiplier", "reason"], rows)
 
 
 def write_response(

@@ -25,7 +25,7 @@ def panels(report: RigReport, sheet: GearboxSheet | None) -> list[Panel]:
     """The six panels of the sheet."""
     efficiency, lost = _over_load(report, "efficiency"), _over_load(report, "loss_torque")
     rpm, no_load = RPM * report.map["input_speed"].values, report.no_load[1]
-    twist, torque = report.virgin
+    twist, torque = report.initial_loading
     running = [Curve("rig", rpm, no_load, _line(SHADES[0]))]
     torsion = [Curve("rig, first loading", 1e3 * twist, torque, _line(SHADES[0]))]
     if sheet is not None:
@@ -122,8 +122,8 @@ def write_sheet(
     write_text(
         directory / "comparison.csv",
         table_csv(
-            ["figure", "unit", "catalogue", "rig", "relative difference", "remark"],
-            ([c.figure, c.unit, c.catalogue, c.rig, c.difference, c.remark] for c in report.comparisons),
+            ["quantity", "unit", "catalogue", "rig", "relative difference", "remark"],
+            ([c.quantity, c.unit, c.catalogue, c.rig, c.difference, c.remark] for c in report.comparisons),
         ),
     )
     table = report.map

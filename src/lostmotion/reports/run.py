@@ -18,7 +18,7 @@ def summary(result: xarray.Dataset | RawResult) -> str:
     def last(name: str) -> float:
         return float(np.asarray(result[name])[-1])
 
-    def largest(name: str) -> float:
+    def peak(name: str) -> float:
         return float(np.max(np.abs(np.asarray(result[name]))))
 
     stuck = float(np.mean(np.asarray(result["input_contact"]) == 0))
@@ -27,8 +27,8 @@ def summary(result: xarray.Dataset | RawResult) -> str:
         f"  {last('time'):g} s, {result.attrs['switching_count']} events, solver {result.attrs['solver']}",
         f"  at the end: motor {last('motor_speed'):.6g} rad/s, load {last('load_speed'):.6g} rad/s "
         f"at {last('load_angle'):.6g} rad, twist {1e3 * last('twist'):.4g} mrad",
-        f"  largest: motor torque {largest('motor_torque'):.4g} N·m, output torque "
-        f"{largest('output_torque'):.4g} N·m, load speed {largest('load_speed'):.4g} rad/s",
+        f"  peak: motor torque {peak('motor_torque'):.4g} N·m, output torque "
+        f"{peak('output_torque'):.4g} N·m, load speed {peak('load_speed'):.4g} rad/s",
         f"  input shaft stuck for {100.0 * stuck:.1f} % of the samples",
     ]
     if "energy" in result.attrs:

@@ -1,4 +1,4 @@
-"""The figures of a data sheet as rows of text, in the units that data sheets use."""
+"""The data of a data sheet as rows of text, in the units that data sheets use."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ..units.practical import practical
 
 
 def rows_of(record: Record) -> list[tuple[str, str, str]]:
-    """(figure, value, status of its source) of all figures of a record."""
+    """(quantity, value, status of its source) of all data of a record."""
     fields = type(record).model_json_schema()["properties"]
     out: list[tuple[str, str, str]] = []
 
     def add(key: str, label: str, text: str) -> None:
         source = record.source_of(key)
-        out.append((label, text, source.status if source else "own figure"))
+        out.append((label, text, source.status if source else "own value"))
 
     for name in type(record).model_fields:
         value = getattr(record, name)
@@ -63,7 +63,7 @@ def _add_losses(losses: Any, add: Any) -> None:
 
 
 def rows_of_part(g: Gearbox) -> list[tuple[str, str, str]]:
-    """The figures of a gearbox that has no sheet."""
+    """The data of a gearbox that has no sheet."""
     names = (("rated_output_torque", "N*m"), ("rated_input_speed", "rad/s"), ("inertia", "kg*m^2"))
-    plain = [(name.replace("_", " "), practical(getattr(g, name), unit), "own figure") for name, unit in names]
-    return [("ratio", f"{g.ratio:g}", "own figure"), *plain]
+    plain = [(name.replace("_", " "), practical(getattr(g, name), unit), "own value") for name, unit in names]
+    return [("ratio", f"{g.ratio:g}", "own value"), *plain]

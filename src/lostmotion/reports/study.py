@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from matplotlib.figure import Figure
 
-MOST_LABELS = 20  # names along an axis
+MAX_LABELS = 20  # names along an axis
 INK, ACCENT = STYLES["2-DOF-NL"]["color"], STYLES["2-DOF-L"]["color"]
 
 
@@ -171,9 +171,9 @@ def bars(values: dict[str, dict[str, Any]], label: str) -> Figure:
 
 
 @in_our_looks
-def scatter(table: pa.Table, study: Study, most: int = 6) -> Figure:
+def scatter(table: pa.Table, study: Study, max_columns: int = 6) -> Figure:
     """Kept values over parameters, at most six of each and 5000 points."""
-    keep, vary = list(study.keep)[:most], study.vary[:most]
+    keep, vary = list(study.keep)[:max_columns], study.vary[:max_columns]
     some = table.take(np.linspace(0, table.num_rows - 1, min(table.num_rows, 5000)).astype(int))
     figure = Picture(figsize=(max(4.5, 2.6 * len(vary)), 2.3 * len(keep)))
     for r, name in enumerate(keep):
@@ -184,7 +184,7 @@ def scatter(table: pa.Table, study: Study, most: int = 6) -> Figure:
             axes.plot(places, some[name].to_numpy(), ".", markersize=2.5, color=INK, alpha=0.5)
             axes.tick_params(labelsize=7)
             if v.names is not None:
-                few = len(v.names) <= MOST_LABELS and r == len(keep) - 1
+                few = len(v.names) <= MAX_LABELS and r == len(keep) - 1
                 axes.set_xticks(range(len(v.names)), v.names if few else [""] * len(v.names), rotation=90, fontsize=6)
             if r == len(keep) - 1:
                 axes.set_xlabel(labelled(table, v.title), fontsize=8)
@@ -199,7 +199,7 @@ def show(directory: Path) -> list[str]:
     need("scipy", "Showing a study", "study")
     study, table = study_of(directory), read_table(directory)
     rows = statistics(table, study)
-    header = ["", "mean", "std. dev.", "least", "5 %", "50 %", "95 %", "largest"]
+    header = ["", "mean", "std. dev.", "min", "5 %", "50 %", "95 %", "max"]
     failed = [e for e in table["error"].to_pylist() if e]
     lines = [study.title or str(directory), f"  {table.num_rows} of {study.total} runs, {len(failed)} failed"]
     lines += [f"    {failed.count(e)} x {e}" for e in list(dict.fromkeys(failed))[:5]]

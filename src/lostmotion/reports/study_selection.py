@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INK, ACCENT = STYLES["2-DOF-NL"]["color"], STYLES["2-DOF-L"]["color"]
-MOST = 10  # lines of each list that are printed; selection.csv has all
-MOST_NAMES = 12  # along the front of the plot
+MAX_LINES = 10  # lines of each list that are printed; selection.csv has all
+MAX_NAMES = 12  # along the front of the plot
 
 
 def show_selection(table: pa.Table, study: Study, view: Path) -> list[str]:
@@ -70,19 +70,19 @@ def _ranking(table: pa.Table, ranked: list[Candidate], front: list[Candidate], s
     lines = [f"Selection: {len(fitting)} of {len(ranked)} fit" + (f", {failed} cannot be run" if failed else "")]
     if not fitting:
         return lines
-    width = max(len(c.name) for c in fitting[:MOST]) + 2
+    width = max(len(c.name) for c in fitting[:MAX_LINES]) + 2
     titles = [f"{labelled(table, column)}, {direction}" for column, direction in select.objectives.items()]
     columns = [max(12, len(title) + 2) for title in titles]
     lines.append(" " * (width + 2) + "".join(t.rjust(w) for t, w in zip(titles, columns, strict=True)))
     on_front = {c.run for c in front}
-    for c in fitting[:MOST]:
+    for c in fitting[:MAX_LINES]:
         values = "".join(f"{v:.5g}".rjust(w) for v, w in zip(c.values.values(), columns, strict=True))
         notes = ["Pareto front"] if len(select.objectives) > 1 and c.run in on_front else []
         notes += [f"tightest: {c.tightest}"] if c.tightest else []
         notes += [f"not judged: {c.not_judged}"] if c.not_judged else []
         lines.append(f"  {c.name.ljust(width)}{values}" + (f"  ({'; '.join(notes)})" if notes else ""))
-    if len(fitting) > MOST:
-        lines.append(f"  and {len(fitting) - MOST} more, see selection.csv")
+    if len(fitting) > MAX_LINES:
+        lines.append(f"  and {len(fitting) - MAX_LINES} more, see selection.csv")
     return lines
 
 
@@ -104,8 +104,8 @@ def _costs(table: pa.Table, costs: list[Price], objective: str) -> list[str]:
 def _misfits(ranked: list[Candidate]) -> list[str]:
     out = [c for c in ranked if not c.fits]
     lines = ["Why the others do not fit:"] if out else []
-    lines += [f"  {c.name}: {c.why}" for c in out[:MOST]]
-    return [*lines, f"  and {len(out) - MOST} more, see selection.csv"] if len(out) > MOST else lines
+    lines += [f"  {c.name}: {c.why}" for c in out[:MAX_LINES]]
+    return [*lines, f"  and {len(out) - MAX_LINES} more, see selection.csv"] if len(out) > MAX_LINES else lines
 
 
 @in_our_looks
@@ -122,7 +122,7 @@ def pareto_figure(table: pa.Table, ranked: list[Candidate], front: list[Candidat
         axes.plot([c.values[x] for c in group], [c.values[y] for c in group], linestyle="", markersize=4, **style)
     ordered = sorted(front, key=lambda c: c.values[x])
     axes.plot([c.values[x] for c in ordered], [c.values[y] for c in ordered], color=ACCENT, label="Pareto front")
-    for c in ordered[:MOST_NAMES]:
+    for c in ordered[:MAX_NAMES]:
         point = (c.values[x], c.values[y])
         axes.annotate(c.name, point, textcoords="offset points", xytext=(4, 4), fontsize=6)
     axes.set(

@@ -73,7 +73,7 @@ def frequency_response(
         Over ``amplitude`` and ``frequency`` [Hz], with ``output`` and ``harmonic``: complex ``response`` (first harmonic
         of each output / that of the input), ``harmonics`` (complex amplitudes, 0 the mean), ``distortion`` (rms of all
         above the first / of the first), ``efficiency`` (mean power out of the gear / mean motor power), ``motor_power``,
-        ``load_power``, ``gear_loss`` [W], ``drift`` [rad] a period, ``residual`` of periodicity, ``periods``,
+        ``load_power``, ``gear_loss`` [W], ``angle_advance`` [rad] of the load a period, ``residual`` of periodicity, ``periods``,
         ``newton_steps``, ``multiplier`` (largest Floquet multiplier), ``stable``, ``reason`` (empty where a motion was
         found; elsewhere why not, and the values are NaN).
 
@@ -173,11 +173,19 @@ OF_EACH_POINT = {
     "motor_power": ("W", "mean mechanical power of the motor"),
     "load_power": ("W", "mean power on the load's side of the gear"),
     "gear_loss": ("W", "mean power lost in the gear, torsion included"),
-    "drift": ("rad", "of the load angle over one period"),
+    "angle_advance": ("rad", "advance of the load angle over one period"),
     "residual": ("1", "change of a state over one period"),
     "periods": ("1", "periods followed"),
     "newton_steps": ("1", "steps of Newton's method"),
     "multiplier": ("1", "largest Floquet multiplier"),
+}
+
+# Those that are computed by the core, and NaN where no motion was found: name -> the core's.
+CORE_NAMES = {
+    "motor_power": "motor_power",
+    "load_power": "load_power",
+    "gear_loss": "gear_loss",
+    "angle_advance": "drift",
 }
 
 
@@ -236,14 +244,14 @@ def _harmonics(
 def _of_each_point(r: dict[str, Any], found: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """The values of `OF_EACH_POINT`, and whether the motion is stable."""
     points = {name: r[name].reshape(found.shape) for name in ("residual", "periods", "newton_steps")}
-    for name in ("motor_power", "load_power", "gear_loss", "drift"):
-        points[name] = np.where(found, r[name].reshape(found.shape), np.nan)
+    for name, key in CORE_NAMES.items():
+        points[name] = np.where(found, r[key].reshape(found.shape), np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
         efficiency = points["load_power"] / points["motor_power"]
     points["efficiency"] = np.where(points["motor_power"] > 0.0, efficiency, np.nan)
     multipliers = [floquet_multipliers(j) for j in r["jacobian"]]
-    largest = np.array([abs(m[0]) for m in multipliers]).reshape(found.shape)
-    points["multiplier"] = np.where(found, largest, np.nan)
+    largest_multiplier = np.array([abs(m[0]) for m in multipliers]).reshape(found.shape)
+    points["multiplier"] = np.where(found, largest_multiplier, np.nan)
     return points, found & np.array([is_stable(m) for m in multipliers]).reshape(found.shape)
 
 

@@ -132,8 +132,8 @@ def python_control() -> Any:
 
 
 def _pairs(values: np.ndarray) -> list[tuple[float, float]]:
-    size = np.abs(values)
-    complex_ones = values[values.imag > 1e-9 * (size + 1e-300)]
+    magnitude = np.abs(values)
+    complex_ones = values[values.imag > 1e-9 * (magnitude + 1e-300)]
     found = [(abs(v) / (2.0 * np.pi), -v.real / abs(v)) for v in complex_ones]
     return sorted((float(f), float(xi)) for f, xi in found)
 

@@ -24,10 +24,10 @@ SAMPLES_PER_PERIOD = 2048
 MAX_PERIODS = 20_000
 PERIODICITY = 1e-10  # largest change of a state over one period / its magnitude, for a motion to count as periodic
 NEUTRAL = 1e-6  # a Floquet multiplier this near 1 belongs to a direction in which a sticking drive may rest anywhere
-SAME = 1e-5  # solutions that differ by less, in parts of their size, are one
+SAME = 1e-5  # solutions that differ by less, relative to their magnitude, are one
 
 # Of the components that the core's Jacobian goes over: all but the load angle, which is neutral.
-COMPONENTS = (*STATES, "hysteresis_capacity", "held_torque")
+COMPONENTS = (*STATES, "hysteresis_capacity", "locked_torque")
 _ACTIVE = [k for k, name in enumerate(COMPONENTS) if name != "load_angle"]
 
 
@@ -109,7 +109,7 @@ def periodic_motion(
     """A periodic motion under periodic inputs, by shooting.
 
     Newton's method on the map over one period, with its exact Jacobian; it is entered after a few periods from `start`,
-    and where it does not converge, the transient is followed further. The load angle is neutral: it may drift.
+    and where it does not converge, the transient is followed further. The load angle is neutral: it may advance from period to period.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def periodic_motion(
     -------
     xarray.Dataset
         The result variables over one period, and the ``jacobian`` of the map over it. Attributes: ``residual`` (largest change of a state over the period / its
-        largest magnitude), ``drift`` of the load angle [rad], ``multipliers_real`` and ``multipliers_imag`` (Floquet),
+        largest magnitude), ``angle_advance`` of the load [rad], ``multipliers_real`` and ``multipliers_imag`` (Floquet),
         ``stable``, ``smooth`` (the multipliers are exact: no switching grazes), ``periods`` followed, ``newton_steps``,
         ``start_<state>``, ``period`` [s], ``gear_ratio``.
 
@@ -183,7 +183,7 @@ def _motion(r: dict[str, Any], drive: Drive, period: float) -> xarray.Dataset:
             "period": period,
             "gear_ratio": drive.gearbox.ratio,
             "residual": float(r["residual"][0]),
-            "drift": float(r["drift"][0]),
+            "angle_advance": float(r["drift"][0]),
             "multipliers_real": multipliers.real.tolist(),
             "multipliers_imag": multipliers.imag.tolist(),
             "stable": int(is_stable(multipliers)),
@@ -231,8 +231,8 @@ def _same(drive: Drive, a: xarray.Dataset, b: xarray.Dataset) -> bool:
     if a.attrs["period"] < b.attrs["period"]:
         a, b = b, a
     g = drive.gearbox
-    # What is smaller than this does not tell motions apart.
-    least = {
+    # What is smaller than this is no difference between motions.
+    floors = {
         "motor_speed": SAME * g.rated_input_speed,
         "load_speed": SAME * g.rated_input_speed / g.ratio,
         "output_torque": SAME * g.rated_output_torque,
@@ -244,7 +244,7 @@ def _same(drive: Drive, a: xarray.Dataset, b: xarray.Dataset) -> bool:
     for shift in range(times):
         at = (t + shift * b.attrs["period"]) % b.attrs["period"]
         gaps = []
-        for name, floor in least.items():
+        for name, floor in floors.items():
             x, y = a[name].values, b[name].values
             other = y if times == 1 else np.interp(at, b["time"].values, y, period=b.attrs["period"])
             gaps.append(np.max(np.abs(x - other)) / max(np.max(np.abs(x)), np.max(np.abs(y)), floor, 1e-300))

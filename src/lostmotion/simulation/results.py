@@ -111,7 +111,7 @@ def add_derived(data: dict[str, Any], ratio: Any) -> None:
 
 
 def gear_efficiency(data: dict[str, Any], ratio: Any) -> Any:
-    """Useful torque / torque fed in [-], by the direction of the load; NaN where the input shaft stands still.
+    """Useful torque / torque fed in [-], by the direction of the load; NaN where the input shaft is at rest.
 
     Driving (T_2 has the sign of w_M) it is T_2/(i T_1), overrunning i T_1/T_2; 0 where both sides feed the losses.
     """

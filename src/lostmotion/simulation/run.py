@@ -96,9 +96,9 @@ def run(
             f'relative_tolerance {relative_tolerance:g}: the exact solver has none; leave it out, or give solver="dormand-prince"'
         )
     tolerance = TOLERANCE if relative_tolerance is None else relative_tolerance
-    least, largest = TOLERANCES
-    if not least <= tolerance <= largest:
-        raise InputError(f"relative_tolerance {tolerance:g} must lie between {least:g} and {largest:g}")
+    low, high = TOLERANCES
+    if not low <= tolerance <= high:
+        raise InputError(f"relative_tolerance {tolerance:g} must lie between {low:g} and {high:g}")
     table = scenario.simulation
     check_memory(table.samples)
     result = _core.run(
@@ -131,7 +131,7 @@ def check_memory(samples: int) -> None:
 
 
 def free_memory() -> int | None:
-    """Bytes of memory that programs can still have, or None where the system does not tell."""
+    """Bytes of memory that programs can still have, or None where the system does not say."""
     try:
         with open("/proc/meminfo", encoding="ascii") as table:
             kilobytes = next(line.split()[1] for line in table if line.startswith("MemAvailable:"))

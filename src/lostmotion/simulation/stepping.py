@@ -18,7 +18,7 @@ from .run import start_state
 from .scenario import Initial, Scenario, drive_of
 from .variables import CHANNEL_NAMES, VARIABLES
 
-SHORTEST_INTERVAL, LONGEST_INTERVAL = 1e-12, 1e12
+MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 """Of a step [s]: below, it is lost in the rounding of the time; above, in that of a motion's phase."""
 
 _CHANNEL = {name: k for k, name in enumerate(CHANNEL_NAMES)}
@@ -55,8 +55,8 @@ class Simulation:
 
     def __init__(self, drive: Drive | Scenario, *, step: float = 1e-3, initial: Initial | None = None) -> None:
         step = argument("step", step, "s")
-        if not SHORTEST_INTERVAL <= step <= LONGEST_INTERVAL:
-            raise InputError(f"step {step} s must lie between {SHORTEST_INTERVAL:g} s and {LONGEST_INTERVAL:g} s")
+        if not MIN_INTERVAL <= step <= MAX_INTERVAL:
+            raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
         if initial is None:
             initial = drive.initial if isinstance(drive, Scenario) else Initial()
         self._drive = drive_of(drive)
@@ -117,16 +117,14 @@ class Simulation:
         c0, c1 = command if isinstance(command, tuple) else (command, command)
         m0, m1 = load_torque if isinstance(load_torque, tuple) else (load_torque, load_torque)
         try:
-            within = SHORTEST_INTERVAL <= interval <= LONGEST_INTERVAL
+            within = MIN_INTERVAL <= interval <= MAX_INTERVAL
             finite = c0 - c0 == 0.0 and c1 - c1 == 0.0 and m0 - m0 == 0.0 and m1 - m1 == 0.0
         except TypeError:
             raise InputError(
                 f"interval {shown(interval)}, command {shown(command)} and load_torque {shown(load_torque)} must be numbers (SI)"
             ) from None
         if not within:
-            raise InputError(
-                f"interval {interval} s must lie between {SHORTEST_INTERVAL:g} s and {LONGEST_INTERVAL:g} s"
-            )
+            raise InputError(f"interval {interval} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
         if not finite:
             raise InputError(f"command {command} and load_torque {load_torque} must be finite")
         if self.time + interval == self.time:

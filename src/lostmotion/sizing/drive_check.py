@@ -163,7 +163,7 @@ def _within(
     key: str = "",
     cycle: DutyCycle | None = None,
 ) -> Finding:
-    """Compares a figure with its limit; `key` of the scenario would give it."""
+    """Compares a value with its limit; `key` of the scenario would give it."""
     over = "" if cycle is None else f", {cycle}"
     if limit is None:
         return Finding(rule, what, f"{value:.4g} {unit}{over}", "unknown", f"no {name} is given: {key}")

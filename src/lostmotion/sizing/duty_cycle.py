@@ -16,7 +16,7 @@ from ..errors import InputError
 if TYPE_CHECKING:
     import xarray
 
-STANDSTILL = 1e-3  # below this share of its largest speed the motor is taken to stand still
+STANDSTILL = 1e-3  # below this share of its largest speed the motor is taken to be at rest
 SHORTEST = 0.01  # of the time in motion; a shorter standstill is no rest
 STEADY = 0.01  # of the largest motor torque, within which it does not change at rest
 

@@ -9,7 +9,7 @@ from ..model.signals import Ramp, TorqueSignal
 from ..simulation.run import simulate
 from ..simulation.scenario import Initial, Scenario
 
-LONGEST = 1000.0  # [s]
+MAX_DURATION = 1000.0  # [s]
 SAMPLES = 2000
 SLOW = 0.01  # of the rated input speed, where the run itself does not move
 STEADY = 1e-3  # relative change from one quarter of a run to the next at which the speed is taken to last
@@ -40,7 +40,7 @@ class Holding:
 
 
 def holding(scenario: Scenario, load_torque: float, speed: float) -> Holding:
-    """How a drive with command 0 stands a constant load torque.
+    """How a drive with command 0 bears a constant load torque.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def _lasting_speed(scenario: Scenario, load_torque: TorqueSignal, start: Initial
         last, before = angle[-1] - angle[-1 - quarter], angle[-1 - quarter] - angle[-1 - half]
         if not run["motor_speed"].values[-quarter:].any():
             return 0.0
-        if abs(last - before) < STEADY * abs(last) or duration > LONGEST:
+        if abs(last - before) < STEADY * abs(last) or duration > MAX_DURATION:
             return float(last / (0.25 * duration))
         if abs(last) > abs(before) and duration > RUNAWAY:
             return math.copysign(math.inf, last)

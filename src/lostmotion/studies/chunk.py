@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 SLOPES = "gearbox.stiffness.slopes"
 DERIVED = frozenset(v.name for v in VARIABLES if v.derived)
 SLOW_RUNS = 20  # in a piece of those that are made one by one
-MOST_NUMBERS = 2**23  # of samples that are held at once: 64 megabytes
+MAX_NUMBERS = 2**23  # of samples that are held at once: 64 megabytes
 
 
 def compute_chunk(text: str, first: int, last: int, threads: int = 1) -> bytes:
@@ -55,7 +55,7 @@ def pieces(study: Study, first: int, last: int) -> list[tuple[int, int]]:
     if not needed:
         return [(a, min(a + SLOW_RUNS, last)) for a in range(first, last, SLOW_RUNS)]
     arrays = len(CHANNEL_NAMES) if needed & DERIVED else len(needed)
-    size = max(1, MOST_NUMBERS // (arrays * study.scenario.simulation.samples))
+    size = max(1, MAX_NUMBERS // (arrays * study.scenario.simulation.samples))
     size = size if fast else min(size, SLOW_RUNS)
     return [(a, min(a + size, last)) for a in range(first, last, size)]
 

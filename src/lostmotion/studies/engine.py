@@ -73,7 +73,7 @@ def _silent(done: int) -> None:
 
 
 def _rising(progress: Callable[[int], None]) -> Callable[[int], None]:
-    """The same, told of the furthest only: a chunk is simulated while the one before it is being written."""
+    """The same, notified of the furthest only: a chunk is simulated while the one before it is being written."""
     furthest = 0
 
     def report(done: int) -> None:

@@ -24,7 +24,7 @@ from .select import SHARES, USE, Selection, check_bounds
 from .vary import Vary, base_value, check_key, scaled
 
 MAX_RUNS = 100_000_000
-MOST_BASES = 100  # with other records, that are kept
+MAX_BASES = 100  # with other records, that are kept
 OWN_COLUMNS = ("run", "error", "switchings", "violated", "why", "not judged")
 
 
@@ -118,9 +118,9 @@ class Study(Part):
     def _check_kept(self, expression: Expression) -> None:
         table = self.scenario.simulation
         if any(not -table.samples <= k < table.samples for k in expression.indices):
-            raise ValueError(f"{expression.text!r} looks at a sample that a run of {table.samples} does not have")
+            raise ValueError(f"{expression.text!r} reads a sample that a run of {table.samples} does not have")
         if any(not 0.0 <= t <= table.duration for t in expression.instants):
-            raise ValueError(f"{expression.text!r} looks at an instant outside the {table.duration} s of a run")
+            raise ValueError(f"{expression.text!r} reads an instant outside the {table.duration} s of a run")
         motor_varies = any(TABLE_OF.get(key) == "motor" for v in self.vary for key in v.all_keys)
         if "ideal_speed" in expression.names and self.scenario.motor.kind != "dc" and not motor_varies:
             raise ValueError("ideal_speed needs a motor of kind dc; a torque source has no speed of its own")
@@ -192,7 +192,7 @@ class Study(Part):
             # The names first, so that the conditions find them.
             order = sorted(records, key=lambda k: k not in TABLE_OF)
             found = with_records(self.tables, {k: records[k] for k in order})
-            if len(self._bases) >= MOST_BASES:
+            if len(self._bases) >= MAX_BASES:
                 self._bases.clear()
             self._bases[key] = found
         return found

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..data_sheets.components import Conditions
 from ..data_sheets.records import KINDS, catalogue, find
+from ..data_sheets.sheet import in_current_words
 from ..errors import InputError
 from ..inputs.schema import unit_in_schema
 from ..simulation.scenario import Scenario, from_tables
@@ -27,28 +28,29 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
     table
         ``"gearbox"`` or ``"motor"``.
     wanted
-        For each figure of a record a text with ``*`` for anything (``kind``, ``maker``, ``name``), or least and largest value. A
-        record that lacks the figure does not fit.
+        For each datum of a record a text with ``*`` for anything (``kind``, ``manufacturer``, ``name``), or minimum and maximum. A
+        record that lacks the datum does not fit.
 
     Raises
     ------
     ValueError
-        A key is no figure of such records, its value is neither, or nothing fits.
+        A key is no datum of such records, its value is neither, or nothing fits.
     """
     schema = KINDS[table].model_json_schema()["properties"]
     known = [key for key, node in schema.items() if unit_in_schema(node) is not None or _is_text(key)]
     bounds = {}
+    wanted = in_current_words(wanted)
     for key, value in wanted.items():
         if key not in known:
             raise ValueError(
-                f"has catalogue.{key}, which is no figure of a {table}; they are {', '.join(sorted(known))}"
+                f"has catalogue.{key}, which is no datum of a {table}; they are {', '.join(sorted(known))}"
             )
         if _is_text(key):
             if not isinstance(value, str):
                 raise ValueError(f"has catalogue.{key} = {value!r}; it must be a text, * standing for anything")
             continue
         if not isinstance(value, list | tuple) or len(value) != 2:
-            raise ValueError(f"has catalogue.{key} = {value!r}; it must be a list of least and largest value")
+            raise ValueError(f"has catalogue.{key} = {value!r}; it must be a list of minimum and maximum")
         try:
             bounds[key] = [float(x) for x in in_si(value, unit_in_schema(schema[key]))]
         except (TypeError, ValueError) as error:
@@ -58,8 +60,8 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
         if not isinstance(record, KINDS[table]):
             continue
         texts = all(fnmatchcase(str(getattr(record, k)), v) for k, v in wanted.items() if _is_text(k))
-        figures = {key: getattr(record, key) for key in bounds}
-        if texts and all(x is not None and bounds[k][0] <= x <= bounds[k][1] for k, x in figures.items()):
+        numbers = {key: getattr(record, key) for key in bounds}
+        if texts and all(x is not None and bounds[k][0] <= x <= bounds[k][1] for k, x in numbers.items()):
             found.append(record.name)
     if not found:
         raise ValueError(f"has a catalogue filter that no {table} fits; `lostmotion catalogue` lists them")
@@ -67,7 +69,7 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
 
 
 def _is_text(key: str) -> bool:
-    return key in ("name", "kind", "maker")
+    return key in ("name", "kind", "manufacturer")
 
 
 def check_names(table: str, names: Any) -> None:

@@ -15,7 +15,7 @@ Direction = Literal["least", "largest"]
 USE = "use of "
 """begins the columns of the drive check: the share of each limit that is used"""
 SHARES = tuple(rule for rule in RULES if rule not in ("resonance", "dead_zone", "holding", "loss_map"))
-"""rules of the drive check that compare a figure with a limit"""
+"""rules of the drive check that compare a value with a limit"""
 
 
 class Bound(Part):
@@ -38,7 +38,7 @@ class Bound(Part):
         return self
 
     def in_unit(self, unit: str | None) -> tuple[float, float]:
-        """(least, largest) permissible value in a unit; None: it is not known, any is taken in SI.
+        """(minimum, maximum) permissible value in a unit; None: it is not known, any is taken in SI.
 
         Raises
         ------

@@ -32,7 +32,7 @@ class Candidate:
     values: dict[str, float]
     """of the objectives"""
     tightest: str = ""
-    """the rule of the drive check whose limit is used most, and its share"""
+    """the rule of the drive check whose limit is used critical, and its share"""
 
     @property
     def fits(self) -> bool:
@@ -52,7 +52,7 @@ class Price:
     best: Candidate | None
     """the best that would fit without it"""
     gain: float
-    """by how much the first objective would then be better, as a share of its value now; NaN where there is no such figure"""
+    """by how much the first objective would then be better, as a share of its value now; NaN where there is no such value"""
 
 
 def candidates(table: pa.Table, study: Study) -> list[Candidate]:
@@ -100,13 +100,13 @@ def _candidate(
             violated.append(column)
             why.append(f"{column} has no value")
     uses = {rule: use for rule in SHARES if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
-    most = max(uses, key=lambda rule: uses[rule], default="")
-    tightest = f"{most} {100.0 * uses[most]:.0f} %" if most else ""
+    critical = max(uses, key=lambda rule: uses[rule], default="")
+    tightest = f"{critical} {100.0 * uses[critical]:.0f} %" if critical else ""
     return Candidate(row["run"], name, tuple(violated), "; ".join(why), row.get("not judged", ""), values, tightest)
 
 
 def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
-    """What each limit costs that some run violates, the one that excludes most first.
+    """What each limit costs that some run violates, the one that excludes critical first.
 
     Parameters
     ----------

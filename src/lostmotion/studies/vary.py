@@ -16,7 +16,7 @@ from ..simulation.scenario import Scenario
 from .records import CONDITIONS, TABLE_OF, check_names, names_that_fit
 from .units import in_si, unit_of_key
 
-MOST_LEVELS = 1_000_000  # of one parameter
+MAX_LEVELS = 1_000_000  # of one parameter
 WAYS = ("values", "grid", "uniform", "log_uniform", "normal", "triangular")
 
 
@@ -50,7 +50,7 @@ class Vary(Part):
     log_uniform: tuple[float, float] | None = None
     normal: Normal | None = None
     triangular: tuple[float, float, float] | None = None
-    """least, most likely, largest"""
+    """minimum, mode, maximum"""
 
     @model_validator(mode="before")
     @classmethod
@@ -85,8 +85,8 @@ class Vary(Part):
             raise ValueError(f"of {self.title}: {pair[0]} must be below {pair[1]}")
         if self.log_uniform is not None and self.log_uniform[0] <= 0.0:
             raise ValueError(f"of {self.title}: log_uniform needs positive bounds")
-        if self.grid is not None and not 1 <= self.grid[2] <= MOST_LEVELS:
-            raise ValueError(f"of {self.title}: grid needs 1 to {MOST_LEVELS} values, not {self.grid[2]}")
+        if self.grid is not None and not 1 <= self.grid[2] <= MAX_LEVELS:
+            raise ValueError(f"of {self.title}: grid needs 1 to {MAX_LEVELS} values, not {self.grid[2]}")
         if self.values is not None and not self.values:
             raise ValueError(f"of {self.title}: values is empty")
         if self.triangular is not None and not self.triangular[0] <= self.triangular[1] <= self.triangular[2]:
@@ -192,7 +192,7 @@ def check_key(scenario: Scenario, key: str, *, relative: bool) -> None:
     """
     if key in CONDITIONS:
         if relative:
-            raise ValueError(f"varies {key} with relative, but it is itself no figure of the record; give its values")
+            raise ValueError(f"varies {key} with relative, but it is itself no datum of the record; give its values")
         return
     value = base_value(scenario, key)
     if isinstance(value, BaseModel):

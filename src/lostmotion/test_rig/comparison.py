@@ -18,9 +18,9 @@ from .rig import TestRig
 
 @dataclass(frozen=True)
 class Comparison:
-    """One figure of the data sheet beside the rig's."""
+    """One datum of the data sheet beside the rig's."""
 
-    figure: str
+    quantity: str
     unit: str
     catalogue: float
     rig: float
@@ -33,34 +33,34 @@ class Comparison:
 
 
 def compare(rig: TestRig, sheet: GearboxSheet, notes: tuple[str, ...]) -> Iterable[Comparison]:
-    """Each figure of the sheet beside the same measured."""
+    """Each datum of the sheet beside the same measured."""
     contradiction = "contradicts the no-load torque; see note" if any("Contradiction" in n for n in notes) else ""
-    figures = sheet.losses
+    losses = sheet.losses
 
     def here(temperature: float | None) -> bool:
-        """Whether a figure is of the temperature that the gearbox was made for."""
-        return temperature in (None, figures.temperature)
+        """Whether a datum is of the temperature that the gearbox was made for."""
+        return temperature in (None, losses.temperature)
 
-    for p in filter(lambda p: here(p.temperature), figures.all_efficiencies()):
+    for p in filter(lambda p: here(p.temperature), losses.all_efficiencies()):
         what = f"efficiency at {RPM * p.input_speed:.0f} rpm, load {p.load:g}"
         yield Comparison(what, "1", p.efficiency, rig.efficiency(p.input_speed, p.load), contradiction)
-    for p in filter(lambda p: here(p.temperature), figures.backdrive_efficiency):
+    for p in filter(lambda p: here(p.temperature), losses.backdrive_efficiency):
         what = f"back-drive efficiency at {RPM * p.input_speed:.0f} rpm, load {p.load:g}"
         yield Comparison(what, "1", p.efficiency, rig.efficiency(p.input_speed, -p.load), contradiction)
-    for q in filter(lambda q: here(q.temperature), figures.no_load_torque):
+    for q in filter(lambda q: here(q.temperature), losses.no_load_torque):
         what = f"no-load torque at {RPM * q.input_speed:.0f} rpm"
         yield Comparison(what, "N·m", q.torque, rig.no_load_torque(q.input_speed))
-    if figures.starting_torque is not None and here(figures.starting_temperature):
-        yield Comparison("starting torque", "N·m", figures.starting_torque, rig.starting_torque())
-    if figures.backdriving_torque is not None and here(figures.backdriving_temperature):
-        yield Comparison("back-driving torque", "N·m", figures.backdriving_torque, rig.backdriving_torque() or np.inf)
-    if figures.static_efficiency is not None:
+    if losses.starting_torque is not None and here(losses.starting_temperature):
+        yield Comparison("starting torque", "N·m", losses.starting_torque, rig.starting_torque())
+    if losses.backdriving_torque is not None and here(losses.backdriving_temperature):
+        yield Comparison("back-driving torque", "N·m", losses.backdriving_torque, rig.backdriving_torque() or np.inf)
+    if losses.static_efficiency is not None:
         eta = rig.gearbox.rated_output_torque / (rig.gearbox.ratio * rig.starting_torque(1.0))
-        yield Comparison("static efficiency at rated load", "1", figures.static_efficiency, eta)
+        yield Comparison("static efficiency at rated load", "1", losses.static_efficiency, eta)
     if sheet.stiffness is not None:
         torques = sheet.stiffness.torques
-        largest = max(1.5 * (torques[-1] if torques else 0.0), rig.gearbox.rated_output_torque)
-        measured = rig.stiffness(torques, largest)
+        up_to = max(1.5 * (torques[-1] if torques else 0.0), rig.gearbox.rated_output_torque)
+        measured = rig.stiffness(torques, up_to)
         for k, (printed, value) in enumerate(zip(sheet.stiffness.slopes, measured, strict=True)):
             yield Comparison(f"torsional stiffness K{k + 1}", "N·m/rad", printed, value)
     if sheet.backlash:

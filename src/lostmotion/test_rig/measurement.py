@@ -29,7 +29,7 @@ class RigReport:
     """efficiency and loss torque, motor driving"""
     no_load: tuple[Any, Any]
     """input speeds [rad/s], torques [N·m]"""
-    virgin: tuple[Any, Any]
+    initial_loading: tuple[Any, Any]
     """twist [rad], torque [N·m] of the first loading"""
     loops: tuple[Loop, ...]
     """at falling amplitudes, the largest at rated torque"""
@@ -58,14 +58,14 @@ def measure(
     notes: Iterable[str] = (),
     progress: Callable[[], None] = lambda: None,
 ) -> RigReport:
-    """Measure all figures of a gearbox.
+    """Measure all that data sheets say of a gearbox.
 
     Parameters
     ----------
     sheet
-        Figures to compare with.
+        Data to compare with.
     notes
-        Of the loss map's making; a contradiction among the figures is pointed out beside them.
+        Of the loss map's making; a contradiction among the data is pointed out beside them.
     progress
         Called `WORK` times.
     """
@@ -81,7 +81,7 @@ def measure(
         gearbox=gearbox,
         map=rig.efficiency_map(speeds, LOADS, progress),
         no_load=(speeds, done(np.array([rig.no_load_torque(n) for n in speeds]))),
-        virgin=done(rig.virgin_curve(1.2 * T_2R)),
+        initial_loading=done(rig.initial_loading_curve(1.2 * T_2R)),
         loops=tuple(done(rig.loop(share * T_2R)) for share in LOOPS),
         starting_torque=done(rig.starting_torque()),
         backdriving_torque=done(rig.backdriving_torque()),

@@ -1,6 +1,6 @@
 """Virtual test rig: what manufacturers measure of a gearbox, measured on the simulated one.
 
-Nothing here reads the loss map or the torsion curve back; every figure comes out of a simulated run, as on the rigs of
+Nothing here reads the loss map or the torsion curve back; every value comes out of a simulated run, as on the rigs of
 figures 6 to 8 of the paper.
 """
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray
 from .loop import Loop
 
-FLYWHEEL = 1e9  # [kg m2] on the input: keeps its speed, or stands still, whatever the gearbox does
+FLYWHEEL = 1e9  # [kg m2] on the input: keeps its speed, or stays at rest, whatever the gearbox does
 
 
 RIG_FREQUENCY = 20.0  # [Hz] of the load on the stiffest segment of the curve, damped critically
@@ -145,27 +145,27 @@ class TestRig:
             energy=False,
         )
 
-    def virgin_curve(self, torque: float) -> tuple[Any, Any]:
+    def initial_loading_curve(self, torque: float) -> tuple[Any, Any]:
         """(twist [rad], torque [N·m]) of the first loading up to a torque."""
         result = self.torsion([torque])
         return result["twist"].values, result["output_torque"].values
 
-    def stiffness(self, torques: Iterable[float], largest: float) -> list[float]:
-        """K1, K2, ... [N·m/rad]: slopes between the given torques [N·m], and from the last up to `largest`."""
-        twist, torque = self.virgin_curve(largest)
-        edges = [0.0, *torques, largest]
+    def stiffness(self, torques: Iterable[float], up_to: float) -> list[float]:
+        """K1, K2, ... [N·m/rad]: slopes between the given torques [N·m], and from the last up to `up_to`."""
+        twist, torque = self.initial_loading_curve(up_to)
+        edges = [0.0, *torques, up_to]
         out = []
         for low, high in itertools.pairwise(edges):
             inside = (torque > low + 0.1 * (high - low)) & (torque < high - 0.1 * (high - low))
             if np.count_nonzero(inside) < 3:
-                twist, torque = self.virgin_curve(high)  # a short piece needs a ramp of its own
+                twist, torque = self.initial_loading_curve(high)  # a short piece needs a ramp of its own
                 inside = (torque > low + 0.1 * (high - low)) & (torque < high - 0.1 * (high - low))
             out.append(float(np.polyfit(twist[inside], torque[inside], 1)[0]))
         return out
 
     def backlash(self, torque: float) -> float:
         """Total gap [rad]: twice where the first loaded segment, taken up to `torque` [N·m], meets zero torque."""
-        twist, T = self.virgin_curve(torque)
+        twist, T = self.initial_loading_curve(torque)
         inside = (0.1 * torque < T) & (0.9 * torque > T)
         slope, offset = np.polyfit(twist[inside], T[inside], 1)
         return float(-2.0 * offset / slope)
@@ -188,17 +188,17 @@ class TestRig:
         """Input torque [N·m] that sets the gearbox in motion against a relative load, by a slow ramp."""
         g = self.gearbox
         against = load * g.rated_output_torque
-        begin, most = against / g.ratio, (1.0 + 4.0 * load) * g.rated_output_torque / g.ratio
+        begin, rise = against / g.ratio, (1.0 + 4.0 * load) * g.rated_output_torque / g.ratio
         result = simulate(
             self._braked(),
-            command=CommandSignal(samples=Samples(times=(0.0, RAMP), values=(begin, begin + most))),
+            command=CommandSignal(samples=Samples(times=(0.0, RAMP), values=(begin, begin + rise))),
             load_torque=against,
             duration=RAMP,
             sample_interval=RAMP,
             initial=Initial(twist=self._twist_at(against)),
             energy=False,
         )
-        return begin + most * self._break_away(result)[0] / RAMP
+        return begin + rise * self._break_away(result)[0] / RAMP
 
     def backdriving_torque(self) -> float | None:
         """Output torque [N·m] that sets the gearbox in motion with a free input, by a slow ramp; None: it holds three times its rated torque."""

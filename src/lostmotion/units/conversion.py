@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # Quantities whose SI unit is written in two ways.
 FORMS = {"N*m/A": ("V*s/rad", "N*m/A"), "N*m*s/rad": ("N*m*s/rad", "N*m*s")}
-LONGEST = 100  # characters
+MAX_LENGTH = 100  # characters
 POUNDS = ("pound", "ounce")
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -57,7 +57,7 @@ def to_si(text: str, unit: str) -> float:
         The text is not one number with one unit, or its unit measures something else. The message shows what would be
         right.
     """
-    if len(text) > LONGEST:
+    if len(text) > MAX_LENGTH:
         raise ValueError(f"is too long for one number with one unit; write {_wanted(unit)}")
     digits, symbol = _split(plain(text), unit)
     number = Decimal(digits)

@@ -67,7 +67,7 @@ class Lubricant(Part):
         return float(10.0 ** (10.0**exponent) - 0.7) * 1e-6
 
 
-class LossFigures(Part):
+class LossData(Part):
     """All that a data sheet may say about losses. Torques at the input shaft unless said otherwise."""
 
     efficiency: tuple[EfficiencyPoint, ...] = ()
@@ -86,17 +86,17 @@ class LossFigures(Part):
     static_efficiency: Efficiency | None = None
     """when breaking loose under load, as printed for worm gears"""
     temperature: Temperature = 20.0
-    """of all figures that name no other"""
+    """of all data that name no other"""
     lubricant: Lubricant | None = None
     static_load_factor: Annotated[Number, Positive] = 1.2
-    """load-dependent loss at standstill / that in motion, where no static or back-driving figure says it"""
+    """load-dependent loss at standstill / that in motion, where no static or back-driving datum says it"""
     table: LossMap | None = None
     """a whole loss map, which makes all others superfluous"""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        figures = ("efficiency", "no_load_torque", "starting_torque", "static_efficiency", "backdriving_torque")
-        given = [name for name in figures if getattr(self, name) not in (None, ())]
+        names = ("efficiency", "no_load_torque", "starting_torque", "static_efficiency", "backdriving_torque")
+        given = [name for name in names if getattr(self, name) not in (None, ())]
         if self.table is not None and given:
             raise ValueError(f"has a table and {given[0]}; the table says all, so give one or the other")
         if self.load_correction and len([p for p in self.efficiency if p.load == 1.0]) != 1:
