@@ -318,16 +318,16 @@ class _Builder:
         speeds = sorted({0.0, slow, *measured, 1.0, fastest})
         speeds = [v for v in speeds if v <= max(fastest, *measured)]
 
-        def axis(parts: dict[float, _LoadPart], standing: _LoadPart) -> list[float]:
-            nodes = {x for L in (*parts.values(), standing) for x in L.loads}
+        def axis(parts: dict[float, _LoadPart], at_rest: _LoadPart) -> list[float]:
+            nodes = {x for L in (*parts.values(), at_rest) for x in L.loads}
             return sorted({*nodes, 1.0, max(top, *nodes)})
 
         up, down = axis(driving, static), axis(overrunning, static_back)
         loads = [-mu for mu in reversed(down)] + [0.0] + up
         values, origins = [], []
         for mu in loads:
-            parts, standing = (overrunning, static_back) if mu < 0.0 else (driving, static)
-            cells = [self._node(abs(mu), v, parts, standing) for v in speeds]
+            parts, at_rest = (overrunning, static_back) if mu < 0.0 else (driving, static)
+            cells = [self._node(abs(mu), v, parts, at_rest) for v in speeds]
             values.append(tuple(loss_factor * m for m, _ in cells))
             origins.append(tuple(origin for _, origin in cells))
         if loss_factor != 1.0:
@@ -335,10 +335,10 @@ class _Builder:
         losses = LossMap(speeds=tuple(speeds), loads=tuple(loads), values=tuple(values))
         return BuiltMap(losses, tuple(origins), tuple(self.notes))
 
-    def _node(self, mu: float, v: float, parts: dict[float, _LoadPart], standing: _LoadPart) -> tuple[float, str]:
+    def _node(self, mu: float, v: float, parts: dict[float, _LoadPart], at_rest: _LoadPart) -> tuple[float, str]:
         if v == 0.0:
-            origin = standing.origin(mu) if mu > 0.0 else self.start_origin
-            return max(0.0, self.unloaded.start + standing(mu)), origin
+            origin = at_rest.origin(mu) if mu > 0.0 else self.start_origin
+            return max(0.0, self.unloaded.start + at_rest(mu)), origin
         without = self.unloaded.running(v)
         if mu == 0.0:
             return without, self.no_load_origin if v in self.unloaded.curve else "filled in: along the speed"

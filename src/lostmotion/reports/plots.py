@@ -33,7 +33,7 @@ LOOKS: Any = {
 }
 
 
-# Decorates what makes or draws figures; the looks of the user's own figures stay as they are.
+# Decorates what makes or draws figures; the looks of the user's figures stay as they are.
 in_our_looks = mpl.rc_context(LOOKS)
 
 

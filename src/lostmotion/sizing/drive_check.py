@@ -257,7 +257,7 @@ def _held(scenario: Scenario, load_torque: float, speed: float) -> Finding:
     try:
         found = holding(scenario, load_torque, speed)
     except _core.SolverError as error:
-        return Finding("holding", what, "cannot be told", "unknown", str(error))
+        return Finding("holding", what, "cannot be determined", "unknown", str(error))
     if found.holds:
         value = f"the load stays at rest, and comes to rest if the power fails at {abs(found.begin):.3g} rad/s"
         return Finding("holding", what, value, "ok")

@@ -68,7 +68,7 @@ def parsed(text: str) -> Study:
 
 @lru_cache(maxsize=8)
 def _units(text: str) -> dict[str, str]:
-    """Units of the columns; empty where an expression's cannot be told."""
+    """Units of the columns; empty where an expression's cannot be determined."""
     study = parsed(text)
     units = {v.title: v.unit for v in study.vary if v.names is None} | {n: e.unit for n, e in study.expressions.items()}
     units |= {f"{USE}{rule}": "1" for rule in SHARES}

@@ -94,13 +94,13 @@ class Expression:
         if self._term.measure.over_time:
             raise ValueError(f"{text!r} leaves a value for each instant; reduce it, as in peak({text})")
         self.instants = tuple(reader.instants)
-        """instants [s] that it looks at by .sel(time=...)"""
+        """instants [s] that it reads by .sel(time=...)"""
         self.indices = tuple(reader.indices)
-        """samples that it looks at by .isel(time=...)"""
+        """samples that it reads by .isel(time=...)"""
         self.variables = (self.names & known) | ({"command"} if "ideal_speed" in self.names else frozenset())
         """the result variables that it needs"""
         self.unit = text_of(self._term.measure, KNOWN_UNITS)
-        """unit of the values, ``"1"`` for a plain number; empty where it cannot be told"""
+        """unit of the values, ``"1"`` for a plain number; empty where it cannot be determined"""
         self.reduction: tuple[str, str] | None = None
         """reduction and variable, if it is nothing else, so that the core can do it"""
         match tree:

@@ -11,7 +11,7 @@ class Measure(NamedTuple):
     """Of one value."""
 
     unit: Any = None
-    """a unit of the registry; None where it cannot be told, as of a number that may be a factor or a change of unit"""
+    """a unit of the registry; None where it cannot be determined, as of a number that may be a factor or a change of unit"""
     over_time: bool = False
     """a value for each instant, not one for each run"""
     boolean: bool = False
@@ -58,7 +58,7 @@ def reduced(a: Measure, exponent: int = 1) -> Measure:
 
 
 def text_of(a: Measure, known: tuple[str, ...]) -> str:
-    """The unit as text, like one of `known` where it is the same; ``"1"`` for a plain number, empty if it cannot be told."""
+    """The unit as text, like one of `known` where it is the same; ``"1"`` for a plain number, empty if it cannot be determined."""
     if a.unit is None:
         return ""
     for text in known:

@@ -142,7 +142,7 @@ def _refuse_separators(text: str, unit: str) -> None:
 
 
 def _computed(a: Decimal, operator: str, second: str, power: str | None) -> str:
-    """The value of ``a operator second``; empty where it cannot be told, as of a range."""
+    """The value of ``a operator second``; empty where it cannot be determined, as of a range."""
     try:
         b = Decimal(second)
         b = b if power is None else b ** int(power)
@@ -205,7 +205,7 @@ def _factor(units: Product, unit: str) -> Decimal | None:
 def _readings(units: Product, wanted: Product) -> Iterator[Product]:
     """What a product may mean where `wanted` is: as it stands, with turns for a speed in 1/min, with pounds as forces."""
     if any(name.endswith("hertz") for name in units) and not any(name.endswith("hertz") for name in wanted):
-        return  # whether turns or radians are counted cannot be told
+        return  # whether turns or radians are counted cannot be determined
     turns = angle_of(wanted)
     if turns and angle_of(units) == 0 and units.get("minute", 0) == -turns:
         yield units | {"revolution": turns}
