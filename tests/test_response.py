@@ -154,7 +154,7 @@ def test_scipy_and_control_get_the_same_model():
         assert np.array_equal(getattr(own, name), getattr(model, name))
     assert own.input_labels == ["command", "load_torque"]
     assert own.output_labels[2] == "load_speed"
-    with pytest.raises(KeyError, match="there is no 'load_sped'"):
+    with pytest.raises(lm.InputError, match='there is no "load_sped"'):
         model.response(1.0, "load_sped")
 
 
@@ -405,7 +405,7 @@ def test_control_gets_the_response_as_data():
         (lambda: lm.periodic_motion(NONLINEAR, lm.CommandSignal(steps=[{"height": 1.0}])), "mean and sines only"),
         (
             lambda: lm.periodic_motion(NONLINEAR, lm.CommandSignal(amplitude=1.0, frequency=1.0), multiple=0),
-            "1 or more",
+            "must be a whole number above 0",
         ),
         (
             lambda: lm.periodic_motion(

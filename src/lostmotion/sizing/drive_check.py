@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from .. import _core
-from ..errors import InputError
+from ..inputs.arguments import checked
 from ..model.parts import Gearbox, Rigid
 from ..simulation.run import simulate
 from ..simulation.scenario import Scenario
@@ -78,6 +78,7 @@ class Finding:
         return f"{mark}  {self.what}: {self.value}{remark} [{self.source}]"
 
 
+@checked
 def check_drive(scenario: Scenario) -> tuple[Finding, ...]:
     """Checks a drive against its scenario.
 
@@ -92,10 +93,6 @@ def check_drive(scenario: Scenario) -> tuple[Finding, ...]:
     SolverError
         As `simulate`.
     """
-    if not isinstance(scenario, Scenario):
-        raise InputError(
-            f"{scenario!r:.60} has no task to be checked against; give a Scenario, such as load(path) returns"
-        )
     result = _finely_sampled(scenario)
     cycle = duty_cycle(result, scenario.task.cycle)
     findings = [
@@ -179,6 +176,7 @@ def _within(
 
 def _loads(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> list[Finding]:
     g = scenario.gearbox
+    largest = float(abs(result["output_torque"]).max())
     average = g.limits.average_output_torque if g.limits else None
     name = "rated output torque" if average is None else "average output torque"
     return [
@@ -191,16 +189,31 @@ def _loads(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> list
             name,
             cycle=cycle,
         ),
-        _within(
-            "peak_output_torque",
-            "output torque, largest",
-            float(abs(result["output_torque"]).max()),
-            g.limits.peak_output_torque if g.limits else None,
-            "N·m",
-            "repeated peak torque of the gearbox",
-            key="gearbox.limits.peak_output_torque",
+        _with_momentary(
+            _within(
+                "peak_output_torque",
+                "output torque, largest",
+                largest,
+                g.limits.peak_output_torque if g.limits else None,
+                "N·m",
+                "repeated peak torque of the gearbox",
+                key="gearbox.limits.peak_output_torque",
+            ),
+            largest,
+            g.limits.momentary_output_torque if g.limits else None,
         ),
     ]
+
+
+def _with_momentary(finding: Finding, torque: float, momentary: float | None) -> Finding:
+    """Beyond, or without, a repeated peak torque: what the limit for emergency stops says."""
+    if momentary is None or finding.verdict == "ok":
+        return finding
+    if torque > momentary:
+        remark = f"even the momentary torque of the gearbox, {momentary:.4g} N·m, is exceeded"
+        return replace(finding, verdict="warning", remark="; ".join(filter(None, [finding.remark, remark])))
+    remark = f"in an emergency stop the gearbox stands {momentary:.4g} N·m"
+    return replace(finding, remark="; ".join(filter(None, [finding.remark, remark])))
 
 
 def _speeds(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> list[Finding]:

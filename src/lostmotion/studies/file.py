@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
 from ..errors import InputError
+from ..inputs.arguments import checked
 from ..inputs.quantities import Part
 from ..inputs.toml_files import read_toml
 from ..simulation.scenario import Scenario, find_scenario, load, read_tables
@@ -234,6 +235,7 @@ class Study(Part):
 # --- reading ---
 
 
+@checked
 def load_study(path: str | Path) -> Study:
     """Read a study file. Its key `base` names the scenario file, relative to it; `set` may change values of that.
 
