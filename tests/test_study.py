@@ -496,6 +496,28 @@ def test_a_bad_study_ends_in_one_clear_line(tmp_path: Path, old: str, new: str, 
     assert "\n" not in str(caught.value)
 
 
+def test_a_saved_result_can_be_the_base_of_a_study(tmp_path: Path):
+    """All its values are written out, so the study is that of the scenario."""
+    lm.save(lm.simulate(lm.load("step-to-standstill")), tmp_path / "result.csv")
+    for name, base in (("own", "result.csv"), ("other", "step-to-standstill")):
+        (tmp_path / f"{name}.toml").write_text(GOOD.replace("{base}", base))
+    first, second = (lm.load_study(tmp_path / f"{name}.toml") for name in ("own", "other"))
+    assert first.scenario == second.scenario
+    tables = [read_table(lm.study(study, tmp_path / name)) for name, study in (("a", first), ("b", second))]
+    assert tables[0].to_pydict() == tables[1].to_pydict()
+
+
+def test_a_saved_result_is_refused_where_a_file_of_text_is_wanted(tmp_path: Path):
+    lm.save(lm.simulate(lm.load("step-to-standstill")), tmp_path / "result.csv")
+    (tmp_path / "s.toml").write_text('base = "result.csv"\n')
+    with pytest.raises(
+        InputError, match=r'key base: "result.csv" has the ending of a saved result; name a scenario file'
+    ):
+        lm.load(tmp_path / "s.toml")
+    with pytest.raises(InputError, match=r"result.csv: has the ending of a saved result; a study is a TOML file"):
+        lm.load_study(tmp_path / "result.csv")
+
+
 def test_memory_does_not_grow_with_the_length_of_a_study(tmp_path: Path):
     import resource
 

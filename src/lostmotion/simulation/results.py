@@ -316,12 +316,12 @@ def _read_netcdf(path: Path) -> xarray.Dataset:
 
 
 def _header(dataset: xarray.Dataset) -> str:
-    """All but the samples, as JSON: attributes, and the switchings by columns."""
+    """All but the samples, as JSON: attributes, how many samples there are, and the switchings by columns."""
     attributes = {k: v for k, v in dataset.attrs.items() if k != SWITCHINGS}
-    if SWITCHINGS not in dataset.attrs:
-        return json.dumps({"attributes": attributes})
-    columns = {str(name): v.values.tolist() for name, v in switchings_of(dataset).items()}
-    return json.dumps({"attributes": attributes, SWITCHINGS: columns})
+    header = {"attributes": attributes, "samples": dataset.sizes["time"]}
+    if SWITCHINGS in dataset.attrs:
+        header[SWITCHINGS] = {str(name): v.values.tolist() for name, v in switchings_of(dataset).items()}
+    return json.dumps(header)
 
 
 def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Dataset:
@@ -330,6 +330,11 @@ def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Datase
         time = columns.pop("time")
     except (json.JSONDecodeError, KeyError):
         raise InputError(f"{path}: is no result of lostmotion; its header or its time column is missing") from None
+    written = meta.get("samples", len(time))  # files of older versions do not say it
+    if len(time) != written:
+        raise InputError(
+            f"{path}: holds {len(time)} of the {written} samples that its header announces; it is cut off or changed; run the scenario again"
+        )
     switchings = {SWITCHINGS: packed_again(meta[SWITCHINGS])} if SWITCHINGS in meta else {}
     return _dataset(time, columns, meta["attributes"] | switchings)
 

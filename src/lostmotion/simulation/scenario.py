@@ -14,7 +14,7 @@ from pydantic import model_validator
 from ..data_sheets.records import Conditions, as_torque_source, at_voltage, gearbox_table, motor_table
 from ..errors import InputError
 from ..inputs.quantities import Angle, NotNegative, Part, Positive, Speed, Time, Torque
-from ..inputs.toml_files import read_toml
+from ..inputs.toml_files import RESULTS, read_toml
 from ..inputs.validation import shown
 from ..model.parts import Drive, Gearbox, Load, Motor, Rigid
 from ..model.signals import CommandSignal, TorqueSignal
@@ -278,6 +278,11 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
     base = data.pop("base")
     if not isinstance(base, str):
         raise InputError(f"{path}: key base: {shown(base)} must be the name of a scenario file")
+    if Path(base).suffix in RESULTS:
+        raise InputError(
+            f"{path}: key base: {shown(base)} has the ending of a saved result; name a scenario file (.toml), or change the result by "
+            f"`lostmotion run {base} --set KEY=VALUE`"
+        )
     based = _read(find_scenario(base, path.parent), (*including, path.resolve()))
     motor = data.get("motor")
     if isinstance(motor, dict) and "rated_voltage" in motor and "from" not in motor:
