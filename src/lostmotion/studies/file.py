@@ -16,7 +16,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Part
 from ..inputs.toml_files import read_toml
 from ..simulation.results import FORMATS
-from ..simulation.scenario import Scenario, find_scenario, load, read_tables
+from ..simulation.scenario import Scenario, find_scenario, read_tables
 from ..simulation.sources import load
 from ..simulation.variables import VARIABLES
 from .design import unit_cube

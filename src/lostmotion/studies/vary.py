@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterator, Mapping
+from statistics import NormalDist
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -128,8 +129,6 @@ class Vary(Part):
 
     def quantile(self, u: np.ndarray) -> np.ndarray:
         """Values at probabilities 0 < u < 1."""
-        import scipy.stats as st
-
         levels = self.levels()
         if levels is not None:
             out: Any = levels[np.minimum((u * len(levels)).astype(int), len(levels) - 1)]
@@ -139,11 +138,13 @@ class Vary(Part):
             a, b = (math.log(x) for x in self.log_uniform)
             out = np.exp(a + u * (b - a))
         elif self.normal is not None:
-            out = st.norm.ppf(u, self.normal.mean, self.normal.deviation)
+            out = np.vectorize(NormalDist(self.normal.mean, self.normal.deviation).inv_cdf, otypes=[float])(u)
         else:
             assert self.triangular is not None
             low, mode, high = self.triangular
-            out = st.triang.ppf(u, (mode - low) / (high - low), low, high - low) if high > low else np.full_like(u, low)
+            rising = low + np.sqrt(u * (high - low) * (mode - low))
+            falling = high - np.sqrt((1.0 - u) * (high - low) * (high - mode))
+            out = np.where(u * (high - low) < mode - low, rising, falling)
         return np.asarray(out, dtype=float)
 
 
