@@ -41,7 +41,6 @@ LINEAR = lm.linearize(SCENARIO, lm.Initial())
 SHEET = next(r for r in lm.catalogue() if r.name == "schaeffler-rt1-h-20-100")
 RIG = lm.TestRig(SCENARIO.gearbox)
 STUDY = lm.Study(scenario=SCENARIO, vary=[{"key": "load.inertia", "values": [1.0]}], keep={"top": "peak(load_speed)"})
-SIMULATION = lm.Simulation(SCENARIO)
 
 
 def dangle(*_: object, **__: object) -> None:
@@ -79,10 +78,10 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "TestRig": (lm.TestRig, {"gearbox": SCENARIO.gearbox}),
     "ResultAccessor": (lm.ResultAccessor, {"dataset": RESULT}),
     "InputError": (lm.InputError, {"text": "x"}),
-    "Simulation.reset": (SIMULATION.reset, {"initial": lm.Initial()}),
-    "Simulation.advance": (SIMULATION.advance, {"interval": 1e-3, "command": 0.0, "load_torque": 0.0}),
-    "Simulation[...]": (SIMULATION.__getitem__, {"name": "twist"}),
-    "Simulation.state": (lambda state: setattr(SIMULATION, "state", state), {"state": SIMULATION.state}),
+    "Simulation.reset": (lambda **a: lm.Simulation(SCENARIO).reset(**a), {"initial": lm.Initial()}),
+    "Simulation.advance": (lambda **a: lm.Simulation(SCENARIO).advance(**a), {"interval": 1e-3, "command": 0.0, "load_torque": 0.0}),
+    "Simulation[...]": (lambda name: lm.Simulation(SCENARIO)[name], {"name": "twist"}),
+    "Simulation.state": (lambda state: setattr(lm.Simulation(SCENARIO), "state", state), {"state": lm.Simulation(SCENARIO).state}),
     "TestRig.steady": (RIG.steady, {"input_speed": 10.0, "load": 0.5}),
     "TestRig.efficiency": (RIG.efficiency, {"input_speed": 10.0, "load": 0.5}),
     "TestRig.efficiency_map": (RIG.efficiency_map, {"speeds": [10.0], "loads": [0.5], "progress": dangle}),
@@ -188,8 +187,8 @@ SENTENCES = [
     (lambda: lm.switchings_of(xr.Dataset()), "this dataset has no switchings"),
     (lambda: lm.Load(1), "the load takes its values by name, such as inertia=...; not 1"),
     (lambda: RIG.efficiency_map(["3000"], [1]), 'speeds: "3000" has no unit'),
-    (lambda: SIMULATION["speed"], '"speed" is no variable; the variables are command,'),
-    (lambda: SIMULATION[None], "None is no variable"),
+    (lambda: lm.Simulation(SCENARIO)["speed"], '"speed" is no variable; the variables are command,'),
+    (lambda: lm.Simulation(SCENARIO)[None], "None is no variable"),
     (lambda: lm.simulate({"motor": 1}), "scenario_or_drive: { motor = 1 } must be a Scenario"),
     (lambda: lm.study(STUDY, "s", threads=0), "threads: 0 must be a whole number above 0"),
 ]  # fmt: skip
