@@ -244,11 +244,14 @@ def response(
     amplitudes: Annotated[
         str,
         typer.Option(
-            "--amplitudes", metavar="LIST", help="0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many)."
+            "--amplitudes",
+            metavar="LIST",
+            help="0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many). Commas separate; two whole numbers, which may be "
+            "a decimal comma, are written 1.0,5.0.",
         ),
     ] = "0.02..1:6",
     frequencies: Annotated[
-        str, typer.Option("--frequencies", metavar="LIST", help="[Hz], as the amplitudes.")
+        str, typer.Option("--frequencies", metavar="LIST", help="[Hz], written as the amplitudes.")
     ] = "0.1..100:60",
     source: Annotated[
         str, typer.Option("--input", metavar="NAME", help="command or load_torque: what is a sine.")
@@ -284,9 +287,10 @@ def response(
     from ..simulation.variables import CHANNEL_NAMES
     from .grids import parse_grid
 
-    wanted, grid = parse_grid(amplitudes, "amplitudes"), parse_grid(frequencies, "frequencies")
     if source not in ("command", "load_torque"):
         raise InputError(f"--input {source}: must be command or load_torque")
+    wanted = parse_grid(amplitudes, "amplitudes", "" if source == "command" else "N*m")
+    grid = parse_grid(frequencies, "frequencies", "Hz")
     if variable not in CHANNEL_NAMES:
         raise InputError(f"--variable {variable}: must be one of {', '.join(CHANNEL_NAMES)}")
     try_directory(output)
@@ -471,7 +475,8 @@ def study(
 ) -> None:
     """Many runs: vary parameters, store selected results, resume after an interruption.
 
-    Writes a directory of Parquet files, one row a run, that pandas, DuckDB and polars open directly.
+    Writes a directory of Parquet files, one row a run, that pandas, DuckDB and polars open directly. If runs failed, their rows
+    say why, all others are there, and the exit code is 1.
 
     \b
     lostmotion study tolerance.toml -o tolerance
@@ -509,10 +514,10 @@ def study(
             fail(f"interrupted; what is in {directory} stays, and the same command resumes it", 130)
     from ..studies.table import failures
 
+    print(f"{loaded.total} runs are in {directory}; `lostmotion study show {directory}` shows them")
     failed = failures(directory)
     if failed:
-        print(f"{len(failed)} of {loaded.total} runs failed, such as: {failed[0]}", file=sys.stderr)
-    print(f"{loaded.total} runs are in {directory}; `lostmotion study show {directory}` shows them")
+        fail(f"{len(failed)} of {loaded.total} runs failed, such as: {failed[0]}; the column `error` has all reasons")
 
 
 drive_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Check a drive against its task.")

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from functools import cache
 from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandler, Strict, ValidationError
@@ -16,6 +17,8 @@ from ..errors import InputError
 from ..units.conversion import Unit
 from .validation import describe, shown
 
+Count = Annotated[int, "above 0"]
+"""a whole number above 0, as the core takes it"""
 Number = Annotated[float, Unit("")]
 Torque = Annotated[float, Unit("N*m")]
 Inertia = Annotated[float, Unit("kg*m^2")]
@@ -85,7 +88,12 @@ class Part(BaseModel):
 
         return table(self)
 
-    def __init__(self, /, **values: Any) -> None:
+    def __init__(self, /, *nameless: Any, **values: Any) -> None:
+        if nameless:
+            first = next(iter(type(self).model_fields))
+            raise InputError(
+                f"{self._subject()} takes its values by name, such as {first}=...; not {shown(nameless[0])}"
+            )
         with self._one_error(values):
             super().__init__(**values)
 
@@ -122,7 +130,7 @@ class Part(BaseModel):
         try:
             yield
         except ValidationError as error:
-            raise InputError(describe(error, cls._described_by(), cls._subject(), given)) from None
+            raise InputError(describe(error, _description(cls), cls._subject(), given)) from None
 
     @classmethod
     def _described_by(cls) -> dict[str, Any]:
@@ -133,6 +141,11 @@ class Part(BaseModel):
     def _subject(cls) -> str:
         """What it is, for messages: the torsion curve."""
         return "the " + " ".join(re.findall("[A-Z][a-z]*", cls.__name__.split("[")[0])).lower()
+
+
+@cache  # it takes longer than all the rest of a refusal
+def _description(part: type[Part]) -> dict[str, Any]:
+    return part._described_by()
 
 
 class _Abridged(str):

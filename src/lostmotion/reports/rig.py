@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..data_sheets.sheets import GearboxSheet
+from ..model.parts import Rigid
 from ..test_rig.rig import LOST_MOTION_LOAD, RigReport
 from . import plots
 from .pages import embed, panels_csv, render_page, save_figure, table_csv, write_text
@@ -89,7 +90,11 @@ def panels(report: RigReport, sheet: GearboxSheet | None) -> list[Panel]:
 def summary_rows(report: RigReport) -> list[tuple[str, str]]:
     """What the rig says of itself, beside the comparison."""
     back = report.backdriving_torque
-    loop = report.loops[0]
+    loop, g = report.loops[0], report.gearbox
+    # Without their cause, what is measured is rounding.
+    hysteresis = g.hysteresis is not None and g.hysteresis.efficiency < 1.0
+    backlash = not isinstance(g.stiffness, Rigid) and g.stiffness.pieces()[1][0] == 0.0
+    width = shown(loop.width, "rad") if hysteresis or backlash else "none: neither hysteresis nor backlash is given"
     return [
         ("starting torque at the input", f"{report.starting_torque:.4g} N·m"),
         (
@@ -97,8 +102,8 @@ def summary_rows(report: RigReport) -> list[tuple[str, str]]:
             f"{back:.4g} N·m" if back is not None else "none up to three times rated torque: self-locking",
         ),
         (f"lost motion at ±{100 * LOST_MOTION_LOAD:.0f} % of rated torque", shown(report.lost_motion, "rad")),
-        ("width of the loop at zero torque, rated torque in both directions", shown(loop.width, "rad")),
-        ("energy lost in that loop", f"{loop.area:.4g} J"),
+        ("width of the loop at zero torque, rated torque in both directions", width),
+        ("energy lost in that loop", f"{loop.area:.4g} J" if hysteresis else "none: no hysteresis is given"),
     ]
 
 

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ..errors import InputError, need
-from ..inputs.quantities import arguments
+from ..inputs.arguments import checked
+from ..inputs.quantities import Count, Frequency, Number, Torque, arguments
+from ..inputs.validation import shown
 from ..model.parts import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from ..simulation.scenario import Initial, Scenario, drive_of, mean_inputs
@@ -26,18 +28,19 @@ THREE_DECIBELS = math.sqrt(2.0)  # the bandwidth ends where the gain has fallen 
 Source = Literal["command", "load_torque"]
 
 
+@checked
 def frequency_response(
     drive: Drive | Scenario,
     frequencies: Sequence[float] | float,
     amplitudes: Sequence[float] | float,
     *,
     source: Source = "command",
-    mean_command: float | None = None,
-    mean_load_torque: float | None = None,
-    harmonics: int = 8,
-    refine: float | None = None,
-    threads: int | None = None,
-    max_periods: int = MAX_PERIODS,
+    mean_command: Number | None = None,
+    mean_load_torque: Torque | None = None,
+    harmonics: Count = 8,
+    refine: Number | None = None,
+    threads: Count | None = None,
+    max_periods: Count = MAX_PERIODS,
     progress: Callable[[], None] | None = None,
 ) -> xarray.Dataset:
     """Response by harmonic linearisation (describing functions): harmonics of all outputs over one sinusoidal input.
@@ -91,8 +94,6 @@ def frequency_response(
         raise InputError("amplitudes must be positive; give at least one")
     if source not in ("command", "load_torque"):
         raise InputError(f"source {source!r} is not known; it must be command or load_torque")
-    if harmonics < 1:
-        raise InputError(f"harmonics {harmonics} must be 1 or more")
     means = mean_inputs(drive, mean_command, mean_load_torque)
     drive = drive_of(drive)
 
@@ -239,6 +240,27 @@ def _labelled(
     )
 
 
+def of_output(response: xarray.Dataset, output: str) -> xarray.DataArray:
+    """The response of one output over amplitude and frequency.
+
+    Raises
+    ------
+    InputError
+        The dataset is no frequency response, or has no such output.
+    """
+    if "response" not in response:
+        raise InputError("this dataset is no frequency response; lm.frequency_response makes one")
+    known = [str(name) for name in response["output"].values]
+    return response["response"].sel(output=_known_output(output, known))
+
+
+def _known_output(output: str, known: Sequence[str]) -> str:
+    if output not in known:
+        raise InputError(f"output {shown(output)} is not known; it must be one of {', '.join(known)}")
+    return output
+
+
+@checked
 def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: str = "load_speed") -> xarray.Dataset:
     """Bandwidth and phase crossover as functions of amplitude, with the dead zone of the drive.
 
@@ -261,7 +283,7 @@ def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: s
     """
     import xarray as xr
 
-    values = response["response"].sel(output=output).values
+    values = of_output(response, output).values
     x = np.log(response["frequency"].values)
     bandwidth, crossover = [], []
     for curve in values:
@@ -291,15 +313,16 @@ def _falls_through(x: np.ndarray, y: np.ndarray, level: float) -> float:
     return float(np.exp(x[k] + (level - y[k]) / (y[k + 1] - y[k]) * (x[k + 1] - x[k])))
 
 
+@checked
 def bandwidth(
     drive: Drive | Scenario,
-    amplitude: float,
+    amplitude: Number,
     *,
     output: str = "load_speed",
-    mean_command: float | None = None,
-    mean_load_torque: float | None = None,
-    lowest: float = 0.1,
-    highest: float = 1000.0,
+    mean_command: Number | None = None,
+    mean_load_torque: Torque | None = None,
+    lowest: Frequency = 0.1,
+    highest: Frequency = 1000.0,
 ) -> float:
     """Frequency [Hz] at which the gain from the command first falls 3 dB below that at the lowest frequency.
 
@@ -320,7 +343,7 @@ def bandwidth(
     Raises
     ------
     InputError
-        The amplitude is not positive.
+        The amplitude is not positive, the output is not known, or the frequencies do not rise.
     RuntimeError
         No periodic motion was found, or the output does not move at the lowest frequency.
     """
@@ -329,7 +352,9 @@ def bandwidth(
 
     if not amplitude > 0.0:
         raise InputError(f"no bandwidth: the amplitude {amplitude:g} of the command must be positive")
-    channel = CHANNEL_NAMES.index(output)
+    if not 0.0 < lowest < highest:
+        raise InputError(f"no bandwidth: lowest {lowest:g} Hz must be above 0 and below highest, {highest:g} Hz")
+    channel = CHANNEL_NAMES.index(_known_output(output, CHANNEL_NAMES))
     means = mean_inputs(drive, mean_command, mean_load_torque)
     drive = drive_of(drive)
 
@@ -353,15 +378,22 @@ def bandwidth(
     return math.nan
 
 
-def to_control(response: xarray.Dataset, amplitude: float, output: str = "load_speed") -> control.FrequencyResponseData:
+@checked
+def to_control(
+    response: xarray.Dataset, amplitude: Number, output: str = "load_speed"
+) -> control.FrequencyResponseData:
     """One curve of a response for python-control, as data over frequency.
 
     Raises
     ------
     MissingLibraryError
         python-control is not installed.
-    KeyError
-        The response has no such amplitude or output.
+    InputError
+        The dataset is no frequency response, or has no such amplitude or output.
     """
-    curve = response["response"].sel(output=output, amplitude=amplitude)
+    curves = of_output(response, output)
+    known = response["amplitude"].values.tolist()
+    if amplitude not in known:
+        raise InputError(f"amplitude {amplitude:g}: the response has {', '.join(f'{a:g}' for a in known)}")
+    curve = curves.sel(amplitude=amplitude)
     return _control().frd(curve.values, 2.0 * np.pi * curve["frequency"].values)

@@ -11,10 +11,10 @@ from typing import Annotated, Any, Self
 
 from pydantic import model_validator
 
-from ..data_sheets.records import Conditions, gearbox_table, motor_table
+from ..data_sheets.records import Conditions, as_torque_source, at_voltage, gearbox_table, motor_table
 from ..errors import InputError
 from ..inputs.quantities import Angle, NotNegative, Part, Positive, Speed, Time, Torque
-from ..inputs.toml_files import read_toml
+from ..inputs.toml_files import RESULTS, read_toml
 from ..inputs.validation import shown
 from ..model.parts import Drive, Gearbox, Load, Motor, Rigid
 from ..model.signals import CommandSignal, TorqueSignal
@@ -122,18 +122,8 @@ class Scenario(Part):
 
 
 def drive_of(what: Scenario | Drive) -> Drive:
-    """The drive of a scenario, or a drive as it is.
-
-    Raises
-    ------
-    InputError
-        It is neither.
-    """
-    if isinstance(what, Drive):
-        return what
-    if isinstance(what, Scenario):
-        return what.drive()
-    raise InputError(f"{what!r:.60} is no drive; give a Drive, or a Scenario such as load(path) returns")
+    """The drive of a scenario, or a drive as it is."""
+    return what if isinstance(what, Drive) else what.drive()
 
 
 def mean_inputs(
@@ -230,6 +220,8 @@ def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str],
     InputError
     """
     overrides = [overrides] if isinstance(overrides, str) else overrides
+    if not isinstance(overrides, Iterable) or not all(isinstance(entry, str) for entry in overrides):
+        raise InputError(f'{shown(overrides)} must be changes by key, such as {{"command.amplitude": 0.1}}')
     items = overrides.items() if isinstance(overrides, Mapping) else [_parse_override(text) for text in overrides]
     try:
         _set_all(data, items)
@@ -286,7 +278,19 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
     base = data.pop("base")
     if not isinstance(base, str):
         raise InputError(f"{path}: key base: {shown(base)} must be the name of a scenario file")
-    return _merge(_read(find_scenario(base, path.parent), (*including, path.resolve())), data)
+    if Path(base).suffix in RESULTS:
+        raise InputError(
+            f"{path}: key base: {shown(base)} has the ending of a saved result; name a scenario file (.toml), or change the result by "
+            f"`lostmotion run {base} --set KEY=VALUE`"
+        )
+    based = _read(find_scenario(base, path.parent), (*including, path.resolve()))
+    motor = data.get("motor")
+    if isinstance(motor, dict) and "rated_voltage" in motor and "from" not in motor:
+        try:
+            _set_all(based, [(f"motor.{key}", value) for key, value in motor.items()])
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+    return _merge(based, data)
 
 
 def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...]) -> None:
@@ -372,11 +376,19 @@ def _parse_override(text: str) -> tuple[str, Any]:
 
 
 def _set_all(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None:
-    """Changes values by dotted key. A record comes before what changes it, in whatever order they are given."""
-    whole = ("gearbox", "motor", "gearbox.from", "motor.from")
-    for key, value in sorted(changes, key=lambda change: change[0] not in whole):
+    """Changes values by dotted key. What others depend on comes before them, in whatever order they are given."""
+    before = ("gearbox", "motor", "gearbox.from", "motor.from", "motor.kind", "motor.rated_voltage")
+    changes = list(changes)
+    given = [key.removeprefix("motor.") for key, _ in changes]
+    for key, value in sorted(changes, key=lambda change: before.index(change[0]) if change[0] in before else 99):
         first, *rest = key.split(".")
-        data[first] = _changed(data.get(first), rest, value, first)
+        node = data.get(first)
+        if isinstance(node, dict) and "from" not in node:  # beside `from` the record sees to it
+            if key == "motor.kind" and value == "torque_source":
+                node = as_torque_source(node)
+            elif key == "motor.rated_voltage":
+                node = at_voltage(node, value, given)
+        data[first] = _changed(node, rest, value, first)
 
 
 def _changed(node: Any, keys: list[str], value: Any, where: str) -> Any:

@@ -9,6 +9,7 @@ from typing import Any
 from ..data_sheets.records import KINDS, Conditions, catalogue, find
 from ..errors import InputError
 from ..inputs.quantities import unit_in_schema
+from ..inputs.validation import shown
 from ..simulation.scenario import Scenario, from_tables
 from .units import in_si
 
@@ -44,14 +45,18 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
             )
         if _is_text(key):
             if not isinstance(value, str):
-                raise ValueError(f"has catalogue.{key} = {value!r}; it must be a text, * standing for anything")
+                raise ValueError(
+                    f"has catalogue.{key} = {shown(value)}; it must be a text in quotes, * standing for anything"
+                )
             continue
         if not isinstance(value, list | tuple) or len(value) != 2:
-            raise ValueError(f"has catalogue.{key} = {value!r}; it must be a list of least and largest value")
+            raise ValueError(f"has catalogue.{key} = {shown(value)}; it must be a list of least and largest value")
         try:
             bounds[key] = [float(x) for x in in_si(value, unit_in_schema(schema[key]))]
         except (TypeError, ValueError) as error:
-            raise ValueError(f"has catalogue.{key} = {value!r}: {error}") from None
+            raise ValueError(f"has catalogue.{key} = {shown(value)}: {error}") from None
+        if not bounds[key][0] <= bounds[key][1]:
+            raise ValueError(f"has catalogue.{key} = {shown(value)}, which is reversed; the least value comes first")
     found = []
     for record in catalogue():
         if not isinstance(record, KINDS[table]):
@@ -78,10 +83,10 @@ def check_names(table: str, names: Any) -> None:
         One is not; the message says what may have been meant.
     """
     if not isinstance(names, list | tuple):
-        raise ValueError(f"has values = {names!r}; it must be a list of names")
+        raise ValueError(f"has values = {shown(names)}; it must be a list of names")
     for name in names:
         if not isinstance(name, str):
-            raise ValueError(f"has the value {name!r}, which is no name of a {table}")
+            raise ValueError(f"has the value {shown(name)}, which is no name of a {table}")
         find(name, table)
 
 
