@@ -80,10 +80,8 @@ class LongStep {
         (Lanes::load(z) + change).store(z);
         for (std::size_t i = 0; i < n_inputs; ++i) z[line + i] += h_ * z[slope + i];
         for (std::size_t q = 0; q < sines_.size(); ++q) {
-            const double s = z[sine + 2 * q], c = z[sine + 2 * q + 1];
-            const double cosine_change = sines_[q].cosine_change.high, sin = sines_[q].sin.high;
-            z[sine + 2 * q] = s + (cosine_change * s + sin * c);
-            z[sine + 2 * q + 1] = c + (cosine_change * c - sin * s);
+            const auto now = Pack<2>::load(z + sine + 2 * q);
+            (now + Turn{sines_[q].cosine_change.high, sines_[q].sin.high} * now).store(z + sine + 2 * q);
         }
     }
 
