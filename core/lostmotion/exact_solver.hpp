@@ -192,6 +192,9 @@ class ExactSolver {
         }
         return true;
     }
+    static bool moderate(const State& rate) {
+        return std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100;
+    }
     // After a change of the inputs: if the regime goes on, the rate jumps by no more than what they bring.
     [[gnu::cold]] void follow_inputs(const RegimeKey& before) {
         if (!course_.rate_known || !(key_ == before)) {
@@ -263,6 +266,17 @@ class ExactSolver {
         Ends *here = &ends_[0], *there = &ends_[1];
         const bool constant_inputs = cursor->constant_inputs();
         if (!course_.rate_known && cursor->carries_rate()) course_.doubt = rate_doubt(e, *cursor, segment.memory);
+        if (e.regime.n_guards == 0 && LongStep<D>::pays(p, limit - time_)) {
+            *end = *cursor;
+            end->leap_to(limit);
+            if (moderate(end->rate())) {  // else the looks find out when the motion leaves the range
+                ++looks_;
+                time_ = limit;
+                now_.x = end->x();
+                keep_course(e, *end);
+                return Status::done;
+            }
+        }
         evaluate(e, constant, *cursor, *here);
         Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
         for (int i = 0; i < n_inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
@@ -278,7 +292,7 @@ class ExactSolver {
                 rest(segment, *cursor, limit);
                 return Status::done;
             }
-            if (!(std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100)) return Status::outside;
+            if (!moderate(rate)) return Status::outside;
             const Coupled fourth = absolute(cursor->fourth_derivative());
             const double left = limit - time_;
             level = p.bounded_level(level);
