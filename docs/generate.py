@@ -93,8 +93,31 @@ def scenario_reference() -> str:
         "",
     ]
     write_table("top level", schema, schema, lines, set())
+    lines += changes()
     lines += units()
     return "\n".join(lines).replace("[top level]", "top level")
+
+
+def changes() -> list[str]:
+    """What a change of one key does to a part that is otherwise given."""
+    return [
+        "## Changes to a motor or gearbox",
+        "",
+        "A key beside `from`, over a `base`, by `--set` or in a study takes the place of its own figure; a change that could have no effect",
+        "is refused. What belongs together goes together:",
+        "",
+        "- `motor.rated_voltage`: the same motor, its command 1 now another voltage. Stall torque and no-load speed go with the voltage, so",
+        "  `armature_voltage_constant` and `rated_speed` follow, unless they are given too; rated torque and time constant stay. Half the",
+        "  command at twice the rated voltage is the same motion. A voltage at which the motor does not reach its rated torque is refused.",
+        "- `motor.rated_torque`, `motor.rated_speed` and `motor.armature_voltage_constant` are the figures of the speed-torque line: changing one",
+        "  gives another motor, whose stall torque is the product of the first and the last.",
+        '- `motor.kind = "torque_source"`: rotor, friction and rated torque stay, what only a DC motor has is dropped.',
+        "- `motor.limits` and `gearbox.limits` are what the manufacturer allows. They change no motion, only the verdicts of `lostmotion drive check`, and no other",
+        "  key changes them.",
+        "- `gearbox.ratio`, `inertia`, `viscous_friction`, `rated_input_speed` and `rated_output_torque` beside `from` are figures of the record: its loss map",
+        "  is made anew with them. Stiffness and hysteresis stay as printed.",
+        "",
+    ]
 
 
 def units() -> list[str]:

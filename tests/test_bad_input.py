@@ -250,7 +250,9 @@ FUNCTIONS = [
     *(
         (
             lambda s, t=t: lm.simulate(s, solver="dormand-prince", relative_tolerance=t),
-            f"relative_tolerance {t:g} must lie",
+            f"relative_tolerance {t:g} must lie"
+            if math.isfinite(t)
+            else f"relative_tolerance: {t:g} must be a finite number",
         )
         for t in (math.nan, math.inf, -1.0, 0.0, 1e-300, 1.0)
     ),
@@ -260,12 +262,12 @@ FUNCTIONS = [
     (lambda s: lm.explain(s, 99.0), "must lie between 0 and the duration"),
     (lambda s: lm.explain(s, "0,1 s"), 'time: "0,1 s" has a decimal comma'),
     (lm.explain, "time is missing"),
-    (lambda s: lm.explain(s.drive(), 0.1), "give a Scenario"),
-    (lambda s: lm.check_drive(s.drive()), "give a Scenario"),
+    (lambda s: lm.explain(s.drive(), 0.1), "must be a Scenario, such as load(path) returns, or a Simulation"),
+    (lambda s: lm.check_drive(s.drive()), "must be a Scenario, such as load(path) returns"),
     (lambda s: lm.frequency_response(s, ["60 rpm"], [0.1]), 'frequencies: "60 rpm" is a speed of rotation'),
     (lambda s: lm.frequency_response(s, [math.nan], [0.1]), "frequencies: nan must be a finite number"),
-    (lambda s: lm.frequency_response(s, [1.0], [0.1], harmonics=0), "harmonics 0 must be 1 or more"),
-    (lambda s: lm.linearize(s, 5), "initial 5 must be a state"),
+    (lambda s: lm.frequency_response(s, [1.0], [0.1], harmonics=0), "harmonics: 0 must be a whole number above 0"),
+    (lambda s: lm.linearize(s, 5), "state: 5 must be a state, such as Initial(motor_speed=100)"),
     (lambda s: lm.linearize(s, lm.Initial(), command=math.nan), "command: nan must be a finite number"),
     (lambda s: lm.Simulation(s, step="1,5 ms"), 'step: "1,5 ms" has a decimal comma'),
     (lambda s: lm.Simulation(s).advance("1 ms", 0.1), 'interval "1 ms", command 0.1 and'),

@@ -21,6 +21,7 @@ from lostmotion.data_sheets.motor_sheet import MotorSheet
 from lostmotion.data_sheets.records import catalogue, find, parse_sheets
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
+from lostmotion.reports.rig import summary_rows
 from lostmotion.simulation.scenario_files import gearbox_from_record
 from lostmotion.sizing.drive_check import check_drive
 from lostmotion.test_rig.comparison import Comparison, compare
@@ -713,3 +714,30 @@ def test_a_sheet_that_says_maker_for_the_manufacturer_is_read_as_before(tmp_path
         parse_sheets(
             tomllib.loads('maker = "A"\nmanufacturer = "B"\n' + former.replace('maker = "NORD"', "")), "both.toml"
         )
+
+
+def test_the_rig_gives_no_figure_where_there_is_no_cause():
+    """A curve without hysteresis and backlash has no loop; what the rig measures of one is rounding."""
+    plain = lm.gearbox("paper-gearbox").model_copy(update={"hysteresis": None})
+    assert plain.stiffness.backlash == 0.0
+    slack = plain.model_copy(update={"stiffness": plain.stiffness.model_copy(update={"backlash": 1e-3})})
+    rows = {name: dict(summary_rows(lm.measure(g))) for name, g in (("plain", plain), ("slack", slack))}
+    width, energy = "width of the loop at zero torque, rated torque in both directions", "energy lost in that loop"
+    assert rows["plain"][width] == "none: neither hysteresis nor backlash is given"
+    assert rows["slack"][width].startswith(f"{np.degrees(1e-3) * 60.0:.4g}"[:4])  # the backlash, in arcmin
+    assert rows["plain"][energy] == rows["slack"][energy] == "none: no hysteresis is given"
+    assert dict(summary_rows(lm.measure(lm.gearbox("paper-gearbox"))))[energy].endswith(" J")
+
+
+def test_a_reversed_range_is_told_as_such():
+    for words, sentence in (
+        (["--ratio", "120..50"], "--ratio 120..50: is reversed; write 50..120"),
+        (["--torque", "1,5..3"], 'has a decimal comma; write "1.5 N*m"'),
+        (["--torque", ".."], ""),
+        (["--torque", "nan..3"], "is not a finite number"),
+    ):
+        done = CliRunner().invoke(app, ["catalogue", *words])
+        assert (done.exit_code == 0) is (sentence == "")
+        assert sentence in str(done.exception or "").replace("'", '"')
+    bare, united = (CliRunner().invoke(app, ["catalogue", "--torque", t]) for t in ("20..30", "20 Nm..3 kgf*m"))
+    assert bare.exit_code == united.exit_code == 0

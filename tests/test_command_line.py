@@ -223,6 +223,56 @@ def test_no_command_imports_a_slow_library_before_it_computes(tmp_path: Path, ca
     assert not SLOW & set(modules)
 
 
+STUDY = """
+base = "paper-2dof-nl-small"
+design = "{design}"
+runs = 8
+[[vary]]
+key = "load.inertia"
+normal = {{ mean = 2.0, deviation = 0.1 }}
+[[vary]]
+key = "load.friction_torque"
+triangular = [0.0, 0.1, 0.3]
+[keep]
+top = "peak(load_speed)"
+"""
+SAYS_WHEN_IT_IMPORTS = """
+import os, sys
+class Watch:
+    def find_spec(self, name, path=None, target=None):
+        if name == "scipy.stats":
+            os.write(1, f"imports, progress shown: {'rich.progress' in sys.modules}".encode())  # the bar takes print over
+            os._exit(0)
+sys.meta_path.insert(0, Watch())
+sys.stderr.isatty = lambda: True
+"""
+
+
+@pytest.mark.parametrize("design", ["random", "latin_hypercube"])
+def test_a_study_imports_no_slow_library_before_it_computes(tmp_path: Path, design: str) -> None:
+    (tmp_path / "s.toml").write_text(STUDY.format(design=design))
+    script = STOPS_AT_THE_FIRST_COMPUTATION.replace('m.partition(".")[0]', "m")
+    done = subprocess.run(
+        [sys.executable, "-c", script, "study", "s.toml"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    word, _, *modules = done.stdout.split()
+    assert word == "computes"
+    assert not (SLOW | {"scipy.stats", "scipy.special"}) & set(modules)
+
+
+def test_the_engine_of_sobol_points_is_imported_behind_all_checks_and_the_progress_bar(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(STUDY.format(design="sobol"))
+    (tmp_path / "bad.toml").write_text(STUDY.format(design="sobol").replace("runs = 8", "runs = -8"))
+    script = SAYS_WHEN_IT_IMPORTS + STOPS_AT_THE_FIRST_COMPUTATION
+    call = [sys.executable, "-c", script, "study"]
+    done = subprocess.run([*call, "s.toml"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "imports, progress shown: True"
+    done = subprocess.run([*call, "bad.toml"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "key runs: -8 must be at least 1" in done.stderr
+    assert done.stdout == ""
+
+
 @pytest.mark.parametrize("call", [("--help",), ("--version",), ("run", "--help"), ("study", "--help")], ids=" ".join)
 def test_help_imports_next_to_nothing(tmp_path: Path, call: tuple[str, ...]) -> None:
     done = lostmotion(*call, cwd=tmp_path, env=os.environ | {"PYTHONPROFILEIMPORTTIME": "1"})

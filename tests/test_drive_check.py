@@ -284,3 +284,58 @@ def test_no_mean_is_judged_ok_by_waiting_while_the_load_sinks():
     for duration in (20.0, 200.0):
         assert set(verdicts[duration]) == means
         assert "ok" not in verdicts[duration].values()
+
+
+MEANS = ("average_output_torque", "average_input_speed", "motor_torque", "winding_temperature")
+
+
+def lifted(begin: float, end: float, duration: float, again: bool = False, **changes) -> lm.Scenario:
+    """A load of 20 N·m that the command lifts except from `begin` to `end`, in which it sinks."""
+    steps = [{"height": 0.5}, {"height": -0.5, "time": begin}]
+    steps += [{"height": 0.5, "time": end}] if again else []
+    own = {"command": {"steps": steps}, "load.torque": 20.0, "task.hold_without_power": False}
+    return lm.load("catalogue-robot-joint", own | {"simulation.duration": duration} | changes)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3, 0.45])
+def test_a_load_that_sinks_for_a_part_of_the_run_is_not_passed_over(share: float):
+    duration = 0.5 / (1.0 - share)
+    scenario = lifted(0.5, duration, duration)
+    run = lm.simulate(scenario)
+    assert float(run["load_speed"][-1]) < 0.0  # it does sink
+    found = by_rule(scenario)
+    for rule in MEANS:
+        assert found[rule].verdict != "ok", rule
+        assert "also at its end, so that this mean depends on the duration" in found[rule].remark
+        told = float(found[rule].remark.split("drives the motor for ")[1].split(" s of")[0])
+        falling = float((run["motor_speed"] < 0.0).mean()) * duration
+        assert told == pytest.approx(falling, abs=0.02 * duration)
+    whole = by_rule(lifted(0.5, 0.5, 0.5))
+    for rule in MEANS:
+        assert whole[rule].verdict != "unknown"
+        assert "with command 0" not in whole[rule].remark
+
+
+def test_a_load_that_sinks_between_two_moves_is_told_and_judged():
+    """Its time is fixed by the command, so it is a part of the cycle."""
+    found = by_rule(lifted(0.4, 0.7, 1.0, again=True))
+    for rule in MEANS:
+        assert found[rule].verdict != "unknown"
+        assert found[rule].remark.split("; ")[-1].startswith("with command 0 the load drives the motor for 0.")
+        assert "depends" not in found[rule].remark
+
+
+def test_a_cycle_that_includes_the_sinking_is_judged():
+    found = by_rule(lifted(0.5, 0.7, 0.7, **{"task.cycle": 0.7}))
+    for rule in MEANS:
+        assert found[rule].verdict != "unknown"
+        assert "with command 0 the load drives the motor" in found[rule].remark
+
+
+def test_a_load_that_is_only_slowed_down_by_friction_is_no_sinking_one():
+    coasting = lm.load(
+        "catalogue-robot-joint",
+        {"command": {"steps": [{"height": 0.5}, {"height": -0.5, "time": 0.5}]}, "simulation.duration": 0.52},
+    )
+    for rule in MEANS:
+        assert "with command 0" not in by_rule(coasting)[rule].remark

@@ -51,7 +51,9 @@ def test_a_scenario_brings_its_constant_inputs_and_its_start_along() -> None:
 
 
 def test_what_is_no_drive_is_refused_in_plain_words() -> None:
-    with pytest.raises(lm.InputError, match=r"'drive.toml' is no drive; give a Drive, or a Scenario"):
+    with pytest.raises(
+        lm.InputError, match=r'drive: "drive.toml" must be a Drive, or a Scenario, such as load\(path\) returns'
+    ):
         lm.bandwidth("drive.toml", 1.0)
 
 
@@ -202,7 +204,7 @@ def test_several_variables_come_as_an_array_and_a_wrong_name_is_told() -> None:
     pair = simulation["load_speed", "efficiency"]
     assert pair.tolist() == [simulation["load_speed"], simulation["efficiency"]]
     assert simulation[["load_speed", "efficiency"]].tolist() == pair.tolist()
-    with pytest.raises(KeyError, match="'load_sped' is no variable; the variables are command, "):
+    with pytest.raises(lm.InputError, match='"load_sped" is no variable; the variables are command, '):
         simulation["load_sped"]
 
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
+from lostmotion.cli.grids import parse_grid
 from lostmotion.paper import paper_scenario
 from lostmotion.response.linear import rigid_constants
 from lostmotion.response.shooting import PERIODICITY
@@ -154,7 +156,7 @@ def test_scipy_and_control_get_the_same_model():
         assert np.array_equal(getattr(own, name), getattr(model, name))
     assert own.input_labels == ["command", "load_torque"]
     assert own.output_labels[2] == "load_speed"
-    with pytest.raises(KeyError, match="there is no 'load_sped'"):
+    with pytest.raises(lm.InputError, match='there is no "load_sped"'):
         model.response(1.0, "load_sped")
 
 
@@ -405,7 +407,7 @@ def test_control_gets_the_response_as_data():
         (lambda: lm.periodic_motion(NONLINEAR, lm.CommandSignal(steps=[{"height": 1.0}])), "mean and sines only"),
         (
             lambda: lm.periodic_motion(NONLINEAR, lm.CommandSignal(amplitude=1.0, frequency=1.0), multiple=0),
-            "1 or more",
+            "must be a whole number above 0",
         ),
         (
             lambda: lm.periodic_motion(
@@ -476,17 +478,34 @@ def test_the_command_writes_figures_and_tables(tmp_path: Path):
 
 def test_a_drive_that_never_moves_still_gets_its_figures(tmp_path: Path):
     scenario = str(ROOT / "scenarios" / "paper-2dof-nl-large.toml")
-    words = ["--amplitudes", "0.001,0.002", "--frequencies", "1,5", "-o", str(tmp_path / "o")]
+    words = ["--amplitudes", "0.001,0.002", "--frequencies", "1.0,5.0", "-o", str(tmp_path / "o")]
     done = CliRunner().invoke(app, ["response", scenario, *words])
     assert done.exit_code == 0, done.output
     assert (tmp_path / "o" / "bode.png").exists()
+
+
+def test_lists_of_values_are_read_alike() -> None:
+    assert parse_grid("0.025,0.1,1", "amplitudes") == [0.025, 0.1, 1.0]
+    assert parse_grid("1,2,5", "amplitudes") == [1.0, 2.0, 5.0]  # three cannot be one number
+    assert parse_grid("1.0,5.0", "amplitudes") == [1.0, 5.0]
+    assert parse_grid("0.5", "amplitudes") == [0.5]
+    assert parse_grid("10 %, 50 %", "amplitudes") == [0.1, 0.5]
+    assert parse_grid("2 Hz,1 kHz", "frequencies", "Hz") == [2.0, 1000.0]
+    assert parse_grid("0.01..1:3", "amplitudes") == pytest.approx([0.01, 0.1, 1.0])
+    for text in ("0,5", "1,5,025", "1,000", "", ",", "1..2", "1..2:0", "0..1:3", "nan", "1,-2.0", "1e400"):
+        with pytest.raises(lm.InputError, match=f"^--amplitudes {re.escape(text)}: "):
+            parse_grid(text, "amplitudes")
 
 
 @pytest.mark.parametrize(
     ("words", "match"),
     [
         (["--amplitudes", "a"], "--amplitudes a: must be numbers"),
-        (["--amplitudes", "0,1"], "above 0"),
+        (["--amplitudes", "0.0,1.0"], "above 0"),
+        (["--amplitudes", "1,5"], "may be a list or a decimal comma; write 1.0,5.0 or 1.5"),
+        (["--amplitudes", "0,025"], "has a decimal comma in 0,025; write 0.025"),
+        (["--frequencies", "1,5 Hz..10 Hz:3"], "has a decimal comma"),
+        (["--frequencies", "60 rpm"], "is a speed of rotation, not a frequency"),
         (["--frequencies", "1..x:3"], "--frequencies 1..x:3"),
         (["--input", "reference"], "--input reference"),
         (["--variable", "speed"], "--variable speed"),

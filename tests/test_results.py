@@ -98,6 +98,26 @@ def test_a_periodic_motion_which_has_no_switchings_is_saved_too(small: Path, tmp
     xr.testing.assert_equal(back["twist"].drop_vars("time"), motion["twist"].drop_vars("time"))
 
 
+def test_a_csv_file_that_is_cut_at_the_end_of_a_line_is_refused(result: xr.Dataset, tmp_path: Path) -> None:
+    lm.save(result, tmp_path / "r.csv")
+    lines = (tmp_path / "r.csv").read_text().splitlines(keepends=True)
+    for kept, words in ((1000, "998 of the 2001 samples"), (3, "1 of the 2001 samples"), (2, "is no CSV file")):
+        (tmp_path / "cut.csv").write_text("".join(lines[:kept]))
+        with pytest.raises(lm.InputError, match=words):
+            lm.open_result(tmp_path / "cut.csv")
+    (tmp_path / "cut.csv").write_text("".join([*lines, lines[-1]]))
+    with pytest.raises(lm.InputError, match="2002 of the 2001 samples"):
+        lm.open_result(tmp_path / "cut.csv")
+
+
+def test_a_csv_file_that_does_not_say_how_many_samples_it_has_still_loads(result: xr.Dataset, tmp_path: Path) -> None:
+    lm.save(result, tmp_path / "r.csv")
+    text = (tmp_path / "r.csv").read_text()
+    assert text.count(', "samples": 2001') == 1
+    (tmp_path / "old.csv").write_text(text.replace(', "samples": 2001', ""))
+    xr.testing.assert_identical(lm.open_result(tmp_path / "old.csv"), result)
+
+
 def test_what_is_no_result_has_no_switchings() -> None:
     with pytest.raises(ValueError, match="has no switchings; give a result of simulate"):
         lm.switchings_of(xr.Dataset())

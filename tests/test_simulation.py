@@ -9,6 +9,7 @@ import sys
 import textwrap
 import threading
 import time
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -117,7 +118,7 @@ def test_every_variable_can_be_read_while_stepping(small: Path) -> None:
     run = lm.simulate(scenario, command=0.1, duration=0.3, sample_interval=0.01)
     for variable in lm.VARIABLES:
         assert sim[variable.name] == pytest.approx(float(run[variable.name][-1]), rel=1e-9)
-    with pytest.raises(KeyError, match="load_sped"):
+    with pytest.raises(lm.InputError, match="load_sped"):
         sim["load_sped"]
 
 
@@ -270,6 +271,38 @@ def test_a_billion_seconds_at_constant_command_end():
     speed = result["load_speed"].values
     assert speed[1] == pytest.approx(speed[-1], rel=1e-12)
     assert result["load_angle"].values[-1] == pytest.approx(1e9 * speed[-1], rel=1e-6)
+
+
+def test_a_billion_seconds_of_a_sine_end_in_the_steady_state_of_a_linear_drive():
+    scenario = lm.load("paper-2dof-l-large", ["motor.friction_torque=0", "command.frequency=1.3 Hz"])
+    d = scenario.drive()
+    m, g, z = d.motor, d.gearbox, d.load
+    J, i, k = m.rotor_inertia + g.inertia, g.ratio, 17225.0
+    slowing = (m.armature_voltage_constant - 1) / m.rated_speed
+    A = np.array(
+        [
+            [-1 / m.electrical_time_constant, -m.rated_torque * slowing / m.electrical_time_constant, 0, 0],
+            [1 / J, -g.viscous_friction / J, 0, -k / (i * 0.9 * J)],
+            [0, 0, -z.viscous_friction / z.inertia, k / z.inertia],
+            [0, 1 / i, -1, 0],
+        ]
+    )
+    B = [m.rated_torque * m.armature_voltage_constant / m.electrical_time_constant, 0, 0, 0]
+    omega = 2 * np.pi * 1.3
+    answer = np.linalg.solve(1j * omega * np.eye(4) - A, B) * 1.0275  # to exp(i omega t)
+    names = ("motor_torque", "motor_speed", "load_speed", "twist")
+    for interval in (1e9, 1e7, 1e5 / 3):
+        result = lm.simulate(scenario, duration=1e9, sample_interval=interval)
+        assert result["time"].values[-1] == pytest.approx(1e9)
+        for n in {result.sizes["time"] - 1, result.sizes["time"] // 3} - {0}:
+            turns = float(Fraction(1.3) * Fraction(float(result["time"].values[n])) % 1)
+            expected = (answer * np.exp(2j * np.pi * turns)).imag
+            for name, value, size in zip(names, expected, abs(answer), strict=True):
+                # np.linalg.solve is good for some 1e-12 here.
+                assert result[name].values[n] == pytest.approx(value, abs=1e-9 * size)
+        energy = lm.energy_of(result)
+        assert energy["load_damper"] == pytest.approx(1e9 * z.viscous_friction * abs(answer[2]) ** 2 / 2, rel=1e-8)
+        assert abs(energy["residual"]) < 1e-12 * energy["turned_over"]
 
 
 def test_stepping_and_sampled_constants_change_nothing_at_constant_speed():

@@ -30,6 +30,7 @@ from lostmotion.studies.chunk import _core_can, pieces, run_piece, scenario_of_r
 from lostmotion.studies.design import CHUNK
 from lostmotion.studies.expressions import FUNCTIONS, REDUCTIONS
 from lostmotion.studies.file import Study
+from lostmotion.studies.vary import Vary
 
 SHORT = paper_scenario("2-DOF-NL", "large").replace(**{"simulation.duration": 0.2, "simulation.sample_interval": 2e-3})
 
@@ -494,6 +495,41 @@ def test_a_bad_study_ends_in_one_clear_line(tmp_path: Path, old: str, new: str, 
     with pytest.raises(InputError, match=match) as caught:
         lm.load_study(path)
     assert "\n" not in str(caught.value)
+
+
+def test_a_saved_result_can_be_the_base_of_a_study(tmp_path: Path):
+    """All its values are written out, so the study is that of the scenario."""
+    lm.save(lm.simulate(lm.load("step-to-standstill")), tmp_path / "result.csv")
+    for name, base in (("own", "result.csv"), ("other", "step-to-standstill")):
+        (tmp_path / f"{name}.toml").write_text(GOOD.replace("{base}", base))
+    first, second = (lm.load_study(tmp_path / f"{name}.toml") for name in ("own", "other"))
+    assert first.scenario == second.scenario
+    tables = [read_table(lm.study(study, tmp_path / name)) for name, study in (("a", first), ("b", second))]
+    assert tables[0].to_pydict() == tables[1].to_pydict()
+
+
+def test_a_saved_result_is_refused_where_a_file_of_text_is_wanted(tmp_path: Path):
+    lm.save(lm.simulate(lm.load("step-to-standstill")), tmp_path / "result.csv")
+    (tmp_path / "s.toml").write_text('base = "result.csv"\n')
+    with pytest.raises(
+        InputError, match=r'key base: "result.csv" has the ending of a saved result; name a scenario file'
+    ):
+        lm.load(tmp_path / "s.toml")
+    with pytest.raises(InputError, match=r"result.csv: has the ending of a saved result; a study is a TOML file"):
+        lm.load_study(tmp_path / "result.csv")
+
+
+def test_quantiles_are_those_of_the_statistics_library():
+    import scipy.stats
+
+    u = np.concatenate([[1e-12, 0.5, 1.0 - 1e-12], np.random.default_rng(1).random(1000)])
+    normal = Vary(key="load.inertia", normal={"mean": 2.0, "deviation": 0.1})
+    assert np.allclose(normal.quantile(u), scipy.stats.norm.ppf(u, 2.0, 0.1), rtol=1e-14, atol=0.0)
+    for low, mode, high in ((1.0, 1.2, 3.0), (1.0, 1.0, 3.0), (1.0, 3.0, 3.0), (-2.0, 0.0, 1.0)):
+        triangular = Vary(key="load.inertia", triangular=[low, mode, high])
+        theirs = scipy.stats.triang.ppf(u, (mode - low) / (high - low), low, high - low)
+        assert np.allclose(triangular.quantile(u), theirs, rtol=0.0, atol=1e-14)
+    assert (Vary(key="load.inertia", triangular=[2.0, 2.0, 2.0]).quantile(u) == 2.0).all()
 
 
 def test_memory_does_not_grow_with_the_length_of_a_study(tmp_path: Path):

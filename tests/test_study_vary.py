@@ -1,5 +1,6 @@
 """What a study can vary: records by name, conditions of their use, entries of lists; and what it cannot."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -138,9 +139,40 @@ def test_runs_that_fail_are_counted_on_the_command_line(tmp_path: Path):
     path = write(tmp_path, '[[vary]]\nkey = "gearbox.temperature"\nvalues = ["20 degC", "40 degC"]')
     done = subprocess.run(
         [sys.executable, "-m", "lostmotion", "study", str(path)],
-        cwd=tmp_path, capture_output=True, text=True, check=True,
+        cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
+    assert done.returncode == 1
+    assert len(done.stderr.strip().splitlines()) == 1
     assert "1 of 2 runs failed, such as: gearbox schaeffler-rt1-h-20-100: has data for 20 °C only" in done.stderr
+    rows = read_table(tmp_path / path.stem).to_pydict()  # what went well stays, with what went wrong
+    assert [bool(error) for error in rows["error"]] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ('key = "gearbox"\ncatalogue = { ratio = [120, 50] }', "has catalogue.ratio = [120, 50], which is reversed"),
+        ('key = "gearbox"\ncatalogue = { ratio = [120] }', "has catalogue.ratio = [120]; it must be a list of minimum"),
+        (
+            'key = "gearbox"\ncatalogue = { kind = ["worm", true] }',
+            'catalogue.kind = ["worm", true]; it must be a text',
+        ),
+        ('key = "gearbox"\ncatalogue = ["worm"]', 'has catalogue = ["worm"]; it must be a table'),
+        ('key = "gearbox"\nvalues = [true]', "has the value true, which is no name of a gearbox"),
+        ('key = "temperature"\nvalues = [20]', "did you mean gearbox.temperature?"),
+        (
+            'key = "inertja"\nvalues = [20]',
+            "varies inertja, which the base scenario does not know (there is no inertja)",
+        ),
+        ('key = "motor.inertia"\nvalues = [20]', "did you mean "),
+        ('key = "load.inertai"\nvalues = [20]', "did you mean load.inertia?"),
+    ],
+)
+def test_what_is_wrong_with_a_parameter_is_said_in_the_words_of_the_file(tmp_path: Path, text: str, sentence: str):
+    with pytest.raises(lm.InputError) as caught:
+        lm.load_study(write(tmp_path, f"[[vary]]\n{text}"))
+    assert sentence in str(caught.value)
+    assert not re.search("True|'", str(caught.value))
 
 
 def test_the_catalogue_is_filtered_by_figures(tmp_path: Path):

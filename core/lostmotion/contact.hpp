@@ -32,14 +32,16 @@ class Flow {
  public:
     Flow(const LinearRates& rates, const Instant& now) : rates_(rates), now_(now) {}
 
-    // Sign that the k-th derivative of a form has just after now, from its value and the sum of the magnitudes of its
-    // terms; 0 if it stays at zero.
-    int sign(const LinearForm& form, int k, double value, double size) {
-        while (++k < n_derivatives) {
-            const auto [rate, rate_size] = derivative(form, k);
-            if (std::fabs(value) > noise(size, rate)) return value > 0.0 ? +1 : -1;
-            value = rate;
-            size = rate_size;
+    // Sign that a form has just after now, from its value and the sum of the magnitudes of its terms: that of the first
+    // of the value and its derivatives that is not zero. 0 if it stays at zero or, if asked by value alone, is zero
+    // now.
+    int sign(const LinearForm& form, double value, double size, bool by_value_alone) {
+        for (int k = 1; k < n_derivatives; ++k) {
+            const double next = rate(form, k);
+            if (std::fabs(value) > noise(size, next)) return value > 0.0 ? +1 : -1;
+            if (by_value_alone) return 0;
+            value = next;
+            size = rate_size(form, k);
         }
         return 0;
     }
@@ -49,38 +51,38 @@ class Flow {
     double noise(double size, double rate) const {
         return rounding * size + time_rounding * std::fabs(now_.time * rate);
     }
-    // First derivative of the state, and the sums of the magnitudes of its terms.
-    std::pair<const State&, const State&> rate() {
-        if (order_ < 1) extend();
-        return {x_[1], size_[1]};
-    }
-
     // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
-    std::pair<double, double> derivative(const LinearForm& f, int k) {
-        if (k > order_) extend();
-        const State &x = x_[k], &size = size_[k];
+    double rate(const LinearForm& f, int k) { return evaluate_rate(f, derivative(k), now_.input[k]); }
+    double rate_size(const LinearForm& f, int k) {
+        const State& terms = size(k);
         const auto& u = now_.input[k];
         double sum = std::fabs(f.c[command] * u[0]) + std::fabs(f.c[load_torque] * u[1]);
-        for (int j = 0; j < n_states; ++j) sum += std::fabs(f.c[j]) * size[j];
-        return {evaluate_rate(f, x, u), sum};
+        for (int j = 0; j < n_states; ++j) sum += std::fabs(f.c[j]) * terms[j];
+        return sum;
     }
 
  private:
-    void extend() {
-        const int k = order_++;
-        if (k == 0) {
+    const State& derivative(int k) {
+        if (order_ == 0) {
             x_[1] = rates_(now_.x, rates_.constant(now_.memory), now_.input[0]);
-            size_[1] = rates_.size(magnitudes(now_.x), magnitudes(now_.memory), now_.input_size);
-        } else {
-            const auto& u = now_.input[k];
-            x_[k + 1] = rates_.higher(x_[k], u);
-            size_[k + 1] = rates_.higher_size(size_[k], {std::fabs(u[0]), std::fabs(u[1])});
+            order_ = 1;
         }
+        for (; order_ < k; ++order_) x_[order_ + 1] = rates_.higher(x_[order_], now_.input[order_]);
+        return x_[k];
+    }
+    const State& size(int k) {
+        if (sized_ == 0) {
+            size_[1] = rates_.size(magnitudes(now_.x), magnitudes(now_.memory), now_.input_size);
+            sized_ = 1;
+        }
+        for (; sized_ < k; ++sized_)
+            size_[sized_ + 1] = rates_.higher_size(size_[sized_], magnitudes(now_.input[sized_]));
+        return size_[k];
     }
 
     const LinearRates& rates_;
     const Instant& now_;
-    int order_ = 0;
+    int order_ = 0, sized_ = 0;
     std::array<State, n_derivatives + 1> x_, size_;  // as far as they are known
 };
 
@@ -384,7 +386,7 @@ class SwitchedDrive {
             const LinearForm& form = entry.regime.guards[k].form;
             const double value = evaluate(form, now.x, now.memory, now.input[0]);
             const double size = magnitude(form, now.x, now.memory, now.input[0]);
-            const auto [rate, rate_size] = flow.derivative(form, 1);
+            const double rate = flow.rate(form, 1), rate_size = flow.rate_size(form, 1);
             const bool zero = std::fabs(value) <= flow.noise(size, rate);
             if (zero && rate < 0.0 && !event.by_value_alone(entry.regime.guards[k]))
                 worst = std::fmax(worst, -rate / rate_size);
@@ -400,7 +402,7 @@ class SwitchedDrive {
     std::pair<const Guard*, bool> violated(const Entry& entry, const Instant& now, unsigned ignored,
                                            const Event* event = nullptr) const {
         const GuardTable& guards = entry.guards;
-        GuardTable::Values constant, value, size, slope, slope_size;
+        GuardTable::Values constant, value, size;
         guards.constants(now.memory, constant);
         guards.evaluate(constant, now.x, now.input[0], value);
         guards.sizes(magnitudes(now.memory), magnitudes(now.x), now.input_size, size);
@@ -411,16 +413,11 @@ class SwitchedDrive {
         near &= ~ignored;
         if (near == 0) return {nullptr, false};
         Flow flow(entry.rates, now);
-        const auto& [rate, rate_size] = flow.rate();
-        guards.rates(rate, now.input[1], slope);
-        guards.rate_sizes(rate_size, magnitudes(now.input[1]), slope_size);
         bool overcome = false;
         for (; near != 0; near &= near - 1) {
             const int k = std::countr_zero(near);
-            const int sign = std::fabs(value[k]) > flow.noise(size[k], slope[k]) ? (value[k] > 0.0 ? +1 : -1)
-                             : event != nullptr && event->by_value_alone(entry.regime.guards[k])
-                                 ? 0
-                                 : flow.sign(guards.form(k), 1, slope[k], slope_size[k]);
+            const bool by_value_alone = event != nullptr && event->by_value_alone(entry.regime.guards[k]);
+            const int sign = flow.sign(entry.regime.guards[k].form, value[k], size[k], by_value_alone);
             if (sign >= 0) continue;
             if ((entry.contacts >> k & 1) == 0) return {&entry.regime.guards[k], overcome};
             overcome = true;

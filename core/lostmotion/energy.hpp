@@ -6,6 +6,7 @@
 // Where the panel spans many of the shortest time constants, rounding spoils the derivatives: of a fast part of the
 // motion that has died out they are nothing but rounding times its rate to the fourth. There the powers are taken at
 // the nodes of the Gauss-Kronrod pair of 7 and 15 points (Kronrod 1965; R. Piessens et al., QUADPACK, Springer 1983).
+// Segments of thousands of periods are taken at once (long_step.hpp).
 #pragma once
 
 #include <optional>
@@ -29,7 +30,7 @@ enum EnergyFlow : int {
 struct EnergyLedger {
     std::array<double, n_flows> flow{};                                                     // [J] since the start
     double kinetic_begin = 0.0, kinetic_end = 0.0, elastic_begin = 0.0, elastic_end = 0.0;  // [J]
-    double turned_over = 0.0;  // [J] sum of the magnitudes of all flows, panel by panel
+    double turned_over = 0.0;  // [J] sum of the magnitudes of all flows, panel by panel (or of apparent energies)
 
     // What the balance fails by [J].
     double residual() const {
@@ -52,6 +53,10 @@ class EnergyMeter {
         const Regime& r = s.entry.regime;
         if (r.at_rest[input_contact] && r.at_rest[load_contact]) return true;
         Propagator<DriveDims>& p = s.entry.propagator;
+        if (LongStep<DriveDims>::pays(p, s.end - s.begin)) {
+            add_long(s);
+            return true;
+        }
         if (!cursor_) end_ = cursor_.emplace(s.at.input());
         Cursor<DriveDims>&cursor = *cursor_, &end = *end_;
         cursor = s.at;
@@ -176,6 +181,22 @@ class EnergyMeter {
             difference += std::fabs(sums[f] - lower);
         }
         return add(sums, difference, panel_tolerance, h, shortest);
+    }
+
+    // The same of a segment that is taken at once, exact but for rounding. What is turned over is the apparent energy:
+    // root mean square times root mean square.
+    void add_long(const Segment<SwitchedDrive>& s) {
+        const Factors factors(drive_, s.entry.regime, s.memory);
+        const double length = s.end - s.begin;
+        const LongProducts<DriveDims> products(s.entry.propagator, s.constant, s.at.x(), s.at.input(), length);
+        for (int f = 0; f < n_flows; ++f) {
+            const std::vector<double> a = products.step().coefficients(factors.left, f, factors.left_constant[f]),
+                                      b = products.step().coefficients(factors.right, f, factors.right_constant[f]);
+            ledger.flow[f] += products(a, b);
+            ledger.turned_over += std::sqrt(std::fmax(0.0, products(a, a)) * std::fmax(0.0, products(b, b)));
+        }
+        elapsed_ += length;
+        mean_power_ = ledger.turned_over / elapsed_;
     }
 
     // The same by the powers at nodes, from where a cursor stands.

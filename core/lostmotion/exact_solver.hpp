@@ -192,8 +192,11 @@ class ExactSolver {
         }
         return true;
     }
+    static bool moderate(const State& rate) {
+        return std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100;
+    }
     // After a change of the inputs: if the regime goes on, the rate jumps by no more than what they bring.
-    void follow_inputs(const RegimeKey& before) {
+    [[gnu::cold]] void follow_inputs(const RegimeKey& before) {
         if (!course_.rate_known || !(key_ == before)) {
             course_.forget();
             return;
@@ -210,13 +213,13 @@ class ExactSolver {
         course_.touch_size = 0.0;
     }
     // Bound on the speed of the twist over the first look, from the rate.
-    double slip_bound(typename Cache::Entry& e, const Coupled& rate) const {
+    [[gnu::cold]] double slip_bound(typename Cache::Entry& e, const Coupled& rate) const {
         if (!e.propagator.ready()) e.prepare(turns_, scale_);
         return (e.propagator.level(first_level).growth * absolute(rate))[twist];
     }
     // Rounding of a rate that is computed from the state, relative to the rate, as far as it acts on the twist. What
     // the search for the modes takes for zero must not be seen to fall at once.
-    double rate_doubt(typename Cache::Entry& e, const Cursor& at, const Memory& memory) const {
+    [[gnu::cold]] double rate_doubt(typename Cache::Entry& e, const Cursor& at, const Memory& memory) const {
         State size = e.rates.size(magnitudes(at.x()), magnitudes(memory), at.input().sizes());
         if (at.rate()[twist] == 0.0) size[twist] = 0.0;  // it starts from rest
         const double bound = slip_bound(e, coupled(at.rate()));
@@ -263,6 +266,17 @@ class ExactSolver {
         Ends *here = &ends_[0], *there = &ends_[1];
         const bool constant_inputs = cursor->constant_inputs();
         if (!course_.rate_known && cursor->carries_rate()) course_.doubt = rate_doubt(e, *cursor, segment.memory);
+        if (e.regime.n_guards == 0 && LongStep<D>::pays(p, limit - time_)) {
+            *end = *cursor;
+            end->leap_to(limit);
+            if (moderate(end->rate())) {  // else the looks find out when the motion leaves the range
+                ++looks_;
+                time_ = limit;
+                now_.x = end->x();
+                keep_course(e, *end);
+                return Status::done;
+            }
+        }
         evaluate(e, constant, *cursor, *here);
         Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
         for (int i = 0; i < n_inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
@@ -275,17 +289,10 @@ class ExactSolver {
             if (count % 64 == 0) cursor->anchor(time_);
             const State& rate = cursor->rate();
             if (constant_inputs && has_settled(e.regime, rate)) {
-                now_.x = cursor->x();
-                if (time_ == segment.begin) {
-                    now_.x[load_angle] += rate[load_angle] * (limit - time_);
-                    time_ = limit;
-                }
-                keep_course(e, *cursor);
-                for (int k = 0; k < n_coupled; ++k) course_.rate[k] = 0.0;
-                course_.rate_known = true;
+                rest(segment, *cursor, limit);
                 return Status::done;
             }
-            if (!(std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100)) return Status::outside;
+            if (!moderate(rate)) return Status::outside;
             const Coupled fourth = absolute(cursor->fourth_derivative());
             const double left = limit - time_;
             level = p.bounded_level(level);
@@ -326,8 +333,20 @@ class ExactSolver {
         return Status::done;
     }
 
+    // The motion has settled.
+    [[gnu::cold]] void rest(const Segment<System>& segment, const Cursor& at, double limit) {
+        now_.x = at.x();
+        if (time_ == segment.begin) {
+            now_.x[load_angle] += at.rate()[load_angle] * (limit - time_);
+            time_ = limit;
+        }
+        keep_course(segment.entry, at);
+        for (int k = 0; k < n_coupled; ++k) course_.rate[k] = 0.0;
+        course_.rate_known = true;
+    }
+
     // At the end of a stretch that no guard ends.
-    void keep_course(const typename Cache::Entry& e, const Cursor& at) {
+    [[gnu::cold]] void keep_course(const typename Cache::Entry& e, const Cursor& at) {
         // Carried on for long, the speeds that a stuck twist ties together drift apart by rounding.
         if constexpr (requires(std::array<bool, n_contacts> at_rest) { system_.stop(now_.x, at_rest); }) {
             std::array<bool, n_contacts> at_rest = e.regime.at_rest;
@@ -460,10 +479,11 @@ class ExactSolver {
         const LinearForm form = e.guards.form(g);
         Departure out;
         for (std::size_t k = 1; k < 4; ++k) {
-            const auto [value, size] = flow.derivative(form, static_cast<int>(k));
-            out.derivative[k] = value;
-            if (out.order == 0 && value < -rounding * size) return out;
-            if (out.order == 0 && value > rounding * size) out.order = k;
+            const double value = out.derivative[k] = flow.rate(form, static_cast<int>(k));
+            if (out.order > 0) continue;
+            const double resolution = rounding * flow.rate_size(form, static_cast<int>(k));
+            if (value < -resolution) return out;
+            if (value > resolution) out.order = k;
         }
         return out;
     }
@@ -504,7 +524,7 @@ class ExactSolver {
 
     // A guard that starts on zero and rises, by the derivative of this order: where it comes back to zero before `end`,
     // at most one base interval on; else `end`. Leaves trial_ there.
-    double first_return(const LinearForm& form, const Cursor& cursor, std::size_t order, double end) {
+    [[gnu::cold]] double first_return(const LinearForm& form, const Cursor& cursor, std::size_t order, double end) {
         cursor.expand(expansion_);
         Polynomial guard = expansion_.polynomial(form, 0.0);
         for (std::size_t k = 1; k < order; ++k) guard.part[0].set(static_cast<int>(k - 1), 0.0);

@@ -39,7 +39,17 @@ class Sampler {
             p.constant = s.constant;
             p.first = next_;
             p.end = next_ = end;
-            p.rest = p.cursor.advance_by_levels(s.at, instant(p.first) - s.begin);
+            p.at_once = LongStep<DriveDims>::pays(s.entry.propagator, s.end - s.begin);
+            if (p.at_once) {
+                Cursor<DriveDims>& begin = p.begin ? *p.begin : p.begin.emplace(s.at);
+                begin = s.at;
+                begin.keep(p.constant);
+                p.cursor = begin;
+                if (instant(p.first) > s.begin) p.cursor.leap_to(instant(p.first));
+                p.rest = 0.0;
+            } else {
+                p.rest = p.cursor.advance_by_levels(s.at, instant(p.first) - s.begin);
+            }
             p.cursor.keep(p.constant);
         }
         return s.last || n_pieces_ == most_pieces ? write() : true;
@@ -63,13 +73,23 @@ class Sampler {
         Column constant;
         Cursor<DriveDims> cursor;
         std::size_t first = 0, end = 0;
-        double rest = 0.0;  // from the cursor to the first [s]
+        double rest = 0.0;                       // from the cursor to the first [s]
+        bool at_once = false;                    // whether the segment is long enough for it
+        std::optional<Cursor<DriveDims>> begin;  // of such a segment
     };
     static constexpr std::size_t most_pieces = 4;
 
     bool write(Piece& p) {
         auto& propagator = p.entry->propagator;
         const int level = propagator.level_of(interval_);
+        std::optional<LongStep<DriveDims>> step;
+        if (level < 0 && p.at_once) step.emplace(p.cursor.long_step(whole_interval(p)));
+        const auto advance = [&](std::size_t to) {
+            if (step)
+                p.cursor.leap_to(instant(to), *step);
+            else
+                p.cursor.advance(instant(to) - p.cursor.time());
+        };
         const Reader reader(drive_, p.entry->regime, p.memory);
         for (std::size_t next = p.first;;) {
             const int n = static_cast<int>(std::min<std::size_t>(p.end - next, Instants::most - next % Instants::most));
@@ -79,7 +99,7 @@ class Sampler {
             } else {
                 instants_.set(0, load(p.cursor.x()), p.cursor.input().values());
                 for (int k = 1; k < n; ++k) {
-                    p.cursor.advance(instant(next + k) - p.cursor.time());
+                    advance(next + static_cast<std::size_t>(k));
                     instants_.set(k, load(p.cursor.x()), p.cursor.input().values());
                 }
             }
@@ -88,10 +108,21 @@ class Sampler {
             if (next == p.end) return true;
             if (next % 4096 == 0 && interrupted != nullptr && interrupted(interrupted_context)) return false;
             if (level >= 0) p.cursor.move_to(instant(next - 1), stride_.x());
-            p.cursor.advance(instant(next) - p.cursor.time());
+            if (step && next % 65536 == 0) {  // so that rounding does not add up
+                p.cursor = *p.begin;
+                p.cursor.leap_to(instant(next));
+            } else {
+                advance(next);
+            }
         }
     }
 
+    // As much of the interval as lies between any two of the samples, as the clock shows them.
+    double whole_interval(const Piece& p) const {
+        const double end = instant(p.end), tick = std::nextafter(end, 2.0 * end) - end;
+        const double whole = tick * std::floor(interval_ / tick);
+        return whole < interval_ ? whole - tick : whole;
+    }
     double instant(std::size_t k) const { return begin_ + static_cast<double>(k) * interval_; }
     // The number of the first sample after a segment.
     std::size_t due(const Segment<SwitchedDrive>& s) const {

@@ -9,7 +9,7 @@ class InputError(ValueError):
     """Input that cannot be used. Its text is one line: the file, the key, the value and the remedy."""
 
     def __init__(self, text: str = "") -> None:
-        super().__init__("".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text))
+        super().__init__("".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(text)))
 
 
 class MissingLibraryError(ImportError):

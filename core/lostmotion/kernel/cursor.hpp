@@ -5,6 +5,7 @@
 // Where nothing drives the motion, x' = A x, nothing but x cancels, and it is the state that keeps its accuracy.
 #pragma once
 
+#include "long_step.hpp"
 #include "propagator.hpp"
 
 namespace lostmotion {
@@ -119,6 +120,21 @@ class Cursor {
             *this = from;
         nudge(h);
     }
+    // Over a long stretch at once, to an instant.
+    void leap_to(double to) {
+        double length = to - input_.time();
+        if (left_of(to, length) < 0.0) length = std::nextafter(length, 0.0);
+        LongStep<D> step = long_step(length);
+        leap_to(to, step);
+    }
+    // The same by a step that is no longer than the stretch.
+    void leap_to(double to, LongStep<D>& step) {
+        advance(left_of(to, step.length()));
+        x_ = step(x_, input_);
+        input_.follow(to);
+        rate_known_ = false;
+    }
+    LongStep<D> long_step(double length) const { return {*propagator_, *constant_, input_, length}; }
     // By one base interval at most, forward or backward; the inputs turn on from where they are.
     void nudge(double s) {
         if (s == 0.0) return;
@@ -139,6 +155,10 @@ class Cursor {
     }
 
  private:
+    // What a length leaves of the way to an instant, of which the rounding of the clock may be most.
+    double left_of(double to, double length) const {
+        return static_cast<double>(DoubleDouble::sum(to, -input_.time()) + -length);
+    }
     // At a state that the inputs belong to.
     [[gnu::always_inline]] void arrive(const Lanes& x) {
         x.store(x_.data());

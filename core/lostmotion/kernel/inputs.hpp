@@ -112,6 +112,13 @@ std::vector<InputBasis> input_basis(const std::array<Signal, n>& signals) {
     return basis;
 }
 
+// How far beyond a whole number of periods, in periods.
+inline double turned(double frequency, double time) {
+    const double turns = frequency * time, part = turns - std::floor(turns);
+    // After a thousand periods the rounding of their number would be seen.
+    return turns < 0x1p10 ? part : part + std::fma(frequency, time, -turns);
+}
+
 // By how much a pair of functions turns over a length of time: cos and sin of the angle (of a ramp, 1 and 0).
 struct Turn {
     double cos, sin;
@@ -210,8 +217,7 @@ class InputState {
         int q = 0;
         for (int i = 0; i < n_inputs; ++i)
             for (const Sine& s : (*signals_)[i].sines) {
-                const double turns = s.frequency * t;
-                const double angle = 2.0 * std::numbers::pi * (turns - std::floor(turns)) + s.phase;
+                const double angle = 2.0 * std::numbers::pi * turned(s.frequency, t) + s.phase;
                 weights_[q++] = s.amplitude * std::sin(angle);
                 weights_[q++] = s.amplitude * std::cos(angle);
             }
@@ -220,6 +226,12 @@ class InputState {
 
     double time() const { return time_; }
     int size() const { return size_; }
+    // How many sines there are, those of the first input first, and the frequency [Hz] of one.
+    int sines() const { return sines_end_[n_inputs - 1] / 2; }
+    double frequency(int k) const {
+        const int i = basis_[2 * k].input, before = i == 0 ? 0 : sines_end_[i - 1] / 2;
+        return (*signals_)[i].sines[static_cast<std::size_t>(k - before)].frequency;
+    }
     const InputBasis& basis(int q) const { return basis_[q]; }
     const double* weights() const { return weights_; }
 

@@ -2,29 +2,68 @@
 
 from __future__ import annotations
 
+import itertools
+import re
+
 import numpy as np
 
 from ..errors import InputError
+from ..inputs.validation import shown
+from ..units.conversion import si_value
 
 
-def parse_grid(text: str, option: str) -> list[float]:
+def parse_grid(text: str, option: str, unit: str = "") -> list[float]:
     """Values from ``0.1,1,10`` or, with equal ratios, ``0.1..100:60`` (first, last, how many).
+
+    Parameters
+    ----------
+    unit
+        Of bare numbers (SI); an entry may bring its own.
 
     Raises
     ------
     InputError
-        The text is neither, or not positive.
+        The text is neither, is ambiguous, or is not positive.
     """
     problem = f"--{option} {text}: must be numbers such as 0.1,1,10 or a range such as 0.1..100:60"
-    try:
-        if ".." not in text:
-            values = [float(x) for x in text.split(",")]
-        else:
-            bounds, _, count = text.partition(":")
-            low, high = (float(x) for x in bounds.split(".."))
-            values = np.geomspace(low, high, int(count)).tolist() if int(count) > 1 else [low]
-    except ValueError:
-        raise InputError(problem) from None
-    if not all(np.isfinite(values)) or min(values) <= 0.0:
+    if ".." not in text:
+        _refuse_decimal_comma(text, option)
+        values = [_value(entry, unit, problem) for entry in text.split(",")]
+    else:
+        bounds, _, count = text.partition(":")
+        low, _, high = bounds.partition("..")
+        if not (count.isascii() and count.isdecimal() and int(count) > 0):
+            raise InputError(problem)
+        ends = [_value(entry, unit, problem) for entry in (low, high)]
+        if min(ends) <= 0.0:
+            raise InputError(f"{problem}, all of them above 0")
+        values = np.geomspace(ends[0], ends[1], int(count)).tolist() if int(count) > 1 else ends[:1]
+    if min(values) <= 0.0:
         raise InputError(f"{problem}, all of them above 0")
     return values
+
+
+def _value(entry: str, unit: str, problem: str) -> float:
+    if not entry.strip():
+        raise InputError(problem)
+    try:
+        return si_value(entry.strip(), unit)
+    except ValueError as error:
+        raise InputError(f"{problem}; {shown(entry.strip())} {error}") from None
+
+
+def _refuse_decimal_comma(text: str, option: str) -> None:
+    """Two whole numbers, or digits after a comma that no whole number begins with, may be one number with a decimal comma."""
+    entries = [entry.strip() for entry in text.split(",")]
+    whole = [bool(re.fullmatch("[0-9]+", entry)) for entry in entries]
+    if len(entries) == 2 and all(whole) and not re.match("0[0-9]", entries[1]):
+        first, second = entries
+        raise InputError(
+            f"--{option} {text}: may be a list or a decimal comma; write {first}.0,{second}.0 or {first}.{second}"
+        )
+    for before, entry in itertools.pairwise(entries):
+        if re.match("0[0-9]", entry) and re.fullmatch("[0-9]+", before):
+            thousands = f" or {before}{entry}" if len(entry) == 3 and not before.startswith("0") else ""
+            raise InputError(
+                f"--{option} {text}: has a decimal comma in {before},{entry}; write {before}.{entry}{thousands}"
+            )

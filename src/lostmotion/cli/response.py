@@ -21,11 +21,14 @@ def response(
     amplitudes: Annotated[
         str,
         typer.Option(
-            "--amplitudes", metavar="LIST", help="0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many)."
+            "--amplitudes",
+            metavar="LIST",
+            help="0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many). Commas separate; two whole numbers, which may be "
+            "a decimal comma, are written 1.0,5.0.",
         ),
     ] = "0.02..1:6",
     frequencies: Annotated[
-        str, typer.Option("--frequencies", metavar="LIST", help="[Hz], as the amplitudes.")
+        str, typer.Option("--frequencies", metavar="LIST", help="[Hz], written as the amplitudes.")
     ] = "0.1..100:60",
     source: Annotated[
         str, typer.Option("--input", metavar="NAME", help="command or load_torque: what is a sine.")
@@ -59,8 +62,9 @@ def response(
     from ..simulation.sources import load
     from .grids import parse_grid
 
-    wanted, grid = parse_grid(amplitudes, "amplitudes"), parse_grid(frequencies, "frequencies")
     _check_names(source, variable)
+    wanted = parse_grid(amplitudes, "amplitudes", "" if source == "command" else "N*m")
+    grid = parse_grid(frequencies, "frequencies", "Hz")
     try_directory(output)
     name = Path(scenario).stem
     loaded = {name: load(scenario, overrides or ())} | {Path(other).stem: load(other) for other in compare or ()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -40,7 +39,8 @@ def study(
 ) -> None:
     """Many runs: vary parameters, store selected results, resume after an interruption.
 
-    Writes a directory of Parquet files, one row a run, that pandas, DuckDB and polars open directly.
+    Writes a directory of Parquet files, one row a run, that pandas, DuckDB and polars open directly. If runs failed, their rows
+    say why, all others are there, and the exit code is 1.
 
     \b
     lostmotion study tolerance.toml -o tolerance
@@ -86,7 +86,7 @@ def _show(directory: Path, best: str | None) -> None:
 def _print_outcome(directory: Path, total: int) -> None:
     from ..studies.table import failures
 
+    print(f"{total} runs are in {directory}; `lostmotion study show {directory}` shows them")
     failed = failures(directory)
     if failed:
-        print(f"{len(failed)} of {total} runs failed, such as: {failed[0]}", file=sys.stderr)
-    print(f"{total} runs are in {directory}; `lostmotion study show {directory}` shows them")
+        fail(f"{len(failed)} of {total} runs failed, such as: {failed[0]}; the column `error` has all reasons")

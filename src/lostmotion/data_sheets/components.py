@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from typing import Annotated, Any
 
 from ..errors import InputError
 from ..inputs.part import Part
-from ..inputs.quantities import Angle, NotNegative, Number, Positive, Temperature
+from ..inputs.quantities import Angle, NotNegative, Number, Positive, Temperature, argument
 from ..inputs.validation import shown, unknown_key
-from ..model.parts import Gearbox, LinearStiffness, Motor, TorsionCurve
+from ..model.parts import DC_KEYS, Gearbox, LinearStiffness, Motor, TorsionCurve
 from .gearbox_sheet import SCALARS, GearboxSheet
 from .loss_map_builder import BuiltMap, build_loss_map
 from .motor_sheet import MotorSheet
@@ -181,9 +181,9 @@ def motor(name: str, *, voltage_limit: float | None = None) -> Motor:
     InputError
         There is no such record, or it lacks what a run needs.
     """
-    changes = {} if voltage_limit is None else {"voltage_limit": voltage_limit}
+    table = motor_table(name, {} if voltage_limit is None else {"voltage_limit": voltage_limit})
     try:
-        return Motor(**motor_table(name, changes))
+        return Motor(**table)
     except InputError as error:
         raise InputError(f"motor {name}: {error}") from None
 
@@ -214,8 +214,52 @@ def motor_table(reference: str, changes: Mapping[str, Any]) -> dict[str, Any]:
         keys = [f"motor.{key}" for key, gap in CLOSES.items() if gap in missing and key not in changes]
         remedy = f"; give {' and '.join(keys)} beside `from`" if keys else ""
         raise InputError(f"motor from {shown(reference)}: {error}{remedy}") from None
+    if changes.get("kind") == "torque_source":
+        table = as_torque_source(table)
+    elif "rated_voltage" in changes:
+        table = at_voltage(table, changes["rated_voltage"], changes)
     _change(table, changes)
     return table
+
+
+def as_torque_source(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of `[motor]` without those that only a DC motor has."""
+    return {key: value for key, value in table.items() if key not in DC_KEYS}
+
+
+def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str]) -> dict[str, Any]:
+    """Values of `[motor]` with another rated voltage, as `Motor.at_voltage`.
+
+    Parameters
+    ----------
+    table
+        As a scenario has it. One that is no whole DC motor with a rated voltage only gets the new one.
+    voltage
+        [V], or text with a unit.
+    given
+        Keys that are changed too: where these say all that would follow, nothing does.
+
+    Raises
+    ------
+    InputError
+        At this voltage the motor does not reach its rated torque.
+    """
+    changed = {**table, "rated_voltage": voltage}
+    if {"rated_speed", "armature_voltage_constant"} <= set(given):
+        return changed
+    try:
+        motor = Motor(**table)
+        value = argument("rated_voltage", voltage, "V")
+    except InputError:
+        return changed  # which the scenario refuses, with the name of the key
+    if motor.kind != "dc" or motor.rated_voltage is None or value <= 0.0:
+        return changed
+    try:
+        moved = motor.at_voltage(value)
+    except InputError as error:
+        raise InputError(f"key motor.rated_voltage: {error}") from None
+    follow = ("rated_speed", "armature_voltage_constant")
+    return changed | {key: getattr(moved, key) for key in follow}
 
 
 def use_records(data: dict[str, Any]) -> None:

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..inputs.arguments import checked
+from ..inputs.quantities import Number, Temperature
 from ..model.parts import LossMap
 from ..units.practical import RPM
 from .gearbox_sheet import GearboxSheet
@@ -42,7 +44,10 @@ class BuiltMap:
     """contradictions and assumptions, one sentence each"""
 
 
-def build_loss_map(sheet: GearboxSheet, *, temperature: float | None = None, loss_factor: float = 1.0) -> BuiltMap:
+@checked
+def build_loss_map(
+    sheet: GearboxSheet, *, temperature: Temperature | None = None, loss_factor: Number = 1.0
+) -> BuiltMap:
     """The loss map of a data sheet.
 
     Parameters

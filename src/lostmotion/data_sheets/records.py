@@ -24,9 +24,13 @@ KINDS: dict[str, type[GearboxSheet] | type[MotorSheet]] = {"gearbox": GearboxShe
 COMMON = ("kind", "manufacturer", "note")
 
 
-@cache
 def catalogue() -> tuple[GearboxSheet | MotorSheet, ...]:
     """All records that are shipped, gearboxes first."""
+    return _shipped()
+
+
+@cache
+def _shipped() -> tuple[GearboxSheet | MotorSheet, ...]:
     found: list[GearboxSheet | MotorSheet] = []
     directory = files("lostmotion") / "catalogue"
     for file in sorted(directory.iterdir(), key=lambda f: f.name):

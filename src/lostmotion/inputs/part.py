@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ..errors import InputError
 from .display import abridged
-from .validation import describe
+from .validation import describe, shown
 
 
 class Part(BaseModel):
@@ -32,7 +33,12 @@ class Part(BaseModel):
 
         return table(self)
 
-    def __init__(self, /, **values: Any) -> None:
+    def __init__(self, /, *nameless: Any, **values: Any) -> None:
+        if nameless:
+            first = next(iter(type(self).model_fields))
+            raise InputError(
+                f"{self._subject()} takes its values by name, such as {first}=...; not {shown(nameless[0])}"
+            )
         with self._one_error(values):
             super().__init__(**values)
 
@@ -69,7 +75,7 @@ class Part(BaseModel):
         try:
             yield
         except ValidationError as error:
-            raise InputError(describe(error, cls._described_by(), cls._subject(), given)) from None
+            raise InputError(describe(error, _description(cls), cls._subject(), given)) from None
 
     @classmethod
     def _described_by(cls) -> dict[str, Any]:
@@ -80,3 +86,8 @@ class Part(BaseModel):
     def _subject(cls) -> str:
         """What it is, for messages: the torsion curve."""
         return "the " + " ".join(re.findall("[A-Z][a-z]*", cls.__name__.split("[")[0])).lower()
+
+
+@cache  # it takes longer than all the rest of a refusal
+def _description(part: type[Part]) -> dict[str, Any]:
+    return part._described_by()

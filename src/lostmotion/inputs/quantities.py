@@ -14,6 +14,8 @@ from ..errors import InputError
 from ..units.conversion import Unit
 from .validation import shown
 
+Count = Annotated[int, "above 0"]
+"""a whole number above 0, as the core takes it"""
 Number = Annotated[float, Unit("")]
 Torque = Annotated[float, Unit("N*m")]
 Inertia = Annotated[float, Unit("kg*m^2")]

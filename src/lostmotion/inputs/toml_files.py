@@ -9,6 +9,8 @@ from typing import Any
 
 from ..errors import InputError
 
+RESULTS = (".nc", ".csv", ".parquet")  # endings of saved results
+
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
     """The contents of a TOML file that is meant to hold `what`.
@@ -18,6 +20,8 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     InputError
         It cannot be read; the message says why, and what may have been meant.
     """
+    if path.suffix in RESULTS and path.is_file():
+        raise InputError(f"{path}: has the ending of a saved result; {what} is a TOML file (.toml)")
     try:
         text = path.read_text(encoding="utf-8")
     except IsADirectoryError:

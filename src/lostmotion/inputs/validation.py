@@ -83,9 +83,13 @@ def _toml(value: Any) -> str:
         return value.isoformat()
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {_toml(x)}" for key, x in value.items()) + " }"
-    return repr(value)
+    if hasattr(value, "tolist"):  # an array
+        return _toml(value.tolist())
+    text = repr(value)
+    # What describes itself by its class, or in several lines, says nothing to a reader of one.
+    return "the given object" if text.startswith("<") or "\n" in text or " at 0x" in text else text
 
 
 class _Problem:

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 import xarray as xr
 
 from ..errors import InputError
+from ..inputs.arguments import checked
+from ..inputs.validation import shown
+from ..response.harmonic import of_output
 from ..simulation.results import energy_of, scenario_of
 from ..simulation.scenario import Scenario
 from .run import summary
@@ -23,11 +26,14 @@ class ResultAccessor:
     """
 
     def __init__(self, dataset: xr.Dataset) -> None:
+        if not isinstance(dataset, xr.Dataset):
+            raise InputError(f"{shown(dataset)} must be a dataset, such as simulate returns")
         self._dataset = dataset
 
     def __repr__(self) -> str:
         return "result.lm: plot(), plot_maps(), summary(), scenario, energy"
 
+    @checked
     def plot(self, output: str = "load_speed") -> Figure:
         """The figure that the command line draws: of a run the overview, of a frequency response the Bode figure.
 
@@ -44,6 +50,7 @@ class ResultAccessor:
         from . import plots, response_figures
 
         if "response" in self._dataset:
+            of_output(self._dataset, output)
             return response_figures.bode_figure({"": self._dataset}, output)
         lacking = [name for name in plots.OVERVIEW if name not in self._dataset]
         if len(lacking) == len(plots.OVERVIEW):
@@ -52,6 +59,7 @@ class ResultAccessor:
             raise InputError(f"this dataset lacks {', '.join(lacking)}, which the figure of a run shows")
         return plots.overview(self._dataset)
 
+    @checked
     def plot_maps(self, output: str = "load_speed") -> Figure:
         """Gain, phase, efficiency and distortion of a frequency response over amplitude and frequency.
 
@@ -62,8 +70,7 @@ class ResultAccessor:
         """
         from . import response_figures
 
-        if "response" not in self._dataset:
-            raise InputError("this dataset is no frequency response; lm.frequency_response makes one")
+        of_output(self._dataset, output)
         return response_figures.maps_figure(self._dataset, output)
 
     def summary(self) -> str:

@@ -13,21 +13,28 @@ from ..data_sheets.gearbox_sheet import GearboxSheet
 from ..data_sheets.motor_sheet import MotorSheet
 from ..data_sheets.records import catalogue, find, read_sheets
 from ..errors import InputError
+from ..units.conversion import si_value
 from ..units.practical import RPM
 from .sheet_rows import rows_of
 
 
-def _range(text: str | None, option: str) -> tuple[float, float]:
+def _range(text: str | None, option: str, unit: str = "") -> tuple[float, float]:
     """Bounds from ``MIN..MAX``; each may be left out."""
     if text is None:
         return -np.inf, np.inf
     low, dots, high = text.partition("..")
+    problem = f"--{option} {text}: must be MIN..MAX, such as --{option} 50..120"
     try:
-        if not dots:
-            return float(low), float(low)
-        return float(low or "-inf"), float(high or "inf")
-    except ValueError:
-        raise InputError(f"--{option} {text}: must be MIN..MAX, such as --{option} 50..120") from None
+        ends = (si_value(low, unit) if low else -np.inf, si_value(high, unit) if high else np.inf)
+    except ValueError as error:
+        raise InputError(f"{problem}; it {error}") from None
+    if not dots:
+        if not low:
+            raise InputError(problem)
+        return ends[0], ends[0]
+    if ends[0] > ends[1]:
+        raise InputError(f"--{option} {text}: is reversed; write {high.strip()}..{low.strip()}")
+    return ends
 
 
 def list_records(
@@ -53,7 +60,7 @@ def list_records(
     kinds = sorted({_table(r) for r in records}) + sorted({r.kind for r in records})
     if kind is not None and kind not in kinds:
         raise InputError(f"--kind {kind}: must be one of {', '.join(kinds)}")
-    ratios, torques = _range(ratio, "ratio"), _range(torque, "torque")
+    ratios, torques = _range(ratio, "ratio"), _range(torque, "torque", "N*m")
     found: list[GearboxSheet | MotorSheet] = []
     for r in records:
         own_ratio = r.ratio if isinstance(r, GearboxSheet) else None

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 
+from ..errors import InputError
 from . import plots
 from .panels import LABELS, Curve, Panel
 
@@ -80,7 +81,7 @@ def maps_figure(response: xarray.Dataset, output: str) -> Figure:
         There are fewer than two amplitudes or frequencies.
     """
     if min(response.sizes["amplitude"], response.sizes["frequency"]) < 2:
-        raise ValueError(
+        raise InputError(
             "maps need at least two amplitudes and two frequencies; plot() draws the response over frequency"
         )
     source = response.attrs["source"]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..data_sheets.gearbox_sheet import GearboxSheet
+from ..model.parts import Rigid
 from ..test_rig.measurement import RigReport
 from ..test_rig.rig import LOST_MOTION_LOAD
 from ..units.practical import RPM, practical
@@ -92,7 +93,11 @@ def _printed_torsion(sheet: GearboxSheet) -> list[Curve]:
 def summary_rows(report: RigReport) -> list[tuple[str, str]]:
     """What the rig says of itself, beside the comparison."""
     back = report.backdriving_torque
-    loop = report.loops[0]
+    loop, g = report.loops[0], report.gearbox
+    # Without their cause, what is measured is rounding.
+    hysteresis = g.hysteresis is not None and g.hysteresis.efficiency < 1.0
+    backlash = not isinstance(g.stiffness, Rigid) and g.stiffness.pieces()[1][0] == 0.0
+    width = practical(loop.width, "rad") if hysteresis or backlash else "none: neither hysteresis nor backlash is given"
     return [
         ("starting torque at the input", f"{report.starting_torque:.4g} N·m"),
         (
@@ -100,8 +105,8 @@ def summary_rows(report: RigReport) -> list[tuple[str, str]]:
             f"{back:.4g} N·m" if back is not None else "none up to three times rated torque: self-locking",
         ),
         (f"lost motion at ±{100 * LOST_MOTION_LOAD:.0f} % of rated torque", practical(report.lost_motion, "rad")),
-        ("width of the loop at zero torque, rated torque in both directions", practical(loop.width, "rad")),
-        ("energy lost in that loop", f"{loop.area:.4g} J"),
+        ("width of the loop at zero torque, rated torque in both directions", width),
+        ("energy lost in that loop", f"{loop.area:.4g} J" if hysteresis else "none: no hysteresis is given"),
     ]
 
 

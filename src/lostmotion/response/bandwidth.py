@@ -8,18 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError, need
+from ..inputs.arguments import checked
+from ..inputs.quantities import Frequency, Number, Torque
 from ..model.parts import Drive
 from ..simulation.scenario import Initial, Scenario, drive_of, mean_inputs
 from ..simulation.variables import CHANNEL_NAMES
+from .harmonic import known_output, of_output, sine_inputs
 from .shooting import MAX_PERIODS, reason_of, respond
 
 if TYPE_CHECKING:
     import xarray
-from .harmonic import sine_inputs
 
 THREE_DECIBELS = math.sqrt(2.0)  # the bandwidth ends where the gain has fallen by this factor
 
 
+@checked
 def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: str = "load_speed") -> xarray.Dataset:
     """Bandwidth and phase crossover as functions of amplitude, with the dead zone of the drive.
 
@@ -42,7 +45,7 @@ def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: s
     """
     import xarray as xr
 
-    values, frequencies = response["response"].sel(output=output).values, response["frequency"].values
+    values, frequencies = of_output(response, output).values, response["frequency"].values
     bandwidth = [three_decibels_down(frequencies, np.abs(curve)) for curve in values]
     crossover = [_falls_through(frequencies, np.degrees(np.unwrap(np.angle(curve))), -180.0) for curve in values]
     core = drive_of(drive).core()
@@ -73,15 +76,16 @@ def _falls_through(frequencies: np.ndarray, y: np.ndarray, level: float) -> floa
     return float(np.exp(x[k] + (level - y[k]) / (y[k + 1] - y[k]) * (x[k + 1] - x[k])))
 
 
+@checked
 def bandwidth(
     drive: Drive | Scenario,
-    amplitude: float,
+    amplitude: Number,
     *,
     output: str = "load_speed",
-    mean_command: float | None = None,
-    mean_load_torque: float | None = None,
-    lowest: float = 0.1,
-    highest: float = 1000.0,
+    mean_command: Number | None = None,
+    mean_load_torque: Torque | None = None,
+    lowest: Frequency = 0.1,
+    highest: Frequency = 1000.0,
 ) -> float:
     """Frequency [Hz] at which the gain from the command first falls 3 dB below that at the lowest frequency.
 
@@ -102,7 +106,7 @@ def bandwidth(
     Raises
     ------
     InputError
-        The amplitude is not positive.
+        The amplitude is not positive, the output is not known, or the frequencies do not rise.
     RuntimeError
         No periodic motion was found, or the output does not move at the lowest frequency.
     """
@@ -111,7 +115,9 @@ def bandwidth(
 
     if not amplitude > 0.0:
         raise InputError(f"no bandwidth: the amplitude {amplitude:g} of the command must be positive")
-    channel = CHANNEL_NAMES.index(output)
+    if not 0.0 < lowest < highest:
+        raise InputError(f"no bandwidth: lowest {lowest:g} Hz must be above 0 and below highest, {highest:g} Hz")
+    channel = CHANNEL_NAMES.index(known_output(output, CHANNEL_NAMES))
     means = mean_inputs(drive, mean_command, mean_load_torque)
     drive = drive_of(drive)
 

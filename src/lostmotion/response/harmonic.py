@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.quantities import arguments
+from ..inputs.arguments import checked
+from ..inputs.quantities import Count, Number, Torque, arguments
+from ..inputs.validation import shown
 from ..model.parts import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from ..simulation.scenario import Initial, Scenario, drive_of, mean_inputs
@@ -25,18 +27,19 @@ if TYPE_CHECKING:
 Source = Literal["command", "load_torque"]
 
 
+@checked
 def frequency_response(
     drive: Drive | Scenario,
     frequencies: Sequence[float] | float,
     amplitudes: Sequence[float] | float,
     *,
     source: Source = "command",
-    mean_command: float | None = None,
-    mean_load_torque: float | None = None,
-    harmonics: int = 8,
-    refine: float | None = None,
-    threads: int | None = None,
-    max_periods: int = MAX_PERIODS,
+    mean_command: Number | None = None,
+    mean_load_torque: Torque | None = None,
+    harmonics: Count = 8,
+    refine: Number | None = None,
+    threads: Count | None = None,
+    max_periods: Count = MAX_PERIODS,
     progress: Callable[[], None] | None = None,
 ) -> xarray.Dataset:
     """Response by harmonic linearisation (describing functions): harmonics of all outputs over one sinusoidal input.
@@ -82,7 +85,7 @@ def frequency_response(
     InputError
         An argument cannot be used.
     """
-    frequencies, amplitudes = _checked(frequencies, amplitudes, source, harmonics)
+    frequencies, amplitudes = _checked(frequencies, amplitudes, source)
     means = mean_inputs(drive, mean_command, mean_load_torque)
     drive = drive_of(drive)
 
@@ -122,7 +125,7 @@ def frequency_response(
 
 
 def _checked(
-    frequencies: Sequence[float] | float, amplitudes: Sequence[float] | float, source: Source, harmonics: int
+    frequencies: Sequence[float] | float, amplitudes: Sequence[float] | float, source: Source
 ) -> tuple[list[float], list[float]]:
     """Frequencies [Hz], rising, and amplitudes."""
     frequencies = sorted(set(arguments("frequencies", frequencies, "Hz")))
@@ -133,8 +136,6 @@ def _checked(
         raise InputError("amplitudes must be positive; give at least one")
     if source not in ("command", "load_torque"):
         raise InputError(f"source {source!r} is not known; it must be command or load_torque")
-    if harmonics < 1:
-        raise InputError(f"harmonics {harmonics} must be 1 or more")
     return frequencies, amplitudes
 
 
@@ -255,15 +256,48 @@ def _of_each_point(r: dict[str, Any], found: np.ndarray) -> tuple[dict[str, np.n
     return points, found & np.array([is_stable(m) for m in multipliers]).reshape(found.shape)
 
 
-def to_control(response: xarray.Dataset, amplitude: float, output: str = "load_speed") -> control.FrequencyResponseData:
+def of_output(response: xarray.Dataset, output: str) -> xarray.DataArray:
+    """The response of one output over amplitude and frequency.
+
+    Raises
+    ------
+    InputError
+        The dataset is no frequency response, or has no such output.
+    """
+    if "response" not in response:
+        raise InputError("this dataset is no frequency response; lm.frequency_response makes one")
+    known = [str(name) for name in response["output"].values]
+    return response["response"].sel(output=known_output(output, known))
+
+
+def known_output(output: str, known: Sequence[str]) -> str:
+    """The name of an output, if it is one of those that are known.
+
+    Raises
+    ------
+    InputError
+    """
+    if output not in known:
+        raise InputError(f"output {shown(output)} is not known; it must be one of {', '.join(known)}")
+    return output
+
+
+@checked
+def to_control(
+    response: xarray.Dataset, amplitude: Number, output: str = "load_speed"
+) -> control.FrequencyResponseData:
     """One curve of a response for python-control, as data over frequency.
 
     Raises
     ------
     MissingLibraryError
         python-control is not installed.
-    KeyError
-        The response has no such amplitude or output.
+    InputError
+        The dataset is no frequency response, or has no such amplitude or output.
     """
-    curve = response["response"].sel(output=output, amplitude=amplitude)
+    curves = of_output(response, output)
+    known = response["amplitude"].values.tolist()
+    if amplitude not in known:
+        raise InputError(f"amplitude {amplitude:g}: the response has {', '.join(f'{a:g}' for a in known)}")
+    curve = curves.sel(amplitude=amplitude)
     return python_control().frd(curve.values, 2.0 * np.pi * curve["frequency"].values)

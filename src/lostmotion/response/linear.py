@@ -10,7 +10,9 @@ import numpy as np
 
 from .. import _core
 from ..errors import InputError, need
-from ..inputs.quantities import argument
+from ..inputs.arguments import checked
+from ..inputs.quantities import Number, Time, Torque, argument, arguments
+from ..inputs.validation import shown
 from ..model.parts import ConstantEfficiency, Drive, Rigid
 from ..simulation.run import start_state
 from ..simulation.scenario import Initial, Scenario, drive_of
@@ -61,10 +63,14 @@ class LinearModel:
         moved = ", ".join(f"{name} {value:.6g}" for name, value in point.items() if value != 0.0)
         return f"linear model at {moved or 'rest, command 0'}: {', '.join(modes) or 'no contact'}"
 
+    @checked
     def response(self, frequency: Any, output: str = "load_speed", source: str = "command") -> np.ndarray:
         """F(y)/F(u) at frequencies [Hz], complex."""
         b, c, d = self._pair(output, source)
-        s = 2j * np.pi * np.atleast_1d(np.asarray(frequency, dtype=float))
+        frequencies = arguments("frequency", frequency, "Hz")
+        if 0.0 in frequencies:
+            raise InputError(f"frequency {shown(frequency)} must not be 0 Hz, where the load angle grows without end")
+        s = 2j * np.pi * np.array(frequencies)
         eye = np.eye(len(self.A))
         return np.array([c @ np.linalg.solve(x * eye - self.A, b) + d for x in s])
 
@@ -72,6 +78,7 @@ class LinearModel:
         """(frequency [Hz], damping ratio [-]) of each pair of complex eigenvalues, rising."""
         return _pairs(np.linalg.eigvals(self.A))
 
+    @checked
     def antiresonances(self, output: str = "load_speed", source: str = "command") -> list[tuple[float, float]]:
         """(frequency [Hz], damping ratio [-]) of each pair of complex transmission zeros, rising."""
         need("scipy", "Finding transmission zeros", "control")
@@ -87,7 +94,8 @@ class LinearModel:
 
     def _pair(self, output: str, source: str) -> tuple[np.ndarray, np.ndarray, float]:
         if output not in self.outputs or source not in self.inputs:
-            raise KeyError(f"there is no {output!r} over {source!r}; outputs: {self.outputs}, inputs: {self.inputs}")
+            outputs, inputs = ", ".join(self.outputs), ", ".join(self.inputs)
+            raise InputError(f"there is no {shown(output)} over {shown(source)}; outputs: {outputs}; inputs: {inputs}")
         i, o = self.inputs.index(source), self.outputs.index(output)
         return self.B[:, i], self.C[o], float(self.D[o, i])
 
@@ -138,12 +146,13 @@ def _pairs(values: np.ndarray) -> list[tuple[float, float]]:
     return sorted((float(f), float(xi)) for f, xi in found)
 
 
+@checked
 def linearize(
     drive: Drive | Scenario,
     state: Initial | None = None,
     *,
-    command: float = 0.0,
-    load_torque: float = 0.0,
+    command: Number = 0.0,
+    load_torque: Torque = 0.0,
     command_rate: float = 0.0,
     load_torque_rate: float = 0.0,
 ) -> LinearModel:
@@ -169,7 +178,6 @@ def linearize(
         The state has no continuation.
     """
     drive = drive_of(drive)
-    command, load_torque = argument("command", command, ""), argument("load_torque", load_torque, "N*m")
     if state is None:
         if regimes := _why_several_regimes(drive):
             raise InputError(
@@ -226,8 +234,9 @@ class RigidConstants:
         return self.rated_speed / ratio / (1.0 - x**2 + 2j * self.damping_ratio * x)
 
 
+@checked
 def rigid_constants(
-    drive: Drive | Scenario, *, motor_time_constant: float | None = None, time_constant: float | None = None
+    drive: Drive | Scenario, *, motor_time_constant: Time | None = None, time_constant: Time | None = None
 ) -> RigidConstants:
     """Constants of (8) to (11); two of them may be given instead of computed.
 
@@ -237,6 +246,9 @@ def rigid_constants(
         The drive has no DC motor, or no constant efficiency.
     """
     drive = drive_of(drive)
+    for name, value in (("motor_time_constant", motor_time_constant), ("time_constant", time_constant)):
+        if value is not None and not value > 0.0:
+            raise InputError(f"{name}: {value:g} s must be greater than 0")
     m, g, load = drive.motor, drive.gearbox, drive.load
     if m.rated_speed is None or m.electrical_time_constant is None or m.armature_voltage_constant is None:
         raise InputError("the closed form needs a DC motor")

@@ -10,6 +10,8 @@ import numpy as np
 
 from .. import _core
 from ..errors import InputError
+from ..inputs.arguments import checked
+from ..inputs.quantities import Count, Number, Torque
 from ..model.parts import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from ..simulation.results import add_derived
@@ -97,14 +99,15 @@ def _period(*signals: CommandSignal | TorqueSignal) -> float:
     raise InputError(f"the frequencies {sorted(set(frequencies))} Hz have no common period within 100 of the slowest")
 
 
+@checked
 def periodic_motion(
     drive: Drive | Scenario,
-    command: CommandSignal | float | None = None,
-    load_torque: TorqueSignal | float | None = None,
+    command: CommandSignal | Number | None = None,
+    load_torque: TorqueSignal | Torque | None = None,
     *,
-    multiple: int = 1,
+    multiple: Count = 1,
     start: Initial | None = None,
-    max_periods: int = MAX_PERIODS,
+    max_periods: Count = MAX_PERIODS,
 ) -> xarray.Dataset:
     """A periodic motion under periodic inputs, by shooting.
 
@@ -143,8 +146,6 @@ def periodic_motion(
     drive = drive_of(drive)
     command = command if isinstance(command, CommandSignal) else CommandSignal(mean=command or 0.0)
     load_torque = load_torque if isinstance(load_torque, TorqueSignal) else TorqueSignal(mean=load_torque or 0.0)
-    if multiple < 1:
-        raise InputError(f"multiple {multiple} must be 1 or more")
     period = multiple * _period(command, load_torque)
     r = respond(
         drive,
@@ -201,13 +202,14 @@ def is_stable(multipliers: np.ndarray) -> bool:
     return bool(np.all(np.abs(multipliers) < 1.0 + NEUTRAL))
 
 
+@checked
 def periodic_motions(
     drive: Drive | Scenario,
-    command: CommandSignal | float | None = None,
-    load_torque: TorqueSignal | float | None = None,
+    command: CommandSignal | Number | None = None,
+    load_torque: TorqueSignal | Torque | None = None,
     *,
     starts: Iterable[Initial],
-    multiples: Iterable[int] = (1,),
+    multiples: Iterable[Count] = (1,),
 ) -> list[xarray.Dataset]:
     """The different periodic motions that several starts lead to, each once.
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from .. import _core
 from ..errors import InputError
-from ..inputs.quantities import argument
+from ..inputs.arguments import checked
+from ..inputs.quantities import Time
 from ..model.parts import Drive
 from .run import core_inputs
 from .scenario import Scenario
@@ -77,7 +78,8 @@ class Explanation:
         return "\n".join(lines)
 
 
-def explain(what: Scenario | Simulation, time: float | None = None) -> Explanation:
+@checked
+def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanation:
     """The state of the contacts of a drive at one instant.
 
     Parameters
@@ -103,14 +105,8 @@ def explain(what: Scenario | Simulation, time: float | None = None) -> Explanati
             raise InputError("a simulation is explained at its present time; leave time out")
         values, contacts = what._core.explain()
         return _explanation(what.drive, what.time, values, contacts)
-    if not isinstance(what, Scenario):
-        raise InputError(
-            f"{what!r:.60} has no inputs to be explained; give a Scenario, such as load(path) or scenario_of(result) returns, "
-            "or a Simulation"
-        )
     if time is None:
         raise InputError(f"time is missing; give one between 0 and the duration, {what.simulation.duration} s")
-    time = argument("time", time, "s")
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     values, contacts = _core.explain_at(*core_inputs(what), time)

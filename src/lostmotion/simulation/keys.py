@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from ..data_sheets.components import as_torque_source, at_voltage
 from ..errors import InputError
 from ..inputs.validation import shown
 
@@ -28,11 +29,19 @@ def parse_override(text: str) -> tuple[str, Any]:
 
 
 def set_values(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None:
-    """Changes values by dotted key. A record comes before what changes it, in whatever order they are given."""
-    whole = ("gearbox", "motor", "gearbox.from", "motor.from")
-    for key, value in sorted(changes, key=lambda change: change[0] not in whole):
+    """Changes values by dotted key. What others depend on comes before them, in whatever order they are given."""
+    before = ("gearbox", "motor", "gearbox.from", "motor.from", "motor.kind", "motor.rated_voltage")
+    changes = list(changes)
+    given = [key.removeprefix("motor.") for key, _ in changes]
+    for key, value in sorted(changes, key=lambda change: before.index(change[0]) if change[0] in before else 99):
         first, *rest = key.split(".")
-        data[first] = _changed(data.get(first), rest, value, first)
+        node = data.get(first)
+        if isinstance(node, dict) and "from" not in node:  # beside `from` the record sees to it
+            if key == "motor.kind" and value == "torque_source":
+                node = as_torque_source(node)
+            elif key == "motor.rated_voltage":
+                node = at_voltage(node, value, given)
+        data[first] = _changed(node, rest, value, first)
 
 
 def _changed(node: Any, keys: list[str], value: Any, where: str) -> Any:

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..atomic_writer import write_whole
 from ..errors import InputError, need
+from ..inputs.arguments import checked
+from .results import labelled
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import packed_again, switchings_of
 from .variables import VARIABLES
 
 if TYPE_CHECKING:
     import xarray
-from ..atomic_writer import write_whole
-from .results import labelled
 
 FORMATS = {".nc": "NetCDF", ".csv": "CSV", ".parquet": "Parquet"}
 
@@ -49,19 +50,23 @@ def _need_library(path: Path) -> None:
         need("pyarrow", f"{path}: a Parquet file", "study")
 
 
+@checked
 def save(dataset: xarray.Dataset, path: str | Path) -> None:
     """Write a result as ``.nc``, ``.csv`` or ``.parquet``; `open_result` reads each back unchanged.
 
     Raises
     ------
     InputError
-        Unknown ending, or the file cannot be written; nothing half-written remains.
+        No result, unknown ending, or the file cannot be written; nothing half-written remains.
     """
+    if "time" not in dataset.coords or not any(v.name in dataset for v in VARIABLES):
+        raise InputError("this dataset is no result over time; give one of simulate, periodic_motion or open_result")
     path = check_output(path)
     writers = {".nc": _write_netcdf, ".csv": _write_csv, ".parquet": _write_parquet}
     write_whole(path, lambda target: writers[path.suffix](dataset, target))
 
 
+@checked
 def open_result(path: str | Path) -> xarray.Dataset:
     """Read a result that `save` wrote.
 
@@ -121,12 +126,12 @@ def _read_netcdf(path: Path) -> xarray.Dataset:
 
 
 def _header(dataset: xarray.Dataset) -> str:
-    """All but the samples, as JSON: attributes, and the switchings by columns."""
+    """All but the samples, as JSON: attributes, how many samples there are, and the switchings by columns."""
     attributes = {k: v for k, v in dataset.attrs.items() if k != SWITCHINGS}
-    if SWITCHINGS not in dataset.attrs:
-        return json.dumps({"attributes": attributes})
-    columns = {str(name): v.values.tolist() for name, v in switchings_of(dataset).items()}
-    return json.dumps({"attributes": attributes, SWITCHINGS: columns})
+    header = {"attributes": attributes, "samples": dataset.sizes["time"]}
+    if SWITCHINGS in dataset.attrs:
+        header[SWITCHINGS] = {str(name): v.values.tolist() for name, v in switchings_of(dataset).items()}
+    return json.dumps(header)
 
 
 def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Dataset:
@@ -135,6 +140,11 @@ def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Datase
         time = columns.pop("time")
     except (json.JSONDecodeError, KeyError):
         raise InputError(f"{path}: is no result of lostmotion; its header or its time column is missing") from None
+    written = meta.get("samples", len(time))  # files of older versions do not say it
+    if len(time) != written:
+        raise InputError(
+            f"{path}: holds {len(time)} of the {written} samples that its header announces; it is cut off or changed; run the scenario again"
+        )
     switchings = {SWITCHINGS: packed_again(meta[SWITCHINGS])} if SWITCHINGS in meta else {}
     return labelled(time, columns, meta["attributes"] | switchings)
 

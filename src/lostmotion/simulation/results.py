@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..inputs.arguments import checked
 from .scenario import Scenario
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import packed
@@ -122,11 +123,23 @@ def gear_efficiency(data: dict[str, Any], ratio: Any) -> Any:
     return np.where(data["motor_speed"] == 0.0, np.nan, eta)
 
 
+@checked
 def scenario_of(dataset: xarray.Dataset) -> Scenario:
-    """The scenario that a result came from."""
+    """The scenario that a result came from.
+
+    Raises
+    ------
+    InputError
+        The dataset carries none.
+    """
+    if "scenario" not in dataset.attrs:
+        raise InputError(
+            "this dataset carries no scenario; give a result of simulate or open_result, attributes included"
+        )
     return Scenario.from_json(dataset.attrs["scenario"])
 
 
+@checked
 def energy_of(dataset: xarray.Dataset | RawResult) -> dict[str, float]:
     """Energy ledger of a run [J].
 
@@ -134,6 +147,11 @@ def energy_of(dataset: xarray.Dataset | RawResult) -> dict[str, float]:
     `load_damper` and `load_friction` is what became heat; `load_work` what went into the disturbance torque;
     `kinetic_change` and `elastic_change` what is stored; `residual` what the balance fails by, `turned_over` the sum
     of the magnitudes of all flows.
+
+    Raises
+    ------
+    InputError
+        The result has no energy ledger.
     """
     if "energy" not in dataset.attrs:
         raise InputError("this result has no energy ledger; simulate with the exact solver and energy=True")

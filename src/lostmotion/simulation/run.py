@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from .. import _core
 from ..errors import InputError
-from ..inputs.validation import shown
+from ..inputs.arguments import checked
+from ..inputs.quantities import Number
 from ..model.parts import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from .results import RawResult, raw_result
 from .scenario import Initial, LoadTable, Scenario, SimulationTable
+from .variables import STATES
 
 if TYPE_CHECKING:
     import xarray
@@ -25,6 +27,7 @@ MAX_SWITCHINGS = 100_000  # kept with a result; beyond it they are only counted
 BYTES_PER_SAMPLE = 170  # of a result while it is made, measured
 
 
+@checked
 def simulate(
     scenario_or_drive: Scenario | Drive,
     *,
@@ -34,7 +37,7 @@ def simulate(
     sample_interval: float | None = None,
     initial: Initial | None = None,
     solver: SolverName = "exact",
-    relative_tolerance: float | None = None,
+    relative_tolerance: Number | None = None,
     energy: bool = True,
 ) -> xarray.Dataset:
     """Simulate a drive.
@@ -160,8 +163,6 @@ def as_scenario(
         if duration is None or sample_interval is None:
             raise InputError("a drive alone needs duration and sample_interval [s]")
         changes = {"motor": drive.motor, "gearbox": drive.gearbox, "load": LoadTable(**drive.load.model_dump())}
-    elif not isinstance(scenario_or_drive, Scenario):
-        raise InputError(f"{shown(scenario_or_drive)} must be a Scenario, such as load(path) returns, or a Drive")
     elif all(v is None for v in (command, load_torque, duration, sample_interval, initial)):
         return scenario_or_drive
     else:
@@ -194,18 +195,7 @@ def core_inputs(scenario: Scenario) -> tuple[_core.Drive, _core.Signal, _core.Si
 
 
 def start_state(initial: Initial) -> list[float]:
-    """The solver's state vector.
-
-    Raises
-    ------
-    InputError
-        It is no state.
-    """
-    from .variables import STATES
-
-    if not isinstance(initial, Initial):
-        raise InputError(f"initial {shown(initial)} must be a state, such as Initial(motor_speed=100)")
-
+    """The solver's state vector."""
     return [getattr(initial, name) for name in STATES]
 
 

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Self
 from pydantic import model_validator
 
 from ..data_sheets.components import Conditions, use_records
-from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Positive, Speed, Time, Torque
 from ..model.parts import Drive, Gearbox, Load, Motor, Rigid
@@ -117,18 +116,8 @@ class Scenario(Part):
 
 
 def drive_of(what: Scenario | Drive) -> Drive:
-    """The drive of a scenario, or a drive as it is.
-
-    Raises
-    ------
-    InputError
-        It is neither.
-    """
-    if isinstance(what, Drive):
-        return what
-    if isinstance(what, Scenario):
-        return what.drive()
-    raise InputError(f"{what!r:.60} is no drive; give a Drive, or a Scenario such as load(path) returns")
+    """The drive of a scenario, or a drive as it is."""
+    return what if isinstance(what, Drive) else what.drive()
 
 
 def mean_inputs(

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..data_sheets.components import gearbox_table
 from ..errors import InputError
-from ..inputs.toml_files import read_toml
+from ..inputs.toml_files import RESULTS, read_toml
 from ..inputs.validation import shown
 from ..model.parts import Gearbox
 from .keys import parse_override, set_values
@@ -104,6 +104,8 @@ def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str],
     InputError
     """
     overrides = [overrides] if isinstance(overrides, str) else overrides
+    if not isinstance(overrides, Iterable) or not all(isinstance(entry, str) for entry in overrides):
+        raise InputError(f'{shown(overrides)} must be changes by key, such as {{"command.amplitude": 0.1}}')
     items = overrides.items() if isinstance(overrides, Mapping) else [parse_override(text) for text in overrides]
     try:
         set_values(data, items)
@@ -127,7 +129,19 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
     base = data.pop("base")
     if not isinstance(base, str):
         raise InputError(f"{path}: key base: {shown(base)} must be the name of a scenario file")
-    return _merge(_read(find_scenario(base, path.parent), (*including, path.resolve())), data)
+    if Path(base).suffix in RESULTS:
+        raise InputError(
+            f"{path}: key base: {shown(base)} has the ending of a saved result; name a scenario file (.toml), or change the result by "
+            f"`lostmotion run {base} --set KEY=VALUE`"
+        )
+    based = _read(find_scenario(base, path.parent), (*including, path.resolve()))
+    motor = data.get("motor")
+    if isinstance(motor, dict) and "rated_voltage" in motor and "from" not in motor:
+        try:
+            set_values(based, [(f"motor.{key}", value) for key, value in motor.items()])
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+    return _merge(based, data)
 
 
 def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...]) -> None:

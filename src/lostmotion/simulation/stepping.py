@@ -11,7 +11,8 @@ import numpy as np
 
 from .. import _core
 from ..errors import InputError
-from ..inputs.quantities import argument
+from ..inputs.arguments import checked
+from ..inputs.quantities import Time
 from ..inputs.validation import shown
 from ..model.parts import Drive
 from .run import start_state
@@ -53,8 +54,8 @@ class Simulation:
     >>> sim["load_speed", "twist"]                                    # doctest: +SKIP
     """
 
-    def __init__(self, drive: Drive | Scenario, *, step: float = 1e-3, initial: Initial | None = None) -> None:
-        step = argument("step", step, "s")
+    @checked
+    def __init__(self, drive: Drive | Scenario, *, step: Time = 1e-3, initial: Initial | None = None) -> None:
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
             raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
         if initial is None:
@@ -71,6 +72,7 @@ class Simulation:
     def __repr__(self) -> str:
         return f"Simulation({self._drive!r}, at {self.time:.6g} s)"
 
+    @checked
     def reset(self, initial: Initial | None = None) -> None:
         """Go back to t = 0.
 
@@ -114,19 +116,22 @@ class Simulation:
         SolverError
             The motion has no continuation. The state stays as it was.
         """
-        c0, c1 = command if isinstance(command, tuple) else (command, command)
-        m0, m1 = load_torque if isinstance(load_torque, tuple) else (load_torque, load_torque)
         try:
+            c0, c1 = command if isinstance(command, tuple) else (command, command)
+            m0, m1 = load_torque if isinstance(load_torque, tuple) else (load_torque, load_torque)
             within = MIN_INTERVAL <= interval <= MAX_INTERVAL
             finite = c0 - c0 == 0.0 and c1 - c1 == 0.0 and m0 - m0 == 0.0 and m1 - m1 == 0.0
-        except TypeError:
+        except (TypeError, ValueError):
             raise InputError(
-                f"interval {shown(interval)}, command {shown(command)} and load_torque {shown(load_torque)} must be numbers (SI)"
+                f"interval {shown(interval)}, command {shown(command)} and load_torque {shown(load_torque)} must be numbers (SI), the last two "
+                "also pairs of numbers"
             ) from None
         if not within:
-            raise InputError(f"interval {interval} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
+            raise InputError(f"interval {shown(interval)} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
         if not finite:
-            raise InputError(f"command {command} and load_torque {load_torque} must be finite")
+            raise InputError(
+                f"command {shown(command)} and load_torque {shown(load_torque)} must be finite numbers (SI)"
+            )
         if self.time + interval == self.time:
             raise InputError(
                 f"interval {interval} s is below the resolution of the time, {self.time} s; take a longer one, or reset"
@@ -142,22 +147,21 @@ class Simulation:
 
         Raises
         ------
-        KeyError
+        InputError
             There is no such variable.
         """
         values = self._core.read()
         if isinstance(name, tuple | list):
             return np.array([self._value(one, values) for one in name])
-        channel = _CHANNEL.get(name)
-        return values[channel] if channel is not None else self._value(name, values)
+        return self._value(name, values)
 
     def _value(self, name: str, values: list[float]) -> float:
-        channel = _CHANNEL.get(name)
-        if channel is not None:
-            return values[channel]
-        if name not in self._derived:
-            raise KeyError(f"{name!r} is no variable; the variables are {', '.join(v.name for v in VARIABLES)}")
-        return self._derived[name](values)
+        try:
+            channel = _CHANNEL.get(name)
+            return values[channel] if channel is not None else self._derived[name](values)
+        except (KeyError, TypeError):  # unknown, or nothing that could be a name
+            known = ", ".join(v.name for v in VARIABLES)
+            raise InputError(f"{shown(name)} is no variable; the variables are {known}") from None
 
     def read(self) -> dict[str, float]:
         """All result variables (SI), by name."""
@@ -187,4 +191,7 @@ class Simulation:
 
     @state.setter
     def state(self, state: SimulationState) -> None:
-        self._core.set_state(state.time, *state.values)
+        try:
+            self._core.set_state(state.time, *state.values)
+        except (AttributeError, TypeError):
+            raise InputError(f"{shown(state)} is no state of a simulation; give what `state` returned") from None

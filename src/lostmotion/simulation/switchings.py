@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import InputError
+from ..inputs.arguments import checked
 from .variables import CONTACTS
 
 if TYPE_CHECKING:
@@ -43,6 +45,7 @@ def _text(rows: np.ndarray) -> str:
     return base64.b64encode(rows.tobytes()).decode()
 
 
+@checked
 def switchings_of(result: xarray.Dataset) -> xarray.Dataset:
     """The switchings of a run, one entry each along the dimension ``switching``.
 
@@ -60,13 +63,13 @@ def switchings_of(result: xarray.Dataset) -> xarray.Dataset:
 
     Raises
     ------
-    ValueError
+    InputError
         The dataset is no result of `simulate`.
     """
     import xarray as xr
 
     if ATTRIBUTE not in result.attrs:
-        raise ValueError(
+        raise InputError(
             "this dataset has no switchings; give a result of simulate or open_result, attributes included"
         )
     rows = np.frombuffer(base64.b64decode(result.attrs[ATTRIBUTE]), dtype="<f8").reshape(-1, len(NAMES))

@@ -6,14 +6,16 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 from .. import _core
-from ..errors import InputError
+from ..inputs.arguments import checked
 from ..model.parts import Gearbox, Rigid
 from ..simulation.run import simulate
 from ..simulation.scenario import Scenario
 from ..test_rig.rig import LOST_MOTION_LOAD, TestRig
 from ..units.practical import ARCMIN, RPM
-from .duty_cycle import DutyCycle, duty_cycle
+from .duty_cycle import SHORTEST, STANDSTILL, DutyCycle, duty_cycle
 from .holding import holding
 
 if TYPE_CHECKING:
@@ -26,9 +28,6 @@ NEAR_RESONANCE = 1.5  # a command within this factor of a resonance excites it
 POINTS = 40  # samples to a period of the fastest resonance, so that no peak is missed
 SAMPLES = (2_000, 200_000)  # the fewest of a run, and the most at the finest interval
 
-MOST_IDLE = (
-    0.5  # share of a run that may be motion with command 0, such as a load that sinks, before means are not judged
-)
 MEANS = ("average_output_torque", "average_input_speed", "motor_torque", "winding_temperature")
 
 Verdict = Literal["ok", "warning", "unknown"]
@@ -77,6 +76,7 @@ class Finding:
         return f"{mark}  {self.what}: {self.value}{remark} [{self.source}]"
 
 
+@checked
 def check_drive(scenario: Scenario) -> tuple[Finding, ...]:
     """Checks a drive against its scenario.
 
@@ -91,10 +91,6 @@ def check_drive(scenario: Scenario) -> tuple[Finding, ...]:
     SolverError
         As `simulate`.
     """
-    if not isinstance(scenario, Scenario):
-        raise InputError(
-            f"{scenario!r:.60} has no task to be checked against; give a Scenario, such as load(path) returns"
-        )
     result = _finely_sampled(scenario)
     cycle = duty_cycle(result, scenario.task.cycle)
     findings = [
@@ -111,24 +107,37 @@ def check_drive(scenario: Scenario) -> tuple[Finding, ...]:
     ]
     if scenario.gearbox.losses.kind == "map":
         findings.append(_loss_map(result))
-    if cycle.holding_torque is None and _idle_share(result) > MOST_IDLE:
-        findings = [_not_judged(f) if f.rule in MEANS and f.verdict == "ok" else f for f in findings]
-    return tuple(findings)
+    return tuple(_with_sinking(f, result, cycle) if f.rule in MEANS else f for f in findings)
 
 
-def _idle_share(result: xarray.Dataset) -> float:
-    """Share of the run after the last command that is not 0."""
-    commanded = result["time"].values[result["command"].values != 0.0]
-    end = float(result["time"][-1])
-    return (end - float(commanded[-1])) / end if len(commanded) else 0.0
+def _with_sinking(finding: Finding, result: xarray.Dataset, cycle: DutyCycle) -> Finding:
+    """A mean, with what the load does to it where it drives the motor with command 0.
+
+    Such a motion that goes on at the end of the run has no end of its own: the mean depends on the duration, and is not judged
+    where no `task.cycle` says that all of it repeats. Elsewhere it is a part of the cycle, and is told.
+    """
+    sinking, at_end = _sinking(result)
+    shortest = SHORTEST * cycle.duration
+    if sinking <= shortest:
+        return finding
+    told = f"with command 0 the load drives the motor for {sinking:.3g} s of the run"
+    if cycle.holding_torque is None and cycle.period is None and at_end > shortest:
+        told += ", also at its end, so that this mean depends on the duration; let the run end with the move, or give task.cycle"
+        if finding.verdict == "ok":
+            finding = replace(finding, verdict="unknown")
+    return replace(finding, remark="; ".join(filter(None, [finding.remark, told])))
 
 
-def _not_judged(finding: Finding) -> Finding:
-    remark = (
-        "with command 0 the load keeps moving until the end of the run, so that this mean depends on the duration; let the run end "
-        "with the move"
-    )
-    return replace(finding, verdict="unknown", remark=remark)
+def _sinking(result: xarray.Dataset) -> tuple[float, float]:
+    """Time [s] in which the load torque drives the turning motor with command 0: of the whole run, and after the last command."""
+    time, command = result["time"].values, result["command"].values
+    speed = result["motor_speed"].values
+    driven = result["load_torque"].values * speed < 0.0
+    sinks = (command == 0.0) & (abs(speed) > STANDSTILL * abs(speed).max()) & driven
+    lasting = np.diff(time) * (sinks[1:] & sinks[:-1])
+    commanded = np.flatnonzero(command)
+    last = int(commanded[-1]) if len(commanded) else 0
+    return float(lasting.sum()), float(lasting[last:].sum())
 
 
 def _loss_map(result: xarray.Dataset) -> Finding:
@@ -178,6 +187,7 @@ def _within(
 
 def _loads(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> list[Finding]:
     g = scenario.gearbox
+    largest = float(abs(result["output_torque"]).max())
     average = g.limits.average_output_torque if g.limits else None
     name = "rated output torque" if average is None else "average output torque"
     return [
@@ -190,16 +200,31 @@ def _loads(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> list
             name,
             cycle=cycle,
         ),
-        _within(
-            "peak_output_torque",
-            "output torque, largest",
-            float(abs(result["output_torque"]).max()),
-            g.limits.peak_output_torque if g.limits else None,
-            "N·m",
-            "repeated peak torque of the gearbox",
-            key="gearbox.limits.peak_output_torque",
+        _with_momentary(
+            _within(
+                "peak_output_torque",
+                "output torque, largest",
+                largest,
+                g.limits.peak_output_torque if g.limits else None,
+                "N·m",
+                "repeated peak torque of the gearbox",
+                key="gearbox.limits.peak_output_torque",
+            ),
+            largest,
+            g.limits.momentary_output_torque if g.limits else None,
         ),
     ]
+
+
+def _with_momentary(finding: Finding, torque: float, momentary: float | None) -> Finding:
+    """Beyond, or without, a repeated peak torque: what the limit for emergency stops says."""
+    if momentary is None or finding.verdict == "ok":
+        return finding
+    if torque > momentary:
+        remark = f"even the momentary torque of the gearbox, {momentary:.4g} N·m, is exceeded"
+        return replace(finding, verdict="warning", remark="; ".join(filter(None, [finding.remark, remark])))
+    remark = f"in an emergency stop the gearbox stands {momentary:.4g} N·m"
+    return replace(finding, remark="; ".join(filter(None, [finding.remark, remark])))
 
 
 def _speeds(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> list[Finding]:

@@ -40,7 +40,9 @@ def unit_cube(design: str, parameters: int, total: int, seed: int, first: int, l
 
 
 def _sobol(parameters: int, seed: int, first: int, last: int) -> np.ndarray:
-    from scipy.stats import qmc
+    from scipy.stats import (
+        qmc,  # takes a second to import: here, where progress is shown and bad input has been refused
+    )
 
     sampler = qmc.Sobol(parameters, scramble=True, rng=np.random.default_rng(seed))
     if first:

@@ -10,16 +10,19 @@ from typing import Any
 
 from ..atomic_writer import write_bytes
 from ..errors import InputError, need
+from ..inputs.arguments import checked
+from ..inputs.quantities import Count
 from .chunk import as_parquet, compute_chunk, parsed, pieces, run_piece, tabulate
 from .design import CHUNK
 from .file import Study, from_json, to_json
 
 
+@checked
 def study(
     what: Study,
     directory: str | Path,
     *,
-    threads: int | None = None,
+    threads: Count | None = None,
     executor: Executor | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Path:

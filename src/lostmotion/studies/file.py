@@ -12,10 +12,13 @@ import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
 from ..errors import InputError
+from ..inputs.arguments import checked
 from ..inputs.part import Part
 from ..inputs.toml_files import read_toml
+from ..simulation.result_files import FORMATS
 from ..simulation.scenario import Scenario
-from ..simulation.scenario_files import find_scenario, load, read_tables
+from ..simulation.scenario_files import find_scenario, read_tables
+from ..simulation.sources import load
 from ..simulation.variables import VARIABLES
 from .design import unit_cube
 from .expressions import Expression, read_expression
@@ -235,8 +238,9 @@ class Study(Part):
 # --- reading ---
 
 
+@checked
 def load_study(path: str | Path) -> Study:
-    """Read a study file. Its key `base` names the scenario file, relative to it; `set` may change values of that.
+    """Read a study file. Its key `base` names the scenario file or saved result, relative to it; `set` may change values of that.
 
     Raises
     ------
@@ -247,12 +251,13 @@ def load_study(path: str | Path) -> Study:
     data = read_toml(path, "a study")
     base = data.pop("base", None)
     if not isinstance(base, str):
-        raise InputError(f"{path}: key base: must name the scenario file that is varied")
+        raise InputError(f"{path}: key base: must name the scenario file, or the saved result, that is varied")
     changes = data.pop("set", {})
     if not isinstance(changes, dict):
         raise InputError(f'{path}: key set: must be a table, such as set = {{ "load.inertia" = 2 }}')
     where = find_scenario(base, path.parent)
-    scenario, written = load(where, changes), read_tables(where, changes)
+    scenario = load(where, changes)
+    written = {} if where.suffix in FORMATS else read_tables(where, changes)  # a result has all values written out
     for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:
         _find_sheets(entry, path.parent)
     try:

@@ -11,6 +11,7 @@ from ..data_sheets.records import KINDS, catalogue, find
 from ..data_sheets.sheet import in_current_words
 from ..errors import InputError
 from ..inputs.schema import unit_in_schema
+from ..inputs.validation import shown
 from ..simulation.scenario import Scenario, from_tables
 from .units import in_si
 
@@ -47,14 +48,18 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
             )
         if _is_text(key):
             if not isinstance(value, str):
-                raise ValueError(f"has catalogue.{key} = {value!r}; it must be a text, * standing for anything")
+                raise ValueError(
+                    f"has catalogue.{key} = {shown(value)}; it must be a text in quotes, * standing for anything"
+                )
             continue
         if not isinstance(value, list | tuple) or len(value) != 2:
-            raise ValueError(f"has catalogue.{key} = {value!r}; it must be a list of minimum and maximum")
+            raise ValueError(f"has catalogue.{key} = {shown(value)}; it must be a list of minimum and maximum")
         try:
             bounds[key] = [float(x) for x in in_si(value, unit_in_schema(schema[key]))]
         except (TypeError, ValueError) as error:
-            raise ValueError(f"has catalogue.{key} = {value!r}: {error}") from None
+            raise ValueError(f"has catalogue.{key} = {shown(value)}: {error}") from None
+        if not bounds[key][0] <= bounds[key][1]:
+            raise ValueError(f"has catalogue.{key} = {shown(value)}, which is reversed; the least value comes first")
     found = []
     for record in catalogue():
         if not isinstance(record, KINDS[table]):
@@ -81,10 +86,10 @@ def check_names(table: str, names: Any) -> None:
         One is not; the message says what may have been meant.
     """
     if not isinstance(names, list | tuple):
-        raise ValueError(f"has values = {names!r}; it must be a list of names")
+        raise ValueError(f"has values = {shown(names)}; it must be a list of names")
     for name in names:
         if not isinstance(name, str):
-            raise ValueError(f"has the value {name!r}, which is no name of a {table}")
+            raise ValueError(f"has the value {shown(name)}, which is no name of a {table}")
         find(name, table)
 
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from statistics import NormalDist
 from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
 from ..inputs.part import Part
+from ..inputs.validation import shown
 from ..model.signals import Signal
 from ..simulation.keys import list_index
 from ..simulation.scenario import Scenario
@@ -127,8 +130,6 @@ class Vary(Part):
 
     def quantile(self, u: np.ndarray) -> np.ndarray:
         """Values at probabilities 0 < u < 1."""
-        import scipy.stats as st
-
         levels = self.levels()
         if levels is not None:
             out: Any = levels[np.minimum((u * len(levels)).astype(int), len(levels) - 1)]
@@ -138,11 +139,13 @@ class Vary(Part):
             a, b = (math.log(x) for x in self.log_uniform)
             out = np.exp(a + u * (b - a))
         elif self.normal is not None:
-            out = st.norm.ppf(u, self.normal.mean, self.normal.deviation)
+            out = np.vectorize(NormalDist(self.normal.mean, self.normal.deviation).inv_cdf, otypes=[float])(u)
         else:
             assert self.triangular is not None
             low, mode, high = self.triangular
-            out = st.triang.ppf(u, (mode - low) / (high - low), low, high - low) if high > low else np.full_like(u, low)
+            rising = low + np.sqrt(u * (high - low) * (mode - low))
+            falling = high - np.sqrt((1.0 - u) * (high - low) * (high - mode))
+            out = np.where(u * (high - low) < mode - low, rising, falling)
         return np.asarray(out, dtype=float)
 
 
@@ -154,7 +157,7 @@ def _with_names(data: Mapping[str, Any], table: str) -> dict[str, Any]:
             raise ValueError("has values and catalogue; give one of the two")
         wanted = out.pop("catalogue")
         if not isinstance(wanted, dict):
-            raise ValueError(f'has catalogue = {wanted!r}; it must be a table, such as {{ kind = "strain_wave" }}')
+            raise ValueError(f'has catalogue = {shown(wanted)}; it must be a table, such as {{ kind = "strain_wave" }}')
         out["values"] = names_that_fit(table, wanted)
     check_names(table, out.get("values") or ())
     return out
@@ -178,8 +181,24 @@ def base_value(scenario: Scenario, key: str) -> Any:
             else:
                 raise ValueError(f"there is no {part}")
         except ValueError as error:
-            raise ValueError(f"varies {key}, which the base scenario does not know ({error})") from None
+            hint = f"; did you mean {near}?" if (near := near_key(scenario, key)) else ""
+            raise ValueError(f"varies {key}, which the base scenario does not know ({error}){hint}") from None
     return node
+
+
+def near_key(scenario: Scenario, key: str) -> str:
+    """The key of a scenario that ends as this one, or is spelled most like it; empty if none is."""
+    known = [*_keys(scenario.model_dump(), ""), *CONDITIONS]
+    last = key.rpartition(".")[2]
+    same = [k for k in known if k.rpartition(".")[2] == last]
+    return next(iter(difflib.get_close_matches(key, same or known, n=1, cutoff=0.0 if same else 0.6)), "")
+
+
+def _keys(table: Mapping[str, Any], before: str) -> Iterator[str]:
+    for name, value in table.items():
+        yield f"{before}{name}"
+        if isinstance(value, dict):
+            yield from _keys(value, f"{before}{name}.")
 
 
 def check_key(scenario: Scenario, key: str, *, relative: bool) -> None:
@@ -206,7 +225,7 @@ def check_key(scenario: Scenario, key: str, *, relative: bool) -> None:
         if unit_of_key(key) is None:
             raise ValueError(f"varies {key}, which the base scenario does not have; give it there first")
     elif isinstance(value, str | bool):
-        raise ValueError(f"varies {key}, which is {value!r} and no number")
+        raise ValueError(f"varies {key}, which is {shown(value)} and no number")
     elif isinstance(value, tuple) and not (relative and value and _is_numbers(value)):
         raise ValueError(f"varies {key}, which is a list; vary its entries, such as {key}.0, or numbers with relative")
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data_sheets.gearbox_sheet import GearboxSheet
+from ..units.practical import ARCMIN, RPM
+from .rig import TestRig
 
 if TYPE_CHECKING:
     pass
-from ..units.practical import ARCMIN, RPM
-from .rig import TestRig
 
 
 @dataclass(frozen=True)

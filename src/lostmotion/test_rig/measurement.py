@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from ..data_sheets.gearbox_sheet import GearboxSheet
+from ..inputs.arguments import checked
 from ..model.parts import Gearbox
-
-if TYPE_CHECKING:
-    import xarray
 from .comparison import Comparison, compare
 from .loop import Loop
 from .rig import TestRig
+
+if TYPE_CHECKING:
+    import xarray
 
 T = TypeVar("T")
 
@@ -41,17 +42,12 @@ class RigReport:
 
 # What the rig measures beside its comparisons: parts of rated speed, and relative loads.
 SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
-
-
 LOADS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5)
-
-
 LOOPS = (1.0, 0.6, 0.3)
-
-
 WORK = len(LOADS) + len(LOOPS) + 6  # how often `measure` reports progress
 
 
+@checked
 def measure(
     gearbox: Gearbox,
     sheet: GearboxSheet | None = None,

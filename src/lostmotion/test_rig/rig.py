@@ -13,33 +13,34 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..inputs.arguments import checked
+from ..inputs.quantities import Count, Number, Speed, Torque
+from ..inputs.validation import shown
 from ..model.parts import Drive, Gearbox, Load, Motor, Rigid
 from ..model.signals import CommandSignal, Samples, TorqueSignal
 from ..simulation.run import simulate
 from ..simulation.scenario import Initial
 from ..simulation.switchings import switchings_of
+from .loop import Loop
 
 if TYPE_CHECKING:
     import xarray
-from .loop import Loop
 
 FLYWHEEL = 1e9  # [kg m2] on the input: keeps its speed, or stays at rest, whatever the gearbox does
-
-
 RIG_FREQUENCY = 20.0  # [Hz] of the load on the stiffest segment of the curve, damped critically
-
-
 SETTLING = 4.0  # [s] until a steady state is read
-
-
 RAMP = 400.0  # [s] of a slow ramp
-
-
 LOST_MOTION_LOAD = 0.03  # of rated torque, where lost motion is read
 
 
 class RigError(ValueError):
     """A measurement did not settle."""
+
+
+def _positive(name: str, torque: float) -> float:
+    if not torque > 0.0:
+        raise InputError(f"{name}: {torque:g} N·m must be greater than 0")
+    return torque
 
 
 class TestRig:
@@ -53,6 +54,7 @@ class TestRig:
 
     __test__ = False  # no test case of pytest
 
+    @checked
     def __init__(self, gearbox: Gearbox) -> None:
         if isinstance(gearbox.stiffness, Rigid):
             raise InputError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
@@ -77,7 +79,8 @@ class TestRig:
 
     # --- (a), (e): steady state ---
 
-    def steady(self, input_speed: float, load: float) -> tuple[float, float]:
+    @checked
+    def steady(self, input_speed: Speed, load: Number) -> tuple[float, float]:
         """(input torque, output torque) [N·m] at an input speed [rad/s] and a relative load, < 0 overrunning."""
         g = self.gearbox
         torque, speed = load * g.rated_output_torque, input_speed / g.ratio
@@ -95,18 +98,22 @@ class TestRig:
             raise RigError(f"no steady state at {input_speed:.4g} rad/s and load {load:g} within {SETTLING:g} s")
         return T_1, T_2
 
-    def efficiency(self, input_speed: float, load: float) -> float:
+    @checked
+    def efficiency(self, input_speed: Speed, load: Number) -> float:
         """Output power / input power while the motor drives, input / output while the load does."""
         T_1, T_2 = self.steady(input_speed, load)
         driving = T_2 / (self.gearbox.ratio * T_1)
         return driving if load > 0.0 else max(0.0, 1.0 / driving)
 
+    @checked
     def efficiency_map(
-        self, speeds: Iterable[float], loads: Iterable[float], progress: Callable[[], None] = lambda: None
+        self, speeds: Iterable[Speed], loads: Iterable[Number], progress: Callable[[], None] = lambda: None
     ) -> xarray.Dataset:
         """Efficiency and loss torque over input speed [rad/s] and relative load; `progress` is called for each load."""
         g = self.gearbox
         speeds, loads = list(speeds), list(loads)
+        if not speeds or not loads:
+            raise InputError("a map of the efficiency needs at least one speed and one load")
         rows = []
         for mu in loads:
             rows.append([self.steady(n, mu) for n in speeds])
@@ -126,13 +133,15 @@ class TestRig:
             },
         )
 
-    def no_load_torque(self, input_speed: float) -> float:
+    @checked
+    def no_load_torque(self, input_speed: Speed) -> float:
         """Input torque [N·m] that turns the unloaded gearbox at this speed [rad/s]."""
         return self.steady(input_speed, 0.0)[0]
 
     # --- (b), (c): input locked, load ramped slowly ---
 
-    def torsion(self, turning_points: Iterable[float], samples: int = 2000) -> xarray.Dataset:
+    @checked
+    def torsion(self, turning_points: Iterable[Torque], samples: Count = 2000) -> xarray.Dataset:
         """Twist and torque while the load torque goes from 0 through the turning points [N·m], one ramp each."""
         points = [0.0, *turning_points]
         times = [RAMP * k for k in range(len(points))]
@@ -145,15 +154,19 @@ class TestRig:
             energy=False,
         )
 
-    def initial_loading_curve(self, torque: float) -> tuple[Any, Any]:
+    @checked
+    def initial_loading_curve(self, torque: Torque) -> tuple[Any, Any]:
         """(twist [rad], torque [N·m]) of the first loading up to a torque."""
         result = self.torsion([torque])
         return result["twist"].values, result["output_torque"].values
 
-    def stiffness(self, torques: Iterable[float], up_to: float) -> list[float]:
+    @checked
+    def stiffness(self, torques: Iterable[Torque], up_to: Torque) -> list[float]:
         """K1, K2, ... [N·m/rad]: slopes between the given torques [N·m], and from the last up to `up_to`."""
-        twist, torque = self.initial_loading_curve(up_to)
         edges = [0.0, *torques, up_to]
+        if any(low >= high for low, high in itertools.pairwise(edges)):
+            raise InputError(f"torques {shown([*torques, up_to])} N·m must rise, from above 0 up to the last one")
+        twist, torque = self.initial_loading_curve(up_to)
         out = []
         for low, high in itertools.pairwise(edges):
             inside = (torque > low + 0.1 * (high - low)) & (torque < high - 0.1 * (high - low))
@@ -163,16 +176,18 @@ class TestRig:
             out.append(float(np.polyfit(twist[inside], torque[inside], 1)[0]))
         return out
 
-    def backlash(self, torque: float) -> float:
+    @checked
+    def backlash(self, torque: Torque) -> float:
         """Total gap [rad]: twice where the first loaded segment, taken up to `torque` [N·m], meets zero torque."""
-        twist, T = self.initial_loading_curve(torque)
+        twist, T = self.initial_loading_curve(_positive("torque", torque))
         inside = (0.1 * torque < T) & (0.9 * torque > T)
         slope, offset = np.polyfit(twist[inside], T[inside], 1)
         return float(-2.0 * offset / slope)
 
-    def loop(self, amplitude: float) -> Loop:
+    @checked
+    def loop(self, amplitude: Torque) -> Loop:
         """The loop that a slow load between -amplitude and amplitude [N·m] settles on."""
-        samples = 2000
+        samples, amplitude = 2000, _positive("amplitude", amplitude)
         result = self.torsion([amplitude, -amplitude, amplitude, -amplitude, amplitude], samples)
         last = result.isel(time=slice(3 * samples, None))
         return Loop(amplitude, last["twist"].values, last["output_torque"].values)
@@ -184,7 +199,8 @@ class TestRig:
 
     # --- (d): breaking loose ---
 
-    def starting_torque(self, load: float = 0.0) -> float:
+    @checked
+    def starting_torque(self, load: Number = 0.0) -> float:
         """Input torque [N·m] that sets the gearbox in motion against a relative load, by a slow ramp."""
         g = self.gearbox
         against = load * g.rated_output_torque

@@ -1,0 +1,161 @@
+"""Changes to motor, gearbox and load: each key is felt, or refused in one line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from lostmotion.data_sheets.components import Conditions
+from lostmotion.model.parts import GearboxLimits, Hysteresis, LossMap, MotorLimits, TorsionCurve
+from lostmotion.simulation.scenario import LoadTable
+
+# A catalogue motor and gearbox near their limits, so that every limit is judged.
+BASE = {"load.torque": "2 Nm", "gearbox.limits.peak_output_torque": "1 Nm", "motor.limits.max_current": "10 A"}
+
+# For each key another value. Refused are those that have no meaning here.
+OTHER = {
+    "motor.kind": "torque_source",
+    "motor.rotor_inertia": "500 gcm2",
+    "motor.friction_torque": "0.1 Nm",
+    "motor.rated_torque": "0.5 Nm",
+    "motor.rated_speed": "2500 rpm",
+    "motor.rated_voltage": "48 V",
+    "motor.electrical_time_constant": "5 ms",
+    "motor.armature_voltage_constant": 10,
+    "motor.voltage_limit": "12 V",
+    "motor.limits.continuous_torque": "0.1 Nm",
+    "motor.limits.max_speed": "100 rpm",
+    "motor.limits.resistance": "1 ohm",
+    "motor.limits.torque_constant": "50 mNm/A",
+    "motor.limits.thermal_resistance": "9 K/W",
+    "motor.limits.max_winding_temperature": "90 degC",
+    "motor.limits.max_voltage": "10 V",
+    "motor.limits.max_current": "1 A",
+    "gearbox.ratio": 80,
+    "gearbox.inertia": "1e-4 kg*m^2",
+    "gearbox.viscous_friction": 1e-4,
+    "gearbox.rated_input_speed": "1000 rpm",
+    "gearbox.rated_output_torque": "20 Nm",
+    "gearbox.stiffness.kind": "rigid",
+    "gearbox.stiffness.slopes": [1e4, 2e4, 3e4],
+    "gearbox.stiffness.breaks": ["0.3 mrad", "2 mrad"],
+    "gearbox.stiffness.backlash": "1 arcmin",
+    "gearbox.stiffness.preload": "1 Nm",
+    "gearbox.hysteresis.efficiency": 0.8,
+    "gearbox.losses.kind": "constant_efficiency",
+    "gearbox.losses.speeds": [0, 1],
+    "gearbox.losses.loads": [0, 1],
+    "gearbox.losses.values": [[0, 1], [1, 2]],
+    "gearbox.losses.mirrored": True,
+    "gearbox.limits.average_output_torque": "1 Nm",
+    "gearbox.limits.peak_output_torque": "2 Nm",
+    "gearbox.limits.momentary_output_torque": "3 Nm",
+    "gearbox.limits.average_input_speed": "100 rpm",
+    "gearbox.limits.max_input_speed": "100 rpm",
+    "gearbox.note": "worn",
+    "gearbox.temperature": "60 degC",
+    "gearbox.added_backlash": "1 arcmin",
+    "gearbox.loss_factor": 1.5,
+    "load.inertia": "2 kg*m^2",
+    "load.viscous_friction": 0.1,
+    "load.friction_torque": "1 Nm",
+    "load.torque": "3 Nm",
+}
+REFUSED = {
+    "gearbox.stiffness.kind": "gearbox.hysteresis",  # rigid, with hysteresis
+    "gearbox.losses.kind": "gearbox.losses.efficiency",
+    "gearbox.losses.speeds": "has a hole",
+    "gearbox.losses.loads": "rows of values",
+    "gearbox.losses.values": "rows of values",
+    "gearbox.losses.mirrored": "must begin at 0",
+}
+
+
+def keys() -> set[str]:
+    """All keys of motor, gearbox and load, with those of the tables that the record's parts have."""
+    inner = {"motor.limits": MotorLimits, "gearbox.limits": GearboxLimits, "gearbox.stiffness": TorsionCurve}
+    inner |= {"gearbox.hysteresis": Hysteresis, "gearbox.losses": LossMap}
+    whole = {"motor": lm.Motor, "gearbox": lm.Gearbox, "load": LoadTable} | inner
+    found = {f"{table}.{key}" for table, part in whole.items() for key in part.model_fields}
+    return (found | {f"gearbox.{key}" for key in Conditions.model_fields}) - inner.keys()
+
+
+def what_is_seen(scenario: lm.Scenario) -> tuple[object, ...]:
+    result = lm.simulate(scenario)
+    motion = [result[name].values.tobytes() for name in result.data_vars]
+    return (*motion, result.attrs.get("note"), *map(str, lm.check_drive(scenario)))
+
+
+def test_every_key_is_tried() -> None:
+    assert keys() == OTHER.keys()
+
+
+@pytest.mark.parametrize("key", OTHER)
+def test_a_change_to_a_catalogue_part_is_felt_or_refused(key: str) -> None:
+    before = what_is_seen(lm.load("catalogue-robot-joint", BASE))
+    changes = BASE | {key: OTHER[key]}
+    if key in REFUSED or key == "gearbox.temperature":
+        with pytest.raises(lm.InputError) as caught:
+            lm.load("catalogue-robot-joint", changes)
+        assert REFUSED.get(key, "lubricant").split(".")[-1] in str(caught.value)
+        return
+    assert what_is_seen(lm.load("catalogue-robot-joint", changes)) != before
+
+
+@pytest.mark.parametrize("name", ["catalogue-robot-joint", "paper-2dof-nl-large"])
+@pytest.mark.parametrize("how", ["set", "replace", "base", "saved"])
+def test_half_the_command_at_twice_the_rated_voltage_is_the_same_motion(name: str, how: str, tmp_path: Path) -> None:
+    """Volts turn a motor, whatever is called 1."""
+    scenario = lm.load(name)
+    voltage, amplitude = scenario.motor.rated_voltage, scenario.command.amplitude
+    assert voltage is not None
+    assert amplitude is not None
+    changes = {"motor.rated_voltage": 2.0 * voltage, "command.amplitude": 0.5 * amplitude}
+    if how == "set":
+        changed = lm.load(name, [f"{key}={value}" for key, value in changes.items()])
+    elif how == "replace":
+        changed = scenario.replace(**changes)
+    elif how == "base":
+        text = f'base = "{name}"\nmotor.rated_voltage = "{2.0 * voltage} V"\ncommand.amplitude = {0.5 * amplitude}\n'
+        (tmp_path / "other.toml").write_text(text)
+        changed = lm.load(tmp_path / "other.toml")
+    else:
+        lm.save(lm.simulate(scenario), tmp_path / "result.csv")
+        changed = lm.load(tmp_path / "result.csv", changes)
+    assert changed.motor.rated_voltage == 2.0 * voltage
+    first, second = lm.simulate(scenario), lm.simulate(changed)
+    for variable in ("motor_torque", "motor_speed", "load_speed", "twist"):
+        size = float(abs(first[variable]).max())
+        # The parameters differ by rounding, which breaking away at standstill amplifies somewhat.
+        np.testing.assert_allclose(second[variable], first[variable], rtol=0.0, atol=1e-9 * size)
+    assert float(
+        abs(lm.simulate(scenario.replace(**{"motor.rated_voltage": 2.0 * voltage}))["load_speed"]).max()
+    ) > 1.5 * float(abs(first["load_speed"]).max())
+
+
+def test_what_is_given_beside_a_rated_voltage_does_not_follow_it() -> None:
+    motor = lm.load("paper-2dof-nl-large").motor
+    own = {"motor.rated_voltage": 48, "motor.rated_speed": 300, "motor.armature_voltage_constant": 3}
+    for order in (own, dict(reversed(own.items()))):
+        changed = lm.load("paper-2dof-nl-large", order).motor
+        assert (changed.rated_voltage, changed.rated_speed, changed.armature_voltage_constant) == (48, 300, 3)
+        assert changed.rated_torque == motor.rated_torque
+
+
+def test_a_rated_voltage_that_does_not_reach_the_rated_torque_is_refused() -> None:
+    with pytest.raises(lm.InputError, match=r"key motor.rated_voltage: 7 V must be above 7\.7 V"):
+        lm.load("paper-2dof-nl-large", {"motor.rated_voltage": 7})
+
+
+def test_a_torque_source_refuses_what_it_has_no_use_for() -> None:
+    for name in ("catalogue-robot-joint", "paper-2dof-nl-large"):
+        assert lm.load(name, {"motor.kind": "torque_source"}).motor.rated_speed is None
+        for key, value in (("rated_speed", 300), ("rated_voltage", 24), ("armature_voltage_constant", 3)):
+            with pytest.raises(lm.InputError, match=f"has {key}, of no use to a torque_source"):
+                lm.load(name, {f"motor.{key}": value, "motor.kind": "torque_source"})
+
+
+def test_two_limits_of_one_voltage_are_refused() -> None:
+    with pytest.raises(lm.InputError, match=r"voltage_limit and limits.max_voltage, which say the same"):
+        lm.load("catalogue-robot-joint", {"motor.voltage_limit": 24, "motor.limits.max_voltage": 24})

@@ -1,0 +1,209 @@
+"""Whatever object a public name is given, it works or says in one plain line what it wants."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import lostmotion as lm
+from lostmotion.inputs.part import Part
+
+WRONG: list[Any] = [
+    5,
+    None,
+    "x",
+    "1,5 m",
+    [],
+    [None],
+    (),
+    xr.Dataset(),
+    {},
+    {"a": 1},
+    {5: 3},
+    object(),
+    np.zeros(2),
+    True,
+]
+WRONG += [-1, 0, float("nan"), 10**30, Path("none"), lambda: None, lm.Load(inertia=1)]
+
+SCENARIO = lm.load("paper-2dof-nl-small", {"simulation.duration": 0.02, "command.frequency": "50 Hz"})
+RESULT = lm.simulate(SCENARIO)
+RESPONSE = lm.frequency_response(SCENARIO, [1.0, 2.0, 4.0], [0.5, 1.0], threads=1)
+LINEAR = lm.linearize(SCENARIO, lm.Initial())
+SHEET = next(r for r in lm.catalogue() if r.name == "schaeffler-rt1-h-20-100")
+RIG = lm.TestRig(SCENARIO.gearbox)
+STUDY = lm.Study(scenario=SCENARIO, vary=[{"key": "load.inertia", "values": [1.0]}], keep={"top": "peak(load_speed)"})
+
+
+def dangle(*_: object, **__: object) -> None:
+    """Takes all."""
+
+
+# A call of each function that does something, and takes a short time.
+CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
+    "bandwidth": (lm.bandwidth, {"drive": SCENARIO, "amplitude": 1.0, "output": "load_speed", "mean_command": 0.0, "mean_load_torque": 0.0, "lowest": 1.0, "highest": 2.0}),
+    "build_loss_map": (lm.build_loss_map, {"sheet": SHEET, "temperature": None, "loss_factor": 1.0}),
+    "catalogue": (lm.catalogue, {}),
+    "characteristics": (lm.characteristics, {"response": RESPONSE, "drive": SCENARIO, "output": "load_speed"}),
+    "check_drive": (lm.check_drive, {"scenario": SCENARIO}),
+    "energy_of": (lm.energy_of, {"dataset": RESULT}),
+    "explain": (lm.explain, {"what": SCENARIO, "time": 0.01}),
+    "frequency_response": (lm.frequency_response, {"drive": SCENARIO, "frequencies": [10.0], "amplitudes": [1.0], "source": "command", "mean_command": 0.0, "mean_load_torque": 0.0, "harmonics": 1, "refine": None, "threads": 1, "max_periods": 5, "progress": dangle}),
+    "gearbox": (lm.gearbox, {"name": "paper-gearbox", "temperature": None, "added_backlash": 0.0, "loss_factor": 1.0}),
+    "linearize": (lm.linearize, {"drive": SCENARIO, "state": lm.Initial(), "command": 0.0, "load_torque": 0.0, "command_rate": 0.0, "load_torque_rate": 0.0}),
+    "load": (lm.load, {"source": "paper-2dof-nl-small", "overrides": {}}),
+    "load_study": (lm.load_study, {"path": "none.toml"}),
+    "measure": (lm.measure, {"gearbox": None, "sheet": None, "notes": (), "progress": dangle}),
+    "motor": (lm.motor, {"name": "paper-motor", "voltage_limit": None}),
+    "open_result": (lm.open_result, {"path": "none.csv"}),
+    "periodic_motion": (lm.periodic_motion, {"drive": SCENARIO, "command": None, "load_torque": 0.0, "multiple": 1, "start": lm.Initial(), "max_periods": 5}),
+    "periodic_motions": (lm.periodic_motions, {"drive": SCENARIO, "command": None, "load_torque": 0.0, "starts": [lm.Initial()], "multiples": [1]}),
+    "rigid_constants": (lm.rigid_constants, {"drive": lm.load("paper-1dof-l-small"), "motor_time_constant": None, "time_constant": None}),
+    "save": (lm.save, {"dataset": RESULT, "path": "out.csv"}),
+    "scenario_of": (lm.scenario_of, {"dataset": RESULT}),
+    "shipped_scenarios": (lm.shipped_scenarios, {}),
+    "simulate": (lm.simulate, {"scenario_or_drive": SCENARIO, "command": 0.0, "load_torque": 0.0, "duration": 0.01, "sample_interval": 0.001, "initial": None, "solver": "exact", "relative_tolerance": None, "energy": True}),
+    "study": (lm.study, {"what": STUDY, "directory": "study", "threads": 1, "executor": None, "progress": None}),
+    "switchings_of": (lm.switchings_of, {"result": RESULT}),
+    "to_control": (lm.to_control, {"response": RESPONSE, "amplitude": 1.0, "output": "load_speed"}),
+    "Simulation": (lm.Simulation, {"drive": SCENARIO, "step": 1e-3, "initial": None}),
+    "TestRig": (lm.TestRig, {"gearbox": SCENARIO.gearbox}),
+    "ResultAccessor": (lm.ResultAccessor, {"dataset": RESULT}),
+    "InputError": (lm.InputError, {"text": "x"}),
+    "Simulation.reset": (lambda **a: lm.Simulation(SCENARIO).reset(**a), {"initial": lm.Initial()}),
+    "Simulation.advance": (lambda **a: lm.Simulation(SCENARIO).advance(**a), {"interval": 1e-3, "command": 0.0, "load_torque": 0.0}),
+    "Simulation[...]": (lambda name: lm.Simulation(SCENARIO)[name], {"name": "twist"}),
+    "Simulation.state": (lambda state: setattr(lm.Simulation(SCENARIO), "state", state), {"state": lm.Simulation(SCENARIO).state}),
+    "TestRig.steady": (RIG.steady, {"input_speed": 10.0, "load": 0.5}),
+    "TestRig.efficiency": (RIG.efficiency, {"input_speed": 10.0, "load": 0.5}),
+    "TestRig.efficiency_map": (RIG.efficiency_map, {"speeds": [10.0], "loads": [0.5], "progress": dangle}),
+    "TestRig.no_load_torque": (RIG.no_load_torque, {"input_speed": 10.0}),
+    "TestRig.torsion": (RIG.torsion, {"turning_points": [1.0], "samples": 20}),
+    "TestRig.initial_loading_curve": (RIG.initial_loading_curve, {"torque": 1.0}),
+    "TestRig.stiffness": (RIG.stiffness, {"torques": [1.0], "up_to": 50.0}),
+    "TestRig.backlash": (RIG.backlash, {"torque": 1.0}),
+    "TestRig.loop": (RIG.loop, {"amplitude": 1.0}),
+    "TestRig.starting_torque": (RIG.starting_torque, {"load": 0.0}),
+    "LinearModel.response": (LINEAR.response, {"frequency": [1.0], "output": "load_speed", "source": "command"}),
+    "LinearModel.antiresonances": (LINEAR.antiresonances, {"output": "load_speed", "source": "command"}),
+    "ResultAccessor.plot": (RESPONSE.lm.plot, {"output": "load_speed"}),
+    "ResultAccessor.plot_maps": (RESPONSE.lm.plot_maps, {"output": "load_speed"}),
+    "Motor.at_voltage": (SCENARIO.motor.at_voltage, {"voltage": 24.0}),
+    "Scenario.replace": (lambda value: SCENARIO.replace(**{"load.inertia": value}), {"value": 1.0}),
+    "Scenario.from_json": (lm.Scenario.from_json, {"text": "{}"}),
+}  # fmt: skip
+SLOW = {"check_drive", "measure"}  # with an argument that is right
+
+
+def names() -> list[str]:
+    return [name for name in lm.__all__ if callable(getattr(lm, name))]
+
+
+def refused_plainly(call: Callable[[], Any], where: str) -> None:
+    """Runs a call that may work; what it raises is an `InputError` or a report of the solver, in one plain line."""
+    try:
+        call()
+    except (lm.InputError, lm.SolverError, RuntimeError) as error:
+        message = str(error)
+    except TypeError as error:
+        assert re.search(r"positional argument|required .*argument|keyword argument|multiple values", str(error)), where
+        return
+    except Exception as error:
+        pytest.fail(f"{where}: {type(error).__name__}: {error}")
+    else:
+        return
+    assert message, where
+    assert "\n" not in message, where
+    assert not re.search(r"<class|<xarray|<lost|NoneType|object at 0x|pydantic|\bdict\b|ndarray|\\n", message), (
+        f"{where}: {message}"
+    )
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("name", names())
+def test_an_exported_name_refuses_wrong_objects_by_place(name: str) -> None:
+    exported = getattr(lm, name)
+    for wrong in WRONG:
+        refused_plainly(lambda wrong=wrong: exported(wrong), f"{name}({wrong!r:.30})")
+        refused_plainly(lambda wrong=wrong: exported(wrong, wrong), f"{name}(two of {wrong!r:.30})")
+
+
+@pytest.mark.parametrize(
+    "name", [n for n in names() if inspect.isclass(getattr(lm, n)) and issubclass(getattr(lm, n), Part)]
+)
+def test_a_part_refuses_wrong_objects_under_each_key(name: str) -> None:
+    part = getattr(lm, name)
+    for key in part.model_fields:
+        for wrong in WRONG:
+            refused_plainly(lambda key=key, wrong=wrong: part(**{key: wrong}), f"{name}({key}={wrong!r:.30})")
+    for wrong in WRONG:
+        refused_plainly(lambda wrong=wrong: part.model_validate(wrong), f"{name}.model_validate({wrong!r:.30})")
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_each_argument_of_a_function_is_checked(name: str) -> None:
+    function, good = CALLS[name]
+    if name not in SLOW | {"load_study", "open_result", "Scenario.from_json"}:
+        function(**good)
+    for key in good:
+        for wrong in WRONG:
+            if name in SLOW and wrong is good[key]:
+                continue
+            refused_plainly(
+                lambda key=key, wrong=wrong: function(**good | {key: wrong}), f"{name}({key}={wrong!r:.30})"
+            )
+
+
+def test_every_function_and_argument_is_tried() -> None:
+    for name in names():
+        exported = getattr(lm, name)
+        own = inspect.isclass(exported) and (
+            is_dataclass(exported) or issubclass(exported, Part | ImportError | RuntimeError)
+        )
+        assert own or name in CALLS, name
+        if name in CALLS and not own:
+            parameters = inspect.signature(exported).parameters
+            assert set(CALLS[name][1]) == set(parameters), name
+
+
+SENTENCES = [
+    (lambda: lm.TestRig(5), 'gearbox: 5 must be a Gearbox, such as gearbox("schaeffler-rt1-h-20-100") returns'),
+    (lambda: lm.open_result(5), "path: 5 must be text, or the name of a file or directory"),
+    (lambda: lm.save(5, "x.csv"), "dataset: 5 must be a dataset, such as simulate returns"),
+    (lambda: lm.save(xr.Dataset(), "x.csv"), "this dataset is no result over time"),
+    (lambda: lm.switchings_of(5), "result: 5 must be a dataset"),
+    (lambda: lm.switchings_of(xr.Dataset()), "this dataset has no switchings"),
+    (lambda: lm.Load(1), "the load takes its values by name, such as inertia=...; not 1"),
+    (lambda: RIG.efficiency_map(["3000"], [1]), 'speeds: "3000" has no unit'),
+    (lambda: lm.Simulation(SCENARIO)["speed"], '"speed" is no variable; the variables are command,'),
+    (lambda: lm.Simulation(SCENARIO)[None], "None is no variable"),
+    (lambda: lm.simulate({"motor": 1}), "scenario_or_drive: { motor = 1 } must be a Scenario"),
+    (lambda: lm.study(STUDY, "s", threads=0), "threads: 0 must be a whole number above 0"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("call", "sentence"), SENTENCES, ids=[s for _, s in SENTENCES])
+def test_what_is_wanted_is_said(call: Callable[[], Any], sentence: str) -> None:
+    with pytest.raises(lm.InputError, match=re.escape(sentence)):
+        call()
+
+
+def test_numbers_may_be_text_with_a_unit_on_the_rig_too() -> None:
+    rig = lm.TestRig(SCENARIO.gearbox)
+    same = rig.efficiency_map(["3000 rpm"], ["50 %"])
+    assert float(same["input_speed"][0]) == pytest.approx(100.0 * np.pi)
+    assert same.identical(rig.efficiency_map([3000.0 * np.pi / 30.0], [0.5])) or np.allclose(
+        same["efficiency"], rig.efficiency_map([3000.0 * np.pi / 30.0], [0.5])["efficiency"], rtol=1e-12
+    )
