@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Mapping
 from functools import cache
@@ -12,7 +11,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..inputs.toml_files import read_toml
-from ..inputs.validation import shown, unknown_key
+from ..inputs.validation import did_you_mean, shown, unknown_key
 from .gearbox_sheet import GearboxSheet
 from .motor_sheet import MotorSheet
 from .sheet import in_current_words
@@ -111,8 +110,8 @@ def find(reference: str, table: str) -> GearboxSheet | MotorSheet:
     named = {r.name: r for r in catalogue()}
     if isinstance(named.get(reference), kind):
         return named[reference]
-    near = difflib.get_close_matches(reference, [r.name for r in catalogue() if isinstance(r, kind)], n=3, cutoff=0.5)
-    hint = f"did you mean {' or '.join(near)}?" if near else "`lostmotion catalogue` lists them"
+    same = [r.name for r in catalogue() if isinstance(r, kind)]
+    hint = did_you_mean(reference, same, "`lostmotion catalogue` lists them", 3)
     if reference in named:
         other = next(name for name, k in KINDS.items() if isinstance(named[reference], k))
         raise InputError(f"{reference} is a {other}; a {table} is wanted here; `lostmotion catalogue` lists them")

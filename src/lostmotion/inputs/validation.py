@@ -62,8 +62,13 @@ def describe(error: ValidationError, schema: Mapping[str, Any], subject: str, gi
 def unknown_key(key: str, known: Iterable[str]) -> str:
     """What is said of a key that is none of those that are known."""
     known = sorted(known)
-    near = difflib.get_close_matches(key, known, n=1)
-    return f"is not known; did you mean {near[0]}?" if near else f"is not known; known here: {', '.join(known)}"
+    return "is not known; " + did_you_mean(key, known, f"known here: {', '.join(known)}")
+
+
+def did_you_mean(given: str, choices: Iterable[str], otherwise: str, count: int = 1) -> str:
+    """The choices, at most so many, that are spelled most like what was given; if none is near, what to say otherwise."""
+    near = difflib.get_close_matches(given, list(choices), n=count, cutoff=0.6 if count == 1 else 0.5)
+    return f"did you mean {' or '.join(near)}?" if near else otherwise
 
 
 def shown(value: Any) -> str:

@@ -139,9 +139,9 @@ class Motor(Part):
         share = voltage / self.rated_voltage
         k_N = share * self.armature_voltage_constant
         if not k_N > 1.0:
-            least = self.rated_voltage / self.armature_voltage_constant
+            minimum = self.rated_voltage / self.armature_voltage_constant
             raise InputError(
-                f"{voltage:g} V must be above {least:.4g} V, at which the motor stalls under its rated torque; "
+                f"{voltage:g} V must be above {minimum:.4g} V, at which the motor stalls under its rated torque; "
                 "or give rated_speed and armature_voltage_constant too"
             )
         speed = share * self.no_load_speed * (k_N - 1.0) / k_N

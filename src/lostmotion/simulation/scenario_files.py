@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 from ..data_sheets.components import gearbox_table
 from ..errors import InputError
 from ..inputs.toml_files import RESULTS, read_toml
-from ..inputs.validation import shown
+from ..inputs.validation import did_you_mean, shown
 from ..model.parts import Gearbox
 from .keys import parse_override, set_values
 from .scenario import Scenario, from_tables
@@ -44,8 +43,7 @@ def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
         )
     if path.suffix or path.exists():
         return path
-    near = difflib.get_close_matches(str(name), shipped, n=1)
-    hint = f"did you mean {near[0]}?" if near else f"the scenarios that come with the package are {', '.join(shipped)}"
+    hint = did_you_mean(str(name), shipped, f"the scenarios that come with the package are {', '.join(shipped)}")
     raise InputError(f"{name}: there is no such file (.toml) and no such scenario; {hint}")
 
 

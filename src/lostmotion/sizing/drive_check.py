@@ -15,7 +15,7 @@ from ..simulation.run import simulate
 from ..simulation.scenario import Scenario
 from ..test_rig.rig import LOST_MOTION_LOAD, TestRig
 from ..units.practical import ARCMIN, RPM
-from .duty_cycle import SHORTEST, STANDSTILL, DutyCycle, duty_cycle
+from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
 from .holding import holding
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def _with_sinking(finding: Finding, result: xarray.Dataset, cycle: DutyCycle) ->
     where no `task.cycle` says that all of it repeats. Elsewhere it is a part of the cycle, and is told.
     """
     sinking, at_end = _sinking(result)
-    shortest = SHORTEST * cycle.duration
+    shortest = MIN_REST * cycle.duration
     if sinking <= shortest:
         return finding
     told = f"with command 0 the load drives the motor for {sinking:.3g} s of the run"
@@ -187,7 +187,7 @@ def _within(
 
 def _loads(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> list[Finding]:
     g = scenario.gearbox
-    largest = float(abs(result["output_torque"]).max())
+    peak = float(abs(result["output_torque"]).max())
     average = g.limits.average_output_torque if g.limits else None
     name = "rated output torque" if average is None else "average output torque"
     return [
@@ -204,13 +204,13 @@ def _loads(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> list
             _within(
                 "peak_output_torque",
                 "output torque, largest",
-                largest,
+                peak,
                 g.limits.peak_output_torque if g.limits else None,
                 "N·m",
                 "repeated peak torque of the gearbox",
                 key="gearbox.limits.peak_output_torque",
             ),
-            largest,
+            peak,
             g.limits.momentary_output_torque if g.limits else None,
         ),
     ]
@@ -231,7 +231,7 @@ def _speeds(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> lis
     g, m = scenario.gearbox, scenario.motor
     average = g.limits.average_input_speed if g.limits else None
     fastest = RPM * float(abs(result["motor_speed"]).max())
-    largest = (
+    limits_of_speed = (
         ("max_input_speed", "gearbox", "max_input_speed", g.limits.max_input_speed if g.limits else None),
         ("max_motor_speed", "motor", "max_speed", m.limits.max_speed if m.limits else None),
     )
@@ -255,7 +255,7 @@ def _speeds(scenario: Scenario, result: xarray.Dataset, cycle: DutyCycle) -> lis
                 f"largest speed of the {part}",
                 key=f"{part}.limits.{key}",
             )
-            for rule, part, key, limit in largest
+            for rule, part, key, limit in limits_of_speed
         ),
     ]
 
@@ -264,8 +264,10 @@ def _lost_motion(scenario: Scenario) -> Finding:
     g, limit = scenario.gearbox, scenario.task.max_lost_motion
     lost = 0.0 if isinstance(g.stiffness, Rigid) else TestRig(g).lost_motion()
     what = f"lost motion at ±{100.0 * LOST_MOTION_LOAD:.0f} % of rated torque"
-    most = None if limit is None else ARCMIN * limit
-    return _within("lost_motion", what, ARCMIN * lost, most, "arcmin", "limit of the task", key="task.max_lost_motion")
+    maximum = None if limit is None else ARCMIN * limit
+    return _within(
+        "lost_motion", what, ARCMIN * lost, maximum, "arcmin", "limit of the task", key="task.max_lost_motion"
+    )
 
 
 def _holding(scenario: Scenario, result: xarray.Dataset) -> list[Finding]:
@@ -326,7 +328,7 @@ def _motor_heat(scenario: Scenario, cycle: DutyCycle) -> list[Finding]:
         or limits.max_winding_temperature is None
     ):
         return findings
-    ambient, most = scenario.task.ambient_temperature, limits.max_winding_temperature
+    ambient, permissible = scenario.task.ambient_temperature, limits.max_winding_temperature
     what = "winding temperature"
     # dT = R_th R(T) I², R(T) = R (1 + a (ambient + dT - 25 °C))
     cold = limits.thermal_resistance * limits.resistance * (torque / limits.torque_constant) ** 2
@@ -337,9 +339,9 @@ def _motor_heat(scenario: Scenario, cycle: DutyCycle) -> list[Finding]:
             Finding("winding_temperature", what, f"thermal runaway, {cycle}", "warning", remark, math.inf),
         ]
     rise = cold * (1.0 + COPPER * (ambient - REFERENCE)) / (1.0 - COPPER * cold)
-    value = f"{ambient + rise:.0f} of {most:.0f} °C in the long run at {ambient:.0f} °C ambient, {cycle}"
-    use = rise / (most - ambient) if most > ambient else math.inf
-    remark = f"reserve {most - ambient - rise:.0f} K"
+    value = f"{ambient + rise:.0f} of {permissible:.0f} °C in the long run at {ambient:.0f} °C ambient, {cycle}"
+    use = rise / (permissible - ambient) if permissible > ambient else math.inf
+    remark = f"reserve {permissible - ambient - rise:.0f} K"
     verdict: Verdict = "ok" if use <= 1.0 else "warning"
     return [*findings, Finding("winding_temperature", what, value, verdict, remark, use)]
 
@@ -349,18 +351,18 @@ def _voltage(scenario: Scenario, result: xarray.Dataset) -> Finding:
     if m.kind == "dc":
         if m.rated_voltage is None:
             return Finding("voltage", "voltage, largest", "not known", "unknown", "motor.rated_voltage is missing")
-        largest = m.rated_voltage * float(abs(result["command"]).max())
+        peak = m.rated_voltage * float(abs(result["command"]).max())
         limit = m.voltage_limit or (limits.max_voltage if limits else None)
     elif limits is not None and limits.resistance is not None and limits.torque_constant is not None:
         current = result["motor_torque"] / limits.torque_constant
         emf = limits.torque_constant * result["motor_speed"]
-        largest = float(abs(limits.resistance * current + emf).max())
+        peak = float(abs(limits.resistance * current + emf).max())
         limit = limits.max_voltage
     else:
         missing = "motor.limits.resistance and motor.limits.torque_constant are missing"
         return Finding("voltage", "voltage, largest", "not known", "unknown", missing)
     key = "motor.voltage_limit" if m.kind == "dc" else "motor.limits.max_voltage"
-    return _within("voltage", "voltage, largest", largest, limit, "V", "limit of the amplifier", key=key)
+    return _within("voltage", "voltage, largest", peak, limit, "V", "limit of the amplifier", key=key)
 
 
 def _current(scenario: Scenario, result: xarray.Dataset) -> Finding:
@@ -368,9 +370,9 @@ def _current(scenario: Scenario, result: xarray.Dataset) -> Finding:
     if limits is None or limits.torque_constant is None:
         missing = "motor.limits.torque_constant is missing"
         return Finding("current", "current, largest", "not known", "unknown", missing)
-    largest = float(abs(result["motor_torque"]).max()) / limits.torque_constant
+    peak = float(abs(result["motor_torque"]).max()) / limits.torque_constant
     name, key = "limit of motor and amplifier", "motor.limits.max_current"
-    return _within("current", "current, largest", largest, limits.max_current, "A", name, key=key)
+    return _within("current", "current, largest", peak, limits.max_current, "A", name, key=key)
 
 
 # --- motion ---
@@ -425,14 +427,14 @@ def _resonance(scenario: Scenario) -> list[Finding]:
 def _dead_zone(scenario: Scenario, result: xarray.Dataset) -> Finding:
     against = float(result["load_torque"][0])
     forward, backward = (scenario.drive().core().smallest_command(0.0, against, s) for s in (+1, -1))
-    largest = float(abs(result["command"]).max())
+    peak = float(abs(result["command"]).max())
     value = f"the load moves above a command of {forward:.4g} and below {backward:.4g}"
     moves = bool((result["motor_speed"] != 0.0).any())
-    if largest == 0.0:
+    if peak == 0.0:
         return Finding("dead_zone", "dead zone", value, "ok", "the command is 0 throughout")
-    if largest <= min(forward, -backward) and not moves:
-        remark = f"the command never exceeds {largest:.4g}: the load does not move"
+    if peak <= min(forward, -backward) and not moves:
+        remark = f"the command never exceeds {peak:.4g}: the load does not move"
         return Finding("dead_zone", "dead zone", value, "warning", remark)
-    small = largest < 3.0 * max(forward, -backward)
-    remark = f"a large part of the command, which reaches {largest:.4g}" if small else ""
+    small = peak < 3.0 * max(forward, -backward)
+    remark = f"a large part of the command, which reaches {peak:.4g}" if small else ""
     return Finding("dead_zone", "dead zone", value, "warning" if small else "ok", remark)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray
 
 STANDSTILL = 1e-3  # below this share of its largest speed the motor is taken to be at rest
-SHORTEST = 0.01  # of the time in motion; a shorter standstill is no rest
+MIN_REST = 0.01  # of the time in motion; a shorter standstill is no rest
 STEADY = 0.01  # of the largest motor torque, within which it does not change at rest
 
 
@@ -102,7 +102,7 @@ def duty_cycle(result: xarray.Dataset, period: float | None) -> DutyCycle:
     speed = np.abs(result["motor_speed"].values)
     turning = np.flatnonzero(speed > STANDSTILL * speed.max())
     first, last = (turning[0], turning[-1]) if len(turning) else (0, len(speed) - 1)
-    shortest = SHORTEST * (time[last] - time[first])
+    shortest = MIN_REST * (time[last] - time[first])
     steady = STEADY * np.abs(torque).max()
     before, after = first // 2 + 1, (last + len(speed)) // 2  # halves of the standstills, those far from the motion
     waits = time[first] - time[0] > shortest and np.ptp(torque[:before]) <= steady
