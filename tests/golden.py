@@ -62,6 +62,9 @@ def compute() -> Groups:
     nonlinear = lm.load(ROOT / "scenarios/paper-2dof-nl-small.toml")
     groups["paper-2dof-nl-small.frequency_response"] = of_response(nonlinear)
     groups["paper-2dof-nl-small.study"] = of_study(nonlinear)
+    linear = lm.load(ROOT / "scenarios/paper-2dof-l-large.toml", ["motor.friction_torque=0"])
+    long = of_run(linear.replace(**{"simulation.duration": 1e9, "simulation.sample_interval": 1e7}))
+    groups |= {f"a-billion-seconds.{what}": values for what, values in long.items()}
     return groups
 
 
