@@ -18,7 +18,8 @@ import lostmotion as lm
 from lostmotion import _core
 from lostmotion.simulation.run import core_inputs
 from lostmotion.simulation.variables import CHANNEL_NAMES
-from lostmotion.studies.file import CHUNK, to_json
+from lostmotion.studies.design import CHUNK
+from lostmotion.studies.file import to_json
 
 CORES = os.cpu_count() or 1
 KEEP = {"peak": "peak(load_speed)", "rms": "rms(twist)"}

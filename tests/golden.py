@@ -30,9 +30,7 @@ HEADER = """\
 # A number is written as a hexadecimal float, which is all its bits. A series has the SHA-256 of its numbers (8 bytes each, little
 # endian), their count and some of them by position (first, quarters, last, and the one of the largest magnitude), so that
 # a change of the last bit can be told from a wrong value. A list of decimals is compared within a tolerance.
-# Sine and cosine are those of the system's mathematical library, recorded with glibc 2.36 on a processor with fused
-# multiply-add. Another library, or a processor without it, may round them otherwise: masking it off in glibc
-# (GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2) changes catalogue-robot-joint by up to 50 ulp of a channel's largest value.
+# The core has its own sine and cosine: another system's libraries change nothing.
 """
 
 # LAPACK's eigenvalues of a Jacobian J are those of a matrix within eps |J| of it, |J| < 1.5 here. Multipliers of zero may
@@ -62,6 +60,9 @@ def compute() -> Groups:
     nonlinear = lm.load(ROOT / "scenarios/paper-2dof-nl-small.toml")
     groups["paper-2dof-nl-small.frequency_response"] = of_response(nonlinear)
     groups["paper-2dof-nl-small.study"] = of_study(nonlinear)
+    linear = lm.load(ROOT / "scenarios/paper-2dof-l-large.toml", ["motor.friction_torque=0"])
+    long = of_run(linear.replace(**{"simulation.duration": 1e9, "simulation.sample_interval": 1e7}))
+    groups |= {f"a-billion-seconds.{what}": values for what, values in long.items()}
     return groups
 
 

@@ -22,6 +22,12 @@ def test_every_bit_is_as_recorded(build: str) -> None:
     )
 
 
+def test_a_processor_without_fused_multiply_add_gives_the_same_bits(monkeypatch) -> None:
+    monkeypatch.setenv("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2,-AVX512F")
+    done = run_in_build("any", golden.__file__)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def test_what_is_recorded_is_read_back_the_same(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(golden, "FILE", tmp_path / "golden.toml")
     groups = {"some-scenario.samples": {"twist": SERIES, "end": 0.1, "multipliers": [0.25, 1e-20]}}

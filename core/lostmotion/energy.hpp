@@ -185,7 +185,7 @@ class EnergyMeter {
 
     // The same of a segment that is taken at once, exact but for rounding. What is turned over is the apparent energy:
     // root mean square times root mean square.
-    void add_long(const Segment<SwitchedDrive>& s) {
+    [[gnu::noinline]] void add_long(const Segment<SwitchedDrive>& s) {
         const Factors factors(drive_, s.entry.regime, s.memory);
         const double length = s.end - s.begin;
         const LongProducts<DriveDims> products(s.entry.propagator, s.constant, s.at.x(), s.at.input(), length);

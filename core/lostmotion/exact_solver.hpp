@@ -266,17 +266,7 @@ class ExactSolver {
         Ends *here = &ends_[0], *there = &ends_[1];
         const bool constant_inputs = cursor->constant_inputs();
         if (!course_.rate_known && cursor->carries_rate()) course_.doubt = rate_doubt(e, *cursor, segment.memory);
-        if (e.regime.n_guards == 0 && LongStep<D>::pays(p, limit - time_)) {
-            *end = *cursor;
-            end->leap_to(limit);
-            if (moderate(end->rate())) {  // else the looks find out when the motion leaves the range
-                ++looks_;
-                time_ = limit;
-                now_.x = end->x();
-                keep_course(e, *end);
-                return Status::done;
-            }
-        }
+        if (e.regime.n_guards == 0 && LongStep<D>::pays(p, limit - time_) && leap(e, limit)) return Status::done;
         evaluate(e, constant, *cursor, *here);
         Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
         for (int i = 0; i < n_inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
@@ -355,6 +345,19 @@ class ExactSolver {
         course_.rate = at.rate();
         course_.rate_known = at.carries_rate();
         course_.input = at.input().values();
+    }
+
+    // All the way to `limit`, where there is no guard. False if the motion leaves the range of the arithmetic: then the
+    // looks find out when.
+    [[gnu::noinline]] bool leap(const typename Cache::Entry& e, double limit) {
+        *there_ = *begin_;
+        there_->leap_to(limit);
+        if (!moderate(there_->rate())) return false;
+        ++looks_;
+        time_ = limit;
+        now_.x = there_->x();
+        keep_course(e, *there_);
+        return true;
     }
 
     // Speeds that are multiples of the rate of the twist are as accurate as that.

@@ -46,8 +46,9 @@ struct Circle {
     explicit Circle(std::size_t samples) : cosine(samples), sine(samples) {
         for (std::size_t k = 0; k < samples; ++k) {
             const double angle = 2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(samples);
-            cosine[k] = std::cos(angle);
-            sine[k] = std::sin(angle);
+            const SineCosine at = sine_cosine(angle);
+            cosine[k] = at.cos;
+            sine[k] = at.sin;
         }
     }
 };

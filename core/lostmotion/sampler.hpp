@@ -41,10 +41,7 @@ class Sampler {
             p.end = next_ = end;
             p.at_once = LongStep<DriveDims>::pays(s.entry.propagator, s.end - s.begin);
             if (p.at_once) {
-                Cursor<DriveDims>& begin = p.begin ? *p.begin : p.begin.emplace(s.at);
-                begin = s.at;
-                begin.keep(p.constant);
-                p.cursor = begin;
+                p.cursor = s.at;
                 if (instant(p.first) > s.begin) p.cursor.leap_to(instant(p.first));
                 p.rest = 0.0;
             } else {
@@ -73,23 +70,15 @@ class Sampler {
         Column constant;
         Cursor<DriveDims> cursor;
         std::size_t first = 0, end = 0;
-        double rest = 0.0;                       // from the cursor to the first [s]
-        bool at_once = false;                    // whether the segment is long enough for it
-        std::optional<Cursor<DriveDims>> begin;  // of such a segment
+        double rest = 0.0;     // from the cursor to the first [s]
+        bool at_once = false;  // whether the segment is long enough for it
     };
     static constexpr std::size_t most_pieces = 4;
 
-    bool write(Piece& p) {
+    [[gnu::noinline]] bool write(Piece& p) {
         auto& propagator = p.entry->propagator;
         const int level = propagator.level_of(interval_);
-        std::optional<LongStep<DriveDims>> step;
-        if (level < 0 && p.at_once) step.emplace(p.cursor.long_step(whole_interval(p)));
-        const auto advance = [&](std::size_t to) {
-            if (step)
-                p.cursor.leap_to(instant(to), *step);
-            else
-                p.cursor.advance(instant(to) - p.cursor.time());
-        };
+        if (level < 0 && p.at_once) return write_at_once(p);
         const Reader reader(drive_, p.entry->regime, p.memory);
         for (std::size_t next = p.first;;) {
             const int n = static_cast<int>(std::min<std::size_t>(p.end - next, Instants::most - next % Instants::most));
@@ -99,7 +88,7 @@ class Sampler {
             } else {
                 instants_.set(0, load(p.cursor.x()), p.cursor.input().values());
                 for (int k = 1; k < n; ++k) {
-                    advance(next + static_cast<std::size_t>(k));
+                    p.cursor.advance(instant(next + k) - p.cursor.time());
                     instants_.set(k, load(p.cursor.x()), p.cursor.input().values());
                 }
             }
@@ -108,15 +97,33 @@ class Sampler {
             if (next == p.end) return true;
             if (next % 4096 == 0 && interrupted != nullptr && interrupted(interrupted_context)) return false;
             if (level >= 0) p.cursor.move_to(instant(next - 1), stride_.x());
-            if (step && next % 65536 == 0) {  // so that rounding does not add up
-                p.cursor = *p.begin;
-                p.cursor.leap_to(instant(next));
-            } else {
-                advance(next);
-            }
+            p.cursor.advance(instant(next) - p.cursor.time());
         }
     }
 
+    // By one long step from sample to sample.
+    [[gnu::noinline]] bool write_at_once(Piece& p) {
+        const Reader reader(drive_, p.entry->regime, p.memory);
+        const Cursor<DriveDims> first = p.cursor;
+        LongStep<DriveDims> step = p.cursor.long_step(whole_interval(p));
+        for (std::size_t next = p.first;;) {
+            const int n = static_cast<int>(std::min<std::size_t>(p.end - next, Instants::most));
+            for (int k = 0; k < n; ++k) {
+                if (k > 0) p.cursor.leap_to(instant(next + static_cast<std::size_t>(k)), step);
+                instants_.set(k, load(p.cursor.x()), p.cursor.input().values());
+            }
+            for (int k = 0; k < n; k += vec_width) write(reader, next + static_cast<std::size_t>(k), k, n);
+            next += static_cast<std::size_t>(n);
+            if (next == p.end) return true;
+            if (interrupted != nullptr && interrupted(interrupted_context)) return false;
+            if ((next - p.first) % (1024 * Instants::most) == 0) {  // so that rounding does not add up
+                p.cursor = first;
+                p.cursor.leap_to(instant(next));
+            } else {
+                p.cursor.leap_to(instant(next), step);
+            }
+        }
+    }
     // As much of the interval as lies between any two of the samples, as the clock shows them.
     double whole_interval(const Piece& p) const {
         const double end = instant(p.end), tick = std::nextafter(end, 2.0 * end) - end;

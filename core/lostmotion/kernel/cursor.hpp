@@ -121,20 +121,20 @@ class Cursor {
         nudge(h);
     }
     // Over a long stretch at once, to an instant.
-    void leap_to(double to) {
+    [[gnu::noinline]] void leap_to(double to) {
         double length = to - input_.time();
         if (left_of(to, length) < 0.0) length = std::nextafter(length, 0.0);
         LongStep<D> step = long_step(length);
         leap_to(to, step);
     }
     // The same by a step that is no longer than the stretch.
-    void leap_to(double to, LongStep<D>& step) {
+    [[gnu::noinline]] void leap_to(double to, LongStep<D>& step) {
         advance(left_of(to, step.length()));
         x_ = step(x_, input_);
         input_.follow(to);
         rate_known_ = false;
     }
-    LongStep<D> long_step(double length) const { return {*propagator_, *constant_, input_, length}; }
+    [[gnu::noinline]] LongStep<D> long_step(double length) const { return {*propagator_, *constant_, input_, length}; }
     // By one base interval at most, forward or backward; the inputs turn on from where they are.
     void nudge(double s) {
         if (s == 0.0) return;

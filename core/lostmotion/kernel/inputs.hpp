@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "form.hpp"
+#include "sine.hpp"
 
 namespace lostmotion {
 
@@ -148,8 +149,10 @@ class InputTurns {
         std::vector<Turn>& turn = turns_[static_cast<std::size_t>(exponent + reach)];
         if (turn.empty()) {
             const double h = std::ldexp(unit_, exponent);
-            for (std::size_t q = 0; q < basis_.size(); q += 2)
-                turn.push_back({std::cos(basis_[q].omega * h), std::sin(basis_[q].omega * h)});
+            for (std::size_t q = 0; q < basis_.size(); q += 2) {
+                const auto [sine, cosine] = sine_cosine(basis_[q].omega * h);
+                turn.push_back({cosine, sine});
+            }
         }
         return turn.data();
     }
@@ -218,8 +221,9 @@ class InputState {
         for (int i = 0; i < n_inputs; ++i)
             for (const Sine& s : (*signals_)[i].sines) {
                 const double angle = 2.0 * std::numbers::pi * turned(s.frequency, t) + s.phase;
-                weights_[q++] = s.amplitude * std::sin(angle);
-                weights_[q++] = s.amplitude * std::cos(angle);
+                const auto [sine, cosine] = sine_cosine(angle);
+                weights_[q++] = s.amplitude * sine;
+                weights_[q++] = s.amplitude * cosine;
             }
         for (; q < size_ && basis_[q].kind == InputBasis::ramp; ++q) weights_[q] = slope_[basis_[q].input];
     }
@@ -300,9 +304,9 @@ class InputState {
         for (int i = 0; i < n_inputs; ++i) linear_[i] += slope_[i] * h;
         for (int q = 0; q < sines_end_[n_inputs - 1]; q += 2) {
             const double a = basis_[q].omega * h, a2 = a * a;
-            const bool small = a2 < 1e-6;
-            const double cosine = small ? 1.0 - a2 / 2.0 * (1.0 - a2 / 12.0) : std::cos(a);
-            const double sine = small ? a * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0)) : std::sin(a);
+            const auto [sine, cosine] = a2 < 1e-6 ? SineCosine{a * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0)),
+                                                               1.0 - a2 / 2.0 * (1.0 - a2 / 12.0)}
+                                                  : sine_cosine(a);
             (Turn{cosine, sine} * pair_of(*this, q)).store(weights_ + q);
         }
     }
