@@ -467,7 +467,7 @@ class SwitchedDrive {
             near |= (all_bits & ~above(load(&value[g]), clear_of_zero * load(&size[g]) + load(&entry.near_event[g])))
                     << g;
         near &= ~(ignored | entry.behind);
-        bool overcome = entry.regime.driving_input >= 0 && turns_back(entry, now);
+        bool overcome = entry.regime.driving_input >= 0 && turns_back(entry.regime, now);
         if (near == 0) return {nullptr, overcome};
         Flow flow(entry.rates, now);
         for (; near != 0; near &= near - 1) {
@@ -482,12 +482,13 @@ class SwitchedDrive {
     }
 
     // Does the input that drives a contact at its limit turn back just after now?
-    template <class Entry>
-    static bool turns_back(const Entry& entry, const Instant& now) {
-        const LinearForm way = LinearForm::unit(first_input + entry.regime.driving_input, entry.regime.driving_way);
-        Flow flow(entry.rates, now);
-        const auto [rate, size] = flow.derivative(way, 1);
-        return flow.sign(way, 1, rate, size) < 0;
+    static bool turns_back(const Regime& r, const Instant& now) {
+        const auto way = [&](std::size_t k) {
+            return r.driving_way * now.input[k][static_cast<std::size_t>(r.driving_input)];
+        };
+        for (std::size_t k = 1; k + 1 < n_derivatives; ++k)
+            if (std::fabs(way(k)) > time_rounding * std::fabs(now.time * way(k + 1))) return way(k) < 0.0;
+        return false;
     }
 
     // Across an edge of the curve, the map or the amplifier the motion is smooth enough for every contact to go on as
