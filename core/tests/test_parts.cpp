@@ -114,9 +114,10 @@ TEST_SUITE("parts") {
                     for (int j = 0; j < n_states; ++j) {
                         const double e = static_cast<double>(expected[i][j]) - (i == j ? 1.0 : 0.0);
                         // In balanced units; doubling adds about one rounding a level.
-                        const double change = j == load_angle   ? 0.0
-                                              : i == load_angle ? rates.turning[0] * step.integral.coupled(load_speed, j)
-                                                                : step.change(i, j);
+                        const double change = j == load_angle ? 0.0
+                                              : i == load_angle
+                                                  ? rates.turning[0] * step.integral.coupled(load_speed, j)
+                                                  : step.change(i, j);
                         CHECK(std::fabs(change - e) * scale[j] / scale[i] < 1e-10);
                     }
             }

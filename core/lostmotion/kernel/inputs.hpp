@@ -321,9 +321,9 @@ class InputState {
         for (int i = 0; i < n_inputs; ++i) linear_[i] += slope_[i] * h;
         for (int q = 0; q < sines_end_[n_inputs - 1]; q += 2) {
             const double a = basis_[q].omega * h, a2 = a * a;
-            const auto [sine, cosine] = a2 < 1e-6 ? SineCosine{a * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0)),
-                                                               1.0 - a2 / 2.0 * (1.0 - a2 / 12.0)}
-                                                  : sine_cosine(a);
+            const auto [sine, cosine] =
+                a2 < 1e-6 ? SineCosine{a * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0)), 1.0 - a2 / 2.0 * (1.0 - a2 / 12.0)}
+                          : sine_cosine(a);
             (Turn{cosine, sine} * pair_of(*this, q)).store(weights_ + q);
         }
     }

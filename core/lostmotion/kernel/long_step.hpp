@@ -32,7 +32,7 @@ class LongStep {
     static constexpr std::size_t unit = n_states, line = unit + 1, slope = line + n_inputs, sine = slope + n_inputs;
 
     // Whether a stretch is so long that it pays to take it at once.
-    static bool pays(const Propagator& p, double stretch) { return stretch > 16384.0 * p.length(p.longest_level()); }
+    static bool pays(const Propagator& p, double stretch) { return stretch > p.long_stretch(); }
 
     // constant: the part of x' that depends on neither state nor inputs. inputs: any state of the same signals.
     LongStep(const Propagator& p, const Column& constant, const InputState& inputs, double length)

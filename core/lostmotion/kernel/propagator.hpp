@@ -91,6 +91,7 @@ class Propagator {
         per_first_ = 0.5 / base_;
         longest_ = 0;
         while (longest_ + 1 < max_levels && fastest * length(longest_ + 1) <= 1.0) ++longest_;
+        long_stretch_ = 16384.0 * length(longest_);
         levels_ = 0;
         taylor_.prepare(rates);
         add_base();
@@ -118,6 +119,8 @@ class Propagator {
     double per_first() const { return per_first_; }  // 1 / length(1), rounded
     // Steps stay below a sixth of the fastest input period: the doubling formula of a sine loses accuracy beyond it.
     int longest_level() const { return longest_; }
+    // [s] beyond which it pays to take a stretch at once (long_step.hpp).
+    double long_stretch() const { return long_stretch_; }
     // The highest level not longer than s (level 0 even if it is longer). Computes no level.
     int level_below(double s) const {
         if (s >= length(longest_)) return longest_;
@@ -300,10 +303,11 @@ class Propagator {
     Taylor<D> taylor_;
     double base_ = 0.0;  // length of level 0 [s]
     double per_first_ = 0.0;
-    int exponent_ = 0;          // of two: base / unit
-    int longest_ = 0;           // level
-    int bounded_ = max_levels;  // the highest level whose growth is bounded, as far as they are computed
-    int n_pairs_ = 0;           // of functions of the inputs
+    double long_stretch_ = 0.0;  // [s]
+    int exponent_ = 0;           // of two: base / unit
+    int longest_ = 0;            // level
+    int bounded_ = max_levels;   // the highest level whose growth is bounded, as far as they are computed
+    int n_pairs_ = 0;            // of functions of the inputs
     InputTurns* turns_ = nullptr;
     int levels_ = 0;
     std::vector<Step> steps_;          // one a level, kept when others are computed

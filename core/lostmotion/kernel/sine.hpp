@@ -21,7 +21,8 @@ namespace sine_series {
 // pi/2 in pieces: two of 33 bits, whose products with q below 2^19 are exact, and what is left of it; and in three
 // whole numbers.
 inline constexpr double cut_1 = 0x1.921fb544p+0, cut_2 = 0x1.0b4611a6p-34, cut_3 = 0x1.3198a2e037073p-69;
-inline constexpr double whole_1 = 0x1.921fb54442d18p+0, whole_2 = 0x1.1a62633145c07p-54, whole_3 = -0x1.f1976b7ed8fbcp-110;
+inline constexpr double whole_1 = 0x1.921fb54442d18p+0, whole_2 = 0x1.1a62633145c07p-54,
+                        whole_3 = -0x1.f1976b7ed8fbcp-110;
 
 // (-1)^k / (2 k + first)!
 inline constexpr auto coefficients = [](int first) {
