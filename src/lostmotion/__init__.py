@@ -23,20 +23,20 @@ if TYPE_CHECKING:
     from .data_sheets.sheet import Source as Source
     from .errors import InputError as InputError
     from .errors import MissingLibraryError as MissingLibraryError
-    from .model.parts import ConstantEfficiency as ConstantEfficiency
-    from .model.parts import Drive as Drive
-    from .model.parts import Gearbox as Gearbox
-    from .model.parts import GearboxLimits as GearboxLimits
-    from .model.parts import Hysteresis as Hysteresis
-    from .model.parts import LinearStiffness as LinearStiffness
-    from .model.parts import Load as Load
-    from .model.parts import LossMap as LossMap
-    from .model.parts import Motor as Motor
-    from .model.parts import MotorLimits as MotorLimits
-    from .model.parts import Rigid as Rigid
-    from .model.parts import TorsionCurve as TorsionCurve
+    from .model.drive import Drive as Drive
+    from .model.gearbox import Gearbox as Gearbox
+    from .model.gearbox import GearboxLimits as GearboxLimits
+    from .model.load import Load as Load
+    from .model.losses import ConstantEfficiency as ConstantEfficiency
+    from .model.losses import LossMap as LossMap
+    from .model.motor import Motor as Motor
+    from .model.motor import MotorLimits as MotorLimits
     from .model.signals import CommandSignal as CommandSignal
     from .model.signals import TorqueSignal as TorqueSignal
+    from .model.torsion import Hysteresis as Hysteresis
+    from .model.torsion import LinearStiffness as LinearStiffness
+    from .model.torsion import Rigid as Rigid
+    from .model.torsion import TorsionCurve as TorsionCurve
     from .reports.accessor import ResultAccessor as ResultAccessor
     from .response.bandwidth import bandwidth as bandwidth
     from .response.bandwidth import characteristics as characteristics
@@ -86,21 +86,13 @@ _HOMES = {
     "data_sheets.records": ("catalogue",),
     "data_sheets.sheet": ("Source",),
     "errors": ("InputError", "MissingLibraryError"),
-    "model.parts": (
-        "ConstantEfficiency",
-        "Drive",
-        "Gearbox",
-        "GearboxLimits",
-        "Hysteresis",
-        "LinearStiffness",
-        "Load",
-        "LossMap",
-        "Motor",
-        "MotorLimits",
-        "Rigid",
-        "TorsionCurve",
-    ),
+    "model.drive": ("Drive",),
+    "model.gearbox": ("Gearbox", "GearboxLimits"),
+    "model.load": ("Load",),
+    "model.losses": ("ConstantEfficiency", "LossMap"),
+    "model.motor": ("Motor", "MotorLimits"),
     "model.signals": ("CommandSignal", "TorqueSignal"),
+    "model.torsion": ("Hysteresis", "LinearStiffness", "Rigid", "TorsionCurve"),
     "reports.accessor": ("ResultAccessor",),
     "response.bandwidth": ("bandwidth", "characteristics"),
     "response.harmonic": ("frequency_response", "to_control"),

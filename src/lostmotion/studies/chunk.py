@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import _core
 from ..errors import InputError
-from ..model.parts import Rigid
+from ..model.torsion import Rigid
 from ..response.bandwidth import bandwidth
 from ..simulation.results import ENERGY, add_derived, installed_version
 from ..simulation.run import core_inputs, simulate
