@@ -68,8 +68,8 @@ if TYPE_CHECKING:
     from .sizing.drive_check import Finding as Finding
     from .sizing.drive_check import check_drive as check_drive
     from .studies.engine import study as study
-    from .studies.file import Study as Study
     from .studies.file import load_study as load_study
+    from .studies.study import Study as Study
     from .test_rig.comparison import Comparison as Comparison
     from .test_rig.loop import Loop as Loop
     from .test_rig.measurement import RigReport as RigReport
@@ -110,7 +110,8 @@ _HOMES = {
     "simulation.variables": ("VARIABLES", "Variable"),
     "sizing.drive_check": ("Finding", "check_drive"),
     "studies.engine": ("study",),
-    "studies.file": ("Study", "load_study"),
+    "studies.file": ("load_study",),
+    "studies.study": ("Study",),
     "test_rig.comparison": ("Comparison",),
     "test_rig.loop": ("Loop",),
     "test_rig.measurement": ("RigReport", "measure"),

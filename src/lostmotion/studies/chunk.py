@@ -21,9 +21,10 @@ from ..simulation.run import core_inputs, simulate
 from ..simulation.scenario import Scenario
 from ..simulation.variables import CHANNEL_NAMES, VARIABLES
 from .check import COLUMNS, check_columns
-from .file import Study, from_json
+from .file import from_json
 from .functions import REDUCTIONS
 from .select import SHARES, USE
+from .study import Study
 from .vary import base_value
 
 if TYPE_CHECKING:
