@@ -116,9 +116,13 @@ class AdaptiveSolver {
     Status advance(double t_end, Observer& observer) {
         t_end_ = t_end;
         while (time_ < t_end) {
-            const double knot = next_knot(signals_, time_);
+            double limit = std::fmin(t_end, next_knot(signals_, time_));
+            if (const Regime& r = cache_.regime(key_); r.driving_input >= 0) {
+                input_.anchor(time_);
+                limit = input_.turning(r.driving_input, r.driving_way, limit);
+            }
             const Guard* fired = nullptr;
-            const Status status = run_regime(std::fmin(t_end, knot), fired, observer);
+            const Status status = run_regime(limit, fired, observer);
             if (status != Status::done) return status;
             if (fired == nullptr && time_ >= t_end) break;
             const Status switched = change_regime(fired, observer);
@@ -216,6 +220,7 @@ class AdaptiveSolver {
             const Guard* crossed = nullptr;
             double t_event = end;
             for (int g = 0; g < r.n_guards; ++g) {
+                if ((entry.behind >> g & 1) != 0) continue;
                 const Cubic c(value[g], slope[g], end_value[g], end_slope[g], h);
                 if (c.least() <= 0.0) refine_crossing(r.guards[g], dense, end, t_event, crossed);
                 if (r.guards[g].by_touch) find_touch(r.guards[g], c, dense, t_event, crossed);

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "drive.hpp"
@@ -121,17 +122,19 @@ class SwitchedDrive {
     // after an input has changed. Only the contact whose speed has reached zero has stopped, and a stop of the twist is
     // a turning point, which sets the hysteresis capacity anew (16). All other contacts that move go on in their
     // direction, however slowly: an input acts on the speeds through the accelerations only.
+    // input: the inputs up to this instant.
     template <class Cache>
-    Found next(Cache& cache, Instant& now, const Guard* fired, RegimeKey& key) const {
-        if (fired != nullptr ? goes_on(cache, now, *fired, key) : stays(cache, now, key)) return Found::yes;
+    Found next(Cache& cache, Instant& now, const Guard* fired, RegimeKey& key,
+               const std::array<double, n_inputs>& input) const {
+        if (fired != nullptr ? goes_on(cache, now, *fired, key) : stays(cache, now, key, input)) return Found::yes;
         const Regime& old = cache.regime(key);
-        const double T_2 = evaluate(old.output_torque, now.x, now.memory, now.input[0]);
+        const double T_2 = evaluate(old.output_torque, now.x, now.memory, input);
         std::array<bool, n_contacts> at_rest = old.at_rest;
         if (fired != nullptr && fired->kind == Guard::speed) at_rest[fired->contact] = true;
         stop(now.x, at_rest);
         if (at_rest[twist_contact] && !old.at_rest[twist_contact] && drive_.gearbox.has_hysteresis())
             now.memory.hysteresis_capacity = drive_.gearbox.hysteresis_capacity(now.x[twist]);
-        const Event event{at_rest, T_2, fired, key};
+        Event event{at_rest, T_2, fired, key};
         if (fired != nullptr && fired->kind == Guard::capacity && breaks_away(cache, now, event, key))
             return Found::yes;
         return find(cache, now, event, key);
@@ -155,22 +158,28 @@ class SwitchedDrive {
     }
 
  private:
+    enum class Search {
+        lasting,         // does a regime go on? A guard that is zero to rounding has not ended it
+        from_before,     // piece and cell by a walk from those of the output torque before
+        from_each_load,  // by a walk from each load of the map
+        closest,         // the same; the combination that violates its guards least
+    };
+
     // What the search for the regime after an event goes by.
     struct Event {
         std::array<bool, n_contacts> at_rest;
         double T_2;                    // the output torque before [N m]
         const Guard* fired = nullptr;  // what ended the regime before, if not an input
         RegimeKey before{};
-        bool from_each_load = false;  // begin the search for the cell of the loss map from each load
-        bool by_value = false;        // a guard that is zero to rounding holds, whatever its derivatives
-        bool closest = false;         // take the combination that violates its guards least
+        Search search = Search::from_before;
+        std::optional<Modes> refuted{};  // not consistent from before
 
         // The margins of a contact that has just come to a stop are zero by chance only. If one is, the contact may
         // well rest for that moment, and breaks away again. So their derivatives, which rounding may falsify, are not
         // needed.
         bool by_value_alone(const Guard& g) const {
-            return by_value || (fired != nullptr && fired->kind == Guard::speed && g.kind == Guard::capacity &&
-                                g.contact == fired->contact);
+            return search == Search::lasting || (fired != nullptr && fired->kind == Guard::speed &&
+                                                 g.kind == Guard::capacity && g.contact == fired->contact);
         }
         // The solver has seen this regime to its end. Where the motion has all but come to rest, the derivatives at the
         // instant alone may be too small to tell that it ends.
@@ -195,14 +204,12 @@ class SwitchedDrive {
         return {w_M == 0.0, w_M * (1.0 / drive_.gearbox.ratio) == w, w == 0.0};
     }
 
-    using Choices = std::array<std::array<std::int8_t, 3>, n_contacts>;  // the modes that each contact may take
-
     // A contact whose capacity has been overcome begins to slip that way, from rest with no acceleration: the torques
     // are those before. Its jerk has the sign of the fall of the capacity's margin, so that there is nothing to decide
     // as long as all others go on as they were. If the capacity itself has gone with its margin, as where a load that
     // alone holds a self-locking gear reverses, the contact may as well stay stuck.
     template <class Cache>
-    bool breaks_away(Cache& cache, Instant& now, const Event& event, RegimeKey& key) const {
+    bool breaks_away(Cache& cache, Instant& now, Event& event, RegimeKey& key) const {
         const Contact c = event.fired->contact;
         const auto& ended = cache.entry(event.before);
         const auto guard = static_cast<std::size_t>(event.fired - ended.regime.guards.data());
@@ -211,34 +218,25 @@ class SwitchedDrive {
         modes[c] = static_cast<std::int8_t>(event.fired->neighbour);
         Event slipping{event.at_rest, event.T_2};
         slipping.at_rest[c] = false;
-        return !at_its_limit(modes) && settle(cache, now, modes, slipping, key) == Found::yes;
+        if (at_its_limit(modes)) return false;
+        const Found found = settle(cache, now, modes, slipping, key);
+        if (found == Found::inconsistent) event.refuted = modes;
+        return found == Found::yes;
     }
 
-    // Tries the combinations of modes. Usually piece and cell are found by a walk from those before. If the guards that
-    // are zero or nearly so leave none, the motion is too small beside its torques for rounding to tell which of them
-    // rise: then the combination that violates its guards least is taken. A drive that jams violates them by more.
+    // Usually piece and cell are found by a walk from those before. If the guards that are zero or nearly so leave no
+    // combination, the motion is too small beside its torques for rounding to tell which of them rise: then the one
+    // that violates its guards least is taken. A drive that jams violates them by more.
     template <class Cache>
     Found find(Cache& cache, Instant& now, Event event, RegimeKey& key) const {
-        Choices choices{};
-        std::array<int, n_contacts> n{};
-        for (int k = 0; k < n_contacts; ++k) {
-            const auto c = static_cast<Contact>(k);
-            if (!drive_.has(c)) {
-                choices[k][n[k]++] = absent;
-            } else if (c == twist_contact && drive_.rigid()) {
-                choices[k][n[k]++] = 0;
-            } else if (event.at_rest[c]) {
-                for (const int mode : {0, +1, -1}) choices[k][n[k]++] = static_cast<std::int8_t>(mode);
-            } else {
-                choices[k][n[k]++] = key.modes[c];
-            }
-        }
-        const Found found = search(cache, now, choices, n, event, key);
+        const Combinations combinations = combinations_after(event, key.modes);
+        const Found found = search(cache, now, combinations, event, key);
         if (found == Found::yes) return found;
-        event.from_each_load = drive_.gearbox.losses == Gearbox::loss_map;
-        if (event.from_each_load && search(cache, now, choices, n, event, key) == Found::yes) return Found::yes;
-        event.closest = true;
-        if (search(cache, now, choices, n, event, key) == Found::yes) return Found::yes;
+        for (const Search further : {Search::from_each_load, Search::closest}) {
+            if (further == Search::from_each_load && drive_.gearbox.losses != Gearbox::loss_map) continue;
+            event.search = further;
+            if (search(cache, now, combinations, event, key) == Found::yes) return Found::yes;
+        }
         return found;
     }
 
@@ -252,42 +250,99 @@ class SwitchedDrive {
         return stuck == 2 || (slip == 0 && input * bearing < 0);
     }
 
-    // Those with most contacts stuck first. While everything stands the output torque stays as it was, and gives way
-    // only if neither that nor a motion is consistent, and then by as little as it can.
+    // The combinations of modes that may follow, in the order in which they are tried: those with most contacts stuck
+    // first, those with a contact at its limit last.
+    class Combinations {
+     public:
+        void insert(const Modes& modes) {
+            const int rank =
+                (modes[0] != 0) + (modes[1] != 0) + (modes[2] != 0) + (at_its_limit(modes) ? n_contacts + 1 : 0);
+            int k = size_++;
+            for (; k > 0 && rank_[k - 1] > rank; --k) {
+                modes_[k] = modes_[k - 1];
+                rank_[k] = rank_[k - 1];
+            }
+            modes_[k] = modes;
+            rank_[k] = rank;
+        }
+        const Modes* begin() const { return modes_.data(); }
+        const Modes* end() const { return modes_.data() + size_; }
+
+     private:
+        static constexpr int most = 27;
+        std::array<Modes, most> modes_;
+        std::array<int, most> rank_;
+        int size_ = 0;
+    };
+    Combinations combinations_after(const Event& event, const Modes& before) const {
+        std::array<Modes, n_contacts> choices{};
+        std::array<int, n_contacts> n{};
+        for (int k = 0; k < n_contacts; ++k) {
+            const auto c = static_cast<Contact>(k);
+            if (!drive_.has(c)) {
+                choices[k][n[k]++] = absent;
+            } else if (c == twist_contact && drive_.rigid()) {
+                choices[k][n[k]++] = 0;
+            } else if (event.at_rest[c]) {
+                for (const int mode : {0, +1, -1}) choices[k][n[k]++] = static_cast<std::int8_t>(mode);
+            } else {
+                choices[k][n[k]++] = before[c];
+            }
+        }
+        Combinations all;
+        for (int a = 0; a < n[0]; ++a)
+            for (int b = 0; b < n[1]; ++b)
+                for (int c = 0; c < n[2]; ++c) all.insert({choices[0][a], choices[1][b], choices[2][c]});
+        return all;
+    }
+
+    // The first combination that is consistent. While everything stands the output torque stays as it was, and gives
+    // way only if neither that nor a motion is consistent, and then by as little as it can.
     template <class Cache>
-    Found search(Cache& cache, Instant& now, const Choices& choices, const std::array<int, n_contacts>& n,
-                 const Event& event, RegimeKey& key) const {
+    Found search(Cache& cache, Instant& now, const Combinations& combinations, const Event& event,
+                 RegimeKey& key) const {
+        const bool closest = event.search == Search::closest;
         const Memory before = now.memory;  // all that a trial may change
         Found worst = Found::inconsistent;
-        const double largest = event.closest ? largest_violation : std::numeric_limits<double>::infinity();
-        double least = largest;
-        RegimeKey closest;
-        Memory of_closest;
-        for (const bool limit : {false, true})
-            for (int slips = 0; slips <= n_contacts; ++slips)
-                for (int a = 0; a < n[0]; ++a)
-                    for (int b = 0; b < n[1]; ++b)
-                        for (int c = 0; c < n[2]; ++c) {
-                            const Modes modes{choices[0][a], choices[1][b], choices[2][c]};
-                            if ((modes[0] != 0) + (modes[1] != 0) + (modes[2] != 0) != slips) continue;
-                            if (at_its_limit(modes) != limit) continue;
-                            now.memory = before;
-                            const Found found = settle(cache, now, modes, event, key);
-                            if (found == Found::yes && !event.closest && !limit) return found;
-                            if (found == Found::outside) worst = found;
-                            if (found != Found::yes) continue;
-                            const double v = event.closest ? violation(cache.entry(key), now, event)
-                                                           : torque_change(cache.regime(key), now, event);
-                            if (v < least) {
-                                least = v;
-                                closest = key;
-                                of_closest = now.memory;
-                            }
-                        }
-        if (least == largest) return worst;
-        key = closest;
-        now.memory = of_closest;
+        struct {
+            double price;
+            RegimeKey key;
+            Memory memory;
+            bool found = false;
+        } best{closest ? largest_violation : std::numeric_limits<double>::infinity(), key, before};
+        for (const Modes& modes : combinations) {
+            if (event.search == Search::from_before && modes == event.refuted) continue;
+            now.memory = before;
+            RegimeKey trial;
+            const Found found = at_its_limit(modes) ? settle_at_limit(cache, now, modes, event, trial)
+                                                    : settle(cache, now, modes, event, trial);
+            if (found == Found::outside) worst = found;
+            if (found != Found::yes) continue;
+            const double price = closest               ? violation(cache.entry(trial), now, event)
+                                 : at_its_limit(modes) ? torque_change(cache.regime(trial), now, event)
+                                                       : 0.0;
+            if (price < best.price) best = {price, trial, now.memory, true};
+            if (price == 0.0) break;
+        }
+        if (!best.found) return worst;
+        key = best.key;
+        now.memory = best.memory;
         return Found::yes;
+    }
+
+    // Is this combination, in which a contact is at its limit, consistent, or, if what drives it there turns back, does
+    // everything stand at that torque?
+    template <class Cache>
+    Found settle_at_limit(Cache& cache, Instant& now, const Modes& modes, const Event& event, RegimeKey& key) const {
+        Event thorough = event;
+        thorough.search = std::max(event.search, Search::from_each_load);
+        const Found found = settle(cache, now, modes, thorough, key);
+        if (found != Found::inconsistent || event.search == Search::closest) return found;
+        thorough.search = Search::closest;
+        if (settle(cache, now, modes, thorough, key) != Found::yes) return found;
+        Event standing = event;
+        standing.T_2 = evaluate(cache.regime(key).output_torque, now.x, now.memory, now.input[0]);
+        return settle(cache, now, {0, 0, 0}, standing, key);
     }
 
     // Is this combination of modes consistent? Piece and cell are found by a walk that begins at what the torque T_2
@@ -315,7 +370,8 @@ class SwitchedDrive {
         trial.cell = s == 0 ? gearbox.map.load_interval(mu) : gearbox.map.triangle(s * mu, v);
         trial.cell_back = s == 0 ? gearbox.map.load_interval(-mu) : 0;
         const Found found = walk(cache, now, event, trial, key);
-        if (found != Found::inconsistent || !event.from_each_load || s == 0 || modes[twist_contact] != 0) return found;
+        if (found != Found::inconsistent || event.search == Search::from_before || s == 0 || modes[twist_contact] != 0)
+            return found;
         // The torque that keeps the twist at rest depends on the cell, and the cell on the torque.
         for (int j = 0; j < gearbox.map.load_intervals(); ++j) {
             const double middle = 0.5 * (gearbox.map.load_interval_lower(j) + gearbox.map.load_interval_upper(j));
@@ -340,9 +396,9 @@ class SwitchedDrive {
             const auto [left, overcome] = violated(entry, now, moving(entry, event) | along, &event);
             if (left != nullptr && left->kind == Guard::outside) return Found::outside;
             if (left == nullptr) {
-                if (overcome && !event.closest) return Found::inconsistent;
-                if (event.has_ended(trial) && !event.closest) {
-                    if (event.fired->kind == Guard::capacity) return Found::inconsistent;
+                if (overcome && event.search != Search::closest) return Found::inconsistent;
+                if (event.has_ended(trial) && event.search != Search::closest) {
+                    if (!event.fired->is_edge()) return Found::inconsistent;
                     cross(*event.fired, trial);
                 }
                 key = trial;
@@ -410,10 +466,10 @@ class SwitchedDrive {
         for (int g = 0; g < guards.rows(); g += vec_width)
             near |= (all_bits & ~above(load(&value[g]), clear_of_zero * load(&size[g]) + load(&entry.near_event[g])))
                     << g;
-        near &= ~ignored;
-        if (near == 0) return {nullptr, false};
+        near &= ~(ignored | entry.behind);
+        bool overcome = entry.regime.driving_input >= 0 && turns_back(entry.regime, now);
+        if (near == 0) return {nullptr, overcome};
         Flow flow(entry.rates, now);
-        bool overcome = false;
         for (; near != 0; near &= near - 1) {
             const int k = std::countr_zero(near);
             const bool by_value_alone = event != nullptr && event->by_value_alone(entry.regime.guards[k]);
@@ -425,11 +481,21 @@ class SwitchedDrive {
         return {nullptr, overcome};
     }
 
+    // Does the input that drives a contact at its limit turn back just after now?
+    static bool turns_back(const Regime& r, const Instant& now) {
+        const auto way = [&](std::size_t k) {
+            return r.driving_way * now.input[k][static_cast<std::size_t>(r.driving_input)];
+        };
+        for (std::size_t k = 1; k + 1 < n_derivatives; ++k)
+            if (std::fabs(way(k)) > time_rounding * std::fabs(now.time * way(k + 1))) return way(k) < 0.0;
+        return false;
+    }
+
     // Across an edge of the curve, the map or the amplifier the motion is smooth enough for every contact to go on as
     // it was; if that is consistent there is nothing to search.
     template <class Cache>
     bool goes_on(Cache& cache, const Instant& now, const Guard& fired, RegimeKey& key) const {
-        if (fired.kind == Guard::speed || fired.kind == Guard::capacity || fired.kind == Guard::outside) return false;
+        if (!fired.is_edge()) return false;
         auto& from = cache.entry(key);
         const auto& entry = cache.beyond(from, static_cast<int>(&fired - from.regime.guards.data()), [&] {
             RegimeKey beyond = key;
@@ -444,12 +510,16 @@ class SwitchedDrive {
     }
 
     // An input has changed: does the regime go on? The contacts that move keep their direction. A guard that is zero to
-    // rounding has not ended it; the solver finds it if it goes on to fall.
+    // rounding has not ended it; the solver finds it if it goes on to fall. An input that jumps back turns back.
     template <class Cache>
-    bool stays(Cache& cache, const Instant& now, const RegimeKey& key) const {
+    bool stays(Cache& cache, const Instant& now, const RegimeKey& key,
+               const std::array<double, n_inputs>& input) const {
         const auto& entry = cache.entry(key);
+        if (const int i = entry.regime.driving_input;
+            i >= 0 && entry.regime.driving_way * (now.input[0][i] - input[i]) < 0)
+            return false;
         Event lasting{entry.regime.at_rest, 0.0};
-        lasting.by_value = true;
+        lasting.search = Search::lasting;
         const auto [left, overcome] = violated(entry, now, moving(entry, lasting), &lasting);
         return left == nullptr && !overcome;
     }

@@ -89,6 +89,7 @@ class Drive {
     bool solve_reactions(const RegimeKey& key, const Regime& r, Equations& e) const;
     void add_guards(const RegimeKey& key, const Equations& e, Regime& r) const;
     void add_loss_guards(const RegimeKey& key, const Equations& e, Regime& r) const;
+    void add_turning(const RegimeKey& key, Regime& r) const;
 
     static LinearForm closed(const Open& f) {
         LinearForm g;
@@ -223,13 +224,12 @@ inline bool Drive::solve_reactions(const RegimeKey& key, const Regime& r, Equati
     };
     for (Open* f : {&e.T_2, &e.T_1, &e.F_input, &e.H, &e.F_load, &e.input_acceleration, &e.load_acceleration})
         substitute(*f);
-    // Turning the rotor forward must need more torque, not less: else the friction jams.
-    if (!r.at_rest[input_contact]) {
-        const double per_torque =
-            motor.kind == Motor::dc ? e.input_acceleration.c[motor_torque] : e.input_acceleration.c[command];
-        return per_torque > 0.0;
-    }
-    return true;
+    // Turning the rotor forward must need more torque, not less: else the friction jams. While it stands at its limit
+    // this goes for the torque T_2 that it would wind up by giving way.
+    const LinearForm result = closed(r.at_rest[input_contact] ? e.T_2 : e.input_acceleration);
+    const double per_torque = motor.kind == Motor::dc ? result.c[motor_torque] : result.c[command];
+    const bool decides = !r.at_rest[input_contact] || key.modes[input_contact] == +1 || key.modes[input_contact] == -1;
+    return !decides || per_torque > 0.0;
 }
 
 inline void Drive::add_guards(const RegimeKey& key, const Equations& e, Regime& r) const {
@@ -255,6 +255,7 @@ inline void Drive::add_guards(const RegimeKey& key, const Equations& e, Regime& 
         add(T + F, Guard::capacity, load_contact, -1);
     }
     if (key.modes[input_contact] != absent) add_loss_guards(key, e, r);
+    add_turning(key, r);
 
     const TorsionCurve& curve = gearbox.curve;
     if (!rigid() && !r.at_rest[twist_contact]) {
@@ -271,6 +272,22 @@ inline void Drive::add_guards(const RegimeKey& key, const Equations& e, Regime& 
             add(key.amplifier == 0 ? limit - E : -limit - E, Guard::amplifier, input_contact, key.amplifier + 1);
         if (key.amplifier >= 0)
             add(key.amplifier == 0 ? limit + E : E - limit, Guard::amplifier, input_contact, key.amplifier - 1);
+    }
+}
+
+// Everything stands, and one contact "slips": it is at its limit, and T_2 goes along with that as long as what drives
+// it there goes on. When it turns back T_2 stays.
+inline void Drive::add_turning(const RegimeKey& key, Regime& r) const {
+    const auto [input, slip, bearing] = key.modes;
+    if (slip != 0 || input == absent || bearing == absent || (input == 0) == (bearing == 0)) return;
+    if (input == 0) {
+        r.driving_input = load_torque - first_input;
+        r.driving_way = -bearing;
+    } else if (motor.kind == Motor::torque_source) {
+        r.driving_input = command - first_input;
+        r.driving_way = input;
+    } else {
+        r.guards[r.n_guards++] = Guard{static_cast<double>(input) * r.rate[motor_torque], Guard::turning};
     }
 }
 

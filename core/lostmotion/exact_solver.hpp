@@ -39,17 +39,18 @@ struct Segment {
 struct Course {
     State rate{};  // x', if it is known better than from x: under constant inputs
     bool rate_known = false;
-    std::array<double, n_inputs> input{};  // the inputs that the rate belongs to
+    std::array<double, n_inputs> input{};  // up to here; those that the rate belongs to
     // Of the speed of the twist, which ends the regime by touching zero, too. What rounding leaves of a zero is
     // relative to the largest size of its terms.
     bool off_zero = false;    // has it been off zero?
     double touch_size = 0.0;  // the largest size of its terms [rad/s]
     double doubt = 0.0;       // rounding of the rate where the regime began, relative to the rate
+    double most_doubt = 0.0;  // the same as a speed of the twist [rad/s]
 
     // In another regime: what is kept of the numbers means nothing.
     void forget() {
         rate_known = off_zero = false;
-        touch_size = doubt = 0.0;
+        touch_size = doubt = most_doubt = 0.0;
     }
 };
 
@@ -103,6 +104,7 @@ class ExactSolver {
         now_.x = x;
         now_.memory = memory;
         anchor_inputs();
+        course_.input = now_.input[0];
         return status_of(system_.start(cache_, now_, key_));
     }
     // Continues from a state with a known regime.
@@ -120,7 +122,7 @@ class ExactSolver {
     Status inputs_changed() {
         const RegimeKey before = key_;
         anchor_inputs();
-        const Status status = status_of(system_.next(cache_, now_, nullptr, key_));
+        const Status status = status_of(system_.next(cache_, now_, nullptr, key_, course_.input));
         follow_inputs(before);
         return status;
     }
@@ -143,7 +145,9 @@ class ExactSolver {
             begin_->place(entry.propagator, segment.constant, now_.x, course_.rate_known ? &course_.rate : nullptr);
             if (begin_->constant_inputs() && has_settled(entry.regime, begin_->rate())) begin_->settle();
             if (!(time_ < knot_)) knot_ = next_knot(signals_, time_);
-            const double limit = std::min(t_end, knot_);
+            double limit = std::min(t_end, knot_);
+            if (const Regime& r = entry.regime; r.driving_input >= 0)
+                limit = begin_->input().turning(r.driving_input, r.driving_way, limit);
             const Guard* fired = nullptr;
             const Status status = run_regime(segment, limit, fired);
             if (status != Status::done) return status;
@@ -217,14 +221,14 @@ class ExactSolver {
         if (!e.propagator.ready()) e.prepare(turns_, scale_);
         return (e.propagator.level(first_level).growth * absolute(rate))[twist];
     }
-    // Rounding of a rate that is computed from the state, relative to the rate, as far as it acts on the twist. What
+    // Rounding of a rate that is computed from the state, where a regime begins, as far as it acts on the twist. What
     // the search for the modes takes for zero must not be seen to fall at once.
-    [[gnu::cold]] double rate_doubt(typename Cache::Entry& e, const Cursor& at, const Memory& memory) const {
+    [[gnu::cold]] void begin_in_doubt(typename Cache::Entry& e, const Cursor& at, const Memory& memory) {
         State size = e.rates.size(magnitudes(at.x()), magnitudes(memory), at.input().sizes());
         if (at.rate()[twist] == 0.0) size[twist] = 0.0;  // it starts from rest
         const double bound = slip_bound(e, coupled(at.rate()));
-        const double rounding_of_rate = rounding * slip_bound(e, coupled(size));
-        return bound > rounding_of_rate ? rounding_of_rate / bound : 1.0;
+        course_.most_doubt = rounding * slip_bound(e, coupled(size));
+        course_.doubt = bound > course_.most_doubt ? course_.most_doubt / bound : 1.0;
     }
 
     template <class Observer>
@@ -265,7 +269,7 @@ class ExactSolver {
         Cursor *cursor = begin_, *end = there_;
         Ends *here = &ends_[0], *there = &ends_[1];
         const bool constant_inputs = cursor->constant_inputs();
-        if (!course_.rate_known && cursor->carries_rate()) course_.doubt = rate_doubt(e, *cursor, segment.memory);
+        if (!course_.rate_known && cursor->carries_rate()) begin_in_doubt(e, *cursor, segment.memory);
         if (e.regime.n_guards == 0 && LongStep<D>::pays(p, limit - time_) && leap(e, limit)) return Status::done;
         evaluate(e, constant, *cursor, *here);
         Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
@@ -410,6 +414,7 @@ class ExactSolver {
             course_.off_zero |= here.value[e.touch_guard] > touch;
             if (bounds_.least[e.touch_guard] <= touch) doubtful |= 1u << e.touch_guard;
         }
+        doubtful &= ~e.behind;
         if (doubtful == 0) return Verdict::clear;
         GuardTable::Values size;
         e.guards.sizes(magnitudes(memory), magnitudes(cursor.x()), cursor.input(), size);
@@ -455,9 +460,11 @@ class ExactSolver {
         return n_crossing_ > 0 ? Verdict::crossing : Verdict::clear;
     }
 
-    // Rounding of the speed of the twist where it is its rate, carried on from where the regime began.
+    // Rounding of the speed of the twist where it is its rate, carried on from where the regime began. The doubt there
+    // dies out with the motion; where the motion grows, it is one that began with another rounding.
     double twist_speed_rounding(typename Cache::Entry& e, const Cursor& at) const {
-        return (rounding + course_.doubt) * slip_bound(e, coupled(at.rate()));
+        const double bound = slip_bound(e, coupled(at.rate()));
+        return rounding * bound + std::fmin(course_.doubt * bound, course_.most_doubt);
     }
 
     // A guard that starts on zero: does its first derivative that is not zero carry it away, all through the look?

@@ -44,6 +44,7 @@ struct Guard {
         loss_cell,      // load and speed leave their cell of the loss map
         loss_cell_back,
         amplifier,  // the command crosses the voltage limit
+        turning,    // the torque that drives a contact at its limit turns back
         outside,    // the extended loss map ends, or a state leaves the range of the arithmetic
     };
     LinearForm form;
@@ -51,6 +52,11 @@ struct Guard {
     Contact contact = input_contact;  // for speed and capacity
     int neighbour = 0;      // for pieces, cells and the amplifier: the index beyond; capacity: the sign of slip
     bool by_touch = false;  // ends the regime also by touching zero without falling through it
+
+    // Edge of the curve, the map or the amplifier, with a neighbour beyond.
+    bool is_edge() const { return kind >= torsion_piece && kind <= amplifier; }
+    // Says whether a contact goes on in its mode.
+    bool is_of_contact() const { return kind == speed || kind == capacity || kind == turning; }
 };
 
 using GuardTable = FormTable<DriveDims, max_guards>;
@@ -71,6 +77,9 @@ struct Regime {
     bool in_data = true;   // false: the loss map is used outside its data
 
     std::array<bool, n_contacts> at_rest{};  // speeds that this regime keeps at exactly zero
+    // While all stands with one contact at its limit, an input by which it is driven there has to go on this way.
+    int driving_input = -1;  // -1: none
+    double driving_way = 0.0;
 };
 
 }  // namespace lostmotion

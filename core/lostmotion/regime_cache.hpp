@@ -24,7 +24,8 @@ class RegimeCache {
         GuardTable guards;
         int touch_guard = -1;                       // the one that also ends the regime by touching zero
         std::array<unsigned, n_contacts> speeds{};  // the guards of each contact's speed, as bits
-        unsigned contacts = 0;                      // and those of all speeds and capacities
+        unsigned contacts = 0;                      // and those that say whether a contact goes on in its mode
+        unsigned behind = 0;  // edges of the curve that the twist slips away from, so that it does not reach them
         // The guards that are multiples of the rate of the twist: its own speed, and that of one end while the other
         // is at rest.
         struct TwistSpeed {
@@ -45,7 +46,7 @@ class RegimeCache {
             neighbour = {};
             touch_guard = -1;
             speeds = {};
-            contacts = 0;
+            contacts = behind = 0;
             n_twist_speeds = 0;
             for (int g = 0; g < r.n_guards; ++g) {
                 guards.set(g, r.guards[g].form);
@@ -55,7 +56,9 @@ class RegimeCache {
                     if (const double factor = twist_factor(r, r.guards[g].form); factor != 0.0)
                         twist_speeds[n_twist_speeds++] = {g, factor};
                 }
-                if (r.guards[g].kind == Guard::speed || r.guards[g].kind == Guard::capacity) contacts |= 1u << g;
+                if (r.guards[g].is_of_contact()) contacts |= 1u << g;
+                if (r.guards[g].kind == Guard::torsion_piece && slips_away(key, r.guards[g].neighbour))
+                    behind |= 1u << g;
             }
             if constexpr (requires { system.near_event(guards, near_event); }) system.near_event(guards, near_event);
             propagator.reset();
@@ -75,6 +78,10 @@ class RegimeCache {
         }
 
      private:
+        static bool slips_away(const RegimeKey& key, int piece) {
+            const int slip = key.modes[twist_contact];
+            return slip != absent && slip * (piece - key.piece) < 0;
+        }
         static double twist_factor(const Regime& r, const LinearForm& speed) {
             const LinearForm& rate = r.rate[twist];
             const auto moving = [&r](const LinearForm& f, Term t, Contact c) { return r.at_rest[c] ? 0.0 : f.c[t]; };

@@ -72,7 +72,8 @@ class Simulation {
         solver_.resume(now_.time, now_.x, now_.memory, now_.key);
         for (int i = 0; i < n_inputs; ++i) solver_.set_ramp(i, now_.input[i], 0.0);
         if (solver_.begin(now_.time, now_.x, now_.memory) == Status::done)
-            now_ = {now_.time, solver_.state(), solver_.memory(), solver_.key(), now_.input, true, false, {}};
+            now_ = {now_.time, solver_.state(), solver_.memory(), solver_.key(), now_.input,
+                    true,      false,           solver_.course()};
     }
 
     Drive drive_;

@@ -1,6 +1,8 @@
 // From one regime to the next: what both solvers do at an event.
 #pragma once
 
+#include <optional>
+
 #include "contact.hpp"
 #include "kernel/inputs.hpp"
 
@@ -73,9 +75,17 @@ Status switch_regime(const System& system, Cache& cache, InputState<DriveDims>& 
             s.guard = static_cast<int>(fired - old.guards.data());
         }
     }
-    if (fired == nullptr) input.anchor(time);
+    // An input that drives a contact to its limit has taken the torque with it up to here.
+    std::optional<std::array<double, n_inputs>> before;
+    if (fired == nullptr) {
+        if (cache.regime(key).driving_input >= 0) {
+            input.anchor_left(time);
+            before = input.values();
+        }
+        input.anchor(time);
+    }
     see_inputs(input, time, now);
-    const Found found = system.next(cache, now, fired, key);
+    const Found found = system.next(cache, now, fired, key, before.value_or(now.input[0]));
     if (found != Found::yes) return status_of(found);
     if constexpr (requires { observer.switching(s); }) {
         if (wanted) {

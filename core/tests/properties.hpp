@@ -86,6 +86,20 @@ inline Signals perturbed(Signals signals) {
     return signals;
 }
 
+// A random drive whose inputs go on, or end in constants or zero, and an instant at which to split its run.
+struct SplitCase {
+    Drive drive;
+    Signals signals;
+    double duration, at;  // [s]
+
+    SplitCase(RandomDrives& random, long n) : drive(random.drive()), signals(random.signals(drive, 0.25)) {
+        const int kind = static_cast<int>(n % 4);
+        duration = kind < 2 ? 0.25 : 5.0;
+        at = duration * random.uniform(0.02, 0.98);
+        if (kind > 0) signals = that_end(signals, kind == 1 ? 0.02 : 0.2, kind == 3);
+    }
+};
+
 struct Splitting {
     Status status = Status::done, split = Status::done;
     double time = 0.0;           // [s] reached

@@ -308,7 +308,7 @@ class Referee {
             for (int l = 0; l < that_push; ++l) {
                 const TorqueLimit& limit = limits[l];
                 const Quad room = limit.G[0] + limit.q * c.kept_torque;
-                if (limit.q == 0 || magnitude(room) > Quad(1e-24) * magnitude(limit.q) * size) continue;
+                if (!limit.pushes() || magnitude(room) > Quad(1e-24) * magnitude(limit.q) * size) continue;
                 c.pushed_by = l;
                 found.push_back({distance, c});
             }

@@ -22,15 +22,16 @@ inline Case case_of(const Drive& drive, const Signals& signals, double duration,
 
 // Largest difference at the samples of M_D, w_M, w, d, phi, each in units of its largest magnitude in the referee's
 // run. Speeds of input and load are one quantity seen from two sides and share a unit, as do twist and load angle.
-inline std::array<double, n_states> differences(const Drive& drive, const Samples& run, const Result& truth) {
-    constexpr std::array<Channel, n_states> channels{ch_motor_torque, ch_motor_speed, ch_load_speed, ch_twist,
-                                                     ch_load_angle};
+// value(c, k): component c of the other run at sample k.
+template <class Value>
+std::array<double, n_states> differences(const Drive& drive, const Value& value, std::size_t count,
+                                         const Result& truth) {
     std::array<double, n_states> gap{}, size{};
-    const std::size_t count = std::min(run.count, truth.samples.size());
-    for (int c = 0; c < n_states; ++c)
+    count = std::min(count, truth.samples.size());
+    for (std::size_t c = 0; c < n_states; ++c)
         for (std::size_t k = 0; k < count; ++k) {
             size[c] = std::fmax(size[c], std::fabs(truth.samples[k][c]));
-            gap[c] = std::fmax(gap[c], std::fabs(truth.samples[k][c] - run(channels[c], k)));
+            gap[c] = std::fmax(gap[c], std::fabs(truth.samples[k][c] - value(c, k)));
         }
     const double i = drive.gearbox.ratio;
     size[load_speed] = std::fmax(size[load_speed], size[motor_speed] / i);
@@ -38,8 +39,19 @@ inline std::array<double, n_states> differences(const Drive& drive, const Sample
     size[twist] = size[load_angle] = std::fmax(size[twist], size[load_angle]);
     // What should not move at all may move by rounding of what does.
     const State rated = drive.rated_scale();
-    for (int c = 0; c < n_states; ++c) gap[c] /= std::fmax(size[c], 1e-9 * rated[c]);
+    for (std::size_t c = 0; c < n_states; ++c) gap[c] /= std::fmax(size[c], 1e-9 * rated[c]);
     return gap;
+}
+inline std::array<double, n_states> differences(const Drive& drive, const Samples& run, const Result& truth) {
+    constexpr std::array<Channel, n_states> channels{ch_motor_torque, ch_motor_speed, ch_load_speed, ch_twist,
+                                                     ch_load_angle};
+    return differences(drive, [&](std::size_t c, std::size_t k) { return run(channels[c], k); }, run.count, truth);
+}
+// Between two runs of the referee.
+inline double spread(const Drive& drive, const Result& other, const Result& truth) {
+    const auto gap = differences(
+        drive, [&](std::size_t c, std::size_t k) { return other.samples[k][c]; }, other.samples.size(), truth);
+    return *std::max_element(gap.begin(), gap.end());
 }
 
 struct Agreement {

@@ -127,6 +127,9 @@ struct TorqueLimit {
     const char* name = "";
     Series G;
     Quad q = 0;
+    int winds = 0;  // of the input: the sign by which T_2 changes as it gives way
+    // Whether T_2 goes along with the limit: only if giving way restores what holds.
+    bool pushes() const { return winds == 0 ? q != 0 : winds * q > 0; }
 };
 
 class MotionBuilder {
@@ -157,15 +160,15 @@ class MotionBuilder {
         limits.push_back({"load holds, backward", -M_Z + m_.T_f, 1});
         if (!m_.has_map) {
             const Quad alpha = 1 / (m_.i * m_.eta);
-            limits.push_back({"input holds, forward", -M_D + m_.T_10, alpha});
-            limits.push_back({"input holds, backward", M_D + m_.T_10, -alpha});
+            limits.push_back({"input holds, forward", -M_D + m_.T_10, alpha, +1});
+            limits.push_back({"input holds, backward", M_D + m_.T_10, -alpha, -1});
             return limits;
         }
         const Quad i = m_.i, T_2R = m_.T_2R;
-        limits.push_back(
-            {"input holds, forward", -M_D + (m_.T_10 + T_2R * c.forward->at_zero / i), (1 + c.forward->per_load) / i});
+        limits.push_back({"input holds, forward", -M_D + (m_.T_10 + T_2R * c.forward->at_zero / i),
+                          (1 + c.forward->per_load) / i, +1});
         limits.push_back({"input holds, backward", M_D + (m_.T_10 + T_2R * c.backward->at_zero / i),
-                          -(1 + c.backward->per_load) / i});
+                          -(1 + c.backward->per_load) / i, -1});
         for (const int sign : {+1, -1}) {
             const Range& r = (sign > 0 ? c.forward : c.backward)->range;
             if (!r.open_below) limits.push_back({"map cell at standstill, lower", Series(-r.lower), sign / T_2R});

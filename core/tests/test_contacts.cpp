@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include "lostmotion/explain.hpp"
+#include "lostmotion/simulation.hpp"
 #include "support.hpp"
 
 using namespace lostmotion;
@@ -38,6 +39,94 @@ TEST_SUITE("contacts") {
                 CHECK((std::fabs(s.report.x[load_speed]) > 1e-6) == (factor > 1.0));
             }
         }
+    }
+
+    TEST_CASE("the torque of a standing drive follows what pushes it, and stays where that turns back") {
+        // All stands: T_2 is M_Z followed with a play of T_f on either side, or i M_D with one of i T_10. Between
+        // instants dt apart a turning point of 2 sin(10 pi t) is missed by less than 2 (10 pi)^2 dt^2/8 = 4e-8.
+        const auto check = [](const Drive& d, const Signals& signals, double half_width, auto&& centre) {
+            constexpr int steps = 1000;
+            const double interval = 0.0125, dt = interval / steps;
+            const Samples s = run(d, signals, 3.0, interval), adaptive = run(d, signals, 3.0, interval, {}, 1e-10);
+            REQUIRE(s.report.status == Status::done);
+            REQUIRE(adaptive.report.status == Status::done);
+            double T_2 = 0.0;
+            for (std::size_t k = 0; k < s.count; ++k) {
+                for (int n = k == 0 ? steps : 1; n <= steps; ++n) {
+                    const double at = centre(dt * (static_cast<double>(k) * steps - steps + n));
+                    T_2 = std::clamp(T_2, at - half_width, at + half_width);
+                }
+                CHECK(s(ch_output_torque, k) == Approx(T_2).epsilon(1e-7).scale(1.0));
+                CHECK(adaptive(ch_output_torque, k) == Approx(T_2).epsilon(1e-7).scale(1.0));
+                CHECK(s(ch_load_speed, k) == 0.0);
+                CHECK(s(ch_motor_speed, k) == 0.0);
+            }
+        };
+        for (const double a : {0.0, 0.9}) {
+            const auto of_time = [a](double t) { return 1.1 * std::sin(2.0 * pi * t) + a * std::sin(10.0 * pi * t); };
+            const Signal signal{{Knot{}}, {{1.1, 1.0, 0.0}, {a, 5.0, 0.0}}};
+            Drive d = plain_drive(2.0, 1.0, 1.0);
+            d.motor.friction_torque = 8.0;
+            d.load.friction_torque = 0.5;
+            check(d, {Signal{}, signal}, 0.5, of_time);
+            std::swap(d.motor.friction_torque, d.load.friction_torque);
+            check(d, {signal, Signal{}}, 1.0, [&](double t) { return 2.0 * of_time(t); });
+        }
+        Drive d = plain_drive(2.0, 1.0, 1.0);
+        d.motor.kind = Motor::dc;
+        d.motor.electrical_time_constant = 0.5;
+        d.motor.armature_voltage_constant = 2.0;
+        d.motor.friction_torque = 0.25;
+        d.load.friction_torque = 8.0;
+        const auto M_D = [](double t) {  // 2 E, by exponentials of 0.5 s
+            const auto to = [](double from, double end, double span) {
+                return end + (from - end) * std::exp(-2.0 * span);
+            };
+            return t < 0.5 ? to(0.0, 2.0, t) : to(to(0.0, 2.0, 0.5), -2.0, t - 0.5);
+        };
+        const Signal steps = lines({{0.0, 1.0, 0.0}, {0.5, -1.0, 0.0}});
+        check(d, {steps, Signal{}}, 0.5, [&](double t) { return 2.0 * M_D(t); });
+    }
+
+    TEST_CASE("where an input jumps the torque of a standing drive leaves from what it was before") {
+        Drive d = plain_drive(2.0, 1.0, 1.0);
+        d.motor.friction_torque = 0.25;
+        d.load.friction_torque = 8.0;
+        // i M_D = 1, 1.4, 2, 0.6 with a play of 0.5
+        const Signal steps = lines({{0.0, 0.5, 0.0}, {0.1, 0.7, 0.0}, {0.2, 0.9, 1.0}, {0.3, 0.3, 0.0}});
+        const std::vector<double> T_2{0.5, 0.9, 1.3, 1.1};
+        const Samples s = run(d, {steps, Signal{}}, 0.4, 0.1), adaptive = run(d, {steps, Signal{}}, 0.4, 0.1, {}, 1e-9);
+        Simulation simulation(d, 0.1);
+        for (std::size_t k = 0; k < T_2.size(); ++k) {
+            CHECK(s(ch_output_torque, k) == Approx(T_2[k]));
+            CHECK(adaptive(ch_output_torque, k) == Approx(T_2[k]));
+            const Knot& at = steps.knots[k];
+            REQUIRE(simulation.advance(0.1, at.value, at.value + 0.1 * at.slope, 0.0, 0.0) == Status::done);
+            const auto& now = simulation.snapshot();
+            const double T = evaluate(simulation.regime().output_torque, now.x, now.memory, now.input);
+            CHECK(T == Approx(k == 2 ? 1.5 : T_2[k]));
+        }
+    }
+
+    TEST_CASE("a self-locking gear at rest and free of torque is wound up by the motor either way") {
+        // M_D = s t (1 + a) T_2/(i T_2) until T_2 = s T_f, then both move: t = T_f (1 + a)/i.
+        for (const double way : {+1.0, -1.0})
+            for (const double overrunning : {1.25, 2.0}) {
+                const double a = 0.5, T_f = 0.25, i = 2.0;
+                Drive d = plain_drive(i, 1.0, 1.0);
+                d.load.friction_torque = T_f;
+                d.gearbox.losses = Gearbox::loss_map;
+                d.gearbox.map = LossMap({0.0, 1.0}, {-1.0, 0.0, 1.0}, {overrunning, overrunning, 0.0, 0.0, a, a});
+                const Samples s = run(d, {lines({{0.0, 0.0, way}}), Signal{}}, 0.3, 0.01);
+                REQUIRE(s.report.status == Status::done);
+                const double moves = T_f * (1.0 + a) / i;
+                for (std::size_t k = 0; k < s.count; ++k) {
+                    const double t = 0.01 * static_cast<double>(k);
+                    CHECK((s(ch_motor_speed, k) != 0.0) == (t > moves));
+                    if (t < moves)
+                        CHECK(s(ch_output_torque, k) == Approx(way * i * t / (1.0 + a)).epsilon(1e-12).scale(1e-3));
+                }
+            }
     }
 
     TEST_CASE("no contact, damper or hysteresis ever gives energy") {

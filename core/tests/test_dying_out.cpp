@@ -109,6 +109,22 @@ TEST_SUITE("dying_out") {
         std::printf("dying out: 2000 random drives split, largest gap of a motion that amplifies nothing %.1e\n",
                     worst);
     }
+    TEST_CASE("stick-slip that dies out, and ringing about zero torque, go on as long as there is anything left") {
+        // 2007: a self-locking gear creeps down in slips whose torques fall by a sixth each, from 1e-10 N m on beside
+        // 5 N m. 17186, 89382: a free load rings at the edge of a backlash, in the end with 1e-12 N m beside 1 N m.
+        RandomDrives random(1);
+        for (long n = 0; n <= 89382; ++n) {
+            const SplitCase c(random, n);
+            if (n != 2007 && n != 17186 && n != 89382) continue;
+            CAPTURE(n);
+            const Splitting s = split_run(c.drive, c.signals, c.duration, c.at);
+            CHECK(s.status == Status::done);
+            CHECK(s.split == Status::done);
+            CHECK(s.gap < 1e-9);
+            const Samples start = run(c.drive, c.signals, 0.5, 0.05);
+            CHECK(referee::referee_agrees(c.drive, c.signals, 0.5, 0.05, start, 1e-8));
+        }
+    }
     TEST_CASE("self-locking gears whose load reverses stay stuck or go on, but do not jam") {
         for (const bool hysteresis : {false, true}) {
             SelfLockingDrives random(7, hysteresis);

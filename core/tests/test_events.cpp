@@ -48,7 +48,7 @@ struct BouncingBall {
         return Found::yes;
     }
     template <class Cache>
-    Found next(Cache&, Instant& now, const Guard*, RegimeKey&) const {
+    Found next(Cache&, Instant& now, const Guard*, RegimeKey&, const std::array<double, n_inputs>&) const {
         now.x[twist] = 0.0;
         now.x[load_speed] *= -restitution;
         return Found::yes;

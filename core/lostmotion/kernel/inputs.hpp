@@ -297,6 +297,23 @@ class InputState {
             }
         return bound;
     }
+    // The first instant from now on at which an input no longer goes this way, before `limit` and the next knot; else
+    // `limit`. From slope v and curvature a follows v + a s - B s^2/2 <= its slope after s, where B bounds the third
+    // derivative, so that none is stepped over.
+    double turning(int i, double way, double limit) const {
+        double B = 0.0;
+        for (const Sine& s : (*signals_)[i].sines)
+            B += std::fabs(s.amplitude) * std::pow(2.0 * std::numbers::pi * s.frequency, 3);
+        if (B == 0.0) return limit;
+        for (InputState at = *this; at.time_ < limit;) {
+            const auto u = at.jet<3>();
+            const double v = way * u[1][i], a = way * u[2][i];
+            if (v < 0.0) return at.time_;
+            const double safe = at.time_ + (a + std::sqrt(a * a + 2.0 * B * v)) / B;
+            at.follow(std::fmax(safe, std::nextafter(at.time_, limit)));
+        }
+        return limit;
+    }
 
     // Moves on by h, for once; sines and cosines of small angles from their series.
     void turn(double h) {

@@ -16,7 +16,17 @@ if TYPE_CHECKING:
     import xarray
 
 # What ended a regime, in the order of Guard::Kind (core/lostmotion/regime.hpp); last: an input jumped.
-CAUSES = ("came to rest", "broke away", "torsion piece", "loss cell", "loss cell", "voltage limit", "", "input changed")
+CAUSES = (
+    "came to rest",
+    "broke away",
+    "torsion piece",
+    "loss cell",
+    "loss cell",
+    "voltage limit",
+    "motor torque turned",
+    "",
+    "input changed",
+)
 
 ATTRIBUTE = "switchings"
 # Columns of the core's table (bindings/convert.hpp). Left out is the contact, which means nothing for most causes.
