@@ -7,7 +7,10 @@ import pytest
 
 import lostmotion as lm
 from lostmotion.data_sheets.components import Conditions
-from lostmotion.model.parts import GearboxLimits, Hysteresis, LossMap, MotorLimits, TorsionCurve
+from lostmotion.model.gearbox import GearboxLimits
+from lostmotion.model.losses import LossMap
+from lostmotion.model.motor import MotorLimits
+from lostmotion.model.torsion import Hysteresis, TorsionCurve
 from lostmotion.simulation.scenario import LoadTable
 
 # A catalogue motor and gearbox near their limits, so that every limit is judged.

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import lostmotion as lm
-from lostmotion.model.parts import Drive
+from lostmotion.model.drive import Drive
 from lostmotion.paper import constants, paper_scenario
 from lostmotion.paper.reproduce import WORK, reproduce
 

@@ -29,7 +29,7 @@ from lostmotion.studies import chunk as study_chunk
 from lostmotion.studies.chunk import _core_can, pieces, run_piece, scenario_of_run
 from lostmotion.studies.design import CHUNK
 from lostmotion.studies.expressions import FUNCTIONS, REDUCTIONS
-from lostmotion.studies.file import Study
+from lostmotion.studies.study import Study
 from lostmotion.studies.vary import Vary
 
 SHORT = paper_scenario("2-DOF-NL", "large").replace(**{"simulation.duration": 0.2, "simulation.sample_interval": 2e-3})

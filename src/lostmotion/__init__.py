@@ -23,20 +23,20 @@ if TYPE_CHECKING:
     from .data_sheets.sheet import Source as Source
     from .errors import InputError as InputError
     from .errors import MissingLibraryError as MissingLibraryError
-    from .model.parts import ConstantEfficiency as ConstantEfficiency
-    from .model.parts import Drive as Drive
-    from .model.parts import Gearbox as Gearbox
-    from .model.parts import GearboxLimits as GearboxLimits
-    from .model.parts import Hysteresis as Hysteresis
-    from .model.parts import LinearStiffness as LinearStiffness
-    from .model.parts import Load as Load
-    from .model.parts import LossMap as LossMap
-    from .model.parts import Motor as Motor
-    from .model.parts import MotorLimits as MotorLimits
-    from .model.parts import Rigid as Rigid
-    from .model.parts import TorsionCurve as TorsionCurve
+    from .model.drive import Drive as Drive
+    from .model.gearbox import Gearbox as Gearbox
+    from .model.gearbox import GearboxLimits as GearboxLimits
+    from .model.load import Load as Load
+    from .model.losses import ConstantEfficiency as ConstantEfficiency
+    from .model.losses import LossMap as LossMap
+    from .model.motor import Motor as Motor
+    from .model.motor import MotorLimits as MotorLimits
     from .model.signals import CommandSignal as CommandSignal
     from .model.signals import TorqueSignal as TorqueSignal
+    from .model.torsion import Hysteresis as Hysteresis
+    from .model.torsion import LinearStiffness as LinearStiffness
+    from .model.torsion import Rigid as Rigid
+    from .model.torsion import TorsionCurve as TorsionCurve
     from .reports.accessor import ResultAccessor as ResultAccessor
     from .response.bandwidth import bandwidth as bandwidth
     from .response.bandwidth import characteristics as characteristics
@@ -68,8 +68,8 @@ if TYPE_CHECKING:
     from .sizing.drive_check import Finding as Finding
     from .sizing.drive_check import check_drive as check_drive
     from .studies.engine import study as study
-    from .studies.file import Study as Study
     from .studies.file import load_study as load_study
+    from .studies.study import Study as Study
     from .test_rig.comparison import Comparison as Comparison
     from .test_rig.loop import Loop as Loop
     from .test_rig.measurement import RigReport as RigReport
@@ -86,21 +86,13 @@ _HOMES = {
     "data_sheets.records": ("catalogue",),
     "data_sheets.sheet": ("Source",),
     "errors": ("InputError", "MissingLibraryError"),
-    "model.parts": (
-        "ConstantEfficiency",
-        "Drive",
-        "Gearbox",
-        "GearboxLimits",
-        "Hysteresis",
-        "LinearStiffness",
-        "Load",
-        "LossMap",
-        "Motor",
-        "MotorLimits",
-        "Rigid",
-        "TorsionCurve",
-    ),
+    "model.drive": ("Drive",),
+    "model.gearbox": ("Gearbox", "GearboxLimits"),
+    "model.load": ("Load",),
+    "model.losses": ("ConstantEfficiency", "LossMap"),
+    "model.motor": ("Motor", "MotorLimits"),
     "model.signals": ("CommandSignal", "TorqueSignal"),
+    "model.torsion": ("Hysteresis", "LinearStiffness", "Rigid", "TorsionCurve"),
     "reports.accessor": ("ResultAccessor",),
     "response.bandwidth": ("bandwidth", "characteristics"),
     "response.harmonic": ("frequency_response", "to_control"),
@@ -118,7 +110,8 @@ _HOMES = {
     "simulation.variables": ("VARIABLES", "Variable"),
     "sizing.drive_check": ("Finding", "check_drive"),
     "studies.engine": ("study",),
-    "studies.file": ("Study", "load_study"),
+    "studies.file": ("load_study",),
+    "studies.study": ("Study",),
     "test_rig.comparison": ("Comparison",),
     "test_rig.loop": ("Loop",),
     "test_rig.measurement": ("RigReport", "measure"),

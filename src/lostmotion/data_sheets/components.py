@@ -10,7 +10,9 @@ from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Number, Positive, Temperature, argument
 from ..inputs.validation import shown, unknown_key
-from ..model.parts import DC_KEYS, Gearbox, LinearStiffness, Motor, TorsionCurve
+from ..model.gearbox import Gearbox
+from ..model.motor import DC_KEYS, Motor
+from ..model.torsion import LinearStiffness, TorsionCurve
 from .gearbox_sheet import SCALARS, GearboxSheet
 from .loss_map_builder import BuiltMap, build_loss_map
 from .motor_sheet import MotorSheet

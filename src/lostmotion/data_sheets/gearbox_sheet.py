@@ -20,7 +20,8 @@ from ..inputs.quantities import (
     Torque,
     ViscousFriction,
 )
-from ..model.parts import GearboxLimits, Hysteresis, LinearStiffness, TorsionCurve
+from ..model.gearbox import GearboxLimits
+from ..model.torsion import Hysteresis, LinearStiffness, TorsionCurve
 from .loss_data import Efficiency, LossData
 from .sheet import Record
 

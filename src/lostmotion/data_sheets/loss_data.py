@@ -18,7 +18,7 @@ from ..inputs.quantities import (
     Temperature,
     Torque,
 )
-from ..model.parts import LossMap
+from ..model.losses import LossMap
 
 Efficiency = Annotated[Number, Limit(gt=0.0, le=1.0)]
 

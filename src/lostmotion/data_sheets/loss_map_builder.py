@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number, Temperature
-from ..model.parts import LossMap
+from ..model.losses import LossMap
 from ..units.practical import RPM
 from .gearbox_sheet import GearboxSheet
 from .loss_data import EfficiencyPoint, LossData

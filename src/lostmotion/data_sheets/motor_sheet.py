@@ -22,7 +22,7 @@ from ..inputs.quantities import (
     TorqueConstant,
     Voltage,
 )
-from ..model.parts import Motor, MotorLimits
+from ..model.motor import Motor, MotorLimits
 from .sheet import Record
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..model.parts import LossMap
+from ..model.losses import LossMap
 from ..reports.pages import panels_csv, table_csv
 from ..reports.panels import COMMAND_STYLE, STYLES, Curve, Panel, scientific
 from ..response.linear import rigid_constants

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..atomic_writer import write_bytes
-from ..model.parts import Drive
+from ..model.drive import Drive
 from ..response.bandwidth import characteristics
 from .pages import panels_csv, save_figure, table_csv, write_text
 from .response_figures import bode, bode_figure, maps_figure

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..data_sheets.gearbox_sheet import GearboxSheet
-from ..model.parts import Rigid
+from ..model.torsion import Rigid
 from ..test_rig.measurement import RigReport
 from ..test_rig.rig import LOST_MOTION_LOAD
 from ..units.practical import RPM, practical

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..data_sheets.sheet import Record
 from ..inputs.schema import unit_in_schema
-from ..model.parts import Gearbox
+from ..model.gearbox import Gearbox
 from ..units.practical import practical
 
 

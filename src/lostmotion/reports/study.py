@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError, need
 from ..studies.engine import study_of
-from ..studies.file import Study
+from ..studies.study import Study
 from ..studies.table import labelled, read_table
 from ..studies.vary import Vary
 from .pages import save_figure, table_csv, write_text

@@ -6,9 +6,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..studies.file import Study
 from ..studies.select import SHARES, USE, Selection
 from ..studies.selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
+from ..studies.study import Study
 from ..studies.table import labelled
 from .pages import save_figure, table_csv, write_text
 from .panels import STYLES

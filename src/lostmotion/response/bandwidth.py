@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Frequency, Number, Torque
-from ..model.parts import Drive
+from ..model.drive import Drive
 from ..simulation.scenario import Initial, Scenario, drive_of, mean_inputs
 from ..simulation.variables import CHANNEL_NAMES
 from .harmonic import known_output, of_output, sine_inputs

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Torque, arguments
 from ..inputs.validation import shown
-from ..model.parts import Drive
+from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from ..simulation.scenario import Initial, Scenario, drive_of, mean_inputs
 from ..simulation.variables import CHANNEL_NAMES

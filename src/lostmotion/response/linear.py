@@ -13,7 +13,9 @@ from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number, Time, Torque, argument, arguments
 from ..inputs.validation import shown
-from ..model.parts import ConstantEfficiency, Drive, Rigid
+from ..model.drive import Drive
+from ..model.losses import ConstantEfficiency
+from ..model.torsion import Rigid
 from ..simulation.run import start_state
 from ..simulation.scenario import Initial, Scenario, drive_of
 from ..simulation.variables import CONTACTS, STATES

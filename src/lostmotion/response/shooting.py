@@ -12,7 +12,7 @@ from .. import _core
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Torque
-from ..model.parts import Drive
+from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from ..simulation.results import add_derived
 from ..simulation.run import start_state

@@ -9,7 +9,7 @@ from .. import _core
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Time
-from ..model.parts import Drive
+from ..model.drive import Drive
 from .run import core_inputs
 from .scenario import Scenario
 from .stepping import Simulation

@@ -9,7 +9,7 @@ from .. import _core
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number
-from ..model.parts import Drive
+from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from .results import RawResult, raw_result
 from .scenario import Initial, LoadTable, Scenario, SimulationTable

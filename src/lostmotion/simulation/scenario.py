@@ -10,9 +10,13 @@ from pydantic import model_validator
 from ..data_sheets.components import Conditions, use_records
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Positive, Speed, Time, Torque
-from ..model.parts import Drive, Gearbox, Load, Motor, Rigid
+from ..model.drive import Drive
+from ..model.gearbox import Gearbox
+from ..model.load import Load
+from ..model.motor import Motor
 from ..model.signals import CommandSignal, TorqueSignal
 from ..model.task import Task
+from ..model.torsion import Rigid
 from .keys import set_values
 
 MAX_SAMPLES = 100_000_000

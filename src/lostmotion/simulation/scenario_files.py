@@ -11,7 +11,7 @@ from ..data_sheets.components import gearbox_table
 from ..errors import InputError
 from ..inputs.toml_files import RESULTS, read_toml
 from ..inputs.validation import did_you_mean, shown
-from ..model.parts import Gearbox
+from ..model.gearbox import Gearbox
 from .keys import parse_override, set_values
 from .scenario import Scenario, from_tables
 from .series_files import read_series

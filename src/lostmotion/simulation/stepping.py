@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Time
 from ..inputs.validation import shown
-from ..model.parts import Drive
+from ..model.drive import Drive
 from .run import start_state
 from .scenario import Initial, Scenario, drive_of
 from .variables import CHANNEL_NAMES, VARIABLES

@@ -10,7 +10,8 @@ import numpy as np
 
 from .. import _core
 from ..inputs.arguments import checked
-from ..model.parts import Gearbox, Rigid
+from ..model.gearbox import Gearbox
+from ..model.torsion import Rigid
 from ..simulation.run import simulate
 from ..simulation.scenario import Scenario
 from ..test_rig.rig import LOST_MOTION_LOAD, TestRig

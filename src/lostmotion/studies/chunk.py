@@ -14,16 +14,17 @@ import numpy as np
 
 from .. import _core
 from ..errors import InputError
-from ..model.parts import Rigid
+from ..model.torsion import Rigid
 from ..response.bandwidth import bandwidth
 from ..simulation.results import ENERGY, add_derived, installed_version
 from ..simulation.run import core_inputs, simulate
 from ..simulation.scenario import Scenario
 from ..simulation.variables import CHANNEL_NAMES, VARIABLES
 from .check import COLUMNS, check_columns
-from .file import Study, from_json
+from .file import from_json
 from .functions import REDUCTIONS
 from .select import SHARES, USE
+from .study import Study
 from .vary import base_value
 
 if TYPE_CHECKING:

@@ -14,7 +14,8 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from .chunk import as_parquet, compute_chunk, parsed, pieces, run_piece, tabulate
 from .design import CHUNK
-from .file import Study, from_json, to_json
+from .file import from_json, to_json
+from .study import Study
 
 
 @checked

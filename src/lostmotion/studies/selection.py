@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from .file import Study
 from .select import SHARES, USE, Selection
+from .study import Study
 from .table import unit_of
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data_sheets.gearbox_sheet import GearboxSheet
 from ..inputs.arguments import checked
-from ..model.parts import Gearbox
+from ..model.gearbox import Gearbox
 from .comparison import Comparison, compare
 from .loop import Loop
 from .rig import TestRig

@@ -16,8 +16,12 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Speed, Torque
 from ..inputs.validation import shown
-from ..model.parts import Drive, Gearbox, Load, Motor, Rigid
+from ..model.drive import Drive
+from ..model.gearbox import Gearbox
+from ..model.load import Load
+from ..model.motor import Motor
 from ..model.signals import CommandSignal, Samples, TorqueSignal
+from ..model.torsion import Rigid
 from ..simulation.run import simulate
 from ..simulation.scenario import Initial
 from ..simulation.switchings import switchings_of

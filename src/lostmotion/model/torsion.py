@@ -1,0 +1,103 @@
+"""The torsion of a gearbox: stiffness, backlash and hysteresis."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from .. import _core
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Angle,
+    Limit,
+    NotNegative,
+    Number,
+    Positive,
+    Stiffness,
+    Torque,
+    argument,
+)
+
+MAX_PIECES = 100  # of a torsion curve, on each side
+
+
+class TorsionCurve(Part):
+    """Torque against twist (eq. 14): odd, continuous, piecewise linear.
+
+    `backlash` (total gap at the output) and `preload` change the given segments: a gap of half the backlash comes
+    before the first, or the segments below the preload torque drop out, as where two flanks are pressed together.
+    """
+
+    kind: Literal["curve"] = "curve"
+    slopes: tuple[Annotated[Stiffness, NotNegative], ...] = Field(min_length=1, max_length=MAX_PIECES)
+    """of the segments, from twist 0 outwards"""
+    breaks: tuple[Annotated[Angle, Positive], ...] = ()
+    """breakpoints: twists at which the slope changes; one fewer than slopes"""
+    backlash: Annotated[Angle, NotNegative] = 0.0
+    preload: Annotated[Torque, NotNegative] = 0.0
+
+    @model_validator(mode="after")
+    def _is_a_curve(self) -> Self:
+        if len(self.breaks) != len(self.slopes) - 1:
+            raise ValueError(f"has {len(self.slopes)} slopes and {len(self.breaks)} breaks; it needs one break fewer")
+        for k, (a, b) in enumerate(itertools.pairwise(self.breaks)):
+            if b <= a:
+                raise ValueError(f"breaks must rise, but breaks[{k + 1}] = {b} follows {a}")
+        if self.slopes[-1] <= 0.0:
+            raise ValueError("ends with slope 0; the last segment must carry torque")
+        if self.backlash > 0.0 and self.preload > 0.0:
+            raise ValueError("has backlash and preload; a preload removes the backlash, so give only one")
+        return self
+
+    def pieces(self) -> tuple[list[float], list[float]]:
+        """(breaks [rad], slopes [N·m/rad]) with backlash and preload worked in."""
+        breaks, slopes = list(self.breaks), list(self.slopes)
+        if self.backlash > 0.0:
+            gap = 0.5 * self.backlash
+            return [gap, *(gap + b for b in breaks)], [0.0, *slopes]
+        if self.preload > 0.0:
+            torque, previous = 0.0, 0.0
+            for k, b in enumerate([*breaks, math.inf]):
+                rise = slopes[k] * (b - previous)
+                if torque + rise >= self.preload:
+                    start = previous + (self.preload - torque) / slopes[k] if slopes[k] > 0.0 else b
+                    return [x - start for x in breaks[k:] if x > start], slopes[k if b > start else k + 1 :]
+                torque, previous = torque + rise, b
+        return breaks, slopes
+
+    def core(self) -> _core.TorsionCurve:
+        return _core.TorsionCurve(*self.pieces())
+
+    def torque(self, twist: float) -> float:
+        """P(d) [N·m] at the twist [rad]."""
+        return self.core().torque(argument("twist", twist, "rad"))
+
+
+class LinearStiffness(Part):
+    """One stiffness for all twists (5a)."""
+
+    kind: Literal["linear"] = "linear"
+    stiffness: Annotated[Stiffness, Positive]
+
+    def pieces(self) -> tuple[list[float], list[float]]:
+        """(breaks [rad], slopes [N·m/rad]): no break, one slope."""
+        return [], [self.stiffness]
+
+    def core(self) -> _core.TorsionCurve:
+        return _core.TorsionCurve(*self.pieces())
+
+
+class Rigid(Part):
+    """No twist at all (7)."""
+
+    kind: Literal["rigid"] = "rigid"
+
+
+class Hysteresis(Part):
+    """Turning-point hysteresis (16)."""
+
+    efficiency: Annotated[Number, Limit(gt=0.0, le=1.0)]
+    """eta_H, average efficiency of the hysteresis process; 1: none"""
