@@ -11,7 +11,7 @@ namespace {
 
 struct Nothing {
     bool segment(const Segment<SwitchedDrive>&) { return true; }
-    void step(const Regime&, const Memory&, const DenseStep&, bool) {}
+    void step(const Regime&, const Memory&, const DenseStepOf<DriveDims>&, bool) {}
 };
 
 struct Cost {

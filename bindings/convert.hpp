@@ -83,11 +83,13 @@ inline std::array<double, n_states> from_state(const State& x) {
 }
 
 // The course of a motion and whether the inputs are constant, as numbers.
-using CourseNumbers = std::array<double, n_states + n_inputs + 5>;
+using CourseNumbers = std::array<double, n_states + n_inputs + 6>;
 inline CourseNumbers from_course(const Course& c, bool steady) {
     CourseNumbers v{};
     auto next = std::copy(c.input.begin(), c.input.end(), std::copy(c.rate.begin(), c.rate.end(), v.begin()));
-    for (const double x : {double(c.rate_known), double(c.off_zero), c.touch_size, c.doubt, double(steady)})
+    const auto& twist = c.twist[0];
+    for (const double x : {double(c.rate_known), double(twist.off_zero), twist.touch_size, twist.doubt,
+                           twist.most_doubt, double(steady)})
         *next++ = x;
     return v;
 }
@@ -97,9 +99,7 @@ inline Course to_course(const CourseNumbers& v) {
     std::copy_n(v.begin() + n_states, n_inputs, c.input.begin());
     const double* rest = &v[n_states + n_inputs];
     c.rate_known = rest[0] != 0.0;
-    c.off_zero = rest[1] != 0.0;
-    c.touch_size = rest[2];
-    c.doubt = rest[3];
+    c.twist[0] = {rest[1] != 0.0, rest[2], rest[3], rest[4]};
     return c;
 }
 

@@ -12,87 +12,19 @@
 #include <utility>
 
 #include "drive.hpp"
-#include "kernel/rates.hpp"
+#include "kernel/flow.hpp"
+#include "solver/course.hpp"
+#include "solver/switching.hpp"
 
 namespace lostmotion {
-
-// A form counts as zero within this multiple of the sum of the magnitudes of its terms. Its coefficients come from an
-// elimination and carry more than one rounding.
-inline constexpr double rounding = 0x1p14 * std::numeric_limits<double>::epsilon();
-// Rounding of an instant, relative to the time since the start.
-inline constexpr double time_rounding = 4.0 * std::numeric_limits<double>::epsilon();
-
-// A guard that is further from zero than this share of its terms, and of what they are at rated load and speed times
-// `far_from_event`, is not at zero: the rounding of the instant moves it by less. Near a zero of all its terms, the
-// first share alone says nothing.
-inline constexpr double clear_of_zero = 1e-3;
-inline constexpr double far_from_event = 1e-6;
-
-// Time derivatives of the state along the flow of one regime, computed as far as they are asked for.
-class Flow {
- public:
-    Flow(const LinearRates& rates, const Instant& now) : rates_(rates), now_(now) {}
-
-    // Sign that a form has just after now, from its value and the sum of the magnitudes of its terms: that of the first
-    // of the value and its derivatives that is not zero. 0 if it stays at zero or, if asked by value alone, is zero
-    // now.
-    int sign(const LinearForm& form, double value, double size, bool by_value_alone) {
-        for (int k = 1; k < n_derivatives; ++k) {
-            const double next = rate(form, k);
-            if (std::fabs(value) > noise(size, next)) return value > 0.0 ? +1 : -1;
-            if (by_value_alone) return 0;
-            value = next;
-            size = rate_size(form, k);
-        }
-        return 0;
-    }
-
-    // What counts as zero: rounding of the terms, and since the instant itself is known to its rounding only, a value
-    // may be off by that times its rate.
-    double noise(double size, double rate) const {
-        return rounding * size + time_rounding * std::fabs(now_.time * rate);
-    }
-    // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
-    double rate(const LinearForm& f, int k) { return evaluate_rate(f, derivative(k), now_.input[k]); }
-    double rate_size(const LinearForm& f, int k) {
-        const State& terms = size(k);
-        const auto& u = now_.input[k];
-        double sum = std::fabs(f.c[command] * u[0]) + std::fabs(f.c[load_torque] * u[1]);
-        for (int j = 0; j < n_states; ++j) sum += std::fabs(f.c[j]) * terms[j];
-        return sum;
-    }
-
- private:
-    const State& derivative(int k) {
-        if (order_ == 0) {
-            x_[1] = rates_(now_.x, rates_.constant(now_.memory), now_.input[0]);
-            order_ = 1;
-        }
-        for (; order_ < k; ++order_) x_[order_ + 1] = rates_.higher(x_[order_], now_.input[order_]);
-        return x_[k];
-    }
-    const State& size(int k) {
-        if (sized_ == 0) {
-            size_[1] = rates_.size(magnitudes(now_.x), magnitudes(now_.memory), now_.input_size);
-            sized_ = 1;
-        }
-        for (; sized_ < k; ++sized_)
-            size_[sized_ + 1] = rates_.higher_size(size_[sized_], magnitudes(now_.input[sized_]));
-        return size_[k];
-    }
-
-    const LinearRates& rates_;
-    const Instant& now_;
-    int order_ = 0, sized_ = 0;
-    std::array<State, n_derivatives + 1> x_, size_;  // as far as they are known
-};
-
-enum class Found { yes, inconsistent, outside };
 
 // The drive as a switched linear system: which regime follows at an event.
 class SwitchedDrive {
  public:
     using Dims = DriveDims;
+    using Key = RegimeKey;
+    using Regime = lostmotion::Regime;
+    using Guard = lostmotion::Guard;
 
     explicit SwitchedDrive(const Drive& drive) : drive_(drive) { drive_changed(); }
     // To be called when the drive that this refers to has been given other parameters.
@@ -104,6 +36,14 @@ class SwitchedDrive {
     void near_event(const GuardTable& guards, GuardTable::Values& out) const {
         guards.rate_sizes(near_state_, near_input_, out);
     }
+    // The twists of gears, whose rates are the speeds that end a regime by touching zero.
+    static constexpr int n_twists() { return 1; }
+    static constexpr int twist_state(int) { return twist; }
+    // A rigid gear is none: it holds whatever acts.
+    bool has_dry_contacts() const {
+        return drive_.has(input_contact) || drive_.has(load_contact) || drive_.gearbox.has_hysteresis();
+    }
+    static const LinearForm& torque_at_load(const Regime& r) { return r.output_torque; }
     const Drive& drive() const { return drive_; }
     Regime build(const RegimeKey& key) const { return drive_.build(key); }
 
@@ -435,7 +375,7 @@ class SwitchedDrive {
     template <class Entry>
     static double violation(const Entry& entry, const Instant& now, const Event& event) {
         const unsigned ignored = moving(entry, event);
-        Flow flow(entry.rates, now);
+        Flow<DriveDims> flow(entry.rates, now);
         double worst = 0.0;
         for (int k = 0; k < entry.regime.n_guards; ++k) {
             if ((entry.contacts & ~ignored & 1u << k) == 0) continue;
@@ -469,7 +409,7 @@ class SwitchedDrive {
         near &= ~(ignored | entry.behind);
         bool overcome = entry.regime.driving_input >= 0 && turns_back(entry.regime, now);
         if (near == 0) return {nullptr, overcome};
-        Flow flow(entry.rates, now);
+        Flow<DriveDims> flow(entry.rates, now);
         for (; near != 0; near &= near - 1) {
             const int k = std::countr_zero(near);
             const bool by_value_alone = event != nullptr && event->by_value_alone(entry.regime.guards[k]);
@@ -544,5 +484,8 @@ class SwitchedDrive {
     State near_state_{};  // magnitudes of states and inputs whose part in a guard it must exceed
     std::array<double, n_inputs> near_input_{};
 };
+
+using Switching = SwitchingOf<SwitchedDrive>;
+using Course = CourseOf<DriveDims>;
 
 }  // namespace lostmotion

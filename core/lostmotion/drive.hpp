@@ -106,6 +106,10 @@ inline Regime Drive::build(const RegimeKey& key) const {
     const int stuck = (key.modes[0] == 0) + (key.modes[1] == 0) + (key.modes[2] == 0);
     for (int c = 0; c < n_contacts; ++c) r.at_rest[c] = key.modes[c] == 0 || stuck >= 2;
 
+    r.resting[motor_speed] = r.at_rest[input_contact];
+    r.resting[load_speed] = r.at_rest[load_contact];
+    r.following[load_speed] = r.at_rest[twist_contact];
+
     Equations e = compose(key, r);
     r.solvable = solve_reactions(key, r, e);
 
@@ -259,12 +263,15 @@ inline void Drive::add_guards(const RegimeKey& key, const Equations& e, Regime& 
 
     const TorsionCurve& curve = gearbox.curve;
     if (!rigid() && !r.at_rest[twist_contact]) {
+        const int slip = key.modes[twist_contact];
+        const auto edge = [&](const LinearForm& form, int way) {
+            add(form, Guard::torsion_piece, twist_contact, key.piece + way);
+            r.guards[r.n_guards - 1].behind = slip == -way;
+        };
         if (key.piece < curve.outermost_piece())
-            add(LinearForm::unit(one, curve.upper(key.piece)) - LinearForm::unit(twist), Guard::torsion_piece,
-                twist_contact, key.piece + 1);
+            edge(LinearForm::unit(one, curve.upper(key.piece)) - LinearForm::unit(twist), +1);
         if (key.piece > -curve.outermost_piece())
-            add(LinearForm::unit(twist) - LinearForm::unit(one, curve.lower(key.piece)), Guard::torsion_piece,
-                twist_contact, key.piece - 1);
+            edge(LinearForm::unit(twist) - LinearForm::unit(one, curve.lower(key.piece)), -1);
     }
     if (motor.limits_voltage()) {
         const LinearForm E = LinearForm::unit(command), limit = LinearForm::unit(one, motor.voltage_limit);

@@ -53,6 +53,8 @@ struct Guard {
     int neighbour = 0;      // for pieces, cells and the amplifier: the index beyond; capacity: the sign of slip
     bool by_touch = false;  // ends the regime also by touching zero without falling through it
 
+    bool behind = false;  // an edge of the curve that the twist slips away from, so that it does not reach it
+
     // Edge of the curve, the map or the amplifier, with a neighbour beyond.
     bool is_edge() const { return kind >= torsion_piece && kind <= amplifier; }
     // Says whether a contact goes on in its mode.
@@ -76,7 +78,9 @@ struct Regime {
     bool solvable = true;  // false: the reactions have no unique solution (jamming)
     bool in_data = true;   // false: the loss map is used outside its data
 
-    std::array<bool, n_contacts> at_rest{};  // speeds that this regime keeps at exactly zero
+    std::array<bool, n_contacts> at_rest{};  // contacts whose speeds this regime keeps at exactly zero
+    // Of the coupled states: speeds that are kept at zero, and those that follow another as the twist at rest has it.
+    std::array<bool, n_coupled> resting{}, following{};
     // While all stands with one contact at its limit, an input by which it is driven there has to go on this way.
     int driving_input = -1;  // -1: none
     double driving_way = 0.0;

@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "adaptive_solver.hpp"
 #include "energy.hpp"
 #include "sampler.hpp"
+#include "solver/adaptive_solver.hpp"
 
 namespace lostmotion {
 
@@ -123,7 +123,7 @@ class AdaptiveRecorder {
     AdaptiveRecorder(const Drive& drive, Solver& solver, const RunOptions& options, double* out, RunReport& report)
         : drive_(drive), solver_(solver), options_(options), out_(out), report_(report) {}
 
-    void step(const Regime& r, const Memory& m, const DenseStep& dense, bool last) {
+    void step(const Regime& r, const Memory& m, const DenseStepOf<DriveDims>& dense, bool last) {
         if (!r.in_data) report_.left_data_at = std::fmin(report_.left_data_at, dense.begin);
         for (; next_ < options_.samples; ++next_) {
             const double t = static_cast<double>(next_) * options_.sample_interval;

@@ -9,9 +9,10 @@
 #include <span>
 #include <utility>
 
-#include "exact_solver.hpp"
+#include "contact.hpp"
 #include "kernel/stride.hpp"
 #include "reader.hpp"
+#include "solver/exact_solver.hpp"
 
 namespace lostmotion {
 

@@ -17,8 +17,8 @@ class Simulation {
         RegimeKey key;
         std::array<double, n_inputs> input{};  // last values, for reading variables
         bool started = false;
-        bool steady = false;  // the inputs were constant in the last interval
-        Course course;        // what is known of the motion in the present regime beside its state
+        bool steady = false;         // the inputs were constant in the last interval
+        CourseOf<DriveDims> course;  // what is known of the motion in the present regime beside its state
     };
 
     // step: the usual interval [s]; others are allowed, this one is fastest.

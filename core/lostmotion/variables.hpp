@@ -38,7 +38,7 @@ inline Memory magnitudes(const Memory& m) { return {std::fabs(m.hysteresis_capac
 inline constexpr int max_guards = 16;
 
 struct DriveDims : Dims<4, 1, 2, 2, n_contacts, max_guards> {
-    static constexpr int first_turning = load_speed;
+    static constexpr int first_turning = load_speed, twists = 1;
     using Memory = lostmotion::Memory;
     using Contact = lostmotion::Contact;
 };

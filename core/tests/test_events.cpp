@@ -32,6 +32,13 @@ Samples swinging(double at, double duration, double interval) {
 // A ball that loses half its speed at each bounce: switchings accumulate at a known time.
 struct BouncingBall {
     using Dims = DriveDims;
+    using Key = RegimeKey;
+    using Regime = lostmotion::Regime;
+    using Guard = lostmotion::Guard;
+
+    static int n_twists() { return 0; }
+    static int twist_state(int) { return twist; }
+    static const LinearForm& torque_at_load(const Regime& r) { return r.output_torque; }
 
     // Its height is held by the twist, its speed by that of the load.
     double restitution = 0.5;
@@ -196,7 +203,7 @@ TEST_SUITE("events") {
         x[load_angle] = 1.0;
         REQUIRE(solver.begin(0.0, x, {}) == Status::done);
         struct {
-            void step(const Regime&, const Memory&, const DenseStep&, bool) {}
+            void step(const Regime&, const Memory&, const DenseStepOf<DriveDims>&, bool) {}
         } nothing;
         const double period = 4.0 * std::comp_ellint_1(std::sin(0.5)) / std::sqrt(25.0 / 1.001);
         REQUIRE(solver.advance(period, nothing) == Status::done);

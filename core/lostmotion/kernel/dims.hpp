@@ -2,8 +2,23 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
 namespace lostmotion {
+
+// Which coupled speed each angle follows: known when compiled, or from run to run.
+template <class D>
+struct TurningSpeeds {
+    std::array<int, static_cast<std::size_t>(D::angles)> state{};
+    int operator[](int angle) const { return state[static_cast<std::size_t>(angle)]; }
+    void set(int angle, int speed) { state[static_cast<std::size_t>(angle)] = speed; }
+};
+template <class D>
+    requires requires { D::first_turning; }
+struct TurningSpeeds<D> {
+    constexpr int operator[](int angle) const { return D::first_turning + angle; }
+    void set(int, int) {}
+};
 
 template <int coupled_, int angles_, int inputs_, int memory_, int contacts_, int guards_>
 struct Dims {
@@ -15,8 +30,7 @@ struct Dims {
     static constexpr int guards = guards_;      // conditions that end a regime, at most
 
     static constexpr int states = coupled + angles;
-    static constexpr int first_turning =
-        0;  // the coupled speed that the first angle follows; the others are next to it
+    static constexpr int twists = coupled;  // coupled states that are twists of gears, at most
 
     // A linear form has a coefficient for each state, for 1, for the memory and for each input.
     static constexpr int one = states, first_memory = one + 1, first_input = first_memory + memory,

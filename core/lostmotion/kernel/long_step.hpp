@@ -139,7 +139,7 @@ class LongStep {
             out[r] = scaled(rate);
         }
         for (std::size_t j = 0; j < D::angles; ++j)
-            out[n_coupled + j] = scaled(rates_.turning[j] * z[D::first_turning + j]);
+            out[n_coupled + j] = scaled(rates_.turning[j] * z[rates_.turning_speed[j]]);
         return out;
     }
 

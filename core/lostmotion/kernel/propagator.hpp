@@ -84,7 +84,7 @@ class Propagator {
             norm = std::fmax(norm, sum);
         }
         for (int j = 0; j < D::angles; ++j)
-            norm = std::fmax(norm, std::fabs(rates.turning[j]) * scale[D::first_turning + j] / scale[D::coupled + j]);
+            norm = std::fmax(norm, std::fabs(rates.turning[j]) * scale[rates.turning_speed[j]] / scale[D::coupled + j]);
         base_ = turns.unit();
         exponent_ = 0;
         for (; norm * base_ > base_norm; base_ *= 0.5) --exponent_;
@@ -193,7 +193,7 @@ class Propagator {
 
     // The row of an angle in exp(A h) - 1.
     Coupled angle_change(const Integral& over_h, int j) const {
-        return rates().turning[j] * over_h.coupled.row(D::first_turning + j);
+        return rates().turning[j] * over_h.coupled.row(rates().turning_speed[j]);
     }
 
     // Room for one level more. What an earlier use has left there is written over.

@@ -46,7 +46,7 @@ class Stride {
         const ResponseOf<D>* responses = propagator.responses(level);
         const Turn* turns = propagator.turns(level);
         for (int j = 0; j < D::angles; ++j)
-            turning_[j] = rates.turning[j] * step_->integral.coupled.row(D::first_turning + j);
+            turning_[j] = rates.turning[j] * step_->integral.coupled.row(rates.turning_speed[j]);
         x_ = from.x();
         linear_ = input.linear();
         Coupled driving = load(constant), ramp{};

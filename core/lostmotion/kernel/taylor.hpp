@@ -35,7 +35,8 @@ class Expansion {
     std::array<InputsOf<D>, terms + 1> input;  // [k]: their k-th derivative
     std::array<double, D::angles> angle_rate;  // of the angles
     std::array<double, D::angles> turning;     // their rates over their speeds
-    std::array<Coupled, terms> coupled;        // derivatives of the other states, from the first on
+    [[no_unique_address]] TurningSpeeds<D> turning_speed;
+    std::array<Coupled, terms> coupled;  // derivatives of the other states, from the first on
 
     // By how much the state changes over s.
     [[gnu::always_inline]] LanesOf<D> change(double s) const {
@@ -49,7 +50,7 @@ class Expansion {
             sum.coupled = sum.coupled + ((by<0>(c, v[0]) + by<1>(c, v[1])) + (by<2>(c, v[2]) + by<3>(c, v[3])));
             const Pack<4> next = c * four_over_next(part);
             for (int j = 0; j < D::angles; ++j) {
-                const int speed = D::first_turning + j;
+                const int speed = turning_speed[j];
                 sum.angle[j] += (next * Pack<4>::of({v[0][speed], v[1][speed], v[2][speed], v[3][speed]})).sum();
             }
         }
@@ -189,7 +190,7 @@ class Taylor {
         sum.coupled.scale(h);
         // An angle is turned by the integral of its speed's row.
         for (int j = 0; j < D::angles; ++j) {
-            const int speed = D::first_turning + j;
+            const int speed = rates_->turning_speed[j];
             const Coupled first = Matrix::identity().row(speed), second = one.row(speed), third = two.row(speed);
             Coupled row{};
             for (int k = terms - 3; k >= 0; k -= 3)
@@ -230,6 +231,7 @@ class Taylor {
     [[gnu::always_inline]] void expand(const Lanes& rate, const Varies& varies, Expansion<D>& out) const {
         out.angle_rate = rate.angle;
         out.turning = rates_->turning;
+        out.turning_speed = rates_->turning_speed;
         const auto recur = [&](auto forced) __attribute__((always_inline)) {
             auto& v = out.coupled;
             v[0] = rate.coupled;

@@ -46,11 +46,15 @@ struct DormandPrince {
 // the energy do not see it. So it is refused for a drive with dry contacts: one that is stuck would stay so against any
 // torque, and gain speed.
 struct NoRemainder {
+    template <class State>
     void operator()(double, const State&, State&) const {}
 };
 
 // One accepted stretch of the solution; evaluates the state anywhere on it.
-struct DenseStep {
+template <class D>
+struct DenseStepOf {
+    using State = StateOf<D>;
+
     double begin = 0.0, length = 0.0, end = 0.0;  // [s]; used up to `end` <= begin + length
     State x{};
     std::array<State, DormandPrince::stages> k{};
@@ -69,6 +73,20 @@ struct DenseStep {
 template <class System, class Remainder = NoRemainder>
 class AdaptiveSolver {
  public:
+    using D = typename System::Dims;
+    using Cache = RegimeCache<System>;
+    using Regime = typename System::Regime;
+    using Key = typename System::Key;
+    using Guard = typename System::Guard;
+    using GuardTable = typename Cache::GuardTable;
+    using Contact = typename D::Contact;
+    using Memory = typename D::Memory;
+    using State = StateOf<D>;
+    using LinearForm = LinearFormOf<D>;
+    using Signals = SignalsOf<D>;
+    using Inputs = InputsOf<D>;
+    using DenseStep = DenseStepOf<D>;
+
     AdaptiveSolver(const System& system, const Signals& signals, double relative_tolerance, const State& scale,
                    Remainder remainder = {})
         : system_(system),
@@ -99,7 +117,7 @@ class AdaptiveSolver {
     std::size_t switchings() const { return switchings_; }
 
     Status begin(double time, const State& x, const Memory& memory) {
-        if (!std::is_same_v<Remainder, NoRemainder> && has_dry_contacts()) return Status::unseen;
+        if (!std::is_same_v<Remainder, NoRemainder> && system_.has_dry_contacts()) return Status::unseen;
         time_ = time;
         now_.x = x;
         now_.memory = memory;
@@ -131,23 +149,17 @@ class AdaptiveSolver {
         return Status::done;
     }
 
-    std::array<double, n_inputs> input_at(double t) {
+    Inputs input_at(double t) {
         input_.anchor(t);
         return input_.values();
     }
     // The left limit, for the end of the last step.
-    std::array<double, n_inputs> input_before(double t) {
+    Inputs input_before(double t) {
         input_.anchor_left(t);
         return input_.values();
     }
 
  private:
-    // A rigid gear is none: it holds whatever acts.
-    bool has_dry_contacts() const {
-        const Drive& drive = system_.drive();
-        return drive.has(input_contact) || drive.has(load_contact) || drive.gearbox.has_hysteresis();
-    }
-
     template <class Observer>
     Status change_regime(const Guard* fired, Observer& observer) {
         if (fired != nullptr) input_.anchor(time_);
@@ -158,7 +170,7 @@ class AdaptiveSolver {
         return accumulation_.add(time_, 1.0) ? Status::zeno : Status::done;
     }
 
-    State rates(const LinearRates& linear, const Column& constant, double t, const State& x) {
+    State rates(const LinearRatesOf<D>& linear, const ColumnOf<D>& constant, double t, const State& x) {
         State out = linear(x, constant, input_at(t));
         remainder_(t, x, out);
         return out;
@@ -168,13 +180,13 @@ class AdaptiveSolver {
     Status run_regime(double limit, const Guard*& fired, Observer& observer) {
         const auto& entry = cache_.entry(key_);
         const Regime& r = entry.regime;
-        const LinearRates& linear = entry.rates;
-        const Column fixed = linear.constant(now_.memory);
-        GuardTable::Values constant;
+        const LinearRatesOf<D>& linear = entry.rates;
+        const ColumnOf<D> fixed = linear.constant(now_.memory);
+        typename GuardTable::Values constant;
         entry.guards.constants(now_.memory, constant);
         using DP = DormandPrince;
         DenseStep dense;
-        std::array<double, max_guards> value, slope, end_value, end_slope;
+        std::array<double, D::guards> value, slope, end_value, end_slope;
         const auto look = [&](double t, const State& x, const State& rate, auto& g, auto& g_rate) {
             input_.anchor(t);
             const auto u = input_.template jet<2>();
@@ -203,13 +215,13 @@ class AdaptiveSolver {
                 dense.k[stage] = rates(linear, fixed, std::min(time_ + DP::c[stage] * h, latest), x);
             }
             double error = 0.0;
-            for (int n = 0; n < n_states; ++n) {
+            for (int n = 0; n < D::states; ++n) {
                 double e = 0.0;
                 for (int j = 0; j < DP::stages; ++j) e += DP::error[j] * dense.k[j][n];
                 const double size = tolerance_ * (scale_[n] + std::max(std::fabs(now_.x[n]), std::fabs(x[n])));
                 error += (h * e / size) * (h * e / size);
             }
-            error = std::sqrt(error / n_states);
+            error = std::sqrt(error / D::states);
             if (!(error < 1.0)) {
                 if (!(h > 1e-14 * std::max(1.0, time_))) return Status::outside;
                 h *= std::isfinite(error) ? std::clamp(0.9 * std::pow(error, -0.2), 0.2, 0.9) : 0.1;
@@ -251,10 +263,10 @@ class AdaptiveSolver {
     void refine_crossing(const Guard& guard, const DenseStep& dense, double end, double& t_event,
                          const Guard*& crossed) {
         constexpr int looks = 16;
-        const auto value = [&](double t) { return evaluate(guard.form, dense(t), now_.memory, input_at(t)); };
+        const auto value = [&](double t) { return evaluate<D>(guard.form, dense(t), now_.memory, input_at(t)); };
         // A solution of finite accuracy may tremble about a guard that the exact one only approaches.
-        double noise = rounding * magnitude(guard.form, dense.x, now_.memory, input_at(dense.begin));
-        for (int k = 0; k < n_states; ++k) noise += noise_factor * std::fabs(guard.form.c[k]) * scale_[k];
+        double noise = rounding * magnitude<D>(guard.form, dense.x, now_.memory, input_at(dense.begin));
+        for (int k = 0; k < D::states; ++k) noise += noise_factor * std::fabs(guard.form.c[k]) * scale_[k];
         // The speed of the twist is a small difference, and each of its zeros sets the hysteresis anew: one that the
         // error of the solution may make is none.
         if (guard.by_touch) noise += solution_error(guard.form, dense.x);
@@ -286,7 +298,7 @@ class AdaptiveSolver {
         const double near = touch_factor * solution_error(guard.form, dense.x);
         off_zero_ |= c.c0 > near;
         if (!off_zero_ || c.c3 <= near || t >= t_event ||
-            std::fabs(evaluate(guard.form, dense(t), now_.memory, input_at(t))) > near)
+            std::fabs(evaluate<D>(guard.form, dense(t), now_.memory, input_at(t))) > near)
             return;
         t_event = t;
         crossed = &guard;
@@ -295,7 +307,7 @@ class AdaptiveSolver {
     // What the tolerance allows for in a form.
     double solution_error(const LinearForm& form, const State& x) const {
         double error = 0.0;
-        for (int k = 0; k < n_states; ++k) error += tolerance_ * std::fabs(form.c[k]) * (scale_[k] + std::fabs(x[k]));
+        for (int k = 0; k < D::states; ++k) error += tolerance_ * std::fabs(form.c[k]) * (scale_[k] + std::fabs(x[k]));
         return error;
     }
 
@@ -305,21 +317,21 @@ class AdaptiveSolver {
     const System& system_;
     Signals signals_;
     std::vector<InputBasis> basis_;
-    RegimeCache<System> cache_;
+    Cache cache_;
     double tolerance_;
     State scale_;
     Remainder remainder_;
-    InputState<DriveDims> input_;
+    InputState<D> input_;
 
     double longest_step_ = std::numeric_limits<double>::infinity();
     double time_ = 0.0, step_ = 0.0, t_end_ = 0.0;
-    Instant now_;
-    RegimeKey key_;
+    InstantOf<D> now_;
+    Key key_;
     long steps_ = 0;
     std::size_t switchings_ = 0;
     Accumulation accumulation_;
     bool off_zero_ = false;  // whether the guard that may touch has been off zero in this regime
-    Contact stopped_at_ = input_contact;
+    Contact stopped_at_{};
 };
 
 }  // namespace lostmotion

@@ -15,8 +15,9 @@
 #include <limits>
 #include <memory>
 
-#include "kernel/cursor.hpp"
-#include "kernel/polynomial.hpp"
+#include "../kernel/cursor.hpp"
+#include "../kernel/polynomial.hpp"
+#include "course.hpp"
 #include "regime_cache.hpp"
 #include "switching.hpp"
 
@@ -30,35 +31,31 @@ struct Segment {
     const Cursor<typename System::Dims>& at;  // where it begins
     double begin, end;                        // [s]
     bool last;                                // no further segment follows in this call: `end` belongs to it
-    Memory memory;
-    Column constant;  // the part of dx/dt that depends on neither state nor inputs
-    State x_end;      // at end, before any stop there
-};
-
-// What is known of the motion in the present regime beside its state, and goes on with the regime.
-struct Course {
-    State rate{};  // x', if it is known better than from x: under constant inputs
-    bool rate_known = false;
-    std::array<double, n_inputs> input{};  // up to here; those that the rate belongs to
-    // Of the speed of the twist, which ends the regime by touching zero, too. What rounding leaves of a zero is
-    // relative to the largest size of its terms.
-    bool off_zero = false;    // has it been off zero?
-    double touch_size = 0.0;  // the largest size of its terms [rad/s]
-    double doubt = 0.0;       // rounding of the rate where the regime began, relative to the rate
-    double most_doubt = 0.0;  // the same as a speed of the twist [rad/s]
-
-    // In another regime: what is kept of the numbers means nothing.
-    void forget() {
-        rate_known = off_zero = false;
-        touch_size = doubt = most_doubt = 0.0;
-    }
+    typename System::Dims::Memory memory;
+    ColumnOf<typename System::Dims> constant;  // the part of dx/dt that depends on neither state nor inputs
+    StateOf<typename System::Dims> x_end;      // at end, before any stop there
 };
 
 template <class System>
 class ExactSolver {
  public:
     using Cache = RegimeCache<System>;
+    using Entry = typename Cache::Entry;
     using D = typename System::Dims;
+    using Regime = typename System::Regime;
+    using Key = typename System::Key;
+    using Guard = typename System::Guard;
+    using GuardTable = typename Cache::GuardTable;
+    using Guards = typename Cache::Guards;
+    using Contact = typename D::Contact;
+    using Memory = typename D::Memory;
+    using State = StateOf<D>;
+    using Coupled = CoupledOf<D>;
+    using Lanes = LanesOf<D>;
+    using Matrix = MatrixOf<D>;
+    using LinearForm = LinearFormOf<D>;
+    using Signals = SignalsOf<D>;
+    using Course = CourseOf<D>;
     using Cursor = lostmotion::Cursor<D>;
     using InputState = lostmotion::InputState<D>;
     using Propagator = lostmotion::Propagator<D>;
@@ -87,9 +84,9 @@ class ExactSolver {
     double time() const { return time_; }
     const State& state() const { return now_.x; }
     const Memory& memory() const { return now_.memory; }
-    const RegimeKey& key() const { return key_; }
+    const Key& key() const { return key_; }
     const Regime& regime() { return cache_.regime(key_); }
-    const Regime& regime(const RegimeKey& key) { return cache_.regime(key); }
+    const Regime& regime(const Key& key) { return cache_.regime(key); }
     const std::vector<InputBasis>& basis() const { return turns_.basis(); }
     double unit() const { return unit_; }
     Contact stopped_at() const { return stopped_at_; }
@@ -108,7 +105,7 @@ class ExactSolver {
         return status_of(system_.start(cache_, now_, key_));
     }
     // Continues from a state with a known regime.
-    void resume(double time, const State& x, const Memory& memory, const RegimeKey& key, const Course& course = {}) {
+    void resume(double time, const State& x, const Memory& memory, const Key& key, const Course& course = {}) {
         set_time(time);
         now_.x = x;
         now_.memory = memory;
@@ -120,7 +117,7 @@ class ExactSolver {
     void set_ramp(int input, double value, double slope) { signals_[input].knots[0] = {time_, value, slope}; }
     // The inputs have changed at this instant: finds the regime anew.
     Status inputs_changed() {
-        const RegimeKey before = key_;
+        const Key before = key_;
         anchor_inputs();
         const Status status = status_of(system_.next(cache_, now_, nullptr, key_, course_.input));
         follow_inputs(before);
@@ -138,7 +135,7 @@ class ExactSolver {
             if (status != Status::done) return status;
         }
         while (true) {
-            typename Cache::Entry& entry = cache_.entry(key_);
+            Entry& entry = cache_.entry(key_);
             if (!entry.propagator.ready()) entry.prepare(turns_, scale_);
             Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
                                     now_.x};
@@ -146,7 +143,7 @@ class ExactSolver {
             if (begin_->constant_inputs() && has_settled(entry.regime, begin_->rate())) begin_->settle();
             if (!(time_ < knot_)) knot_ = next_knot(signals_, time_);
             double limit = std::min(t_end, knot_);
-            if (const Regime& r = entry.regime; r.driving_input >= 0)
+            if (const Regime& r = entry.regime; r.driving_input >= 0) [[unlikely]]
                 limit = begin_->input().turning(r.driving_input, r.driving_way, limit);
             const Guard* fired = nullptr;
             const Status status = run_regime(segment, limit, fired);
@@ -190,45 +187,55 @@ class ExactSolver {
     }
 
     bool has_settled(const Regime& regime, const State& rate) const {
-        for (int k = 0; k < n_coupled; ++k) {
-            if (k == load_speed && regime.at_rest[twist_contact]) continue;  // it follows the input
+        for (int k = 0; k < D::coupled; ++k) {
+            if (regime.following[k]) continue;
             if (!(std::fabs(rate[k]) <= settled * scale_[k])) return false;
         }
         return true;
     }
     static bool moderate(const State& rate) {
-        return std::fabs(rate[0]) + std::fabs(rate[1]) + std::fabs(rate[2]) < 1e100;
+        double sum = 0.0;
+        for (int k = 0; k < D::coupled; ++k) sum += std::fabs(rate[k]);
+        return sum < 1e100;
     }
     // After a change of the inputs: if the regime goes on, the rate jumps by no more than what they bring.
-    [[gnu::cold]] void follow_inputs(const RegimeKey& before) {
+    [[gnu::cold]] void follow_inputs(const Key& before) {
         if (!course_.rate_known || !(key_ == before)) {
             course_.forget();
             return;
         }
-        const LinearRates& rates = cache_.entry(key_).rates;
+        Entry& e = cache_.entry(key_);
         Lanes rate = load(course_.rate);
-        for (int i = 0; i < n_inputs; ++i)
-            rate.coupled = rate.coupled + (now_.input[0][i] - course_.input[i]) * load(rates.input_column[i]);
-        const double before_jump = slip_bound(cache_.entry(key_), coupled(course_.rate)),
-                     after_jump = slip_bound(cache_.entry(key_), rate.coupled);
-        course_.doubt = after_jump > 0.0 ? std::fmin(1.0, course_.doubt * before_jump / after_jump) : 0.0;
+        for (int i = 0; i < D::inputs; ++i)
+            rate.coupled = rate.coupled + (now_.input[0][i] - course_.input[i]) * load(e.rates.input_column[i]);
+        const Coupled before_jump = bound_ahead(e, coupled(course_.rate)), after_jump = bound_ahead(e, rate.coupled);
+        for (int t = 0; t < e.n_twists; ++t) {
+            auto& twist = course_.twist[t];
+            const double was = before_jump[e.twists[t].state], is = after_jump[e.twists[t].state];
+            twist.doubt = is > 0.0 ? std::fmin(1.0, twist.doubt * was / is) : 0.0;
+            twist.off_zero = false;
+            twist.touch_size = 0.0;
+        }
         rate.store(course_.rate.data());
-        course_.off_zero = false;
-        course_.touch_size = 0.0;
     }
-    // Bound on the speed of the twist over the first look, from the rate.
-    [[gnu::cold]] double slip_bound(typename Cache::Entry& e, const Coupled& rate) const {
+    // Bound on the coupled states over the first event check, from what they are.
+    [[gnu::cold]] Coupled bound_ahead(Entry& e, const Coupled& x) const {
         if (!e.propagator.ready()) e.prepare(turns_, scale_);
-        return (e.propagator.level(first_level).growth * absolute(rate))[twist];
+        return e.propagator.level(first_level).growth * absolute(x);
     }
-    // Rounding of a rate that is computed from the state, where a regime begins, as far as it acts on the twist. What
+    // Rounding of a rate that is computed from the state, where a regime begins, as far as it acts on the twists. What
     // the search for the modes takes for zero must not be seen to fall at once.
-    [[gnu::cold]] void begin_in_doubt(typename Cache::Entry& e, const Cursor& at, const Memory& memory) {
+    [[gnu::cold]] void begin_in_doubt(Entry& e, const Cursor& at, const Memory& memory) {
         State size = e.rates.size(magnitudes(at.x()), magnitudes(memory), at.input().sizes());
-        if (at.rate()[twist] == 0.0) size[twist] = 0.0;  // it starts from rest
-        const double bound = slip_bound(e, coupled(at.rate()));
-        course_.most_doubt = rounding * slip_bound(e, coupled(size));
-        course_.doubt = bound > course_.most_doubt ? course_.most_doubt / bound : 1.0;
+        for (int t = 0; t < e.n_twists; ++t)
+            if (const int k = e.twists[t].state; at.rate()[k] == 0.0) size[k] = 0.0;  // it starts from rest
+        const Coupled ahead = bound_ahead(e, coupled(at.rate())), rounding_ahead = bound_ahead(e, coupled(size));
+        for (int t = 0; t < e.n_twists; ++t) {
+            auto& twist = course_.twist[t];
+            const double bound = ahead[e.twists[t].state];
+            twist.most_doubt = rounding * rounding_ahead[e.twists[t].state];
+            twist.doubt = bound > twist.most_doubt ? twist.most_doubt / bound : 1.0;
+        }
     }
 
     template <class Observer>
@@ -237,7 +244,7 @@ class ExactSolver {
             std::swap(begin_, there_);
             if (++crossings_ % 8 == 0) begin_->inputs().anchor(time_);
         }
-        const RegimeKey before = key_;
+        const Key before = key_;
         const Status status = switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, observer);
         if (fired != nullptr) stopped_at_ = fired->contact;
         if (status != Status::done) return status;
@@ -253,18 +260,18 @@ class ExactSolver {
 
     // Guards at one end of a look.
     struct Ends {
-        GuardTable::Values value, slope;
+        typename GuardTable::Values value, slope;
     };
     // Guards all through it: a lower bound of their cubics, and how far they may lie from these.
     struct Bounds {
-        GuardTable::Values least, error, fourth;
+        typename GuardTable::Values least, error, fourth;
     };
 
     // Advances within the regime until a guard reaches zero (fired) or `limit`.
     Status run_regime(const Segment<System>& segment, double limit, const Guard*& fired) {
-        typename Cache::Entry& e = segment.entry;
+        Entry& e = segment.entry;
         Propagator& p = e.propagator;
-        GuardTable::Values constant;
+        typename GuardTable::Values constant;
         e.guards.constants(segment.memory, constant);
         Cursor *cursor = begin_, *end = there_;
         Ends *here = &ends_[0], *there = &ends_[1];
@@ -273,7 +280,7 @@ class ExactSolver {
         if (e.regime.n_guards == 0 && LongStep<D>::pays(p, limit - time_) && leap(e, limit)) return Status::done;
         evaluate(e, constant, *cursor, *here);
         Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
-        for (int i = 0; i < n_inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
+        for (int i = 0; i < D::inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
         int level = std::min(last_level_, p.level_below(limit - time_));
         const double shortest = 1e-7 * p.length(0);
         for (long count = 1; time_ < limit; ++count) {
@@ -331,20 +338,20 @@ class ExactSolver {
     [[gnu::cold]] void rest(const Segment<System>& segment, const Cursor& at, double limit) {
         now_.x = at.x();
         if (time_ == segment.begin) {
-            now_.x[load_angle] += at.rate()[load_angle] * (limit - time_);
+            for (int j = D::coupled; j < D::states; ++j) now_.x[j] += at.rate()[j] * (limit - time_);
             time_ = limit;
         }
         keep_course(segment.entry, at);
-        for (int k = 0; k < n_coupled; ++k) course_.rate[k] = 0.0;
+        for (int k = 0; k < D::coupled; ++k) course_.rate[k] = 0.0;
         course_.rate_known = true;
     }
 
     // At the end of a stretch that no guard ends.
-    [[gnu::cold]] void keep_course(const typename Cache::Entry& e, const Cursor& at) {
+    [[gnu::cold]] void keep_course(const Entry& e, const Cursor& at) {
         // Carried on for long, the speeds that a stuck twist ties together drift apart by rounding.
-        if constexpr (requires(std::array<bool, n_contacts> at_rest) { system_.stop(now_.x, at_rest); }) {
-            std::array<bool, n_contacts> at_rest = e.regime.at_rest;
-            if (at.carries_rate() && at_rest[twist_contact]) system_.stop(now_.x, at_rest);
+        if constexpr (requires(std::array<bool, D::contacts> at_rest) { system_.stop(now_.x, at_rest); }) {
+            std::array<bool, D::contacts> at_rest = e.regime.at_rest;
+            if (at.carries_rate() && e.followed) system_.stop(now_.x, at_rest);
         }
         course_.rate = at.rate();
         course_.rate_known = at.carries_rate();
@@ -353,7 +360,7 @@ class ExactSolver {
 
     // All the way to `limit`, where there is no guard. False if the motion leaves the range of the arithmetic: then the
     // looks find out when.
-    [[gnu::noinline]] bool leap(const typename Cache::Entry& e, double limit) {
+    [[gnu::noinline]] bool leap(const Entry& e, double limit) {
         *there_ = *begin_;
         there_->leap_to(limit);
         if (!moderate(there_->rate())) return false;
@@ -365,13 +372,15 @@ class ExactSolver {
     }
 
     // Speeds that are multiples of the rate of the twist are as accurate as that.
-    [[gnu::always_inline]] static void evaluate(const typename Cache::Entry& e, const GuardTable::Values& constant,
-                                                Cursor& at, Ends& out) {
+    [[gnu::always_inline]] static void evaluate(const Entry& e, const typename GuardTable::Values& constant, Cursor& at,
+                                                Ends& out) {
         e.guards.evaluate(constant, at.x(), at.input(), out.value);
         e.guards.rates(at.rate(), at.input(), out.slope);
         if (!at.carries_rate()) return;
-        for (int k = 0; k < e.n_twist_speeds; ++k)
-            out.value[e.twist_speeds[k].guard] = e.twist_speeds[k].factor * at.rate()[twist];
+        for (int k = 0; k < e.n_twist_speeds; ++k) {
+            const auto& s = e.twist_speeds[k];
+            out.value[s.guard] = s.factor * at.rate()[e.twists[s.twist].state];
+        }
     }
 
     // |g''''| over the look, from a bound on the fourth derivative of the state that the flow carries on.
@@ -383,9 +392,10 @@ class ExactSolver {
 
     // Encloses all guards over a look of length h. Returns, as bits, those that are not certain to be positive all
     // through it.
-    unsigned enclose(int rows, const Ends& here, const Ends& there, double h) {
+    Guards enclose(int rows, const Ends& here, const Ends& there, double h) {
         const double third = h / 3.0, share = h * h * h * h / 384.0;
-        unsigned doubtful = 0, tight = 0;
+        Guards doubtful = 0;
+        unsigned tight = 0;
         for (int g = 0; g < rows; g += vec_width) {
             const Vec begin = load(&here.value[g]), end = load(&there.value[g]);
             const Vec c1 = begin + third * load(&here.slope[g]), c2 = end - third * load(&there.slope[g]);
@@ -396,44 +406,51 @@ class ExactSolver {
             // One that starts on zero or above and rises all through is certain, too.
             const Vec rise = least(c1 - begin, least(c2 - c1, end - c2));
             const unsigned rises = above(rise, slope_share * error) & ~above(Vec{}, begin);
-            doubtful |= (all_bits & ~(clear | rises)) << g;
+            doubtful |= Guards{all_bits & ~(clear | rises)} << g;
             tight |= clear & ~above(low, 64.0 * error);
         }
         roomy_ = tight == 0;
         return doubtful;
     }
 
-    Verdict judge(typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here,
-                  const Ends& there, double h, bool shortest) {
-        unsigned doubtful = enclose(e.guards.rows(), here, there, h);
+    Verdict judge(Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here, const Ends& there, double h,
+                  bool shortest) {
+        Guards doubtful = enclose(e.guards.rows(), here, there, h);
         n_crossing_ = 0;
-        double touch = 0.0;  // what counts as zero when the speed of the twist touches it
-        if (e.touch_guard >= 0) {
-            course_.touch_size = std::max(course_.touch_size, e.touch_size(cursor.x()));
-            touch = cursor.carries_rate() ? twist_speed_rounding(e, cursor) : rounding * course_.touch_size;
-            course_.off_zero |= here.value[e.touch_guard] > touch;
-            if (bounds_.least[e.touch_guard] <= touch) doubtful |= 1u << e.touch_guard;
+        // What counts as zero when the speed of a twist touches it.
+        std::array<double, D::twists> touch{};
+        for (int t = 0; t < e.n_twists; ++t) {
+            const int g = e.twists[t].touch_guard;
+            if (g < 0) continue;
+            auto& twist = course_.twist[t];
+            twist.touch_size = std::max(twist.touch_size, e.touch_size(e.twists[t], cursor.x()));
+            touch[t] = cursor.carries_rate() ? twist_speed_rounding(e, t, cursor) : rounding * twist.touch_size;
+            twist.off_zero |= here.value[g] > touch[t];
+            if (bounds_.least[g] <= touch[t]) doubtful |= Guards{1} << g;
         }
         doubtful &= ~e.behind;
         if (doubtful == 0) return Verdict::clear;
-        GuardTable::Values size;
+        typename GuardTable::Values size;
         e.guards.sizes(magnitudes(memory), magnitudes(cursor.x()), cursor.input(), size);
         for (; doubtful != 0; doubtful &= doubtful - 1) {
             const int g = std::countr_zero(doubtful);
             const double low = bounds_.least[g], error = bounds_.error[g];
             const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
-            const bool touches = g == e.touch_guard && course_.off_zero && low - error <= touch && c.c3 > touch;
+            const int t = e.touching(g);
+            const double near = t >= 0 ? touch[t] : 0.0;
+            const bool touches = t >= 0 && course_.twist[t].off_zero && low - error <= near && c.c3 > near;
             if (low > error && !touches) continue;
-            const double of_rate = cursor.carries_rate() ? e.twist_factor(g) : 0.0;
-            const double resolution =
-                of_rate != 0.0 ? std::fabs(of_rate) * twist_speed_rounding(e, cursor) : rounding * size[g];
+            const auto of_rate = rate_multiple(e, cursor, g);
+            const double resolution = of_rate.factor != 0.0
+                                          ? std::fabs(of_rate.factor) * twist_speed_rounding(e, of_rate.twist, cursor)
+                                          : rounding * size[g];
             const double tolerance = resolution + time_rounding * std::fabs(time_) *
                                                       std::max(std::fabs(here.slope[g]), std::fabs(there.slope[g]));
             if (low - error >= -tolerance && !touches) continue;
             const double d0 = c.c1 - c.c0, d1 = c.c2 - c.c1, d2 = c.c3 - c.c2;
             const bool rises = std::min(d0, std::min(d1, d2)) > slope_share * error;
             const bool falls = std::max(d0, std::max(d1, d2)) < -slope_share * error;
-            if (rises && c.c0 >= -tolerance && !(touches && c.c0 <= touch)) continue;
+            if (rises && c.c0 >= -tolerance && !(touches && c.c0 <= near)) continue;
             if (falls && c.c3 >= -tolerance) continue;
             const bool starts_on_zero = c.c0 <= rounding * size[g];
             if (falls) {
@@ -441,7 +458,7 @@ class ExactSolver {
                 continue;
             }
             if (c.c0 <= tolerance && !touches && departs(e, memory, cursor, g, h)) continue;
-            const double resolved = touches ? touch : tolerance;
+            const double resolved = touches ? near : tolerance;
             if (error > resolved && !shortest) {
                 // Half the length has a sixteenth of the error, which ought to be small beside what the guard does.
                 const double course = std::max(std::max(std::fabs(c.c0), std::fabs(c.c3)),
@@ -462,13 +479,17 @@ class ExactSolver {
 
     // Rounding of the speed of the twist where it is its rate, carried on from where the regime began. The doubt there
     // dies out with the motion; where the motion grows, it is one that began with another rounding.
-    double twist_speed_rounding(typename Cache::Entry& e, const Cursor& at) const {
-        const double bound = slip_bound(e, coupled(at.rate()));
-        return rounding * bound + std::fmin(course_.doubt * bound, course_.most_doubt);
+    double twist_speed_rounding(Entry& e, int t, const Cursor& at) const {
+        const double bound = bound_ahead(e, coupled(at.rate()))[e.twists[t].state];
+        return rounding * bound + std::fmin(course_.twist[t].doubt * bound, course_.twist[t].most_doubt);
+    }
+    // Where the rate is carried on: how many times the rate of a twist a guard is.
+    static typename Entry::TwistSpeed rate_multiple(const Entry& e, const Cursor& at, int g) {
+        return at.carries_rate() ? e.twist_speed(g) : typename Entry::TwistSpeed{g, 0, 0.0};
     }
 
     // A guard that starts on zero: does its first derivative that is not zero carry it away, all through the look?
-    bool departs(const typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, int g, double h) const {
+    bool departs(const Entry& e, const Memory& memory, const Cursor& cursor, int g, double h) const {
         const auto [first, derivative] = departure(e, memory, cursor, g);
         if (first == 0) return false;
         // value = h^k (derivative_k / k! + what follows), bounded at the far end.
@@ -483,9 +504,9 @@ class ExactSolver {
         std::size_t order = 0;
         std::array<double, 4> derivative{};
     };
-    Departure departure(const typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, int g) const {
-        const Instant now{time_, cursor.x(), memory, cursor.input().jet(), cursor.input().sizes()};
-        Flow flow(e.rates, now);
+    Departure departure(const Entry& e, const Memory& memory, const Cursor& cursor, int g) const {
+        const InstantOf<D> now{time_, cursor.x(), memory, cursor.input().jet(), cursor.input().sizes()};
+        Flow<D> flow(e.rates, now);
         const LinearForm form = e.guards.form(g);
         Departure out;
         for (std::size_t k = 1; k < 4; ++k) {
@@ -499,13 +520,13 @@ class ExactSolver {
     }
 
     // Earliest of the certified crossings; there_ is left at it.
-    void first_crossing(typename Cache::Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here,
-                        const Ends& there, double h, const Guard*& fired) {
+    void first_crossing(Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here, const Ends& there,
+                        double h, const Guard*& fired) {
         double best = std::numeric_limits<double>::infinity();
         const auto cubic = [&](int g) {
             return Cubic(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
         };
-        std::array<double, max_guards> estimate;
+        std::array<double, D::guards> estimate;
         for (int k = 0; k < n_crossing_; ++k) {
             const auto& [g, touch, starts_on_zero] = crossing_[k];
             const Cubic c = cubic(g);
@@ -551,8 +572,8 @@ class ExactSolver {
 
     // Where a guard falls through zero within h, near an estimate. Leaves trial_ there,
     // returns when. About the nearest instant that whole levels lead to, the guard is a polynomial to rounding.
-    double find_zero(typename Cache::Entry& e, int g, const Memory& memory, const Cursor& cursor, bool starts_on_zero,
-                     double estimate, double h) {
+    double find_zero(Entry& e, int g, const Memory& memory, const Cursor& cursor, bool starts_on_zero, double estimate,
+                     double h) {
         const LinearForm form = e.guards.form(g);
         const double base = e.propagator.length(0);
         double low = 0.0, high = h, s = estimate;
@@ -567,10 +588,10 @@ class ExactSolver {
         const double earliest = low;
         for (int m = 0; m < 100; ++m) {
             const double rest = trial_->advance_by_levels(cursor, s), from = s - rest;
-            const double of_rate = trial_->carries_rate() ? e.twist_factor(g) : 0.0;
-            const double value = of_rate != 0.0
-                                     ? of_rate * trial_->rate()[twist]
-                                     : lostmotion::evaluate(form, trial_->x(), memory, trial_->input().values());
+            const auto of_rate = rate_multiple(e, *trial_, g);
+            const double value = of_rate.factor != 0.0
+                                     ? of_rate.factor * trial_->rate()[e.twists[of_rate.twist].state]
+                                     : lostmotion::evaluate<D>(form, trial_->x(), memory, trial_->input().values());
             trial_->expand(expansion_);
             const Polynomial guard = expansion_.polynomial(form, value);
             const double reach = std::fabs(rest) + 0.25 * base, at = trial_->time();
@@ -606,8 +627,8 @@ class ExactSolver {
 
     double time_ = 0.0;
     double knot_ = 0.0;  // [s], the next of the inputs; it has been found if it lies ahead
-    Instant now_;
-    RegimeKey key_;
+    InstantOf<D> now_;
+    Key key_;
     int last_level_ = first_level;
     long looks_ = 0;
     std::size_t switchings_ = 0;
@@ -616,7 +637,7 @@ class ExactSolver {
     // their contents.
     std::array<Cursor, 4> cursors_;
     Cursor *begin_ = &cursors_[0], *here_ = &cursors_[1], *there_ = &cursors_[2], *trial_ = &cursors_[3];
-    std::array<double, n_inputs> input_bound_;  // on the fourth derivative of each, for all time
+    InputsOf<D> input_bound_;  // on the fourth derivative of each, for all time
     Expansion expansion_;
     int crossings_ = 0;
     Ends ends_[2];
@@ -627,12 +648,12 @@ class ExactSolver {
         int guard;
         bool touch, starts_on_zero;
     };
-    std::array<Crossing, max_guards> crossing_{};
+    std::array<Crossing, D::guards> crossing_{};
     int n_crossing_ = 0;
     Course course_;
     Accumulation accumulation_;
     bool jump_pending_ = false;
-    Contact stopped_at_ = input_contact;
+    Contact stopped_at_{};
 };
 
 }  // namespace lostmotion

@@ -3,50 +3,42 @@
 
 #include <optional>
 
-#include "contact.hpp"
-#include "kernel/inputs.hpp"
+#include "../kernel/flow.hpp"
+#include "../kernel/inputs.hpp"
+#include "status.hpp"
 
 namespace lostmotion {
 
-enum class Status {
-    done,
-    interrupted,
-    jammed,   // no combination of contact modes is consistent
-    outside,  // left the extended loss map, or the range of the arithmetic
-    zeno,     // switching instants accumulate
-    unseen,   // a nonlinear remainder acts on a drive whose contacts would not feel it
-};
-
-inline Status status_of(Found found) {
-    if (found == Found::yes) return Status::done;
-    return found == Found::outside ? Status::outside : Status::jammed;
-}
-
 // What ended a regime.
-struct Switching {
+template <class System>
+struct SwitchingOf {
+    using D = typename System::Dims;
+    using Guard = typename System::Guard;
+
     double time = 0.0;
-    Guard::Kind kind = Guard::speed;
-    Contact contact = input_contact;
+    typename Guard::Kind kind = Guard::speed;
+    typename D::Contact contact{};
     bool input_jump = false;  // an input changed its value or slope; kind and contact mean nothing
     int guard = -1;           // its number among those of the regime before; -1: an input jumped
-    RegimeKey before, after;
-    State x{};
-    Memory memory;                                   // after it, as x
-    double torque_before = 0.0, torque_after = 0.0;  // T_2 [N m], left and right limit
+    typename System::Key before, after;
+    StateOf<D> x{};
+    typename D::Memory memory{};                     // after it, as x
+    double torque_before = 0.0, torque_after = 0.0;  // T_2 [N m] at the load, left and right limit
 };
 
 // Inputs and their rates at an instant, for the search of contact modes. At a jump: the right limit.
-inline void see_inputs(const InputState<DriveDims>& input, double time, Instant& now) {
+template <class D>
+void see_inputs(const InputState<D>& input, double time, InstantOf<D>& now) {
     now.time = time;
     input.jet(n_derivatives, now.input.data());
     now.input_size = input.sizes();
 }
 
-// Whether an observer of a run is to be told of the next switching: if it has switching(), and wants_switching() does
-// not say otherwise.
-template <class Observer>
+// Whether an observer of a run wants to see the next switching: if it has switching(), and wants_switching() does not
+// say otherwise.
+template <class System, class Observer>
 bool wants_switching(const Observer& observer) {
-    if constexpr (!requires(Observer o, Switching s) { o.switching(s); })
+    if constexpr (!requires(Observer o, SwitchingOf<System> s) { o.switching(s); })
         return false;
     else if constexpr (requires { observer.wants_switching(); })
         return observer.wants_switching();
@@ -55,20 +47,22 @@ bool wants_switching(const Observer& observer) {
 }
 
 // Finds the regime that follows after `fired` has reached zero, with the inputs of that instant, or, if it is nullptr,
-// after an input has jumped. Tells the observer, if it wants to know.
-template <class System, class Cache, class Observer>
-Status switch_regime(const System& system, Cache& cache, InputState<DriveDims>& input, double time, const Guard* fired,
-                     Instant& now, RegimeKey& key, Observer& observer) {
+// after an input has jumped. Shows the switching to the observer, if it wants to see it.
+template <class System, class Cache, class D, class Observer>
+Status switch_regime(const System& system, Cache& cache, InputState<D>& input, double time,
+                     const typename System::Guard* fired, InstantOf<D>& now, typename System::Key& key,
+                     Observer& observer) {
+    using Guard = typename System::Guard;
     if (fired != nullptr && fired->kind == Guard::outside) return Status::outside;
-    const bool wanted = wants_switching(observer);
-    Switching s;
+    const bool wanted = wants_switching<System>(observer);
+    SwitchingOf<System> s;
     if (wanted) {
-        const Regime& old = cache.regime(key);
+        const auto& old = cache.regime(key);
         if (fired == nullptr) input.anchor_left(time);
         s.time = time;
         s.input_jump = fired == nullptr;
         s.before = key;
-        s.torque_before = evaluate(old.output_torque, now.x, now.memory, input.values());
+        s.torque_before = evaluate<D>(system.torque_at_load(old), now.x, now.memory, input.values());
         if (fired != nullptr) {
             s.kind = fired->kind;
             s.contact = fired->contact;
@@ -76,7 +70,7 @@ Status switch_regime(const System& system, Cache& cache, InputState<DriveDims>& 
         }
     }
     // An input that drives a contact to its limit has taken the torque with it up to here.
-    std::optional<std::array<double, n_inputs>> before;
+    std::optional<InputsOf<D>> before;
     if (fired == nullptr) {
         if (cache.regime(key).driving_input >= 0) {
             input.anchor_left(time);
@@ -92,7 +86,7 @@ Status switch_regime(const System& system, Cache& cache, InputState<DriveDims>& 
             s.after = key;
             s.x = now.x;
             s.memory = now.memory;
-            s.torque_after = evaluate(cache.regime(key).output_torque, now.x, now.memory, now.input[0]);
+            s.torque_after = evaluate<D>(system.torque_at_load(cache.regime(key)), now.x, now.memory, now.input[0]);
             observer.switching(s);
         }
     }

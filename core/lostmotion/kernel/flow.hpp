@@ -1,0 +1,88 @@
+// Values and signs of linear forms just after an instant, along the flow of one regime.
+#pragma once
+
+#include <limits>
+
+#include "rates.hpp"
+
+namespace lostmotion {
+
+// A form counts as zero within this multiple of the sum of the magnitudes of its terms. Its coefficients come from an
+// elimination and carry more than one rounding.
+inline constexpr double rounding = 0x1p14 * std::numeric_limits<double>::epsilon();
+// Rounding of an instant, relative to the time since the start.
+inline constexpr double time_rounding = 4.0 * std::numeric_limits<double>::epsilon();
+
+// A guard that is further from zero than this share of its terms, and of what they are at rated load and speed times
+// `far_from_event`, is not at zero: the rounding of the instant moves it by less. Near a zero of all its terms, the
+// first share alone says nothing.
+inline constexpr double clear_of_zero = 1e-3;
+inline constexpr double far_from_event = 1e-6;
+
+// Time derivatives of the state along the flow of one regime, computed as far as they are asked for.
+template <class D>
+class Flow {
+ public:
+    using State = StateOf<D>;
+    using LinearForm = LinearFormOf<D>;
+    using LinearRates = LinearRatesOf<D>;
+    using Instant = InstantOf<D>;
+
+    Flow(const LinearRates& rates, const Instant& now) : rates_(rates), now_(now) {}
+
+    // Sign that a form has just after now, from its value and the sum of the magnitudes of its terms: that of the first
+    // of the value and its derivatives that is not zero. 0 if it stays at zero or, if asked by value alone, is zero
+    // now.
+    int sign(const LinearForm& form, double value, double size, bool by_value_alone) {
+        for (int k = 1; k < n_derivatives; ++k) {
+            const double next = rate(form, k);
+            if (std::fabs(value) > noise(size, next)) return value > 0.0 ? +1 : -1;
+            if (by_value_alone) return 0;
+            value = next;
+            size = rate_size(form, k);
+        }
+        return 0;
+    }
+
+    // What counts as zero: rounding of the terms, and since the instant itself is known to its rounding only, a value
+    // may be off by that times its rate.
+    double noise(double size, double rate) const {
+        return rounding * size + time_rounding * std::fabs(now_.time * rate);
+    }
+    // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
+    double rate(const LinearForm& f, int k) { return evaluate_rate<D>(f, derivative(k), now_.input[k]); }
+    double rate_size(const LinearForm& f, int k) {
+        const State& terms = size(k);
+        const auto& u = now_.input[k];
+        double sum = 0.0;
+        for (int i = 0; i < D::inputs; ++i) sum += std::fabs(f.c[D::first_input + i] * u[i]);
+        for (int j = 0; j < D::states; ++j) sum += std::fabs(f.c[j]) * terms[j];
+        return sum;
+    }
+
+ private:
+    const State& derivative(int k) {
+        if (order_ == 0) {
+            x_[1] = rates_(now_.x, rates_.constant(now_.memory), now_.input[0]);
+            order_ = 1;
+        }
+        for (; order_ < k; ++order_) x_[order_ + 1] = rates_.higher(x_[order_], now_.input[order_]);
+        return x_[k];
+    }
+    const State& size(int k) {
+        if (sized_ == 0) {
+            size_[1] = rates_.size(magnitudes(now_.x), magnitudes(now_.memory), now_.input_size);
+            sized_ = 1;
+        }
+        for (; sized_ < k; ++sized_)
+            size_[sized_ + 1] = rates_.higher_size(size_[sized_], magnitudes(now_.input[sized_]));
+        return size_[k];
+    }
+
+    const LinearRates& rates_;
+    const Instant& now_;
+    int order_ = 0, sized_ = 0;
+    std::array<State, n_derivatives + 1> x_, size_;  // as far as they are known
+};
+
+}  // namespace lostmotion

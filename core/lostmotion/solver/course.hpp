@@ -1,0 +1,33 @@
+// What a solver knows of a motion beside its state.
+#pragma once
+
+#include <array>
+
+#include "../kernel/form.hpp"
+
+namespace lostmotion {
+
+// What is known of the motion in the present regime beside its state, and goes on with the regime.
+template <class D>
+struct CourseOf {
+    StateOf<D> rate{};  // x', if it is known better than from x: under constant inputs
+    bool rate_known = false;
+    InputsOf<D> input{};  // up to here; those that the rate belongs to
+    // Of the speed of a twist, which ends the regime by touching zero, too. What rounding leaves of a zero is relative
+    // to the largest size of its terms.
+    struct Twist {
+        bool off_zero = false;    // has it been off zero?
+        double touch_size = 0.0;  // the largest size of its terms [rad/s]
+        double doubt = 0.0;       // rounding of the rate where the regime began, relative to the rate
+        double most_doubt = 0.0;  // the same as a speed of the twist [rad/s]
+    };
+    std::array<Twist, D::twists> twist{};
+
+    // In another regime: what is kept of the numbers means nothing.
+    void forget() {
+        rate_known = false;
+        twist = {};
+    }
+};
+
+}  // namespace lostmotion

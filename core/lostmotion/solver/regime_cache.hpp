@@ -1,0 +1,215 @@
+// The regimes visited so far, each built once. A drive has finitely many; a run visits a few dozen.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <new>
+#include <type_traits>
+#include <vector>
+
+#include "../kernel/propagator.hpp"
+
+namespace lostmotion {
+
+template <class System>
+class RegimeCache {
+ public:
+    using D = typename System::Dims;
+    using Regime = typename System::Regime;
+    using Key = typename System::Key;
+    using Guard = typename System::Guard;
+    using LinearForm = LinearFormOf<D>;
+    using GuardTable = FormTable<D, D::guards>;
+    using State = StateOf<D>;
+    // A set of guards, as bits.
+    using Guards = std::conditional_t<(D::guards <= 32), std::uint32_t, std::uint64_t>;
+    static_assert(D::guards <= 64);
+
+    struct Entry {
+        Entry() = default;
+        Entry(const Entry&) = delete;
+        Entry& operator=(const Entry&) = delete;
+
+        Regime regime;
+        LinearRatesOf<D> rates;
+        GuardTable guards;
+        std::array<Guards, D::contacts> speeds{};  // the guards of each contact's speed
+        Guards contacts = 0;                       // those that say whether a contact goes on in its mode
+        Guards behind = 0;                         // edges that a twist slips away from, so that it does not reach them
+        // The twists that move: the state, and the guard of its rate that also ends the regime by touching zero.
+        struct Twist {
+            int state, touch_guard;
+        };
+        std::array<Twist, D::twists> twists;
+        int n_twists = 0;
+        // The guards that are multiples of the rate of a twist: its own speed, and that of one end while the other
+        // is at rest.
+        struct TwistSpeed {
+            int guard, twist;
+            double factor;
+        };
+        std::array<TwistSpeed, D::contacts> twist_speeds;
+        int n_twist_speeds = 0;
+        bool followed = false;                   // does the speed of a state follow another?
+        typename GuardTable::Values near_event;  // what each guard exceeds where it is far from an event
+        Propagator<D> propagator;
+        std::array<Entry*, D::guards> neighbour{};  // what lies beyond each guard, as far as it is known
+
+        void set(const System& system, const Key& key) {
+            // In place, since they are large.
+            const Regime& r = *new (&regime) Regime(system.build(key));
+            new (&rates) LinearRatesOf<D>(r.rate);
+            guards = {};
+            neighbour = {};
+            speeds = {};
+            contacts = behind = 0;
+            for (int g = 0; g < r.n_guards; ++g) {
+                const Guard& guard = r.guards[g];
+                guards.set(g, guard.form);
+                if (guard.kind == Guard::speed) speeds[guard.contact] |= Guards{1} << g;
+                if (guard.is_of_contact()) contacts |= Guards{1} << g;
+                if (guard.behind) behind |= Guards{1} << g;
+            }
+            followed = std::ranges::find(r.following, true) != r.following.end();
+            find_twists(system);
+            if constexpr (requires { system.near_event(guards, near_event); }) system.near_event(guards, near_event);
+            propagator.reset();
+        }
+        void prepare(InputTurns& turns, const State& scale) { propagator.prepare(rates, turns, scale); }
+
+        // How many times the rate of a twist a guard is; factor 0 if of none.
+        TwistSpeed twist_speed(int guard) const {
+            for (int k = 0; k < n_twist_speeds; ++k)
+                if (twist_speeds[k].guard == guard) return twist_speeds[k];
+            return {guard, 0, 0.0};
+        }
+        // The twist whose rate this guard is, if it also ends the regime by touching zero; else -1.
+        int touching(int guard) const {
+            for (int t = 0; t < n_twists; ++t)
+                if (twists[t].touch_guard == guard) return t;
+            return -1;
+        }
+        // Sum of the magnitudes of the terms of a guard that ends by touching, a speed.
+        double touch_size(const Twist& twist, const State& x) const {
+            return sum_in_fours<D::coupled>(
+                [&](auto k) { return std::fabs(guards.coefficient(twist.touch_guard, k) * x[k]); });
+        }
+
+     private:
+        void find_twists(const System& system) {
+            n_twists = n_twist_speeds = 0;
+            for (int t = 0; t < system.n_twists(); ++t) {
+                Twist& twist = twists[n_twists];
+                twist = {system.twist_state(t), -1};
+                bool moves = false;
+                for (int g = 0; g < regime.n_guards; ++g) {
+                    if (regime.guards[g].kind != Guard::speed) continue;
+                    const double factor = times_rate(regime.guards[g].form, regime.rate[twist.state]);
+                    if (factor != 0.0) twist_speeds[n_twist_speeds++] = {g, n_twists, factor};
+                    if (factor != 0.0 && regime.guards[g].by_touch) twist.touch_guard = g;
+                    moves = moves || factor != 0.0;
+                }
+                if (moves) ++n_twists;
+            }
+        }
+        // How many times the rate of a twist a speed is, or 0; the speeds at rest are left out.
+        double times_rate(const LinearForm& speed, const LinearForm& rate) const {
+            const auto moving = [this](const LinearForm& f, int k) { return regime.resting[k] ? 0.0 : f.c[k]; };
+            int first = 0;
+            while (first < D::coupled && moving(rate, first) == 0.0) ++first;
+            if (first == D::coupled) return 0.0;
+            const double a = moving(speed, first), b = moving(rate, first);
+            for (int k = 0; k < D::coupled; ++k)
+                if (a * moving(rate, k) != b * moving(speed, k)) return 0.0;
+            return a / b;
+        }
+    };
+
+    explicit RegimeCache(const System& system) : system_(system) {}
+    ~RegimeCache() {
+        for (std::unique_ptr<Entry>& entry : entries_)
+            if (spare().size() < most_spare) spare().push_back(std::move(entry));
+    }
+    RegimeCache(const RegimeCache&) = delete;
+    RegimeCache& operator=(const RegimeCache&) = delete;
+
+    const Regime& regime(Key key) { return entry(key).regime; }
+
+    Entry& entry(Key key) {  // by value: two words in registers
+        if (last_ != nullptr && key == last_->regime.key) return *last_;
+        std::size_t k = slot(key);
+        if (slots_[k] == nullptr) {
+            if (2 * (used_ + 1) > slots_.size()) k = grow(key);
+            if (used_ == entries_.size()) entries_.push_back(memory());
+            slots_[k] = entries_[used_++].get();
+            slots_[k]->set(system_, key);
+        }
+        return *(last_ = slots_[k]);
+    }
+    // What lies beyond a guard of another regime; its key is asked for the first time only.
+    template <class Key>
+    Entry& beyond(Entry& from, int guard, Key&& key) {
+        Entry*& neighbour = from.neighbour[guard];
+        if (neighbour == nullptr) neighbour = &entry(key());
+        return *(last_ = neighbour);
+    }
+
+    // Forgets all regimes, since the system has changed. Their memory is kept for others.
+    void forget() {
+        if (entries_.size() > most_kept) entries_.resize(most_kept);
+        std::ranges::fill(slots_, nullptr);
+        used_ = 0;
+        last_ = nullptr;
+    }
+
+    // Makes ready for runs with this unit of length and these inputs; propagators for others are forgotten.
+    InputTurns& serve(double unit, std::vector<InputBasis> basis) {
+        if (used_ > most_kept) forget();
+        if (!turns_ || unit != turns_->unit() || basis != turns_->basis()) {
+            for (std::size_t k = 0; k < used_; ++k) entries_[k]->propagator.reset();
+            turns_ = std::make_unique<InputTurns>(unit, std::move(basis));
+        }
+        return *turns_;
+    }
+
+ private:
+    static constexpr std::size_t most_kept = 4000;   // from run to run; each takes about 12 kilobytes
+    static constexpr std::size_t most_spare = 1000;  // from drive to drive, in each thread
+
+    // Entries of caches that are gone, for the sake of their memory.
+    static std::vector<std::unique_ptr<Entry>>& spare() {
+        thread_local std::vector<std::unique_ptr<Entry>> entries;
+        return entries;
+    }
+    static std::unique_ptr<Entry> memory() {
+        if (spare().empty()) return std::make_unique<Entry>();
+        std::unique_ptr<Entry> entry = std::move(spare().back());
+        spare().pop_back();
+        return entry;
+    }
+
+    // Where the regime is, or where it has to go.
+    std::size_t slot(Key key) const {
+        const std::size_t mask = slots_.size() - 1;
+        std::size_t k = key.hash() & mask;
+        while (slots_[k] != nullptr && !(slots_[k]->regime.key == key)) k = (k + 1) & mask;
+        return k;
+    }
+    // Makes room for more; returns the slot of a key anew.
+    std::size_t grow(Key key) {
+        slots_.assign(2 * slots_.size(), nullptr);
+        for (std::size_t n = 0; n < used_; ++n) slots_[slot(entries_[n]->regime.key)] = entries_[n].get();
+        return slot(key);
+    }
+
+    const System& system_;
+    std::unique_ptr<InputTurns> turns_;
+    Entry* last_ = nullptr;                        // the one asked for last
+    std::vector<std::unique_ptr<Entry>> entries_;  // those in use, then such as only keep their memory
+    std::size_t used_ = 0;
+    std::vector<Entry*> slots_ = std::vector<Entry*>(256, nullptr);  // a power of two, by hash, at most half full
+};
+
+}  // namespace lostmotion

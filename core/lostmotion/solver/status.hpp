@@ -1,0 +1,23 @@
+// How a search or a run has ended.
+#pragma once
+
+namespace lostmotion {
+
+// Of the search for the regime that follows at an event.
+enum class Found { yes, inconsistent, outside };
+
+enum class Status {
+    done,
+    interrupted,
+    jammed,   // no combination of contact modes is consistent
+    outside,  // left the extended loss map, or the range of the arithmetic
+    zeno,     // switching instants accumulate
+    unseen,   // a nonlinear remainder acts on a drive whose contacts would not feel it
+};
+
+inline Status status_of(Found found) {
+    if (found == Found::yes) return Status::done;
+    return found == Found::outside ? Status::outside : Status::jammed;
+}
+
+}  // namespace lostmotion
