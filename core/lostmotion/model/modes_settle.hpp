@@ -166,8 +166,8 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
         T_2[g] =
             train().gears[g].law.curve.torque(now.x[p.twist]) + (slip == 2 ? 0.0 : slip * now.memory[p.hysteresis]);
     }
-    const bool held = hold(now, event, trial, T_2);
     locate_losses(now, T_2, trial);
+    const bool held = hold(now, event, trial, T_2);
     Trial result = walk(cache, now, event, trial, key);
     if (!held && result.found == Found::yes) result.found = Found::inconsistent;
     if (result.found != Found::inconsistent || !event.from_each_load) return result;

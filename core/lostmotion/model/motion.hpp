@@ -26,13 +26,19 @@ inline constexpr double rounding = 0x1p14 * std::numeric_limits<double>::epsilon
 // Rounding of an instant, relative to the time since the start.
 inline constexpr double time_rounding = 4.0 * std::numeric_limits<double>::epsilon();
 
+// Added up as the kernel does: the constants, the inputs, the coupled states in fours, the angles.
 template <class Sizes, class F, class Now>
 double evaluate(const Sizes& n, const F& f, const Now& now) {
-    double sum = f.c[n.one];
-    for (int k = 0; k < n.memory; ++k) sum += f.c[n.first_memory + k] * now.memory[k];
-    for (int k = 0; k < n.inputs; ++k) sum += f.c[n.first_input + k] * now.input[0][k];
-    for (int k = 0; k < n.states; ++k) sum += f.c[k] * now.x[k];
-    return sum;
+    double constant = f.c[n.one], input = 0.0, state = 0.0;
+    for (int k = 0; k < n.memory; ++k) constant += f.c[n.first_memory + k] * now.memory[k];
+    for (int k = 0; k < n.inputs; ++k) input += f.c[n.first_input + k] * now.input[0][k];
+    for (int k = 0; k < n.coupled; k += 4) {
+        double part[4] = {};
+        for (int j = k; j < n.coupled && j < k + 4; ++j) part[j - k] = f.c[j] * now.x[j];
+        state += (part[0] + part[1]) + (part[2] + part[3]);
+    }
+    for (int k = n.coupled; k < n.states; ++k) state += f.c[k] * now.x[k];
+    return (constant + input) + state;
 }
 // Sum of the magnitudes of the terms, with those of the inputs' parts.
 template <class Sizes, class F, class Now>

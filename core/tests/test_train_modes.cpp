@@ -1,0 +1,132 @@
+// Which regime of a train follows at an event: against the classic drive's search, and against all combinations.
+#include <doctest/doctest.h>
+
+#include "properties.hpp"
+#include "round_drives.hpp"
+#include "train_twins.hpp"
+
+TEST_SUITE_BEGIN("train_modes");
+
+namespace lostmotion::model {
+namespace {
+
+// The classic drive, with the train's search run beside its own at every event.
+struct Shadowed {
+    explicit Shadowed(const Drive& d) : drive(d), classic(drive), twins(d), train(twins.assembly), cache_(train) {}
+
+    lostmotion::Regime build(const RegimeKey& key) const { return classic.build(key); }
+    void near_event(const GuardTable& g, GuardTable::Values& out) const { classic.near_event(g, out); }
+    void stop(State& x, std::array<bool, n_contacts>& at_rest) const { classic.stop(x, at_rest); }
+
+    template <class Cache>
+    lostmotion::Found start(Cache& cache, lostmotion::Instant& now, RegimeKey& key) const {
+        Instant mine = instant(now);
+        Key my_key;
+        const Found found = train.start(cache_, mine, my_key);
+        const lostmotion::Found expected = classic.start(cache, now, key);
+        compare(expected, now, key, found, mine, my_key, "start");
+        return expected;
+    }
+    template <class Cache>
+    lostmotion::Found next(Cache& cache, lostmotion::Instant& now, const lostmotion::Guard* fired,
+                           RegimeKey& key) const {
+        Instant mine = instant(now);
+        Key my_key = twins.key(key);
+        const Guard* my_guard = nullptr;
+        if (fired != nullptr)
+            my_guard = &cache_.regime(my_key).guards[static_cast<std::size_t>(fired - cache.regime(key).guards.data())];
+        const Found found = train.next(cache_, mine, my_guard, my_key);
+        const lostmotion::Found expected = classic.next(cache, now, fired, key);
+        compare(expected, now, key, found, mine, my_key, fired == nullptr ? "input" : "guard");
+        return expected;
+    }
+
+    Instant instant(const lostmotion::Instant& now) const {
+        Instant out;
+        out.time = now.time;
+        for (int k = 0; k < lostmotion::n_states; ++k) out.x[twins.term[k]] = now.x[k];
+        set(out, hysteresis_capacity, now.memory.hysteresis_capacity);
+        set(out, held_torque, now.memory.held_torque);
+        for (int k = 0; k < lostmotion::n_derivatives; ++k)
+            for (int i = 0; i < lostmotion::n_inputs; ++i) out.input[k][i] = now.input[k][i];
+        for (int i = 0; i < lostmotion::n_inputs; ++i) out.input_size[i] = now.input_size[i];
+        return out;
+    }
+    void set(Instant& out, Term term, double value) const {
+        if (twins.term[term] != nowhere)
+            out.memory[static_cast<std::size_t>(twins.term[term] - train.sizes().first_memory)] = value;
+    }
+    void compare(lostmotion::Found expected, const lostmotion::Instant& now, const RegimeKey& key, Found found,
+                 const Instant& mine, const Key& my_key, const char* what) const {
+        ++events;
+        CAPTURE(what);
+        CAPTURE(now.time);
+        CHECK(static_cast<int>(expected) == static_cast<int>(found));
+        if (expected != lostmotion::Found::yes || found != Found::yes) return;
+        const Key expected_key = twins.key(key);
+        bool same = expected_key.modes == my_key.modes;
+        for (int b = 0; b < train.assembly().layout().branches; ++b)
+            same = same && (expected_key.branch[b] == my_key.branch[b]);
+        differing += !same;
+        const Instant after = instant(now);
+        if (same) CHECK(after.x == mine.x);
+        if (same && twins.term[hysteresis_capacity] != nowhere) CHECK(after.memory[0] == mine.memory[0]);
+        if (same && twins.term[held_torque] != nowhere) {
+            const auto m = static_cast<std::size_t>(twins.term[held_torque] - train.sizes().first_memory);
+            if (key.modes == Modes{0, 0, 0}) CHECK(after.memory[m] == mine.memory[m]);
+        }
+    }
+
+    Drive drive;
+    SwitchedDrive classic;
+    Twins twins;
+    SwitchedTrain<> train;
+    mutable MapCache cache_;
+    mutable long events = 0, differing = 0;
+};
+
+struct Nothing {
+    template <class Segment>
+    bool segment(const Segment&) {
+        return true;
+    }
+};
+
+struct Count {
+    long events = 0, differing = 0;
+    void run(const Drive& d, const Signals& signals, const Start& start, double duration) {
+        const Shadowed system(d);
+        ExactSolver<Shadowed> solver(system, signals, 1e-3, d.balanced_scale());
+        Nothing nothing;
+        if (solver.begin(0.0, start.x, start.memory) == Status::done) solver.advance(duration, nothing);
+        events += system.events;
+        differing += system.differing;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("at every event of random classic drives the train's search finds what the drive's does") {
+    Count count;
+    RandomDrives random(11);
+    for (int n = 0; n < 150; ++n) {
+        const Drive d = random.drive();
+        count.run(d, random.signals(d, 0.5), {}, 0.5);
+    }
+    RoundDrives round(12);
+    for (int n = 0; n < 300; ++n) {
+        const RoundDrives::Run r = round.next(2.0);
+        count.run(r.drive, r.signals, r.start, 2.0);
+    }
+    SelfLockingDrives locking(13, true);
+    for (int n = 0; n < 60; ++n) {
+        const Drive d = locking.drive();
+        count.run(d, locking.reversing(d), {}, 0.5);
+    }
+    CHECK(count.events > 5000);
+    CHECK(count.differing == 0);
+}
+
+}  // namespace lostmotion::model
+
+TEST_SUITE_END();
