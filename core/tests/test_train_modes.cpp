@@ -1,7 +1,9 @@
 // Which regime of a train follows at an event: against the classic drive's search, and against all combinations.
 #include <doctest/doctest.h>
 
+#include "gauss_principle.hpp"
 #include "properties.hpp"
+#include "random_trains.hpp"
 #include "round_drives.hpp"
 #include "train_twins.hpp"
 
@@ -125,6 +127,113 @@ TEST_CASE("at every event of random classic drives the train's search finds what
     }
     CHECK(count.events > 5000);
     CHECK(count.differing == 0);
+}
+
+TEST_CASE("accelerations of random trains are those of the principle of least constraint") {
+    RandomTrains random(21);
+    int compared = 0, at_rest = 0;
+    for (int n = 0; n < 1500; ++n) {
+        Train t = random.train(random.pick(2, 6), false);
+        for (Shaft& s : t.shafts) s.friction.breakaway_torque = 0.0;  // the principle needs one capacity
+        const Assembly a(t);
+        const SwitchedTrain<> system(a);
+        MapCache cache(system);
+        Instant now = random.instant(a, n % 3 == 0 ? 0.0 : 0.3);
+        const Instant before = now;
+        Key key;
+        CAPTURE(n);
+        REQUIRE(system.start(cache, now, key) == Found::yes);
+        const Regime& r = cache.regime(key);
+        const std::vector<double> expected = least_constraint(a, before, 4000);
+        for (std::size_t s = 0; s < expected.size(); ++s) {
+            const double mine = evaluate(a.layout(), r.rate[a.places().shafts[s].speed], now);
+            CHECK(mine == doctest::Approx(expected[s]).scale(1.0).epsilon(1e-6));
+            at_rest += mine == 0.0;
+        }
+        for (const Guard& g : r.guards)
+            CHECK(evaluate(a.layout(), g.form, now) >= -rounding * magnitude(a.layout(), g.form, now));
+        ++compared;
+    }
+    CHECK(compared == 1500);
+    CHECK(at_rest > 500);
+}
+
+TEST_CASE("pivoting and trying all combinations find the same accelerations, with losses") {
+    RandomTrains random(23);
+    int compared = 0;
+    long worst = 0;
+    for (int n = 0; n < 500; ++n) {
+        const Assembly a(random.train(random.pick(2, 5), true));
+        SwitchedTrain<> all(a), pivoting(a);
+        all.few = 1e9;
+        pivoting.few = 0.0;
+        MapCache cache(all);
+        const Instant start = random.instant(a, n % 3 == 0 ? 0.0 : 0.3);
+        Instant now = start, other = start;
+        Key key, other_key;
+        CAPTURE(n);
+        const Found found = all.start(cache, now, key);
+        pivoting.trials = 0;
+        const Found other_found = pivoting.start(cache, other, other_key);
+        worst = std::max(worst, pivoting.trials);
+        CHECK(static_cast<int>(found) == static_cast<int>(other_found));
+        if (found != Found::yes || other_found != Found::yes) continue;
+        // A self-locking gear may hold or lower its load, and a torque between break-away and sliding friction may hold
+        // a shaft or move it, both in accord with the friction.
+        const auto& gears = a.train().gears;
+        if (std::any_of(gears.begin(), gears.end(),
+                        [](const Gear& g) { return g.efficiencies && g.efficiencies->overrunning() <= 0.0; }))
+            continue;
+        const auto& shafts = a.train().shafts;
+        if (std::any_of(shafts.begin(), shafts.end(), [](const Shaft& s) { return s.friction.breakaway_torque > 0.0; }))
+            continue;
+        ++compared;
+        for (const ShaftPlace& s : a.places().shafts)
+            CHECK(evaluate(a.layout(), cache.regime(key).rate[s.speed], now) ==
+                  doctest::Approx(evaluate(a.layout(), cache.regime(other_key).rate[s.speed], other)).epsilon(1e-9));
+    }
+    CHECK(compared > 200);
+    CHECK(worst < 400);
+}
+
+TEST_CASE("a jump that starts a chain with all its contacts at rest is found in few trials") {
+    RandomTrains random(22);
+    long worst = 0, contacts = 0;
+    for (int n = 0; n < 400; ++n) {
+        Train t;
+        t.shafts.resize(7);
+        for (Shaft& s : t.shafts) {
+            s.inertia = random.spread(0.3, 3.0);
+            s.friction.torque = random.spread(0.1, 1.0);
+            s.loaded = true;
+        }
+        for (int g = 0; g < 6; ++g) {
+            Gear gear = random.gear(g, g + 1, false);
+            gear.law.compliance = Gearbox::torsion_curve;
+            gear.law.curve = TorsionCurve({}, {50.0});
+            gear.law.hysteresis_efficiency = 0.8;
+            t.gears.push_back(gear);
+        }
+        const Assembly a(t);
+        const SwitchedTrain<> system(a);
+        MapCache cache(system);
+        Instant now;
+        for (int g = 0; g < 6; ++g) now.memory[a.places().gears[g].hysteresis] = random.spread(0.05, 1.0);
+        Key key;
+        REQUIRE(system.start(cache, now, key) == Found::yes);
+        for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-3.0, 3.0);
+        system.trials = 0;
+        CAPTURE(n);
+        REQUIRE(system.next(cache, now, static_cast<const Guard*>(nullptr), key) == Found::yes);
+        worst = std::max(worst, system.trials);
+        contacts = a.layout().contacts;
+        const std::vector<double> expected = least_constraint(a, now, 20000);
+        for (std::size_t s = 0; s < expected.size(); ++s)
+            CHECK(evaluate(a.layout(), cache.regime(key).rate[a.places().shafts[s].speed], now) ==
+                  doctest::Approx(expected[s]).scale(1.0).epsilon(1e-6));
+    }
+    CHECK(contacts == 13);
+    CHECK(worst <= 100);
 }
 
 }  // namespace lostmotion::model

@@ -5,9 +5,9 @@
 //
 // Which contacts at rest stick is a linear complementarity problem in their torques and accelerations. Few contacts are
 // tried one combination after the other, those with most stuck first. Many are found by pivoting: from all stuck, the
-// contact whose condition is violated most changes its mode, until none is; should a combination come back, the one
-// with the lowest number is taken from then on (Murty's rule), which does not go round in circles where the problem
-// has one solution.
+// contact whose condition is violated most changes its mode, until none is. Losses that grow with the load make the
+// problem unsymmetric, and pivoting may come back to where it was: a combination is tried once only, and where all that
+// it leads to have been tried, those before it lead on.
 #pragma once
 
 #include <algorithm>
@@ -56,6 +56,7 @@ class SwitchedTrain {
     template <class X>
     void stop(X& x, Rest& at_rest) const;
 
+    double few = 27.0;        // up to so many combinations are tried one after the other; more are pivoted
     mutable long trials = 0;  // combinations tried so far
 
  private:
@@ -124,6 +125,9 @@ class SwitchedTrain {
     Found enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
     template <class Cache, class Now>
     Found pivot(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
+    template <class Cache, class Now, class Memory>
+    void hold_where_possible(Cache& cache, Now& now, const Memory& before, Key modes, const Event& event,
+                             Key& key) const;
     template <class Cache, class Now>
     Trial settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const;
     template <class Cache, class Now>
@@ -181,9 +185,8 @@ class SwitchedTrain {
     bool stays(Cache& cache, const Now& now, const Key& key) const;
 
     static constexpr double largest_violation = 1e-6;  // that rounding may make
-    static constexpr long few = 27;                    // combinations that are tried one after the other
-    static constexpr long most = 729;                  // and as a last resort
-    static constexpr int longest_pivoting = 400;
+    static constexpr double most = 729.0;              // combinations that are tried as a last resort
+    static constexpr int longest_pivoting = 300;
 
     const Assembly& assembly_;
     Sizes n_;

@@ -203,10 +203,9 @@ Found SwitchedTrain<Sizes>::search(Cache& cache, Now& now, const Event& event, c
     for (int c = 0; c < contacts(); ++c)
         if (event.at_rest[c] && !places().contacts[c].bilateral)
             combinations *= places().contacts[c].one_way ? 2.0 : 3.0;
-    if (combinations <= static_cast<double>(few)) return enumerate(cache, now, event, from, key);
+    if (combinations <= few) return enumerate(cache, now, event, from, key);
     const Found found = pivot(cache, now, event, from, key);
-    return found == Found::yes || combinations > static_cast<double>(most) ? found
-                                                                           : enumerate(cache, now, event, from, key);
+    return found == Found::yes || combinations > most ? found : enumerate(cache, now, event, from, key);
 }
 
 // Those with most contacts stuck first. While everything stands the torques stay as they were, and give way only if
@@ -279,17 +278,40 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
     for (int c = 0; c < contacts(); ++c)
         modes.modes[c] = event.at_rest[c] || places().contacts[c].bilateral ? std::int8_t{0} : from.modes[c];
     const auto before = now.memory;
-    std::vector<Key> seen;
-    bool lowest_number = false;
+    struct Tried {
+        Key modes;
+        std::vector<Violation> violations;
+    };
+    std::vector<Tried> tried;
+    std::vector<std::size_t> path;  // of those tried, as far as they may lead on
     double least = largest_violation;
     Key closest;
     auto of_closest = before;
     Found worst = Found::inconsistent;
-    for (int count = 0; count < longest_pivoting; ++count) {
+    // Changes the mode that is violated most, of those that lead to a combination not yet tried, or all that are
+    // violated at once. False if there is none.
+    const auto lead_on = [&](const Tried& t) {
+        const auto is_new = [&] {
+            return std::none_of(tried.begin(), tried.end(), [&](const Tried& o) { return o.modes == modes; });
+        };
+        for (const Violation& v : t.violations) {
+            modes = t.modes;
+            modes.modes[v.contact] = static_cast<std::int8_t>(v.mode);
+            if (is_new()) return true;
+            if (&v != &t.violations.front()) continue;
+            for (const Violation& o : t.violations) modes.modes[o.contact] = static_cast<std::int8_t>(o.mode);
+            if (is_new()) return true;
+        }
+        return false;
+    };
+    while (static_cast<int>(tried.size()) < longest_pivoting) {
         now.memory = before;
         Trial trial = settle(cache, now, modes, event, key);
         if (trial.found == Found::outside) worst = Found::outside;
-        if (trial.found == Found::yes && !event.closest) return Found::yes;
+        if (trial.found == Found::yes && !event.closest) {
+            hold_where_possible(cache, now, before, modes, event, key);
+            return Found::yes;
+        }
         if (trial.found == Found::yes) {
             const double v = violation(cache.regime(key), now, event);
             if (v < least) {
@@ -301,15 +323,13 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
         std::erase_if(trial.violations, [&](const Violation& v) {
             return !event.at_rest[v.contact] || modes.modes[v.contact] == v.mode;
         });
-        if (trial.violations.empty()) break;
-        seen.push_back(modes);
-        const auto more = [&](const Violation& a, const Violation& b) {
-            if (lowest_number) return a.contact < b.contact;
+        std::sort(trial.violations.begin(), trial.violations.end(), [](const Violation& a, const Violation& b) {
             return a.order != b.order ? a.order < b.order : a.relative > b.relative;
-        };
-        const Violation& v = *std::min_element(trial.violations.begin(), trial.violations.end(), more);
-        modes.modes[v.contact] = static_cast<std::int8_t>(v.mode);
-        lowest_number = lowest_number || std::find(seen.begin(), seen.end(), modes) != seen.end();
+        });
+        path.push_back(tried.size());
+        tried.push_back({modes, std::move(trial.violations)});
+        while (!path.empty() && !lead_on(tried[path.back()])) path.pop_back();
+        if (path.empty()) break;
     }
     if (least < largest_violation) {
         key = closest;
@@ -319,6 +339,30 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
     now.memory = before;
     key = from;
     return worst;
+}
+
+// Where a shaft holds more than it takes while it slips, both rest and slip may be consistent: it does not break away
+// by itself.
+template <class Sizes>
+template <class Cache, class Now, class Memory>
+void SwitchedTrain<Sizes>::hold_where_possible(Cache& cache, Now& now, const Memory& before, Key modes,
+                                               const Event& event, Key& key) const {
+    for (std::size_t s = 0; s < train().shafts.size(); ++s) {
+        const DryFriction& friction = train().shafts[s].friction;
+        const int c = places().shafts[s].contact;
+        if (c == nowhere || modes.modes[c] == 0 || !event.at_rest[c] || !(friction.holding() > friction.at_zero(0)))
+            continue;
+        Key held = modes, found;
+        held.modes[c] = 0;
+        const auto memory = now.memory;
+        now.memory = before;
+        if (settle(cache, now, held, event, found).found == Found::yes) {
+            modes = held;
+            key = found;
+        } else {
+            now.memory = memory;
+        }
+    }
 }
 
 // By how much the contacts' guards of a regime are violated, each in units of the sum of its terms' magnitudes: by the
