@@ -43,6 +43,43 @@ class Assembly {
         return terms_.state(places_.shafts[g.input].speed, per_input(gear, key)) -
                terms_.state(places_.shafts[g.output].speed);
     }
+    // P(d) in its piece; 0 of a rigid gear.
+    Row spring_torque(int gear, const Key& key) const {
+        const Gear& g = train_.gears[gear];
+        if (g.rigid()) return Row{};
+        const int piece = key.branch[places_.gears[gear].piece];
+        return terms_.state(places_.gears[gear].twist, g.law.curve.slope(piece)) +
+               terms_.one(g.law.curve.offset(piece));
+    }
+    Row angle_torque(int k, const Key& key) const {
+        const PeriodicCurve& curve = train_.angle_torques[k].torque;
+        const AngleTorquePlace& p = places_.angle_torques[k];
+        const int piece = key.branch[p.piece];
+        return terms_.one(curve.at_zero(piece)) +
+               terms_.state(places_.shafts[train_.angle_torques[k].shaft].angle, curve.slope(piece)) -
+               terms_.memory(p.turn, curve.slope(piece));
+    }
+    // Torque against the motion of a shaft.
+    Row drag_torque(int shaft, const Key& key) const {
+        const ShaftPlace& p = places_.shafts[shaft];
+        const TorsionCurve& drag = train_.shafts[shaft].drag;
+        const int piece = p.drag_piece == nowhere ? 0 : key.branch[p.drag_piece];
+        return terms_.state(p.speed, drag.slope(piece)) + terms_.one(drag.offset(piece));
+    }
+    // Dry friction of a shaft that slips, without brakes and gears.
+    Row sliding_friction(int shaft, const Key& key) const {
+        const ShaftPlace& p = places_.shafts[shaft];
+        const DryFriction& friction = train_.shafts[shaft].friction;
+        const int piece = p.friction_piece == nowhere ? 0 : key.branch[p.friction_piece];
+        return terms_.one(mode(key, p.contact) * (p.motor_friction + friction.at_zero(piece))) +
+               terms_.state(p.speed, friction.per_speed(piece));
+    }
+    // What an engaged brake takes of a shaft that slips.
+    Row brake_torque(int k, const Key& key) const {
+        const BrakePlace& p = places_.brakes[k];
+        return static_cast<double>(mode(key, places_.shafts[train_.brakes[k].shaft].contact)) *
+               commanded(p.input, p.branch, train_.brakes[k].torque, key);
+    }
     // Is the rate of the twist kept at zero?
     bool twist_rests(int gear, const Regime& r) const {
         const Gear& g = train_.gears[gear];
@@ -169,11 +206,7 @@ inline void Assembly::compose_gear(int gear, const Key& key, Regime& r, std::vec
     const Gear& g = train_.gears[gear];
     const GearPlace& p = places_.gears[gear];
     const double i = g.law.ratio;
-    Row P;
-    if (!g.rigid()) {
-        const int piece = key.branch[p.piece];
-        P = terms_.state(p.twist, g.law.curve.slope(piece)) + terms_.one(g.law.curve.offset(piece));
-    }
+    const Row P = spring_torque(gear, key);
     Row& H = r.gear_hysteresis[gear];
     if (p.contact != nowhere) {
         const int slip = mode(key, p.contact);
@@ -226,15 +259,10 @@ inline void Assembly::compose_coupling(int coupling, const Key& key, Regime& r) 
 // What the dry contact of a shaft takes.
 inline Row Assembly::shaft_friction(int shaft, const Key& key, const Regime& r, const std::vector<Row>& loss) const {
     const ShaftPlace& p = places_.shafts[shaft];
-    const double s = mode(key, p.contact);
-    if (s == 0.0) return held(p.contact, r);
-    const DryFriction& friction = train_.shafts[shaft].friction;
-    const int piece = p.friction_piece == nowhere ? 0 : key.branch[p.friction_piece];
-    Row F = terms_.one(s * (p.motor_friction + friction.at_zero(piece)));
-    F += terms_.state(p.speed, friction.per_speed(piece));
+    if (mode(key, p.contact) == 0) return held(p.contact, r);
+    Row F = sliding_friction(shaft, key);
     for (std::size_t b = 0; b < train_.brakes.size(); ++b)
-        if (train_.brakes[b].shaft == shaft)
-            F += s * commanded(places_.brakes[b].input, places_.brakes[b].branch, train_.brakes[b].torque, key);
+        if (train_.brakes[b].shaft == shaft) F += brake_torque(static_cast<int>(b), key);
     for (std::size_t g = 0; g < train_.gears.size(); ++g)
         if (train_.gears[g].input == shaft && train_.gears[g].has_dry_losses()) F += loss[g];
     return F;
@@ -242,7 +270,6 @@ inline Row Assembly::shaft_friction(int shaft, const Key& key, const Regime& r, 
 
 inline Row Assembly::acceleration(int shaft, const Key& key, const Regime& r) const {
     const ShaftPlace& p = places_.shafts[shaft];
-    const Shaft& law = train_.shafts[shaft];
     Row sum;
     for (std::size_t m = 0; m < train_.motors.size(); ++m)
         if (train_.motors[m].shaft == shaft) sum += r.motor_torque[m];
@@ -250,18 +277,10 @@ inline Row Assembly::acceleration(int shaft, const Key& key, const Regime& r) co
         if (train_.gears[g].output == shaft) sum += r.output_torque[g];
     for (std::size_t k = 0; k < train_.couplings.size(); ++k)
         if (train_.couplings[k].output == shaft) sum += r.contact_torque[places_.couplings[k].contact];
-    for (std::size_t k = 0; k < train_.angle_torques.size(); ++k) {
-        if (train_.angle_torques[k].shaft != shaft) continue;
-        const PeriodicCurve& curve = train_.angle_torques[k].torque;
-        const int piece = key.branch[places_.angle_torques[k].piece];
-        sum += terms_.one(curve.at_zero(piece)) + terms_.state(p.angle, curve.slope(piece)) -
-               terms_.memory(places_.angle_torques[k].turn, curve.slope(piece));
-    }
+    for (std::size_t k = 0; k < train_.angle_torques.size(); ++k)
+        if (train_.angle_torques[k].shaft == shaft) sum += angle_torque(static_cast<int>(k), key);
     sum -= p.viscous_friction * speed(shaft, r);
-    if (law.has_drag()) {
-        const int piece = p.drag_piece == nowhere ? 0 : key.branch[p.drag_piece];
-        sum -= law.drag.slope(piece) * speed(shaft, r) + terms_.one(law.drag.offset(piece));
-    }
+    if (train_.shafts[shaft].has_drag() && !r.ties.at_rest[shaft]) sum -= drag_torque(shaft, key);
     if (p.load != nowhere) sum -= terms_.input(p.load);
     if (p.contact != nowhere) sum -= r.contact_torque[p.contact];
     for (std::size_t g = 0; g < train_.gears.size(); ++g)
