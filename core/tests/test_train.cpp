@@ -1,6 +1,9 @@
 // The equations that the elements of a train compose, against the classic drive's and closed forms.
 #include <doctest/doctest.h>
 
+#include "lostmotion/model/check.hpp"
+#include "lostmotion/model/pack.hpp"
+#include "random_trains.hpp"
 #include "round_drives.hpp"
 #include "train_twins.hpp"
 
@@ -45,6 +48,13 @@ int compare_all(const Drive& d, Random& random) {
     return compared;
 }
 
+// Dimensions as the kernel's.
+struct Wide {
+    static constexpr int coupled = 24, angles = 6, inputs = 14, memory = 16, contacts = 20, guards = 96;
+    static constexpr int states = coupled + angles, one = states, first_memory = one + 1,
+                         first_input = first_memory + memory, terms = first_input + inputs;
+};
+
 }  // namespace
 
 TEST_CASE("the classic drive as a train has the same equations and guards, to the last bit") {
@@ -55,6 +65,105 @@ TEST_CASE("the classic drive as a train has the same equations and guards, to th
     for (int n = 0; n < 300; ++n) compared += compare_all(drives.drive(), random);
     for (int n = 0; n < 300; ++n) compared += compare_all(round.next(1.0).drive, random);
     CHECK(compared > 3000);
+}
+
+TEST_CASE("what is wrong with a train is said in one line with the names of its elements") {
+    Train good;
+    good.shafts.resize(3);
+    const char* names[] = {"motor", "worm", "table"};
+    for (int s = 0; s < 3; ++s) {
+        good.shafts[s].name = names[s];
+        good.shafts[s].inertia = 1.0;
+    }
+    good.motors.push_back({"m1", 0, Motor{}});
+    good.gears.resize(2);
+    good.gears[0].name = "belt";
+    good.gears[0].output = 1;
+    good.gears[0].law.ratio = 2.0;
+    good.gears[1].name = "mesh";
+    good.gears[1].input = 1;
+    good.gears[1].output = 2;
+    good.gears[1].law.ratio = 3.0;
+    CHECK(check(good) == "");
+    const auto with = [&good](auto change) {
+        Train t = good;
+        change(t);
+        return check(t);
+    };
+    const auto loop = [](double ratio) {
+        return [ratio](Train& t) {
+            Gear g;
+            g.name = "bypass";
+            g.input = 0;
+            g.output = 2;
+            g.law.ratio = ratio;
+            t.gears.push_back(g);
+        };
+    };
+    CHECK(with([](Train& t) { t.gears[1].output = 7; }) ==
+          "gear 'mesh' names shaft number 7, which the train does not have");
+    CHECK(with([](Train& t) { t.motors[0].shaft = -1; }) ==
+          "motor 'm1' names shaft number -1, which the train does not have");
+    CHECK(with([](Train& t) { t.gears[1].output = 1; }) ==
+          "gear 'mesh' joins shaft 'worm' with itself; give it another output");
+    CHECK(with([](Train& t) { t.gears.pop_back(); }) ==
+          "shaft 'table' is turned by nothing: no motor, gear or load torque acts on it; join it to the train");
+    CHECK(with([](Train& t) { t.shafts[2].inertia = 0.0; }) ==
+          "shaft 'table' has no inertia; give it one, or that of a motor or gear on it");
+    CHECK(with(loop(5.0)) ==
+          "gear 'bypass' closes a loop of rigid gears with another ratio: nothing could turn; give it "
+          "a stiffness or leave it out");
+    CHECK(with(loop(6.0)) ==
+          "gear 'bypass' closes a loop of rigid gears with the same ratio: its torque would not be "
+          "determined; give it a stiffness or leave it out");
+    CHECK(with([&](Train& t) {
+              loop(6.0)(t);
+              t.gears[2].law.compliance = Gearbox::torsion_curve;
+          }) == "");
+    CHECK(with([](Train& t) { t.gears[0].law.ratio = -2.0; }).starts_with("gear 'belt' has the ratio -2"));
+    CHECK(with([](Train& t) { t.shafts.resize(40); }) == "the train has 40 shafts; at most 16 are possible");
+    CHECK(check(Train{}) == "the train has no shaft");
+}
+
+TEST_CASE("a packed regime has the same coefficients in the kernel's order, and zeros elsewhere") {
+    RandomTrains random(31);
+    for (int n = 0; n < 100; ++n) {
+        const Assembly a(random.train(random.pick(2, 6), true));
+        const Layout& at = a.layout();
+        REQUIRE(fits<Wide>(at));
+        Key key;
+        for (int c = 0; c < at.contacts; ++c)
+            key.modes[c] = static_cast<std::int8_t>(a.places().contacts[c].bilateral ? 0 : random.pick(-1, 1));
+        for (const ContactPlace& c : a.places().contacts)
+            if (c.one_way) key.modes[&c - a.places().contacts.data()] = -1;
+        const Regime r = a.build(key);
+        const auto p = pack<Wide>(r, at, a.places().shafts[0].speed, static_cast<int>(a.train().shafts.size()));
+        CHECK(p.complete);
+        CHECK(p.n_guards == static_cast<int>(r.guards.size()));
+        Instant x;
+        std::array<double, Wide::terms> wide{};
+        const auto put = [&](int count, int to, auto& values) {
+            for (int k = 0; k < count; ++k)
+                values[k] = wide[static_cast<std::size_t>(to + k)] = random.uniform(-1.0, 1.0);
+        };
+        put(at.coupled, 0, x.x);
+        for (int k = 0; k < at.angles; ++k)
+            x.x[at.coupled + k] = wide[static_cast<std::size_t>(Wide::coupled + k)] = random.uniform(-1.0, 1.0);
+        wide[Wide::one] = 1.0;
+        put(at.memory, Wide::first_memory, x.memory);
+        put(at.inputs, Wide::first_input, x.input[0]);
+        const auto value = [&](const std::array<double, Wide::terms>& f) {
+            double sum = 0.0;
+            for (int k = 0; k < Wide::terms; ++k)
+                sum += f[static_cast<std::size_t>(k)] * wide[static_cast<std::size_t>(k)];
+            return sum;
+        };
+        for (int k = 0; k < at.coupled; ++k)
+            CHECK(value(p.rate[static_cast<std::size_t>(k)]) == doctest::Approx(evaluate(at, r.rate[k], x)));
+        for (int g = 0; g < p.n_guards; ++g)
+            CHECK(value(p.guards[static_cast<std::size_t>(g)].form) ==
+                  doctest::Approx(evaluate(at, r.guards[static_cast<std::size_t>(g)].form, x)));
+    }
 }
 
 }  // namespace lostmotion::model

@@ -193,7 +193,7 @@ TEST_CASE("pivoting and trying all combinations find the same accelerations, wit
                   doctest::Approx(evaluate(a.layout(), cache.regime(other_key).rate[s.speed], other)).epsilon(1e-9));
     }
     CHECK(compared > 200);
-    CHECK(worst < 400);
+    CHECK(worst <= 600);
 }
 
 TEST_CASE("a jump that starts a chain with all its contacts at rest is found in few trials") {

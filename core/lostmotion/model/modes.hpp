@@ -7,7 +7,8 @@
 // tried one combination after the other, those with most stuck first. Many are found by pivoting: from all stuck, the
 // contact whose condition is violated most changes its mode, until none is. Losses that grow with the load make the
 // problem unsymmetric, and pivoting may come back to where it was: a combination is tried once only, and where all that
-// it leads to have been tried, those before it lead on.
+// it leads to have been tried, those before it lead on. Where a self-locking gear keeps all of these from a solution,
+// the search begins again from the modes before the event, then from others that are drawn.
 #pragma once
 
 #include <algorithm>
@@ -139,7 +140,7 @@ class SwitchedTrain {
     template <class Now>
     void locate_losses(const Now& now, const std::array<double, max_contacts>& T_2, Key& trial) const;
     template <class Now>
-    bool hold(Now& now, const Event& event, const Key& modes, std::array<double, max_contacts>& T_2) const;
+    void hold(Now& now, const Event& event, const Key& modes, std::array<double, max_contacts>& T_2) const;
     template <class Now>
     double motor_torque(const Now& now, int motor) const;
 
@@ -186,7 +187,7 @@ class SwitchedTrain {
 
     static constexpr double largest_violation = 1e-6;  // that rounding may make
     static constexpr double most = 729.0;              // combinations that are tried as a last resort
-    static constexpr int longest_pivoting = 300;
+    static constexpr std::size_t from_one_start = 300, longest_pivoting = 600;
 
     const Assembly& assembly_;
     Sizes n_;

@@ -151,7 +151,19 @@ bool SwitchedTrain<Sizes>::breaks_away(Cache& cache, Now& now, const Event& even
     slipping.gear = event.gear;
     slipping.coupling = event.coupling;
     const auto memory = now.memory;
-    if (settle(cache, now, modes, slipping, key).found == Found::yes) return true;
+    Key slips;
+    if (settle(cache, now, modes, slipping, slips).found == Found::yes) {
+        // With a self-locking gear more torque may turn it the other way; by rounding it only seems to. (Of two shafts
+        // the solver finds that at once, by the speed that falls, and the contact is stuck again.)
+        const auto& r = cache.regime(slips);
+        Motion<Sizes, std::decay_t<decltype(r)>, Now> motion(n_, r, now);
+        const double mode = event.neighbour;
+        if (train().shafts.size() == 2 ||
+            motion.sign(mode * assembly_.contact_speed(event.contact)).relative >= -largest_violation) {
+            key = slips;
+            return true;
+        }
+    }
     now.memory = memory;
     return false;
 }
@@ -288,12 +300,12 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
     Key closest;
     auto of_closest = before;
     Found worst = Found::inconsistent;
+    const auto is_new = [&] {
+        return std::none_of(tried.begin(), tried.end(), [&](const Tried& o) { return o.modes == modes; });
+    };
     // Changes the mode that is violated most, of those that lead to a combination not yet tried, or all that are
     // violated at once. False if there is none.
     const auto lead_on = [&](const Tried& t) {
-        const auto is_new = [&] {
-            return std::none_of(tried.begin(), tried.end(), [&](const Tried& o) { return o.modes == modes; });
-        };
         for (const Violation& v : t.violations) {
             modes = t.modes;
             modes.modes[v.contact] = static_cast<std::int8_t>(v.mode);
@@ -304,7 +316,20 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
         }
         return false;
     };
-    while (static_cast<int>(tried.size()) < longest_pivoting) {
+    std::uint32_t drawn = 1;
+    std::size_t begun = 0;  // how many had been tried at the last start
+    const auto start_again = [&](bool first) {
+        path.clear();
+        begun = tried.size();
+        for (int c = 0; c < contacts(); ++c) {
+            if (!event.at_rest[c] || places().contacts[c].bilateral) continue;
+            drawn = 1664525u * drawn + 1013904223u;  // Numerical Recipes' generator: the same in every build
+            const int mode = first ? from.modes[c] : static_cast<int>(drawn >> 16) % 3 - 1;
+            modes.modes[c] = static_cast<std::int8_t>(places().contacts[c].one_way ? std::min(mode, 0) : mode);
+        }
+    };
+    bool first = true;
+    while (tried.size() < longest_pivoting) {
         now.memory = before;
         Trial trial = settle(cache, now, modes, event, key);
         if (trial.found == Found::outside) worst = Found::outside;
@@ -329,7 +354,12 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
         path.push_back(tried.size());
         tried.push_back({modes, std::move(trial.violations)});
         while (!path.empty() && !lead_on(tried[path.back()])) path.pop_back();
-        if (path.empty()) break;
+        if (!path.empty() && tried.size() - begun < from_one_start) continue;
+        for (int draw = 0; draw < 20; ++draw) {
+            start_again(std::exchange(first, false));
+            if (is_new()) break;
+        }
+        if (!is_new()) break;  // there are no others
     }
     if (least < largest_violation) {
         key = closest;

@@ -81,15 +81,15 @@ void SwitchedTrain<Sizes>::locate_losses(const Now& now, const std::array<double
 }
 
 // Torques that the motion does not determine stay where they were, or at the nearest values that their own contacts
-// and the plain friction of the shafts behind them can hold, from the load to the motors. False if there are none.
+// and the plain friction of the shafts behind them can hold, from the load to the motors. Whether all can hold them,
+// the guards tell.
 template <class Sizes>
 template <class Now>
-bool SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
+void SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
                                 std::array<double, max_contacts>& T_2) const {
     const std::vector<ContactPlace>& all = places().contacts;
     const Ties ties = tie(all, static_cast<int>(train().shafts.size()), modes.modes.data());
     std::array<double, max_contacts> coupling = event.coupling;
-    bool possible = true;
     for (std::size_t k = all.size(); k-- > 0;) {
         if (!ties.redundant[k]) continue;
         const ContactPlace& c = all[k];
@@ -138,14 +138,12 @@ bool SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
             high = std::min(high, needed + T_f);
         }
         if (low > high) {
-            possible = false;
             low = own_low;
             high = own_high;
         }
         torque = std::clamp(torque, low, high);
         now.memory[c.locked] = torque;
     }
-    return possible;
 }
 
 // Is this combination of modes consistent? Pieces and cells are found by a walk that begins at what the torques were.
@@ -167,9 +165,8 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
             train().gears[g].law.curve.torque(now.x[p.twist]) + (slip == 2 ? 0.0 : slip * now.memory[p.hysteresis]);
     }
     locate_losses(now, T_2, trial);
-    const bool held = hold(now, event, trial, T_2);
+    hold(now, event, trial, T_2);
     Trial result = walk(cache, now, event, trial, key);
-    if (!held && result.found == Found::yes) result.found = Found::inconsistent;
     if (result.found != Found::inconsistent || !event.from_each_load) return result;
     // The torque that keeps a twist at rest depends on the cell, and the cell on the torque.
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
@@ -186,7 +183,7 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
                 Key other = trial;
                 other.branch[places().gears[g].cell] = static_cast<std::int16_t>(gear.loss_cell(middle, v) ^ half);
                 const Trial again = walk(cache, now, event, other, key);
-                if (again.found == Found::yes && held) return again;
+                if (again.found == Found::yes) return again;
             }
         }
     }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -66,6 +67,20 @@ inline bool moves_freely(const std::vector<ContactPlace>& contacts, const Layout
     return true;
 }
 
+// f -= factor * row. What cancels to within rounding is zero: of a torque that is zero, such as that of a shaft at rest
+// that nothing turns, no rounding may be left whose sign would mean something. (Of two shafts nothing is.)
+inline void subtract(Row& f, double factor, const Row& row, bool two_shafts) {
+    if (two_shafts) {
+        f -= factor * row;
+        return;
+    }
+    constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
+    for (int k = 0; k < max_columns; ++k) {
+        const double a = f.c[k], b = factor * row.c[k];
+        f.c[k] = std::fabs(a - b) <= few_roundings * std::fabs(a) ? 0.0 : a - b;
+    }
+}
+
 // Eliminates the reactions from the forms. False if they have no unique solution.
 inline bool solve_reactions(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key,
                             const Ties& ties, const std::vector<Row>& acceleration, const std::vector<Row*>& forms) {
@@ -73,6 +88,7 @@ inline bool solve_reactions(const std::vector<ContactPlace>& contacts, const Lay
     StuckRows stuck(contacts, layout, key, ties, acceleration);
     auto& [rows, unknowns] = stuck;
     const std::size_t n = rows.size();
+    const bool two_shafts = acceleration.size() == 2;
     // Gauss-Jordan elimination with row pivoting; the right-hand sides are the known terms.
     for (std::size_t k = 0; k < n; ++k) {
         std::size_t pivot = k;
@@ -86,7 +102,7 @@ inline bool solve_reactions(const std::vector<ContactPlace>& contacts, const Lay
         for (std::size_t row = 0; row < n; ++row) {
             const double factor = rows[row].c[unknowns[k]];
             if (row == k || factor == 0.0) continue;
-            rows[row] -= factor * rows[k];
+            subtract(rows[row], factor, rows[k], two_shafts);
             rows[row].c[unknowns[k]] = 0.0;
         }
     }
@@ -94,7 +110,7 @@ inline bool solve_reactions(const std::vector<ContactPlace>& contacts, const Lay
         for (std::size_t k = 0; k < n; ++k) {
             const double factor = f->c[unknowns[k]];
             if (factor == 0.0) continue;
-            *f -= factor * rows[k];
+            subtract(*f, factor, rows[k], two_shafts);
             f->c[unknowns[k]] = 0.0;
         }
     return free;
