@@ -48,13 +48,6 @@ int compare_all(const Drive& d, Random& random) {
     return compared;
 }
 
-// Dimensions as the kernel's.
-struct Wide {
-    static constexpr int coupled = 24, angles = 6, inputs = 14, memory = 16, contacts = 20, guards = 96;
-    static constexpr int states = coupled + angles, one = states, first_memory = one + 1,
-                         first_input = first_memory + memory, terms = first_input + inputs;
-};
-
 }  // namespace
 
 TEST_CASE("the classic drive as a train has the same equations and guards, to the last bit") {
@@ -130,14 +123,14 @@ TEST_CASE("a packed regime has the same coefficients in the kernel's order, and 
     for (int n = 0; n < 100; ++n) {
         const Assembly a(random.train(random.pick(2, 6), true));
         const Layout& at = a.layout();
-        REQUIRE(fits<Wide>(at));
+        REQUIRE(fits<Wide>(a.train(), at));
         Key key;
         for (int c = 0; c < at.contacts; ++c)
             key.modes[c] = static_cast<std::int8_t>(a.places().contacts[c].bilateral ? 0 : random.pick(-1, 1));
         for (const ContactPlace& c : a.places().contacts)
             if (c.one_way) key.modes[&c - a.places().contacts.data()] = -1;
         const Regime r = a.build(key);
-        const auto p = pack<Wide>(r, at, a.places().shafts[0].speed, static_cast<int>(a.train().shafts.size()));
+        const auto p = pack<Wide>(r, a);
         CHECK(p.complete);
         CHECK(p.n_guards == static_cast<int>(r.guards.size()));
         Instant x;
@@ -152,10 +145,10 @@ TEST_CASE("a packed regime has the same coefficients in the kernel's order, and 
         wide[Wide::one] = 1.0;
         put(at.memory, Wide::first_memory, x.memory);
         put(at.inputs, Wide::first_input, x.input[0]);
-        const auto value = [&](const std::array<double, Wide::terms>& f) {
+        const auto value = [&](const PackedForm<Wide>& f) {
             double sum = 0.0;
             for (int k = 0; k < Wide::terms; ++k)
-                sum += f[static_cast<std::size_t>(k)] * wide[static_cast<std::size_t>(k)];
+                sum += f.c[static_cast<std::size_t>(k)] * wide[static_cast<std::size_t>(k)];
             return sum;
         };
         for (int k = 0; k < at.coupled; ++k)

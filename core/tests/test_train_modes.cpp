@@ -236,6 +236,54 @@ TEST_CASE("a jump that starts a chain with all its contacts at rest is found in 
     CHECK(worst <= 100);
 }
 
+TEST_CASE("the search works on packed regimes and the kernel's own instant as on the train's") {
+    struct WideInstant {
+        double time = 0.0;
+        std::array<double, 30> x{};
+        std::array<double, 16> memory{};
+        std::array<std::array<double, 14>, n_derivatives> input{};
+        std::array<double, 14> input_size{};
+    };
+    struct WideCache {
+        const Assembly& assembly;
+        std::unordered_map<Key, std::unique_ptr<PackedRegime<Wide>>, KeyHash> regimes;
+        const PackedRegime<Wide>& regime(const Key& key) {
+            auto& r = regimes[key];
+            if (!r) r = std::make_unique<PackedRegime<Wide>>(pack<Wide>(assembly.build(key), assembly));
+            return *r;
+        }
+    };
+    RandomTrains random(24);
+    for (int n = 0; n < 200; ++n) {
+        const Assembly a(random.train(random.pick(2, 4), true));
+        const SwitchedTrain<> plain(a);
+        const SwitchedTrain<Wide> packed(a, Wide{});
+        MapCache cache(plain);
+        WideCache wide_cache{a, {}};
+        Instant now = random.instant(a, 0.2);
+        WideInstant wide;
+        std::copy_n(now.x.begin(), a.layout().coupled, wide.x.begin());
+        std::copy_n(now.memory.begin(), 16, wide.memory.begin());
+        std::copy_n(now.input_size.begin(), 14, wide.input_size.begin());
+        const auto inputs = [&] {
+            for (int k = 0; k < n_derivatives; ++k) std::copy_n(now.input[k].begin(), 14, wide.input[k].begin());
+        };
+        inputs();
+        Key key, wide_key;
+        CAPTURE(n);
+        CHECK(plain.start(cache, now, key) == packed.start(wide_cache, wide, wide_key));
+        CHECK(key == wide_key);
+        for (int jump = 0; jump < 3; ++jump) {
+            for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-2.0, 2.0);
+            inputs();
+            CHECK(plain.next(cache, now, static_cast<const Guard*>(nullptr), key) ==
+                  packed.next(wide_cache, wide, static_cast<const PackedGuard<Wide>*>(nullptr), wide_key));
+            CHECK(key == wide_key);
+            CHECK(std::equal(wide.memory.begin(), wide.memory.end(), now.memory.begin()));
+        }
+    }
+}
+
 }  // namespace lostmotion::model
 
 TEST_SUITE_END();

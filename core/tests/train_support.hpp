@@ -5,6 +5,7 @@
 #include <unordered_map>
 
 #include "lostmotion/model/modes.hpp"
+#include "lostmotion/model/pack.hpp"
 #include "support.hpp"
 
 namespace lostmotion::model {
@@ -28,6 +29,13 @@ inline Train train_of(const Drive& d) {
     t.gears.push_back(g);
     return t;
 }
+
+// Dimensions as the kernel's.
+struct Wide {
+    static constexpr int coupled = 24, angles = 6, inputs = 14, memory = 16, contacts = 20, guards = 96;
+    static constexpr int states = coupled + angles, one = states, first_memory = one + 1,
+                         first_input = first_memory + memory, terms = first_input + inputs;
+};
 
 // Regimes visited so far; they stay where they are.
 class MapCache {

@@ -28,6 +28,15 @@ namespace lostmotion::model {
 inline constexpr double clear_of_zero = 1e-3;
 inline constexpr double far_from_event = 1e-6;
 
+// The kernel's regimes have room for more guards than they use.
+template <class R>
+std::size_t guard_count(const R& r) {
+    if constexpr (requires { r.n_guards; })
+        return static_cast<std::size_t>(r.n_guards);
+    else
+        return r.guards.size();
+}
+
 enum class Found { yes, inconsistent, outside };
 
 // Sizes: Layout, or the kernel's dimensions. Cache: regime(key) gives a regime that stays where it is.
@@ -54,8 +63,8 @@ class SwitchedTrain {
 
     using Rest = std::array<bool, max_contacts>;
     // Sets the speeds of contacts at rest to what they are, to the last bit, and marks those that this implies.
-    template <class X>
-    void stop(X& x, Rest& at_rest) const;
+    template <class X, class AtRest>
+    void stop(X& x, AtRest& at_rest) const;
 
     double few = 27.0;        // up to so many combinations are tried one after the other; more are pivoted
     mutable long trials = 0;  // combinations tried so far
@@ -145,10 +154,10 @@ class SwitchedTrain {
     double motor_torque(const Now& now, int motor) const;
 
     // The guards of the speeds of contacts that move: their modes were chosen by their speeds.
-    template <class R>
-    static Guards moving(const R& r, const Rest& at_rest, std::size_t n_guards) {
+    template <class R, class AtRest>
+    static Guards moving(const R& r, const AtRest& at_rest) {
         Guards out;
-        for (std::size_t g = 0; g < n_guards; ++g)
+        for (std::size_t g = 0; g < guard_count(r); ++g)
             out[g] = r.guards[g].kind == Guard::speed && !at_rest[r.guards[g].contact];
         return out;
     }
@@ -157,7 +166,7 @@ class SwitchedTrain {
     auto violated(const R& r, const Now& now, const Guards& ignored, const Event* event,
                   std::vector<Violation>& of_contacts) const -> decltype(&r.guards[0]) {
         Motion<Sizes, R, Now> motion(n_, r, now);
-        for (std::size_t g = 0; g < r.guards.size(); ++g) {
+        for (std::size_t g = 0; g < guard_count(r); ++g) {
             const auto& guard = r.guards[g];
             if (ignored[g]) continue;
             const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);

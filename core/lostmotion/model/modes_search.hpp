@@ -51,8 +51,8 @@ void SwitchedTrain<Sizes>::set_near_event() {
 }
 
 template <class Sizes>
-template <class X>
-void SwitchedTrain<Sizes>::stop(X& x, Rest& at_rest) const {
+template <class X, class AtRest>
+void SwitchedTrain<Sizes>::stop(X& x, AtRest& at_rest) const {
     std::array<std::int8_t, max_contacts> modes{};
     for (int c = 0; c < contacts(); ++c) modes[c] = at_rest[c] ? 0 : 1;
     const Ties ties = tie(places().contacts, static_cast<int>(train().shafts.size()), modes.data());
@@ -116,7 +116,8 @@ Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& ke
         event.memory = fired->memory;
         event.shift = fired->shift;
     }
-    const Rest before = old.at_rest;
+    Rest before{};
+    std::copy_n(old.at_rest.begin(), contacts(), before.begin());
     event.at_rest = before;
     if (fired != nullptr && fired->kind == Guard::speed) event.at_rest[fired->contact] = true;
     stop(now.x, event.at_rest);
@@ -400,10 +401,10 @@ void SwitchedTrain<Sizes>::hold_where_possible(Cache& cache, Now& now, const Mem
 template <class Sizes>
 template <class R, class Now>
 double SwitchedTrain<Sizes>::violation(const R& r, const Now& now, const Event& event) const {
-    const Guards ignored = moving(r, event.at_rest, r.guards.size());
+    const Guards ignored = moving(r, event.at_rest);
     Motion<Sizes, R, Now> motion(n_, r, now);
     double worst = 0.0;
-    for (std::size_t g = 0; g < r.guards.size(); ++g) {
+    for (std::size_t g = 0; g < guard_count(r); ++g) {
         const auto& guard = r.guards[g];
         if (ignored[g] || (guard.kind != Guard::speed && guard.kind != Guard::capacity)) continue;
         const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);
@@ -445,8 +446,7 @@ bool SwitchedTrain<Sizes>::stays(Cache& cache, const Now& now, const Key& key) c
     Event lasting;
     lasting.by_value = true;
     std::vector<Violation> of_contacts;
-    return violated(r, now, moving(r, r.at_rest, r.guards.size()), &lasting, of_contacts) == nullptr &&
-           of_contacts.empty();
+    return violated(r, now, moving(r, r.at_rest), &lasting, of_contacts) == nullptr && of_contacts.empty();
 }
 
 }  // namespace lostmotion::model

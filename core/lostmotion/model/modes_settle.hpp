@@ -202,8 +202,7 @@ auto SwitchedTrain<Sizes>::walk(Cache& cache, Now& now, const Event& event, Key 
         const auto& r = cache.regime(trial);
         result.violations.clear();
         if (!r.solvable) return result;
-        const auto* left =
-            violated(r, now, moving(r, event.at_rest, r.guards.size()) | along, &event, result.violations);
+        const auto* left = violated(r, now, moving(r, event.at_rest) | along, &event, result.violations);
         if (left != nullptr && left->kind == Guard::outside) {
             result.found = Found::outside;
             return result;
