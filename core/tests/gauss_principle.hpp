@@ -25,11 +25,11 @@ inline std::vector<double> least_constraint(const Assembly& a, const Instant& no
         torque[t.motors[m].shaft] += t.motors[m].law.kind == Motor::dc
                                          ? now.x[p.motors[m].torque]
                                          : t.motors[m].law.rated_torque * input(p.motors[m].command);
-    struct Row {
+    struct Constraint {
         std::vector<double> c;
         double low, high, torque = 0.0;
     };
-    std::vector<Row> rows;
+    std::vector<Constraint> rows;
     // A dry contact between shafts: its torque acts against its speed.
     const auto contact = [&](int in, double per_in, int out, double per_out, double sliding, double holding,
                              bool exact = false) {
@@ -40,7 +40,7 @@ inline std::vector<double> least_constraint(const Assembly& a, const Instant& no
             if (out >= 0) torque[out] -= per_out * F;
             return;
         }
-        Row r{std::vector<double>(n), -holding, holding};
+        Constraint r{std::vector<double>(n), -holding, holding};
         r.c[in] = per_in;
         if (out >= 0) r.c[out] = per_out;
         rows.push_back(r);
@@ -92,7 +92,7 @@ inline std::vector<double> least_constraint(const Assembly& a, const Instant& no
     std::vector<double> acceleration(n);
     for (std::size_t s = 0; s < n; ++s) acceleration[s] = torque[s] / J[s];
     for (int sweep = 0; sweep < sweeps; ++sweep)
-        for (Row& r : rows) {
+        for (Constraint& r : rows) {
             double v = 0.0, G = 0.0;
             for (std::size_t s = 0; s < n; ++s) {
                 v += r.c[s] * acceleration[s];

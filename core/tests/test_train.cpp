@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include "lostmotion/model/check.hpp"
+#include "lostmotion/model/names.hpp"
 #include "lostmotion/model/pack.hpp"
 #include "random_trains.hpp"
 #include "round_drives.hpp"
@@ -58,6 +59,30 @@ TEST_CASE("the classic drive as a train has the same equations and guards, to th
     for (int n = 0; n < 300; ++n) compared += compare_all(drives.drive(), random);
     for (int n = 0; n < 300; ++n) compared += compare_all(round.next(1.0).drive, random);
     CHECK(compared > 3000);
+}
+
+TEST_CASE("the classic drive as a train has the same natural sizes, to the last bit") {
+    RandomDrives drives(4);
+    for (int n = 0; n < 200; ++n) {
+        const Drive d = drives.drive();
+        const Assembly a(train_of(d));
+        std::array<double, 5> balanced{}, rated{};
+        balanced_scale(a, balanced, a.layout().coupled);
+        rated_scale(a, rated);
+        for (int k = 0; k < 5; ++k) CHECK(balanced[static_cast<std::size_t>(k)] == d.balanced_scale()[k]);
+        for (int k = 0; k < 4; ++k) CHECK(rated[static_cast<std::size_t>(k)] == d.rated_scale()[k]);
+    }
+}
+
+TEST_CASE("states, inputs and contacts of a train have names") {
+    Drive d = plain_drive(2.0, 1.0, 1.0);
+    d.motor.friction_torque = 0.1;
+    const Assembly a(train_of(d));
+    CHECK(state_names(a) ==
+          std::vector<std::string>{"motor_torque", "motor_speed", "load_speed", "gearbox_twist", "load_angle"});
+    CHECK(input_names(a) == std::vector<std::string>{"motor_command", "load_load_torque"});
+    CHECK(contact_name(a, 0) == "motor_contact");
+    CHECK(contact_name(a, 1) == "gearbox_twist_contact");
 }
 
 TEST_CASE("what is wrong with a train is said in one line with the names of its elements") {

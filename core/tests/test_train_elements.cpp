@@ -9,30 +9,6 @@ TEST_SUITE_BEGIN("train_elements");
 namespace lostmotion::model {
 namespace {
 
-Shaft shaft(double inertia) {
-    Shaft s;
-    s.inertia = inertia;
-    return s;
-}
-ShaftMotor torque_motor(int at) {
-    ShaftMotor m;
-    m.shaft = at;
-    m.law.kind = Motor::torque_source;
-    return m;
-}
-Gear rigid_gear(int input, int output, double ratio) {
-    Gear g;
-    g.input = input;
-    g.output = output;
-    g.law.ratio = ratio;
-    return g;
-}
-Gear spring(int input, int output, double ratio, const TorsionCurve& curve) {
-    Gear g = rigid_gear(input, output, ratio);
-    g.law.compliance = Gearbox::torsion_curve;
-    g.law.curve = curve;
-    return g;
-}
 Gear worm(double eta_f, double eta_b) {
     Gear g = rigid_gear(0, 1, 50.0);
     g.efficiencies = MeshEfficiency(eta_f, eta_b);

@@ -10,6 +10,32 @@
 
 namespace lostmotion::model {
 
+// Elements with little more than what a test is about.
+inline Shaft shaft(double inertia) {
+    Shaft s;
+    s.inertia = inertia;
+    return s;
+}
+inline ShaftMotor torque_motor(int at) {
+    ShaftMotor m;
+    m.shaft = at;
+    m.law.kind = Motor::torque_source;
+    return m;
+}
+inline Gear rigid_gear(int input, int output, double ratio) {
+    Gear g;
+    g.input = input;
+    g.output = output;
+    g.law.ratio = ratio;
+    return g;
+}
+inline Gear spring(int input, int output, double ratio, const TorsionCurve& curve) {
+    Gear g = rigid_gear(input, output, ratio);
+    g.law.compliance = Gearbox::torsion_curve;
+    g.law.curve = curve;
+    return g;
+}
+
 // The classic drive in the long form.
 inline Train train_of(const Drive& d) {
     Train t;

@@ -20,6 +20,7 @@
 
 #include "assembly.hpp"
 #include "motion.hpp"
+#include "scales.hpp"
 
 namespace lostmotion::model {
 
@@ -109,8 +110,6 @@ class SwitchedTrain {
     const Train& train() const { return assembly_.train(); }
 
     void set_near_event();
-    double rated_speed(int shaft) const;
-    double rated_torque(int shaft) const;
     template <class F>
     double near_event(const F& f) const {
         double sum = 0.0;

@@ -6,48 +6,14 @@
 namespace lostmotion::model {
 
 template <class Sizes>
-double SwitchedTrain<Sizes>::rated_speed(int shaft) const {
-    for (const Gear& g : train().gears)
-        if (g.input == shaft) return g.law.rated_input_speed;
-    for (const Gear& g : train().gears)
-        if (g.output == shaft) return g.law.rated_input_speed / g.law.ratio;
-    for (const ShaftMotor& m : train().motors)
-        if (m.shaft == shaft) return m.law.rated_speed;
-    return 1.0;
-}
-
-template <class Sizes>
-double SwitchedTrain<Sizes>::rated_torque(int shaft) const {
-    for (const Gear& g : train().gears)
-        if (g.output == shaft) return g.law.rated_output_torque;
-    for (const ShaftMotor& m : train().motors)
-        if (m.shaft == shaft) return m.law.rated_torque;
-    return 1.0;
-}
-
-template <class Sizes>
 void SwitchedTrain<Sizes>::set_near_event() {
-    for (std::size_t m = 0; m < train().motors.size(); ++m) {
-        const MotorPlace& p = places().motors[m];
-        if (p.torque != nowhere) near_state_[p.torque] = far_from_event * train().motors[m].law.rated_torque;
-        near_input_[p.command] = far_from_event;
-    }
-    for (std::size_t s = 0; s < train().shafts.size(); ++s) {
-        const ShaftPlace& p = places().shafts[s];
-        near_state_[p.speed] = far_from_event * rated_speed(static_cast<int>(s));
-        if (p.angle != nowhere) near_state_[p.angle] = far_from_event;
-        if (p.load != nowhere) near_input_[p.load] = far_from_event * rated_torque(static_cast<int>(s));
-    }
-    for (std::size_t g = 0; g < train().gears.size(); ++g) {
-        const Gear& gear = train().gears[g];
-        if (places().gears[g].twist != nowhere)
-            near_state_[places().gears[g].twist] =
-                far_from_event * (gear.rigid() ? 1.0 : gear.law.rated_output_torque / gear.law.curve.largest_slope());
-    }
-    for (const BrakePlace& b : places().brakes) near_input_[b.input] = far_from_event;
-    for (const CouplingPlace& c : places().couplings)
-        if (c.input != nowhere) near_input_[c.input] = far_from_event;
+    rated_scale(assembly_, near_state_);
+    for (double& x : near_state_) x *= far_from_event;
     for (int a = 0; a < assembly_.layout().angles; ++a) near_state_[n_.coupled + a] = far_from_event;
+    near_input_.fill(far_from_event);
+    for (std::size_t s = 0; s < train().shafts.size(); ++s)
+        if (const int load = places().shafts[s].load; load != nowhere)
+            near_input_[load] = far_from_event * rated_torque(train(), static_cast<int>(s));
 }
 
 template <class Sizes>
