@@ -14,6 +14,8 @@ namespace {
 
 // The classic drive, with the train's search run beside its own at every event.
 struct Shadowed {
+    using Dims = DriveDims;
+
     explicit Shadowed(const Drive& d) : drive(d), classic(drive), twins(d), train(twins.assembly), cache_(train) {}
 
     lostmotion::Regime build(const RegimeKey& key) const { return classic.build(key); }
@@ -31,14 +33,14 @@ struct Shadowed {
     }
     template <class Cache>
     lostmotion::Found next(Cache& cache, lostmotion::Instant& now, const lostmotion::Guard* fired,
-                           RegimeKey& key) const {
+                           RegimeKey& key, const std::array<double, n_inputs>& input) const {
         Instant mine = instant(now);
         Key my_key = twins.key(key);
         const Guard* my_guard = nullptr;
         if (fired != nullptr)
             my_guard = &cache_.regime(my_key).guards[static_cast<std::size_t>(fired - cache.regime(key).guards.data())];
-        const Found found = train.next(cache_, mine, my_guard, my_key);
-        const lostmotion::Found expected = classic.next(cache, now, fired, key);
+        const Found found = train.next(cache_, mine, my_guard, my_key, left(mine, input));
+        const lostmotion::Found expected = classic.next(cache, now, fired, key, input);
         compare(expected, now, key, found, mine, my_key, fired == nullptr ? "input" : "guard");
         return expected;
     }
@@ -52,6 +54,11 @@ struct Shadowed {
         for (int k = 0; k < lostmotion::n_derivatives; ++k)
             for (int i = 0; i < lostmotion::n_inputs; ++i) out.input[k][i] = now.input[k][i];
         for (int i = 0; i < lostmotion::n_inputs; ++i) out.input_size[i] = now.input_size[i];
+        return out;
+    }
+    static std::array<double, max_inputs> left(const Instant& now, const std::array<double, n_inputs>& input) {
+        auto out = now.input[0];
+        std::copy(input.begin(), input.end(), out.begin());
         return out;
     }
     void set(Instant& out, Term term, double value) const {
@@ -193,7 +200,7 @@ TEST_CASE("pivoting and trying all combinations find the same accelerations, wit
                   doctest::Approx(evaluate(a.layout(), cache.regime(other_key).rate[s.speed], other)).epsilon(1e-9));
     }
     CHECK(compared > 200);
-    CHECK(worst <= 600);
+    CHECK(worst < 1000);  // of a self-locking train, all ways of searching together
 }
 
 TEST_CASE("a jump that starts a chain with all its contacts at rest is found in few trials") {
@@ -224,7 +231,7 @@ TEST_CASE("a jump that starts a chain with all its contacts at rest is found in 
         for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-3.0, 3.0);
         system.trials = 0;
         CAPTURE(n);
-        REQUIRE(system.next(cache, now, static_cast<const Guard*>(nullptr), key) == Found::yes);
+        REQUIRE(system.next(cache, now, static_cast<const Guard*>(nullptr), key, std::array<double, max_inputs>{}) == Found::yes);
         worst = std::max(worst, system.trials);
         contacts = a.layout().contacts;
         const std::vector<double> expected = least_constraint(a, now, 20000);
@@ -274,10 +281,12 @@ TEST_CASE("the search works on packed regimes and the kernel's own instant as on
         CHECK(plain.start(cache, now, key) == packed.start(wide_cache, wide, wide_key));
         CHECK(key == wide_key);
         for (int jump = 0; jump < 3; ++jump) {
+            const auto before = now.input[0];
+            const auto wide_before = wide.input[0];
             for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-2.0, 2.0);
             inputs();
-            CHECK(plain.next(cache, now, static_cast<const Guard*>(nullptr), key) ==
-                  packed.next(wide_cache, wide, static_cast<const PackedGuard<Wide>*>(nullptr), wide_key));
+            CHECK(plain.next(cache, now, static_cast<const Guard*>(nullptr), key, before) ==
+                  packed.next(wide_cache, wide, static_cast<const PackedGuard<Wide>*>(nullptr), wide_key, wide_before));
             CHECK(key == wide_key);
             CHECK(std::equal(wide.memory.begin(), wide.memory.end(), now.memory.begin()));
         }

@@ -63,14 +63,18 @@ class TrainRun {
                 for (const TestInput& p : pieces)
                     if (p.from > now.time) limit = std::min(limit, p.from);
             see_inputs(now.time);
-            const Guard* fired = advance(std::min(limit, now.time + step));
+            const double end = std::min(limit, now.time + step), turn = turning(end);
+            const Guard* fired = advance(turn);
             if (fired != nullptr) {
                 events.push_back({now.time, fired->kind, fired->contact, fired->branch, key, key});
-                found = fired->kind == Guard::outside ? Found::outside : system.next(cache_, now, fired, key);
+                found = fired->kind == Guard::outside ? Found::outside : system.next(cache_, now, fired, key, now.input[0]);
                 events.back().after = key;
-            } else if (now.time == limit && limit < t_end) {
+            } else if ((now.time == limit && limit < t_end) || turn < end) {
+                auto before = now.input[0];
+                for (int i = 0; i < layout().inputs; ++i)
+                    before[static_cast<std::size_t>(i)] = left_piece(static_cast<std::size_t>(i), now.time).derivative(0, now.time);
                 see_inputs(now.time);
-                found = system.next(cache_, now, static_cast<const Guard*>(nullptr), key);
+                found = system.next(cache_, now, static_cast<const Guard*>(nullptr), key, before);
             }
             if (events.size() > 100000) return false;
         }
@@ -85,6 +89,26 @@ class TrainRun {
         const auto& all = inputs[input];
         std::size_t k = 0;
         while (k + 1 < all.size() && all[k + 1].from <= t) ++k;
+        return all[k];
+    }
+    // Where the input that drives a contact at its limit turns back, or `end`.
+    double turning(double end) {
+        const int i = regime().driving_input;
+        if (i < 0) return end;
+        const TestInput& input = piece(static_cast<std::size_t>(i), now.time);
+        const auto way = [&](double t) { return regime().driving_way * input.derivative(1, t); };
+        if (way(end) >= 0.0) return end;
+        double low = now.time, high = end;
+        for (int b = 0; b < 60; ++b) {
+            const double middle = 0.5 * (low + high);
+            (way(middle) >= 0.0 ? low : high) = middle;
+        }
+        return high;
+    }
+    const TestInput& left_piece(std::size_t input, double t) const {
+        const auto& all = inputs[input];
+        std::size_t k = 0;
+        while (k + 1 < all.size() && all[k + 1].from < t) ++k;
         return all[k];
     }
     void see_inputs(double t) {

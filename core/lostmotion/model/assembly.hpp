@@ -112,6 +112,7 @@ class Assembly {
     void add_twist_pieces(int gear, Regime& r) const;
     void add_speed_pieces(int shaft, Regime& r) const;
     void add_input_limits(Regime& r) const;
+    void add_turning(Regime& r) const;
     void add_angle_pieces(int branch, int turn, int shaft, const PeriodicCurve& curve, Regime& r) const;
 
     Guard& add(Regime& r, const Row& form, Guard::Kind kind, int contact, int branch, int neighbour) const {
@@ -153,6 +154,7 @@ inline Regime Assembly::build(const Key& key) const {
     add_gear_capacities(r);
     add_coupling_capacities(r);
     for (int s = static_cast<int>(train_.shafts.size()) - 1; s >= 0; --s) add_shaft_guards(s, r);
+    add_turning(r);
     for (std::size_t g = 0; g < train_.gears.size(); ++g) add_twist_pieces(static_cast<int>(g), r);
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) add_speed_pieces(static_cast<int>(s), r);
     add_input_limits(r);
@@ -419,6 +421,40 @@ inline void Assembly::add_loss_edges(int gear, Regime& r) const {
     r.in_data = r.in_data && g.in_data(r.key.branch[p.cell]);
 }
 
+// A shaft that "slips" but is kept at rest by others is at its limit: the torques go along with what drives it there, as
+// long as that goes on. When it turns back the torques stay. What drives it is the torque that it would take if it were
+// stuck, in terms of the states and inputs.
+inline void Assembly::add_turning(Regime& r) const {
+    for (int c = 0; c < layout().contacts; ++c) {
+        if (places_.contacts[c].kind != ContactPlace::shaft || r.key.modes[c] == 0 || !r.at_rest[c]) continue;
+        Regime stuck;
+        stuck.key = r.key;
+        stuck.key.modes[c] = 0;
+        stuck.ties = tie(places_.contacts, static_cast<int>(train_.shafts.size()), stuck.key.modes.data());
+        std::vector<Row> acceleration(train_.shafts.size());
+        compose(stuck.key, stuck, acceleration);
+        Row& torque = stuck.contact_torque[c];
+        if (!solve_reactions(places_.contacts, layout(), stuck.key, stuck.ties, acceleration, {&torque})) continue;
+        Row rate;
+        for (int k = 0; k < layout().states; ++k) {
+            // Of what acts on the shaft itself, the whole: no rounding of the elimination.
+            double share = torque.c[k];
+            if (std::fabs(std::fabs(share) - 1.0) < 1e-14) share = share > 0.0 ? 1.0 : -1.0;
+            if (share != 0.0) rate += share * r.rate[k];
+        }
+        const double way = r.key.modes[c];
+        if (std::any_of(rate.c.begin(), rate.c.end(), [](double v) { return v != 0.0; }))
+            add(r, way * rate, Guard::turning, c, nowhere, 0);
+        for (int i = 0; i < layout().inputs; ++i) {
+            const double share = torque.c[layout().first_input + i];
+            if (std::fabs(share) < 1e-14) continue;
+            r.driving_input = i;
+            r.driving_way = way * (share > 0.0 ? 1.0 : -1.0);
+            r.driven_contact = c;
+        }
+    }
+}
+
 // Pieces of the torsion curve, and where the flanks part and touch again.
 inline void Assembly::add_twist_pieces(int gear, Regime& r) const {
     const Gear& g = train_.gears[gear];
@@ -426,10 +462,13 @@ inline void Assembly::add_twist_pieces(int gear, Regime& r) const {
     if (twist_rests(gear, r)) return;
     const TorsionCurve& curve = g.law.curve;
     const int piece = r.key.branch[p.piece];
+    const int slip = p.contact == nowhere ? 0 : r.key.modes[p.contact];
     if (piece < curve.outermost_piece())
-        add(r, terms_.one(curve.upper(piece)) - terms_.state(p.twist), Guard::edge, p.contact, p.piece, piece + 1);
+        add(r, terms_.one(curve.upper(piece)) - terms_.state(p.twist), Guard::edge, p.contact, p.piece, piece + 1)
+            .behind = slip < 0;
     if (piece > -curve.outermost_piece())
-        add(r, terms_.state(p.twist) - terms_.one(curve.lower(piece)), Guard::edge, p.contact, p.piece, piece - 1);
+        add(r, terms_.state(p.twist) - terms_.one(curve.lower(piece)), Guard::edge, p.contact, p.piece, piece - 1)
+            .behind = slip > 0;
     if (p.parted == nowhere || piece == 0) return;
     const bool parted = r.key.branch[p.parted] != 0;
     const Row pressed = terms_.state(p.twist, curve.slope(piece)) + terms_.one(curve.offset(piece)) +

@@ -59,8 +59,9 @@ class SwitchedTrain {
     // after an input has changed. Only the contact whose speed has reached zero has stopped, and a stop of a twist is
     // a turning point, which sets the hysteresis capacity anew (16). All other contacts that move go on in their
     // direction, however slowly: an input acts on the speeds through the accelerations only.
-    template <class Cache, class Now, class G>
-    Found next(Cache& cache, Now& now, const G* fired, Key& key) const;
+    // input: the inputs up to this instant.
+    template <class Cache, class Now, class G, class Input>
+    Found next(Cache& cache, Now& now, const G* fired, Key& key, const Input& input) const;
 
     using Rest = std::array<bool, max_contacts>;
     // Sets the speeds of contacts at rest to what they are, to the last bit, and marks those that this implies.
@@ -99,9 +100,11 @@ class SwitchedTrain {
         int contact = nowhere, mode = 0;  // the mode that it suggests
         int order = 0;
         double relative = 0.0;
+        bool turning = false;
     };
     struct Trial {
         Found found = Found::inconsistent;
+        bool turns_back = false;  // all that is violated is that what drives a contact to its limit turns back
         std::vector<Violation> violations;  // of the contacts, once piece and cell are found
     };
 
@@ -140,6 +143,8 @@ class SwitchedTrain {
     template <class Cache, class Now>
     Trial settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const;
     template <class Cache, class Now>
+    Found settle_at_limit(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const;
+    template <class Cache, class Now>
     Trial walk(Cache& cache, Now& now, const Event& event, Key trial, Key& key) const;
     template <class Cache, class Now>
     bool breaks_away(Cache& cache, Now& now, const Event& event, double margin_size, double near, Key& key) const;
@@ -165,19 +170,29 @@ class SwitchedTrain {
     auto violated(const R& r, const Now& now, const Guards& ignored, const Event* event,
                   std::vector<Violation>& of_contacts) const -> decltype(&r.guards[0]) {
         Motion<Sizes, R, Now> motion(n_, r, now);
+        if (r.driving_input >= 0 && turns_back(r, now)) of_contacts.push_back({r.driven_contact, 0, n_derivatives, 0.0, true});
         for (std::size_t g = 0; g < guard_count(r); ++g) {
             const auto& guard = r.guards[g];
-            if (ignored[g]) continue;
+            if (ignored[g] || guard.behind) continue;
             const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);
             if (value > clear_of_zero * size + near_event(guard.form)) continue;
             const auto s = motion.sign(guard.form, event != nullptr && event->by_value_alone(guard));
             if (s.sign >= 0) continue;
-            if (guard.kind != Guard::speed && guard.kind != Guard::capacity) return &guard;
+            if (guard.is_edge() || guard.kind == Guard::outside) return &guard;
             const bool of_speed = guard.kind == Guard::speed;
-            of_contacts.push_back(
-                {guard.contact, of_speed ? 0 : guard.neighbour, s.order - (of_speed ? 1 : 0), -s.relative});
+            of_contacts.push_back({guard.contact, of_speed ? 0 : guard.neighbour, s.order - (of_speed ? 1 : 0), -s.relative, guard.kind == Guard::turning});
         }
         return nullptr;
+    }
+    // Does the input that drives a contact at its limit turn back just after now?
+    template <class R, class Now>
+    static bool turns_back(const R& r, const Now& now) {
+        const auto way = [&](std::size_t k) {
+            return r.driving_way * now.input[k][static_cast<std::size_t>(r.driving_input)];
+        };
+        for (std::size_t k = 1; k + 1 < n_derivatives; ++k)
+            if (std::fabs(way(k)) > time_rounding * std::fabs(now.time * way(k + 1))) return way(k) < 0.0;
+        return false;
     }
     template <class R, class Now>
     double violation(const R& r, const Now& now, const Event& event) const;
@@ -190,8 +205,8 @@ class SwitchedTrain {
     }
     template <class Cache, class Now, class G>
     bool goes_on(Cache& cache, Now& now, const G& fired, Key& key) const;
-    template <class Cache, class Now>
-    bool stays(Cache& cache, const Now& now, const Key& key) const;
+    template <class Cache, class Now, class Input>
+    bool stays(Cache& cache, const Now& now, const Key& key, const Input& input) const;
 
     static constexpr double largest_violation = 1e-6;  // that rounding may make
     static constexpr double most = 729.0;              // combinations that are tried as a last resort

@@ -63,15 +63,17 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
 }
 
 template <class Sizes>
-template <class Cache, class Now, class G>
-Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& key) const {
-    if (fired != nullptr ? goes_on(cache, now, *fired, key) : stays(cache, now, key)) return Found::yes;
+template <class Cache, class Now, class G, class Input>
+Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& key, const Input& input) const {
+    if (fired != nullptr ? goes_on(cache, now, *fired, key) : stays(cache, now, key, input)) return Found::yes;
+    Now left = now;
+    left.input[0] = input;
     const auto& old = cache.regime(key);
     Event event;
     event.before = key;
-    for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], now);
+    for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], left);
     for (std::size_t k = 0; k < train().couplings.size(); ++k)
-        event.coupling[k] = evaluate(n_, old.contact_torque[places().couplings[k].contact], now);
+        event.coupling[k] = evaluate(n_, old.contact_torque[places().couplings[k].contact], left);
     double margin_size = 0.0, near = 0.0;
     if (fired != nullptr) {
         event.with_guard = true;
@@ -228,7 +230,8 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
             for (const auto& [modes, is_limit] : group) {
                 if (is_limit != limit) continue;
                 now.memory = before;
-                const Found found = settle(cache, now, modes, event, key).found;
+                const Found found = limit ? settle_at_limit(cache, now, modes, event, key)
+                                          : settle(cache, now, modes, event, key).found;
                 if (found == Found::yes && !event.closest && !limit) return found;
                 if (found == Found::outside) worst = found;
                 if (found != Found::yes) continue;
@@ -299,6 +302,9 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
     while (tried.size() < longest_pivoting) {
         now.memory = before;
         Trial trial = settle(cache, now, modes, event, key);
+        if (trial.found == Found::inconsistent && trial.turns_back &&
+            settle_at_limit(cache, now, modes, event, key) == Found::yes)
+            return Found::yes;
         if (trial.found == Found::outside) worst = Found::outside;
         if (trial.found == Found::yes && !event.closest) {
             hold_where_possible(cache, now, before, modes, event, key);
@@ -372,7 +378,7 @@ double SwitchedTrain<Sizes>::violation(const R& r, const Now& now, const Event& 
     double worst = 0.0;
     for (std::size_t g = 0; g < guard_count(r); ++g) {
         const auto& guard = r.guards[g];
-        if (ignored[g] || (guard.kind != Guard::speed && guard.kind != Guard::capacity)) continue;
+        if (ignored[g] || guard.is_edge() || guard.kind == Guard::outside) continue;
         const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);
         const auto [rate, rate_size] = motion.derivative(guard.form, 1);
         const bool zero = std::fabs(value) <= motion.noise(size, rate);
@@ -389,7 +395,7 @@ double SwitchedTrain<Sizes>::violation(const R& r, const Now& now, const Event& 
 template <class Sizes>
 template <class Cache, class Now, class G>
 bool SwitchedTrain<Sizes>::goes_on(Cache& cache, Now& now, const G& fired, Key& key) const {
-    if (fired.kind != Guard::edge && fired.kind != Guard::input_limit) return false;
+    if (!fired.is_edge()) return false;
     Key beyond = key;
     const auto before = now.memory;
     cross(fired, now, beyond);
@@ -406,9 +412,10 @@ bool SwitchedTrain<Sizes>::goes_on(Cache& cache, Now& now, const G& fired, Key& 
 // An input has changed: does the regime go on? The contacts that move keep their direction. A guard that is zero to
 // rounding has not ended it; the solver finds it if it goes on to fall.
 template <class Sizes>
-template <class Cache, class Now>
-bool SwitchedTrain<Sizes>::stays(Cache& cache, const Now& now, const Key& key) const {
+template <class Cache, class Now, class Input>
+bool SwitchedTrain<Sizes>::stays(Cache& cache, const Now& now, const Key& key, const Input& input) const {
     const auto& r = cache.regime(key);
+    if (const int i = r.driving_input; i >= 0 && r.driving_way * (now.input[0][i] - input[i]) < 0.0) return false;
     Event lasting;
     lasting.by_value = true;
     std::vector<Violation> of_contacts;

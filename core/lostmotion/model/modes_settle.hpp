@@ -190,6 +190,29 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
     return result;
 }
 
+// Is this combination, in which a contact is at its limit, consistent, or, if what drives it there turns back, does
+// everything stand at those torques?
+template <class Sizes>
+template <class Cache, class Now>
+Found SwitchedTrain<Sizes>::settle_at_limit(Cache& cache, Now& now, const Key& modes, const Event& event,
+                                            Key& key) const {
+    Event thorough = event;
+    thorough.from_each_load = true;
+    const Found found = settle(cache, now, modes, thorough, key).found;
+    if (found != Found::inconsistent || event.closest) return found;
+    thorough.closest = true;
+    if (settle(cache, now, modes, thorough, key).found != Found::yes) return found;
+    const auto& r = cache.regime(key);
+    Event standing = event;
+    for (std::size_t g = 0; g < train().gears.size(); ++g) standing.gear[g] = evaluate(n_, r.output_torque[g], now);
+    for (std::size_t k = 0; k < train().couplings.size(); ++k)
+        standing.coupling[k] = evaluate(n_, r.contact_torque[places().couplings[k].contact], now);
+    Key stuck = modes;
+    for (int c = 0; c < contacts(); ++c)
+        if (r.at_rest[c]) stuck.modes[c] = 0;
+    return settle(cache, now, stuck, standing, key).found;
+}
+
 // From a piece and a cell across each of their edges that is violated, until none is: do the contacts hold there?
 template <class Sizes>
 template <class Cache, class Now>
@@ -208,9 +231,12 @@ auto SwitchedTrain<Sizes>::walk(Cache& cache, Now& now, const Event& event, Key 
             return result;
         }
         if (left == nullptr) {
+            result.turns_back = std::all_of(result.violations.begin(), result.violations.end(),
+                                            [](const Violation& v) { return v.turning; });
             if (!result.violations.empty() && !event.closest) return result;
+            result.turns_back = false;
             if (event.has_ended(trial) && !event.closest) {
-                if (event.kind == Guard::capacity) {
+                if (event.kind != Guard::edge && event.kind != Guard::input_limit) {
                     result.violations.push_back({event.contact, event.neighbour, n_derivatives, 0.0});
                     return result;
                 }

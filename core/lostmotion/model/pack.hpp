@@ -39,6 +39,9 @@ struct PackedGuard {
     bool by_touch = false;
     int memory = -1;
     double shift = 0.0;
+    bool behind = false;
+
+    bool is_edge() const { return kind == Guard::edge || kind == Guard::input_limit; }
 };
 
 template <class D>
@@ -57,6 +60,8 @@ struct PackedRegime {
     std::array<Follower, D::coupled> followers{};
     int n_followers = 0;
     bool solvable = true, in_data = true;
+    int driving_input = -1, driven_contact = -1;
+    double driving_way = 0.0;
     bool complete = true;  // false: it has more guards than there is room for
 };
 
@@ -71,7 +76,7 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
     for (const Guard& g : r.guards) {
         if (out.n_guards == D::guards) break;
         out.guards[out.n_guards++] = {pack<D>(g.form, n), g.kind,     g.contact, g.branch,
-                                      g.neighbour,        g.by_touch, g.memory,  g.shift};
+                                      g.neighbour,        g.by_touch, g.memory, g.shift, g.behind};
     }
     std::copy_n(r.at_rest.begin(), n.contacts, out.at_rest.begin());
     const auto& shafts = a.places().shafts;
@@ -79,6 +84,9 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
         if (const int leader = r.ties.leader[s]; !r.ties.at_rest[s] && leader != s)
             out.followers[out.n_followers++] = {shafts[s].speed, shafts[leader].speed, r.ties.factor[s]};
     out.solvable = r.solvable;
+    out.driving_input = r.driving_input;
+    out.driving_way = r.driving_way;
+    out.driven_contact = r.driven_contact;
     out.in_data = r.in_data;
     return out;
 }

@@ -34,6 +34,7 @@ struct Guard {
         capacity,     // a stuck contact is overcome
         edge,         // a state leaves its piece or cell of a law
         input_limit,  // an input crosses a limit
+        turning,      // the torque that drives a contact at its limit turns back
         outside,      // the extended data of a law end
     };
     Row form;
@@ -44,6 +45,10 @@ struct Guard {
     bool by_touch = false;  // ends the regime also by touching zero without falling through it
     int memory = -1;        // set if crossing shifts a memory (the turn of an angle) by `shift`
     double shift = 0.0;
+    bool behind = false;  // an edge that the twist slips away from, so that it does not reach it
+
+    // Edge of a law or limit of an input, with a neighbour beyond.
+    bool is_edge() const { return kind == edge || kind == input_limit; }
 };
 
 // Speeds that the contacts at rest tie together: w_k = factor * w_leader, or 0.
@@ -65,6 +70,10 @@ struct Regime {
     std::vector<Row> contact_torque;   // what each contact takes [N m]
     std::array<bool, max_contacts> at_rest{};  // contacts whose speeds this regime keeps at zero
     Ties ties;
+    // While a shaft at rest gives all that its contact can, an input by which it is driven there has to go on this way.
+    int driving_input = -1;  // -1: none
+    double driving_way = 0.0;
+    int driven_contact = -1;
     bool solvable = true;  // false: the reactions have no unique solution (jamming)
     bool in_data = true;   // false: a loss map is used outside its data
 };

@@ -28,7 +28,8 @@ struct StuckRows {
     }
 };
 
-// Does a torque that the gears of a moving, rigidly tied part pass on turn it forward? Without friction the matrix of
+// Does a torque that the gears of a rigidly tied part pass on turn it forward or, while a contact of it is at its limit,
+// wind it up? Without friction the matrix of
 // accelerations over reactions, -d(rows)/d(reactions), is positive definite. Friction that changes the sign of its
 // determinant jams: no motion or several (Painleve).
 inline bool moves_freely(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key,
@@ -37,7 +38,7 @@ inline bool moves_freely(const std::vector<ContactPlace>& contacts, const Layout
     std::vector<bool> done(all.rows.size());
     for (std::size_t first = 0; first < all.rows.size(); ++first) {
         const auto shaft = [&](std::size_t k) { return contacts[all.unknowns[k] - layout.terms].a; };
-        if (done[first] || ties.at_rest[shaft(first)]) continue;
+        if (done[first]) continue;
         std::vector<std::size_t> part;
         for (std::size_t k = first; k < all.rows.size(); ++k)
             if (ties.leader[shaft(k)] == ties.leader[shaft(first)]) {
