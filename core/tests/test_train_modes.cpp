@@ -32,8 +32,8 @@ struct Shadowed {
         return expected;
     }
     template <class Cache>
-    lostmotion::Found next(Cache& cache, lostmotion::Instant& now, const lostmotion::Guard* fired,
-                           RegimeKey& key, const std::array<double, n_inputs>& input) const {
+    lostmotion::Found next(Cache& cache, lostmotion::Instant& now, const lostmotion::Guard* fired, RegimeKey& key,
+                           const std::array<double, n_inputs>& input) const {
         Instant mine = instant(now);
         Key my_key = twins.key(key);
         const Guard* my_guard = nullptr;
@@ -231,7 +231,8 @@ TEST_CASE("a jump that starts a chain with all its contacts at rest is found in 
         for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-3.0, 3.0);
         system.trials = 0;
         CAPTURE(n);
-        REQUIRE(system.next(cache, now, static_cast<const Guard*>(nullptr), key, std::array<double, max_inputs>{}) == Found::yes);
+        REQUIRE(system.next(cache, now, static_cast<const Guard*>(nullptr), key, std::array<double, max_inputs>{}) ==
+                Found::yes);
         worst = std::max(worst, system.trials);
         contacts = a.layout().contacts;
         const std::vector<double> expected = least_constraint(a, now, 20000);

@@ -67,12 +67,14 @@ class TrainRun {
             const Guard* fired = advance(turn);
             if (fired != nullptr) {
                 events.push_back({now.time, fired->kind, fired->contact, fired->branch, key, key});
-                found = fired->kind == Guard::outside ? Found::outside : system.next(cache_, now, fired, key, now.input[0]);
+                found =
+                    fired->kind == Guard::outside ? Found::outside : system.next(cache_, now, fired, key, now.input[0]);
                 events.back().after = key;
             } else if ((now.time == limit && limit < t_end) || turn < end) {
                 auto before = now.input[0];
                 for (int i = 0; i < layout().inputs; ++i)
-                    before[static_cast<std::size_t>(i)] = left_piece(static_cast<std::size_t>(i), now.time).derivative(0, now.time);
+                    before[static_cast<std::size_t>(i)] =
+                        left_piece(static_cast<std::size_t>(i), now.time).derivative(0, now.time);
                 see_inputs(now.time);
                 found = system.next(cache_, now, static_cast<const Guard*>(nullptr), key, before);
             }
@@ -97,7 +99,7 @@ class TrainRun {
         if (i < 0) return end;
         const TestInput& input = piece(static_cast<std::size_t>(i), now.time);
         const auto way = [&](double t) { return regime().driving_way * input.derivative(1, t); };
-        if (way(end) >= 0.0) return end;
+        if (way(end) >= 0.0 || way(now.time) <= 0.0) return end;
         double low = now.time, high = end;
         for (int b = 0; b < 60; ++b) {
             const double middle = 0.5 * (low + high);

@@ -421,9 +421,9 @@ inline void Assembly::add_loss_edges(int gear, Regime& r) const {
     r.in_data = r.in_data && g.in_data(r.key.branch[p.cell]);
 }
 
-// A shaft that "slips" but is kept at rest by others is at its limit: the torques go along with what drives it there, as
-// long as that goes on. When it turns back the torques stay. What drives it is the torque that it would take if it were
-// stuck, in terms of the states and inputs.
+// A shaft that "slips" but is kept at rest by others is at its limit: the torques go along with what drives it there,
+// as long as that goes on. When it turns back the torques stay. What drives it is the torque that it would take if it
+// were stuck, in terms of the states and inputs.
 inline void Assembly::add_turning(Regime& r) const {
     for (int c = 0; c < layout().contacts; ++c) {
         if (places_.contacts[c].kind != ContactPlace::shaft || r.key.modes[c] == 0 || !r.at_rest[c]) continue;
@@ -443,15 +443,20 @@ inline void Assembly::add_turning(Regime& r) const {
             if (share != 0.0) rate += share * r.rate[k];
         }
         const double way = r.key.modes[c];
-        if (std::any_of(rate.c.begin(), rate.c.end(), [](double v) { return v != 0.0; }))
-            add(r, way * rate, Guard::turning, c, nowhere, 0);
-        for (int i = 0; i < layout().inputs; ++i) {
-            const double share = torque.c[layout().first_input + i];
-            if (std::fabs(share) < 1e-14) continue;
-            r.driving_input = i;
-            r.driving_way = way * (share > 0.0 ? 1.0 : -1.0);
-            r.driven_contact = c;
-        }
+        const bool by_states = std::any_of(rate.c.begin(), rate.c.end(), [](double v) { return v != 0.0; });
+        int inputs = 0, input = nowhere;
+        for (int i = 0; i < layout().inputs; ++i)
+            if (std::fabs(torque.c[layout().first_input + i]) > 1e-14) {
+                ++inputs;
+                input = i;
+            }
+        // Only a rate that is a form of the states, or that of one input, can be watched; with more of them the torques
+        // follow all the time.
+        if (by_states && inputs == 0) add(r, way * rate, Guard::turning, c, nowhere, 0);
+        if (by_states || inputs != 1) continue;
+        r.driving_input = input;
+        r.driving_way = way * (torque.c[layout().first_input + input] > 0.0 ? 1.0 : -1.0);
+        r.driven_contact = c;
     }
 }
 

@@ -170,7 +170,8 @@ class SwitchedTrain {
     auto violated(const R& r, const Now& now, const Guards& ignored, const Event* event,
                   std::vector<Violation>& of_contacts) const -> decltype(&r.guards[0]) {
         Motion<Sizes, R, Now> motion(n_, r, now);
-        if (r.driving_input >= 0 && turns_back(r, now)) of_contacts.push_back({r.driven_contact, 0, n_derivatives, 0.0, true});
+        if (r.driving_input >= 0 && turns_back(r, now))
+            of_contacts.push_back({r.driven_contact, 0, n_derivatives, 0.0, true});
         for (std::size_t g = 0; g < guard_count(r); ++g) {
             const auto& guard = r.guards[g];
             if (ignored[g] || guard.behind) continue;
@@ -180,7 +181,8 @@ class SwitchedTrain {
             if (s.sign >= 0) continue;
             if (guard.is_edge() || guard.kind == Guard::outside) return &guard;
             const bool of_speed = guard.kind == Guard::speed;
-            of_contacts.push_back({guard.contact, of_speed ? 0 : guard.neighbour, s.order - (of_speed ? 1 : 0), -s.relative, guard.kind == Guard::turning});
+            of_contacts.push_back({guard.contact, of_speed ? 0 : guard.neighbour, s.order - (of_speed ? 1 : 0),
+                                   -s.relative, guard.kind == Guard::turning});
         }
         return nullptr;
     }

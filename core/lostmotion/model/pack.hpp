@@ -75,8 +75,8 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
     out.complete = r.guards.size() <= static_cast<std::size_t>(D::guards);
     for (const Guard& g : r.guards) {
         if (out.n_guards == D::guards) break;
-        out.guards[out.n_guards++] = {pack<D>(g.form, n), g.kind,     g.contact, g.branch,
-                                      g.neighbour,        g.by_touch, g.memory, g.shift, g.behind};
+        out.guards[out.n_guards++] = {pack<D>(g.form, n), g.kind,   g.contact, g.branch, g.neighbour,
+                                      g.by_touch,         g.memory, g.shift,   g.behind};
     }
     std::copy_n(r.at_rest.begin(), n.contacts, out.at_rest.begin());
     const auto& shafts = a.places().shafts;

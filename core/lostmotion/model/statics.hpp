@@ -28,10 +28,9 @@ struct StuckRows {
     }
 };
 
-// Does a torque that the gears of a rigidly tied part pass on turn it forward or, while a contact of it is at its limit,
-// wind it up? Without friction the matrix of
-// accelerations over reactions, -d(rows)/d(reactions), is positive definite. Friction that changes the sign of its
-// determinant jams: no motion or several (Painleve).
+// Does a torque that the gears of a rigidly tied part pass on turn it forward or, while a contact of it is at its
+// limit, wind it up? Without friction the matrix of accelerations over reactions, -d(rows)/d(reactions), is positive
+// definite. Friction that changes the sign of its determinant jams: no motion or several (Painleve).
 inline bool moves_freely(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key,
                          const Ties& ties, const std::vector<Row>& acceleration) {
     const StuckRows all(contacts, layout, key, ties, acceleration);
