@@ -1,0 +1,165 @@
+// What is wrong with a train, in one line with the names of its elements; empty if nothing is.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "places.hpp"
+
+namespace lostmotion::model {
+
+class TrainCheck {
+ public:
+    explicit TrainCheck(const Train& train) : train_(train) {}
+
+    std::string operator()() const {
+        for (const auto check : {&TrainCheck::shafts_exist, &TrainCheck::elements, &TrainCheck::inertias,
+                                 &TrainCheck::rigid_loops, &TrainCheck::turned, &TrainCheck::sizes})
+            if (std::string error = (this->*check)(); !error.empty()) return error;
+        return {};
+    }
+
+ private:
+    static std::string named(const char* kind, const std::string& name, std::size_t k) {
+        return std::string(kind) + " '" + (name.empty() ? std::to_string(k) : name) + "'";
+    }
+    std::string shaft(int s) const {
+        return named("shaft", train_.shafts[static_cast<std::size_t>(s)].name, static_cast<std::size_t>(s));
+    }
+    bool exists(int s) const { return s >= 0 && s < static_cast<int>(train_.shafts.size()); }
+
+    std::string shafts_exist() const {
+        if (train_.shafts.empty()) return "the train has no shaft";
+        if (std::string error = too_many("shafts", train_.shafts.size(), max_shafts); !error.empty()) return error;
+        const std::size_t contacts = train_.shafts.size() + train_.gears.size() + train_.couplings.size();
+        if (std::string error = too_many("shafts, gears and couplings", contacts, max_contacts); !error.empty())
+            return error;
+        const auto missing = [](const std::string& what, int s) {
+            return what + " names shaft number " + std::to_string(s) + ", which the train does not have";
+        };
+        const auto one = [&](const char* kind, const auto& elements) -> std::string {
+            for (std::size_t k = 0; k < elements.size(); ++k)
+                if (!exists(elements[k].shaft)) return missing(named(kind, elements[k].name, k), elements[k].shaft);
+            return {};
+        };
+        const auto two = [&](const char* kind, const auto& elements) -> std::string {
+            for (std::size_t k = 0; k < elements.size(); ++k) {
+                const auto& e = elements[k];
+                if (!exists(e.input)) return missing(named(kind, e.name, k), e.input);
+                if (!exists(e.output)) return missing(named(kind, e.name, k), e.output);
+                if (e.input == e.output)
+                    return named(kind, e.name, k) + " joins " + shaft(e.input) + " with itself; give it another output";
+            }
+            return {};
+        };
+        for (std::string error : {one("motor", train_.motors), two("gear", train_.gears), one("brake", train_.brakes),
+                                  two("coupling", train_.couplings), one("angle torque", train_.angle_torques)})
+            if (!error.empty()) return error;
+        return {};
+    }
+
+    std::string elements() const {
+        for (std::size_t k = 0; k < train_.gears.size(); ++k) {
+            const Gear& g = train_.gears[k];
+            const std::string name = named("gear", g.name, k);
+            if (!(g.law.ratio > 0.0))
+                return name + " has the ratio " + std::to_string(g.law.ratio) + "; it must be > 0";
+            if (g.efficiencies && !(g.efficiencies->driving() > 0.0))
+                return name + " has a drive efficiency of " + std::to_string(g.efficiencies->driving()) +
+                       "; it must be > 0: no torque would turn it";
+            if (g.mesh_damping > 0.0 && g.rigid()) return name + " is rigid and has mesh damping; give it a stiffness";
+            if (g.parts_flanks() && g.law.has_hysteresis())
+                return name + " has backlash with both mesh damping and hysteresis; take one of them";
+            if (g.transmission_error.present() && (g.rigid() || g.law.has_hysteresis()))
+                return name + " has a transmission error; it needs a stiffness, without hysteresis";
+        }
+        for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
+            const DryFriction& f = train_.shafts[s].friction;
+            if (f.speeds.size() != f.torques.size() || (!f.speeds.empty() && f.speeds[0] != 0.0))
+                return shaft(static_cast<int>(s)) + " has a friction curve that does not begin at speed 0";
+            for (std::size_t k = 1; k < f.speeds.size(); ++k)
+                if (!(f.speeds[k] > f.speeds[k - 1]))
+                    return shaft(static_cast<int>(s)) + " has a friction curve whose speeds do not rise";
+        }
+        return {};
+    }
+
+    std::string inertias() const {
+        const Places places(train_);
+        for (std::size_t s = 0; s < train_.shafts.size(); ++s)
+            if (!(places.shafts[s].inertia > 0.0))
+                return shaft(static_cast<int>(s)) + " has no inertia; give it one, or that of a motor or gear on it";
+        return {};
+    }
+
+    // Rigid gears alone: a loop either locks the train or leaves its torques undetermined.
+    std::string rigid_loops() const {
+        std::vector<ContactPlace> rigid;
+        for (std::size_t k = 0; k < train_.gears.size(); ++k)
+            if (train_.gears[k].rigid())
+                rigid.push_back({ContactPlace::gear, static_cast<int>(k), train_.gears[k].input, train_.gears[k].output,
+                                 1.0 / train_.gears[k].law.ratio, -1.0, true});
+        const int shafts = static_cast<int>(train_.shafts.size());
+        std::vector<std::int8_t> modes(rigid.size(), 1);
+        for (std::size_t k = 0; k < rigid.size(); ++k) {
+            const Ties before = tie(rigid, shafts, modes.data());
+            modes[k] = 0;
+            if (before.leader[rigid[k].a] != before.leader[rigid[k].b]) continue;
+            const auto gear = static_cast<std::size_t>(rigid[k].element);
+            double speed;
+            return named("gear", train_.gears[gear].name, gear) + " closes a loop of rigid gears with " +
+                   (moves_in_tie(rigid[k], before, speed) ? "another ratio: nothing could turn"
+                                                          : "the same ratio: its torque would not be determined") +
+                   "; give it a stiffness or leave it out";
+        }
+        return {};
+    }
+
+    // Does anything act on each part that hangs together?
+    std::string turned() const {
+        std::vector<int> part(train_.shafts.size());
+        for (std::size_t s = 0; s < part.size(); ++s) part[s] = static_cast<int>(s);
+        const auto join = [&](int a, int b) {
+            const int from = part[static_cast<std::size_t>(a)], to = part[static_cast<std::size_t>(b)];
+            std::replace(part.begin(), part.end(), from, to);
+        };
+        for (const Gear& g : train_.gears) join(g.input, g.output);
+        for (const Coupling& c : train_.couplings) join(c.input, c.output);
+        std::vector<bool> acted_on(part.size());
+        for (const ShaftMotor& m : train_.motors) acted_on[static_cast<std::size_t>(part[m.shaft])] = true;
+        for (const AngleTorque& t : train_.angle_torques) acted_on[static_cast<std::size_t>(part[t.shaft])] = true;
+        for (std::size_t s = 0; s < part.size(); ++s)
+            if (train_.shafts[s].loaded) acted_on[static_cast<std::size_t>(part[s])] = true;
+        for (std::size_t s = 0; s < part.size(); ++s)
+            if (!acted_on[static_cast<std::size_t>(part[s])])
+                return shaft(static_cast<int>(s)) +
+                       " is turned by nothing: no motor, gear or load torque acts on it; join it to the train";
+        return {};
+    }
+
+    std::string sizes() const {
+        const Layout n = Places(train_).layout;
+        const std::pair<const char*, std::pair<int, int>> counts[] = {{"states", {n.states, max_states}},
+                                                                      {"inputs", {n.inputs, max_inputs}},
+                                                                      {"memories", {n.memory, max_memory}},
+                                                                      {"terms", {n.terms, max_terms}},
+                                                                      {"piecewise laws", {n.branches, max_branches}}};
+        for (const auto& [what, count] : counts)
+            if (std::string error = too_many(what, static_cast<std::size_t>(count.first), count.second); !error.empty())
+                return error;
+        return {};
+    }
+    static std::string too_many(const char* what, std::size_t n, int most) {
+        if (n <= static_cast<std::size_t>(most)) return {};
+        return "the train has " + std::to_string(n) + ' ' + what + "; at most " + std::to_string(most) +
+               " are possible";
+    }
+
+    const Train& train_;
+};
+
+// Empty, or what is wrong with it. A train is checked before it is assembled.
+inline std::string check(const Train& train) { return TrainCheck(train)(); }
+
+}  // namespace lostmotion::model

@@ -1,0 +1,19 @@
+// Where a dry contact acts.
+#pragma once
+
+namespace lostmotion::model {
+
+inline constexpr int nowhere = -1;
+
+// A contact: of one shaft with the frame, or of two with one another.
+struct ContactPlace {
+    enum Kind { shaft, gear, coupling } kind = shaft;
+    int element = 0;
+    int a = 0, b = nowhere;           // shafts
+    double per_a = 1.0, per_b = 0.0;  // its speed is per_a w_a + per_b w_b
+    bool bilateral = false;           // a rigid gear: stuck, without limit
+    bool one_way = false;             // a freewheel: stuck or -1
+    int locked = nowhere;             // memory: its torque while the motion does not determine it
+};
+
+}  // namespace lostmotion::model

@@ -1,0 +1,425 @@
+// Which combination of modes follows.
+#pragma once
+
+#include "modes.hpp"
+
+namespace lostmotion::model {
+
+template <class Sizes>
+void SwitchedTrain<Sizes>::set_near_event() {
+    rated_scale(assembly_, near_state_);
+    for (double& x : near_state_) x *= far_from_event;
+    for (int a = 0; a < assembly_.layout().angles; ++a) near_state_[n_.coupled + a] = far_from_event;
+    near_input_.fill(far_from_event);
+    for (std::size_t s = 0; s < train().shafts.size(); ++s)
+        if (const int load = places().shafts[s].load; load != nowhere)
+            near_input_[load] = far_from_event * rated_torque(train(), static_cast<int>(s));
+}
+
+template <class Sizes>
+template <class X, class AtRest>
+void SwitchedTrain<Sizes>::stop(X& x, AtRest& at_rest) const {
+    std::array<std::int8_t, max_contacts> modes{};
+    for (int c = 0; c < contacts(); ++c) modes[c] = at_rest[c] ? 0 : 1;
+    const Ties ties = tie(places().contacts, static_cast<int>(train().shafts.size()), modes.data());
+    for (int c = 0; c < contacts(); ++c) at_rest[c] = kept_at_rest(places().contacts[c], ties);
+    for (std::size_t s = 0; s < train().shafts.size(); ++s) {
+        double& w = x[places().shafts[s].speed];
+        if (ties.at_rest[s])
+            w = 0.0;
+        else if (ties.leader[s] != static_cast<int>(s))
+            w = x[places().shafts[ties.leader[s]].speed] * ties.factor[s];
+    }
+}
+
+template <class Sizes>
+template <class Cache, class Now>
+Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
+    key = Key{};
+    Event event;
+    for (int c = 0; c < contacts(); ++c) {
+        const ContactPlace& p = places().contacts[c];
+        const double a = p.per_a * now.x[places().shafts[p.a].speed],
+                     b = p.b == nowhere ? 0.0 : p.per_b * now.x[places().shafts[p.b].speed];
+        if (p.one_way && a + b > 0.0) return Found::inconsistent;
+        key.modes[c] = p.one_way || a + b < 0.0 ? -1 : +1;
+        event.at_rest[c] = p.bilateral || a == -b;
+    }
+    for (std::size_t g = 0; g < train().gears.size(); ++g) {
+        const Gear& gear = train().gears[g];
+        const GearPlace& p = places().gears[g];
+        if (p.error_turn != nowhere)
+            now.memory[p.error_turn] = gear.transmission_error.turn(now.x[places().shafts[gear.input].angle]);
+        const int locked = p.contact == nowhere ? nowhere : places().contacts[p.contact].locked;
+        event.gear[g] = !gear.rigid()       ? gear.law.curve.torque(now.x[p.twist])
+                        : locked == nowhere ? 0.0
+                                            : now.memory[locked];
+    }
+    for (std::size_t k = 0; k < train().angle_torques.size(); ++k) {
+        const AngleTorque& t = train().angle_torques[k];
+        now.memory[places().angle_torques[k].turn] = t.torque.turn(now.x[places().shafts[t.shaft].angle]);
+    }
+    return find(cache, now, event, key);
+}
+
+template <class Sizes>
+template <class Cache, class Now, class G, class Input>
+Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& key, const Input& input) const {
+    if (fired != nullptr ? goes_on(cache, now, *fired, key) : stays(cache, now, key, input)) return Found::yes;
+    Now left = now;
+    left.input[0] = input;
+    const auto& old = cache.regime(key);
+    Event event;
+    event.before = key;
+    for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], left);
+    for (std::size_t k = 0; k < train().couplings.size(); ++k)
+        event.coupling[k] = evaluate(n_, old.contact_torque[places().couplings[k].contact], left);
+    double margin_size = 0.0, near = 0.0;
+    if (fired != nullptr) {
+        event.with_guard = true;
+        event.kind = fired->kind;
+        event.contact = fired->contact;
+        event.branch = fired->branch;
+        event.neighbour = fired->neighbour;
+        event.memory = fired->memory;
+        event.shift = fired->shift;
+    }
+    Rest before{};
+    std::copy_n(old.at_rest.begin(), contacts(), before.begin());
+    event.at_rest = before;
+    if (fired != nullptr && fired->kind == Guard::speed) event.at_rest[fired->contact] = true;
+    stop(now.x, event.at_rest);
+    if (fired != nullptr) {
+        margin_size = magnitude(n_, fired->form, now);
+        near = near_event(fired->form);
+    }
+    for (std::size_t g = 0; g < train().gears.size(); ++g) {
+        const GearPlace& p = places().gears[g];
+        if (p.hysteresis != nowhere && event.at_rest[p.contact] && !before[p.contact])
+            now.memory[p.hysteresis] = train().gears[g].law.hysteresis_capacity(now.x[p.twist]);
+    }
+    if (event.with_guard && event.kind == Guard::capacity && breaks_away(cache, now, event, margin_size, near, key))
+        return Found::yes;
+    return find(cache, now, event, key);
+}
+
+// A contact whose capacity has been overcome begins to slip that way, from rest: there is nothing to decide as long as
+// all others go on as they were. If the capacity itself has gone with its margin, as where a load that alone holds a
+// self-locking gear reverses, the contact may as well stay stuck.
+template <class Sizes>
+template <class Cache, class Now>
+bool SwitchedTrain<Sizes>::breaks_away(Cache& cache, Now& now, const Event& event, double margin_size, double near,
+                                       Key& key) const {
+    if (margin_size <= near) return false;
+    Key modes = key;
+    modes.modes[event.contact] = static_cast<std::int8_t>(event.neighbour);
+    if (at_its_limit(modes)) return false;
+    Event slipping;
+    slipping.at_rest = event.at_rest;
+    slipping.at_rest[event.contact] = false;
+    slipping.gear = event.gear;
+    slipping.coupling = event.coupling;
+    const auto memory = now.memory;
+    Key slips;
+    if (settle(cache, now, modes, slipping, slips).found == Found::yes) {
+        // With a self-locking gear more torque may turn it the other way; by rounding it only seems to. (Of two shafts
+        // the solver finds that at once, by the speed that falls, and the contact is stuck again.)
+        const auto& r = cache.regime(slips);
+        Motion<Sizes, std::decay_t<decltype(r)>, Now> motion(n_, r, now);
+        const double mode = event.neighbour;
+        if (train().shafts.size() == 2 ||
+            motion.sign(mode * assembly_.contact_speed(event.contact)).relative >= -largest_violation) {
+            key = slips;
+            return true;
+        }
+    }
+    now.memory = memory;
+    return false;
+}
+
+// Tries the combinations of modes. Usually pieces and cells are found by a walk from those before. If the guards that
+// are zero or nearly so leave none, the motion is too small beside its torques for rounding to tell which of them
+// rise: then the combination that violates its guards least is taken. A train that jams violates them by more.
+template <class Sizes>
+template <class Cache, class Now>
+Found SwitchedTrain<Sizes>::find(Cache& cache, Now& now, Event event, Key& key) const {
+    const Key from = key;
+    const Found found = search(cache, now, event, from, key);
+    if (found == Found::yes) return found;
+    event.from_each_load =
+        std::any_of(train().gears.begin(), train().gears.end(), [](const Gear& g) { return g.has_dry_losses(); });
+    if (event.from_each_load && search(cache, now, event, from, key) == Found::yes) return Found::yes;
+    event.closest = true;
+    if (search(cache, now, event, from, key) == Found::yes) return Found::yes;
+    return found;
+}
+
+// A contact that "slips" while those that are stuck keep its speed at zero, or that would have to slip against another
+// that is tied to it, does not move: it gives all that it can, and what everything at rest leaves open follows from
+// that.
+template <class Sizes>
+bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
+    const std::vector<ContactPlace>& all = places().contacts;
+    const Ties ties = tie(all, static_cast<int>(train().shafts.size()), key.modes.data());
+    std::array<int, max_shafts> direction{};  // of each leader
+    for (std::size_t k = 0; k < all.size(); ++k) {
+        if (key.modes[k] == 0) continue;
+        const ContactPlace& c = all[k];
+        if (kept_at_rest(c, ties)) return true;
+        if (c.b != nowhere && ties.leader[c.a] != ties.leader[c.b]) continue;
+        double speed;
+        moves_in_tie(c, ties, speed);
+        const int way = key.modes[k] * (speed > 0.0 ? 1 : -1);
+        int& of_leader = direction[ties.leader[c.a]];
+        if (of_leader * way < 0) return true;
+        of_leader = way;
+    }
+    return false;
+}
+
+template <class Sizes>
+template <class Cache, class Now>
+Found SwitchedTrain<Sizes>::search(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
+    double combinations = 1.0;
+    for (int c = 0; c < contacts(); ++c)
+        if (event.at_rest[c] && !places().contacts[c].bilateral)
+            combinations *= places().contacts[c].one_way ? 2.0 : 3.0;
+    if (combinations <= few) return enumerate(cache, now, event, from, key);
+    const Found found = pivot(cache, now, event, from, key);
+    return found == Found::yes || combinations > most ? found : enumerate(cache, now, event, from, key);
+}
+
+// Those with most contacts stuck first. While everything stands the torques stay as they were, and give way only if
+// neither that nor a motion is consistent, and then by as little as they can.
+template <class Sizes>
+template <class Cache, class Now>
+Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
+    std::array<std::array<int, 3>, max_contacts> choice{};
+    std::array<int, max_contacts> n{}, at{};
+    for (int c = 0; c < contacts(); ++c) {
+        const ContactPlace& p = places().contacts[c];
+        if (p.bilateral)
+            choice[c][n[c]++] = 0;
+        else if (!event.at_rest[c])
+            choice[c][n[c]++] = from.modes[c];
+        else
+            for (const int mode : {0, +1, -1})
+                if (!(p.one_way && mode > 0)) choice[c][n[c]++] = mode;
+    }
+    std::vector<std::vector<std::pair<Key, bool>>> by_slips(static_cast<std::size_t>(contacts()) + 1);
+    while (true) {
+        Key modes;
+        std::size_t slips = 0;
+        for (int c = 0; c < contacts(); ++c) {
+            modes.modes[c] = static_cast<std::int8_t>(choice[c][at[c]]);
+            slips += modes.modes[c] != 0;
+        }
+        by_slips[slips].emplace_back(modes, at_its_limit(modes));
+        int c = contacts() - 1;
+        while (c >= 0 && ++at[c] == n[c]) at[c--] = 0;
+        if (c < 0) break;
+    }
+    const auto before = now.memory;  // all that a trial may change
+    Found worst = Found::inconsistent;
+    const double largest = event.closest ? largest_violation : std::numeric_limits<double>::infinity();
+    double least = largest;
+    Key closest;
+    auto of_closest = before;
+    for (const bool limit : {false, true})
+        for (const auto& group : by_slips)
+            for (const auto& [modes, is_limit] : group) {
+                if (is_limit != limit) continue;
+                now.memory = before;
+                const Found found = limit ? settle_at_limit(cache, now, modes, event, key)
+                                          : settle(cache, now, modes, event, key).found;
+                if (found == Found::yes && !event.closest && !limit) return found;
+                if (found == Found::outside) worst = found;
+                if (found != Found::yes) continue;
+                const double v = event.closest ? violation(cache.regime(key), now, event)
+                                               : torque_change(cache.regime(key), now, event);
+                if (v < least) {
+                    least = v;
+                    closest = key;
+                    of_closest = now.memory;
+                }
+            }
+    if (least == largest) {
+        now.memory = before;
+        key = from;
+        return worst;
+    }
+    key = closest;
+    now.memory = of_closest;
+    return Found::yes;
+}
+
+template <class Sizes>
+template <class Cache, class Now>
+Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
+    Key modes;
+    for (int c = 0; c < contacts(); ++c)
+        modes.modes[c] = event.at_rest[c] || places().contacts[c].bilateral ? std::int8_t{0} : from.modes[c];
+    const auto before = now.memory;
+    struct Tried {
+        Key modes;
+        std::vector<Violation> violations;
+    };
+    std::vector<Tried> tried;
+    std::vector<std::size_t> path;  // of those tried, as far as they may lead on
+    double least = largest_violation;
+    Key closest;
+    auto of_closest = before;
+    Found worst = Found::inconsistent;
+    const auto is_new = [&] {
+        return std::none_of(tried.begin(), tried.end(), [&](const Tried& o) { return o.modes == modes; });
+    };
+    // Changes the mode that is violated most, of those that lead to a combination not yet tried, or all that are
+    // violated at once. False if there is none.
+    const auto lead_on = [&](const Tried& t) {
+        for (const Violation& v : t.violations) {
+            modes = t.modes;
+            modes.modes[v.contact] = static_cast<std::int8_t>(v.mode);
+            if (is_new()) return true;
+            if (&v != &t.violations.front()) continue;
+            for (const Violation& o : t.violations) modes.modes[o.contact] = static_cast<std::int8_t>(o.mode);
+            if (is_new()) return true;
+        }
+        return false;
+    };
+    std::uint32_t drawn = 1;
+    std::size_t begun = 0;  // how many had been tried at the last start
+    const auto start_again = [&](bool first) {
+        path.clear();
+        begun = tried.size();
+        for (int c = 0; c < contacts(); ++c) {
+            if (!event.at_rest[c] || places().contacts[c].bilateral) continue;
+            drawn = 1664525u * drawn + 1013904223u;  // Numerical Recipes' generator: the same in every build
+            const int mode = first ? from.modes[c] : static_cast<int>(drawn >> 16) % 3 - 1;
+            modes.modes[c] = static_cast<std::int8_t>(places().contacts[c].one_way ? std::min(mode, 0) : mode);
+        }
+    };
+    bool first = true;
+    while (tried.size() < longest_pivoting) {
+        now.memory = before;
+        Trial trial = settle(cache, now, modes, event, key);
+        if (trial.found == Found::inconsistent && trial.turns_back &&
+            settle_at_limit(cache, now, modes, event, key) == Found::yes)
+            return Found::yes;
+        if (trial.found == Found::outside) worst = Found::outside;
+        if (trial.found == Found::yes && !event.closest) {
+            hold_where_possible(cache, now, before, modes, event, key);
+            return Found::yes;
+        }
+        if (trial.found == Found::yes) {
+            const double v = violation(cache.regime(key), now, event);
+            if (v < least) {
+                least = v;
+                closest = key;
+                of_closest = now.memory;
+            }
+        }
+        std::erase_if(trial.violations, [&](const Violation& v) {
+            return !event.at_rest[v.contact] || modes.modes[v.contact] == v.mode;
+        });
+        std::sort(trial.violations.begin(), trial.violations.end(), [](const Violation& a, const Violation& b) {
+            return a.order != b.order ? a.order < b.order : a.relative > b.relative;
+        });
+        path.push_back(tried.size());
+        tried.push_back({modes, std::move(trial.violations)});
+        while (!path.empty() && !lead_on(tried[path.back()])) path.pop_back();
+        if (!path.empty() && tried.size() - begun < from_one_start) continue;
+        for (int draw = 0; draw < 20; ++draw) {
+            start_again(std::exchange(first, false));
+            if (is_new()) break;
+        }
+        if (!is_new()) break;  // there are no others
+    }
+    if (least < largest_violation) {
+        key = closest;
+        now.memory = of_closest;
+        return Found::yes;
+    }
+    now.memory = before;
+    key = from;
+    return worst;
+}
+
+// Where a shaft holds more than it takes while it slips, both rest and slip may be consistent: it does not break away
+// by itself.
+template <class Sizes>
+template <class Cache, class Now, class Memory>
+void SwitchedTrain<Sizes>::hold_where_possible(Cache& cache, Now& now, const Memory& before, Key modes,
+                                               const Event& event, Key& key) const {
+    for (std::size_t s = 0; s < train().shafts.size(); ++s) {
+        const DryFriction& friction = train().shafts[s].friction;
+        const int c = places().shafts[s].contact;
+        if (c == nowhere || modes.modes[c] == 0 || !event.at_rest[c] || !(friction.holding() > friction.at_zero(0)))
+            continue;
+        Key held = modes, found;
+        held.modes[c] = 0;
+        const auto memory = now.memory;
+        now.memory = before;
+        if (settle(cache, now, held, event, found).found == Found::yes) {
+            modes = held;
+            key = found;
+        } else {
+            now.memory = memory;
+        }
+    }
+}
+
+// By how much the contacts' guards of a regime are violated, each in units of the sum of its terms' magnitudes: by the
+// value or, of one that is zero to rounding, by the rate.
+template <class Sizes>
+template <class R, class Now>
+double SwitchedTrain<Sizes>::violation(const R& r, const Now& now, const Event& event) const {
+    const Guards ignored = moving(r, event.at_rest);
+    Motion<Sizes, R, Now> motion(n_, r, now);
+    double worst = 0.0;
+    for (std::size_t g = 0; g < guard_count(r); ++g) {
+        const auto& guard = r.guards[g];
+        if (ignored[g] || guard.is_edge() || guard.kind == Guard::outside) continue;
+        const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);
+        const auto [rate, rate_size] = motion.derivative(guard.form, 1);
+        const bool zero = std::fabs(value) <= motion.noise(size, rate);
+        if (zero && rate < 0.0 && !event.by_value_alone(guard))
+            worst = std::fmax(worst, -rate / rate_size);
+        else if (!zero && value < 0.0)
+            worst = std::fmax(worst, -value / size);
+    }
+    return worst;
+}
+
+// Across an edge of a law or a limit the motion is smooth enough for every contact to go on as it was; if that is
+// consistent there is nothing to search.
+template <class Sizes>
+template <class Cache, class Now, class G>
+bool SwitchedTrain<Sizes>::goes_on(Cache& cache, Now& now, const G& fired, Key& key) const {
+    if (!fired.is_edge()) return false;
+    Key beyond = key;
+    const auto before = now.memory;
+    cross(fired, now, beyond);
+    const auto& r = cache.regime(beyond);
+    std::vector<Violation> of_contacts;
+    if (r.solvable && violated(r, now, Guards{}, nullptr, of_contacts) == nullptr && of_contacts.empty()) {
+        key = beyond;
+        return true;
+    }
+    now.memory = before;
+    return false;
+}
+
+// An input has changed: does the regime go on? The contacts that move keep their direction. A guard that is zero to
+// rounding has not ended it; the solver finds it if it goes on to fall.
+template <class Sizes>
+template <class Cache, class Now, class Input>
+bool SwitchedTrain<Sizes>::stays(Cache& cache, const Now& now, const Key& key, const Input& input) const {
+    const auto& r = cache.regime(key);
+    if (const int i = r.driving_input; i >= 0 && r.driving_way * (now.input[0][i] - input[i]) < 0.0) return false;
+    Event lasting;
+    lasting.by_value = true;
+    std::vector<Violation> of_contacts;
+    return violated(r, now, moving(r, r.at_rest), &lasting, of_contacts) == nullptr && of_contacts.empty();
+}
+
+}  // namespace lostmotion::model

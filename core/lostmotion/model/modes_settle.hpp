@@ -1,0 +1,265 @@
+// One combination of modes: its pieces and cells, its locked torques, and whether it is consistent.
+#pragma once
+
+#include "modes.hpp"
+
+namespace lostmotion::model {
+
+template <class Sizes>
+template <class Now>
+double SwitchedTrain<Sizes>::motor_torque(const Now& now, int motor) const {
+    const ShaftMotor& m = train().motors[motor];
+    if (m.law.kind == Motor::dc) return now.x[places().motors[motor].torque];
+    return std::clamp(m.law.rated_torque * now.input[0][places().motors[motor].command], -m.torque_limit,
+                      m.torque_limit);
+}
+
+// The branches that the state and the inputs give alone.
+template <class Sizes>
+template <class Now>
+void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
+    const auto side = [&](int input, double low, double high) {
+        const double u = now.input[0][input];
+        return static_cast<std::int16_t>(u > high ? +1 : u < low ? -1 : 0);
+    };
+    const auto set = [&trial](int branch, int value) {
+        if (branch != nowhere) trial.branch[branch] = static_cast<std::int16_t>(value);
+    };
+    for (std::size_t m = 0; m < train().motors.size(); ++m) {
+        const double most_command = train().motors[m].command_limit();
+        if (places().motors[m].branch != nowhere)
+            set(places().motors[m].branch, side(places().motors[m].command, -most_command, most_command));
+    }
+    for (const BrakePlace& b : places().brakes) set(b.branch, side(b.input, 0.0, 1.0));
+    for (const CouplingPlace& c : places().couplings)
+        if (c.branch != nowhere) set(c.branch, side(c.input, 0.0, 1.0));
+    for (std::size_t s = 0; s < train().shafts.size(); ++s) {
+        const ShaftPlace& p = places().shafts[s];
+        const double w = now.x[p.speed];
+        if (p.friction_piece != nowhere && trial.modes[p.contact] != 0)
+            set(p.friction_piece, train().shafts[s].friction.piece(w));
+        set(p.drag_piece, train().shafts[s].drag.locate(w));
+    }
+    for (std::size_t g = 0; g < train().gears.size(); ++g) {
+        const Gear& gear = train().gears[g];
+        const GearPlace& p = places().gears[g];
+        if (p.error_piece != nowhere)
+            set(p.error_piece,
+                gear.transmission_error.piece(now.x[places().shafts[gear.input].angle] - now.memory[p.error_turn]));
+        if (gear.rigid()) continue;
+        const double d = now.x[p.twist];
+        const int piece = gear.law.curve.locate(d);
+        set(p.piece, piece);
+        if (p.parted == nowhere) continue;
+        const double w_in = now.x[places().shafts[gear.input].speed], w_out = now.x[places().shafts[gear.output].speed];
+        const double pressed = gear.law.curve.torque(d) +
+                               gear.mesh_damping * (assembly_.per_input(static_cast<int>(g), trial) * w_in - w_out);
+        set(p.parted, piece != 0 && piece * pressed < 0.0 ? 1 : 0);
+    }
+    for (std::size_t k = 0; k < train().angle_torques.size(); ++k) {
+        const AngleTorquePlace& p = places().angle_torques[k];
+        const double phi = now.x[places().shafts[train().angle_torques[k].shaft].angle];
+        set(p.piece, train().angle_torques[k].torque.piece(phi - now.memory[p.turn]));
+    }
+}
+
+// The cells of the loss laws, at the output torques T_2.
+template <class Sizes>
+template <class Now>
+void SwitchedTrain<Sizes>::locate_losses(const Now& now, const std::array<double, max_contacts>& T_2,
+                                         Key& trial) const {
+    for (std::size_t g = 0; g < train().gears.size(); ++g) {
+        const Gear& gear = train().gears[g];
+        if (!gear.has_dry_losses()) continue;
+        const GearPlace& p = places().gears[g];
+        const int s = trial.modes[places().shafts[gear.input].contact];
+        const double mu = T_2[g] / gear.rated_torque();
+        const double v = std::fabs(now.x[places().shafts[gear.input].speed]) / gear.law.rated_input_speed;
+        trial.branch[p.cell] = static_cast<std::int16_t>(s == 0 ? gear.load_interval(mu) : gear.loss_cell(s * mu, v));
+        trial.branch[p.cell_back] = static_cast<std::int16_t>(s == 0 ? gear.load_interval(-mu) : 0);
+    }
+}
+
+// Torques that the motion does not determine stay where they were, or at the nearest values that their own contacts
+// and the plain friction of the shafts behind them can hold, from the load to the motors. Whether all can hold them,
+// the guards tell.
+template <class Sizes>
+template <class Now>
+void SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
+                                std::array<double, max_contacts>& T_2) const {
+    const std::vector<ContactPlace>& all = places().contacts;
+    const Ties ties = tie(all, static_cast<int>(train().shafts.size()), modes.modes.data());
+    std::array<double, max_contacts> coupling = event.coupling;
+    for (std::size_t k = all.size(); k-- > 0;) {
+        if (!ties.redundant[k]) continue;
+        const ContactPlace& c = all[k];
+        const bool is_gear = c.kind == ContactPlace::gear;
+        double low = -std::numeric_limits<double>::infinity(), high = -low;
+        if (is_gear && !c.bilateral) {
+            const GearPlace& p = places().gears[c.element];
+            const double P = train().gears[c.element].law.curve.torque(now.x[p.twist]), h = now.memory[p.hysteresis];
+            low = P - h;
+            high = P + h;
+        } else if (!is_gear && c.one_way) {
+            low = 0.0;
+        } else if (!is_gear) {
+            const Coupling& law = train().couplings[c.element];
+            const int input = places().couplings[c.element].input;
+            high = law.commanded() ? law.torque * std::clamp(now.input[0][input], 0.0, 1.0) : law.torque;
+            low = -high;
+        }
+        double& torque = is_gear ? T_2[c.element] : coupling[c.element];
+        const double own_low = low, own_high = high;
+        const int out = c.b, contact = places().shafts[out].contact;
+        const bool lossy = std::any_of(train().gears.begin(), train().gears.end(),
+                                       [&](const Gear& g) { return g.input == out && g.has_dry_losses(); });
+        if (contact != nowhere && modes.modes[contact] == 0 && !lossy) {
+            const ShaftPlace& p = places().shafts[out];
+            double needed = p.load == nowhere ? 0.0 : now.input[0][p.load];
+            for (std::size_t m = 0; m < train().motors.size(); ++m)
+                if (train().motors[m].shaft == out) needed -= motor_torque(now, static_cast<int>(m));
+            for (std::size_t g = 0; g < train().gears.size(); ++g) {
+                const Gear& gear = train().gears[g];
+                if (gear.output == out && !(is_gear && static_cast<int>(g) == c.element)) needed -= T_2[g];
+                if (gear.input == out) needed += T_2[g] / (gear.law.ratio * gear.law.efficiency);
+            }
+            for (std::size_t n = 0; n < train().couplings.size(); ++n) {
+                if (train().couplings[n].output == out && (is_gear || static_cast<int>(n) != c.element))
+                    needed -= coupling[n];
+                if (train().couplings[n].input == out) needed += coupling[n];
+            }
+            for (const AngleTorque& t : train().angle_torques)
+                if (t.shaft == out) needed -= t.torque(now.x[p.angle]);
+            double T_f = p.motor_friction + train().shafts[out].friction.holding();
+            for (std::size_t b = 0; b < train().brakes.size(); ++b)
+                if (train().brakes[b].shaft == out)
+                    T_f += train().brakes[b].torque * std::clamp(now.input[0][places().brakes[b].input], 0.0, 1.0);
+            low = std::max(low, needed - T_f);
+            high = std::min(high, needed + T_f);
+        }
+        if (low > high) {
+            low = own_low;
+            high = own_high;
+        }
+        torque = std::clamp(torque, low, high);
+        now.memory[c.locked] = torque;
+    }
+}
+
+// Is this combination of modes consistent? Pieces and cells are found by a walk that begins at what the torques were.
+template <class Sizes>
+template <class Cache, class Now>
+auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const
+    -> Trial {
+    ++trials;
+    Key trial;
+    trial.modes = modes.modes;
+    locate(now, trial);
+    std::array<double, max_contacts> T_2 = event.gear;
+    for (std::size_t g = 0; g < train().gears.size(); ++g) {
+        const GearPlace& p = places().gears[g];
+        if (train().gears[g].rigid()) continue;
+        const int slip = p.contact == nowhere ? +2 : trial.modes[p.contact];
+        if (slip == 0) continue;
+        T_2[g] =
+            train().gears[g].law.curve.torque(now.x[p.twist]) + (slip == 2 ? 0.0 : slip * now.memory[p.hysteresis]);
+    }
+    locate_losses(now, T_2, trial);
+    hold(now, event, trial, T_2);
+    Trial result = walk(cache, now, event, trial, key);
+    if (result.found != Found::inconsistent || !event.from_each_load) return result;
+    // The torque that keeps a twist at rest depends on the cell, and the cell on the torque.
+    for (std::size_t g = 0; g < train().gears.size(); ++g) {
+        const Gear& gear = train().gears[g];
+        if (!gear.has_dry_losses() || places().gears[g].contact == nowhere) continue;
+        if (trial.modes[places().shafts[gear.input].contact] == 0 || trial.modes[places().gears[g].contact] != 0)
+            continue;
+        const double v = std::fabs(now.x[places().shafts[gear.input].speed]) / gear.law.rated_input_speed;
+        for (int j = 0; j < gear.load_intervals(); ++j) {
+            const double low = gear.load_lower(j), high = gear.load_upper(j);
+            const double middle = std::isinf(low) ? high - 1.0 : std::isinf(high) ? low + 1.0 : 0.5 * (low + high);
+            for (const int half : {0, 1}) {  // of the two triangles at this speed
+                if (half == 1 && gear.efficiencies) continue;
+                Key other = trial;
+                other.branch[places().gears[g].cell] = static_cast<std::int16_t>(gear.loss_cell(middle, v) ^ half);
+                const Trial again = walk(cache, now, event, other, key);
+                if (again.found == Found::yes) return again;
+            }
+        }
+    }
+    return result;
+}
+
+// Is this combination, in which a contact is at its limit, consistent, or, if what drives it there turns back, does
+// everything stand at those torques?
+template <class Sizes>
+template <class Cache, class Now>
+Found SwitchedTrain<Sizes>::settle_at_limit(Cache& cache, Now& now, const Key& modes, const Event& event,
+                                            Key& key) const {
+    Event thorough = event;
+    thorough.from_each_load = true;
+    const Found found = settle(cache, now, modes, thorough, key).found;
+    if (found != Found::inconsistent || event.closest) return found;
+    thorough.closest = true;
+    if (settle(cache, now, modes, thorough, key).found != Found::yes) return found;
+    const auto& r = cache.regime(key);
+    Event standing = event;
+    for (std::size_t g = 0; g < train().gears.size(); ++g) standing.gear[g] = evaluate(n_, r.output_torque[g], now);
+    for (std::size_t k = 0; k < train().couplings.size(); ++k)
+        standing.coupling[k] = evaluate(n_, r.contact_torque[places().couplings[k].contact], now);
+    Key stuck = modes;
+    for (int c = 0; c < contacts(); ++c)
+        if (r.at_rest[c]) stuck.modes[c] = 0;
+    return settle(cache, now, stuck, standing, key).found;
+}
+
+// From a piece and a cell across each of their edges that is violated, until none is: do the contacts hold there?
+template <class Sizes>
+template <class Cache, class Now>
+auto SwitchedTrain<Sizes>::walk(Cache& cache, Now& now, const Event& event, Key trial, Key& key) const -> Trial {
+    constexpr int longest_walk = 400;
+    Key previous = trial;
+    Guards along;  // edges that lead back to where the walk came from: the motion goes along them
+    Trial result;
+    for (int step = 0; step < longest_walk; ++step) {
+        const auto& r = cache.regime(trial);
+        result.violations.clear();
+        if (!r.solvable) return result;
+        const auto* left = violated(r, now, moving(r, event.at_rest) | along, &event, result.violations);
+        if (left != nullptr && left->kind == Guard::outside) {
+            result.found = Found::outside;
+            return result;
+        }
+        if (left == nullptr) {
+            result.turns_back = std::all_of(result.violations.begin(), result.violations.end(),
+                                            [](const Violation& v) { return v.turning; });
+            if (!result.violations.empty() && !event.closest) return result;
+            result.turns_back = false;
+            if (event.has_ended(trial) && !event.closest) {
+                if (event.kind != Guard::edge && event.kind != Guard::input_limit) {
+                    result.violations.push_back({event.contact, event.neighbour, n_derivatives, 0.0});
+                    return result;
+                }
+                trial.branch[event.branch] = static_cast<std::int16_t>(event.neighbour);
+                if (event.memory != nowhere) now.memory[event.memory] += event.shift;
+            }
+            key = trial;
+            result.found = Found::yes;
+            return result;
+        }
+        Key next = trial;
+        const auto g = static_cast<std::size_t>(left - &r.guards[0]);
+        Now across = now;
+        cross(*left, across, next);
+        if (step > 0 && next == previous) {
+            along.set(g);
+            continue;
+        }
+        now.memory = across.memory;
+        previous = std::exchange(trial, next);
+        along.reset();
+    }
+    return result;
+}
+
+}  // namespace lostmotion::model

@@ -1,0 +1,123 @@
+// Values and time derivatives of linear forms along the flow of one regime.
+#pragma once
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "row.hpp"
+
+namespace lostmotion::model {
+
+inline constexpr int n_derivatives = 6;
+
+// All that a regime's equations depend on at one instant. The kernel's is the same with its own dimensions.
+struct Instant {
+    double time = 0.0;  // [s]
+    std::array<double, max_states> x{};
+    std::array<double, max_memory> memory{};
+    std::array<std::array<double, max_inputs>, n_derivatives> input{};  // [k]: k-th derivatives
+    std::array<double, max_inputs> input_size{};
+};
+
+// A form counts as zero within this multiple of the sum of the magnitudes of its terms. Its coefficients come from an
+// elimination and carry more than one rounding.
+inline constexpr double rounding = 0x1p14 * std::numeric_limits<double>::epsilon();
+// Rounding of an instant, relative to the time since the start.
+inline constexpr double time_rounding = 4.0 * std::numeric_limits<double>::epsilon();
+
+// Added up as the kernel does: the constants, the inputs, the coupled states in fours, the angles.
+template <class Sizes, class F, class Now>
+double evaluate(const Sizes& n, const F& f, const Now& now) {
+    double constant = f.c[n.one], input = 0.0, state = 0.0;
+    for (int k = 0; k < n.memory; ++k) constant += f.c[n.first_memory + k] * now.memory[k];
+    for (int k = 0; k < n.inputs; ++k) input += f.c[n.first_input + k] * now.input[0][k];
+    for (int k = 0; k < n.coupled; k += 4) {
+        double part[4] = {};
+        for (int j = k; j < n.coupled && j < k + 4; ++j) part[j - k] = f.c[j] * now.x[j];
+        state += (part[0] + part[1]) + (part[2] + part[3]);
+    }
+    for (int k = n.coupled; k < n.states; ++k) state += f.c[k] * now.x[k];
+    return (constant + input) + state;
+}
+// Sum of the magnitudes of the terms, with those of the inputs' parts.
+template <class Sizes, class F, class Now>
+double magnitude(const Sizes& n, const F& f, const Now& now) {
+    double sum = std::fabs(f.c[n.one]);
+    for (int k = 0; k < n.memory; ++k) sum += std::fabs(f.c[n.first_memory + k] * now.memory[k]);
+    for (int k = 0; k < n.inputs; ++k)
+        sum += std::fabs(f.c[n.first_input + k]) * std::fmax(std::fabs(now.input[0][k]), now.input_size[k]);
+    for (int k = 0; k < n.states; ++k) sum += std::fabs(f.c[k] * now.x[k]);
+    return sum;
+}
+
+// Time derivatives of the state, computed as far as they are asked for.
+template <class Sizes, class Regime, class Now>
+class Motion {
+ public:
+    Motion(const Sizes& sizes, const Regime& regime, const Now& now) : n_(sizes), regime_(regime), now_(now) {}
+
+    struct Sign {
+        int sign = 0;
+        int order = 0;          // of the first derivative that is not zero
+        double relative = 0.0;  // to the sum of the magnitudes of its terms
+    };
+    // The sign that a form has just after now: that of the first of its derivatives that is not zero.
+    template <class F>
+    Sign sign(const F& form, bool by_value_alone = false) {
+        double value = evaluate(n_, form, now_), size = magnitude(n_, form, now_);
+        for (int k = 0; k + 1 < n_derivatives; ++k) {
+            const auto [rate, rate_size] = derivative(form, k + 1);
+            if (std::fabs(value) > noise(size, rate))
+                return {value > 0.0 ? +1 : -1, k, size > 0.0 ? value / size : 0.0};
+            if (by_value_alone) return {};
+            value = rate;
+            size = rate_size;
+        }
+        return {};
+    }
+    // What counts as zero: rounding of the terms, and since the instant itself is known to its rounding only, a value
+    // may be off by that times its rate.
+    double noise(double size, double rate) const {
+        return rounding * size + time_rounding * std::fabs(now_.time * rate);
+    }
+    // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
+    template <class F>
+    std::pair<double, double> derivative(const F& f, int k) {
+        while (order_ < k) extend();
+        double sum = 0.0, size = 0.0;
+        for (int i = 0; i < n_.inputs; ++i) {
+            sum += f.c[n_.first_input + i] * now_.input[k][i];
+            size += std::fabs(f.c[n_.first_input + i] * now_.input[k][i]);
+        }
+        for (int j = 0; j < n_.states; ++j) {
+            sum += f.c[j] * x_[k][j];
+            size += std::fabs(f.c[j]) * size_[k][j];
+        }
+        return {sum, size};
+    }
+
+ private:
+    void extend() {
+        const int k = order_++;
+        for (int r = 0; r < n_.states; ++r) {
+            const auto& f = regime_.rate[r];
+            if (k == 0) {
+                x_[1][r] = evaluate(n_, f, now_);
+                size_[1][r] = magnitude(n_, f, now_);
+                continue;
+            }
+            const auto [value, size] = derivative(f, k);
+            x_[k + 1][r] = value;
+            size_[k + 1][r] = size;
+        }
+    }
+
+    const Sizes& n_;
+    const Regime& regime_;
+    const Now& now_;
+    int order_ = 0;
+    std::array<std::array<double, max_states>, n_derivatives + 1> x_, size_;  // as far as they are known
+};
+
+}  // namespace lostmotion::model

@@ -1,0 +1,87 @@
+// Names of what a train consists of, for results, messages and explanations.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "assembly.hpp"
+
+namespace lostmotion::model {
+
+// Of the coupled states, then the angles.
+inline std::vector<std::string> state_names(const Assembly& a) {
+    const Train& t = a.train();
+    const Places& p = a.places();
+    std::vector<std::string> names(static_cast<std::size_t>(a.layout().states));
+    const auto set = [&names](int state, const std::string& name) {
+        if (state != nowhere) names[static_cast<std::size_t>(state)] = name;
+    };
+    for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].torque, t.motors[k].name + "_torque");
+    for (std::size_t k = 0; k < t.shafts.size(); ++k) {
+        set(p.shafts[k].speed, t.shafts[k].name + "_speed");
+        set(p.shafts[k].angle, t.shafts[k].name + "_angle");
+    }
+    for (std::size_t k = 0; k < t.gears.size(); ++k) set(p.gears[k].twist, t.gears[k].name + "_twist");
+    for (int part = 0; part < a.layout().angles; ++part) {
+        const auto last = static_cast<std::size_t>(p.last_shaft[static_cast<std::size_t>(part)]);
+        set(a.layout().coupled + part, t.shafts[last].name + "_angle");
+    }
+    return names;
+}
+
+inline std::vector<std::string> input_names(const Assembly& a) {
+    const Train& t = a.train();
+    const Places& p = a.places();
+    std::vector<std::string> names(static_cast<std::size_t>(a.layout().inputs));
+    const auto set = [&names](int input, const std::string& name) {
+        if (input != nowhere) names[static_cast<std::size_t>(input)] = name;
+    };
+    for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].command, t.motors[k].name + "_command");
+    for (std::size_t k = 0; k < t.shafts.size(); ++k) set(p.shafts[k].load, t.shafts[k].name + "_load_torque");
+    for (std::size_t k = 0; k < t.brakes.size(); ++k) set(p.brakes[k].input, t.brakes[k].name + "_command");
+    for (std::size_t k = 0; k < t.couplings.size(); ++k) set(p.couplings[k].input, t.couplings[k].name + "_command");
+    return names;
+}
+
+inline std::string contact_name(const Assembly& a, int contact) {
+    const ContactPlace& c = a.places().contacts[static_cast<std::size_t>(contact)];
+    const auto k = static_cast<std::size_t>(c.element);
+    switch (c.kind) {
+        case ContactPlace::shaft: return a.train().shafts[k].name + "_contact";
+        case ContactPlace::gear: return a.train().gears[k].name + "_twist_contact";
+        default: return a.train().couplings[k].name + "_contact";
+    }
+}
+
+// The piecewise laws, by their place in a key.
+inline std::vector<std::string> branch_names(const Assembly& a) {
+    const Train& t = a.train();
+    const Places& p = a.places();
+    std::vector<std::string> names(static_cast<std::size_t>(a.layout().branches));
+    const auto set = [&names](int branch, const std::string& name) {
+        if (branch != nowhere) names[static_cast<std::size_t>(branch)] = name;
+    };
+    for (std::size_t k = 0; k < t.motors.size(); ++k)
+        set(p.motors[k].branch, t.motors[k].name + ": limit of the command");
+    for (std::size_t k = 0; k < t.shafts.size(); ++k) {
+        set(p.shafts[k].friction_piece, t.shafts[k].name + ": piece of the friction curve");
+        set(p.shafts[k].drag_piece, t.shafts[k].name + ": piece of the drag");
+    }
+    for (std::size_t k = 0; k < t.gears.size(); ++k) {
+        const std::string& name = t.gears[k].name;
+        set(p.gears[k].piece, name + ": piece of the torsion curve");
+        set(p.gears[k].cell, name + ": cell of the losses");
+        set(p.gears[k].cell_back, name + ": cell of the losses backward");
+        set(p.gears[k].parted, name + ": flanks parted");
+        set(p.gears[k].error_piece, name + ": piece of the transmission error");
+    }
+    for (std::size_t k = 0; k < t.brakes.size(); ++k)
+        set(p.brakes[k].branch, t.brakes[k].name + ": limit of the command");
+    for (std::size_t k = 0; k < t.couplings.size(); ++k)
+        set(p.couplings[k].branch, t.couplings[k].name + ": limit of the command");
+    for (std::size_t k = 0; k < t.angle_torques.size(); ++k)
+        set(p.angle_torques[k].piece, t.angle_torques[k].name + ": piece of the torque over angle");
+    return names;
+}
+
+}  // namespace lostmotion::model

@@ -1,0 +1,94 @@
+// A regime in arrays of compile-time dimensions, for the kernel; what the train does not have is zero.
+#pragma once
+
+#include <algorithm>
+#include <array>
+
+#include "assembly.hpp"
+
+namespace lostmotion::model {
+
+// Does a train fit into a kernel of these dimensions? Guards are counted regime by regime.
+template <class D>
+bool fits(const Train& train, const Layout& n) {
+    return n.coupled <= D::coupled && n.angles <= D::angles && n.memory <= D::memory && n.inputs <= D::inputs &&
+           n.contacts <= D::contacts && static_cast<int>(train.gears.size()) <= D::contacts;
+}
+
+template <class D>
+struct PackedForm {
+    std::array<double, D::terms> c{};
+};
+
+template <class D, class F = PackedForm<D>>
+F pack(const Row& f, const Layout& n) {
+    F out{};
+    std::copy_n(f.c.begin(), n.coupled, out.c.begin());
+    std::copy_n(f.c.begin() + n.coupled, n.angles, out.c.begin() + D::coupled);
+    out.c[D::one] = f.c[n.one];
+    std::copy_n(f.c.begin() + n.first_memory, n.memory, out.c.begin() + D::first_memory);
+    std::copy_n(f.c.begin() + n.first_input, n.inputs, out.c.begin() + D::first_input);
+    return out;
+}
+
+template <class D>
+struct PackedGuard {
+    PackedForm<D> form;
+    Guard::Kind kind = Guard::outside;
+    int contact = -1, branch = -1, neighbour = 0;
+    bool by_touch = false;
+    int memory = -1;
+    double shift = 0.0;
+    bool behind = false;
+
+    bool is_edge() const { return kind == Guard::edge || kind == Guard::input_limit; }
+};
+
+template <class D>
+struct PackedRegime {
+    std::array<PackedForm<D>, D::states> rate{};
+    std::array<PackedForm<D>, D::contacts> output_torque{};   // of each gear [N m]
+    std::array<PackedForm<D>, D::contacts> contact_torque{};  // of each contact [N m]
+    std::array<PackedGuard<D>, D::guards> guards{};
+    int n_guards = 0;
+    std::array<bool, D::contacts> at_rest{};
+    // Shafts that follow another: speed state, that of their leader and the factor; n_followers of them.
+    struct Follower {
+        int state, leader;
+        double factor;
+    };
+    std::array<Follower, D::coupled> followers{};
+    int n_followers = 0;
+    bool solvable = true, in_data = true;
+    int driving_input = -1, driven_contact = -1;
+    double driving_way = 0.0;
+    bool complete = true;  // false: it has more guards than there is room for
+};
+
+template <class D>
+PackedRegime<D> pack(const Regime& r, const Assembly& a) {
+    const Layout& n = a.layout();
+    PackedRegime<D> out;
+    for (int k = 0; k < n.states; ++k) out.rate[k < n.coupled ? k : D::coupled + k - n.coupled] = pack<D>(r.rate[k], n);
+    for (std::size_t g = 0; g < r.output_torque.size(); ++g) out.output_torque[g] = pack<D>(r.output_torque[g], n);
+    for (std::size_t c = 0; c < r.contact_torque.size(); ++c) out.contact_torque[c] = pack<D>(r.contact_torque[c], n);
+    out.complete = r.guards.size() <= static_cast<std::size_t>(D::guards);
+    for (const Guard& g : r.guards) {
+        if (out.n_guards == D::guards) break;
+        out.guards[out.n_guards++] = {pack<D>(g.form, n), g.kind,   g.contact, g.branch, g.neighbour,
+                                      g.by_touch,         g.memory, g.shift,   g.behind};
+    }
+    std::copy_n(r.at_rest.begin(), n.contacts, out.at_rest.begin());
+    const auto& shafts = a.places().shafts;
+    for (int s = 0; s < static_cast<int>(shafts.size()); ++s)
+        if (const int leader = r.ties.leader[s]; !r.ties.at_rest[s] && leader != s)
+            out.followers[out.n_followers++] = {shafts[s].speed, shafts[leader].speed, r.ties.factor[s]};
+    out.solvable = r.solvable;
+    out.driving_input = r.driving_input;
+    out.driving_way = r.driving_way;
+    out.driven_contact = r.driven_contact;
+    out.in_data = r.in_data;
+    return out;
+}
+
+}  // namespace lostmotion::model

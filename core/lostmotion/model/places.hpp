@@ -1,0 +1,203 @@
+// Where the elements of a train stand in its equations: states, contacts, memory, inputs, branches.
+//
+// Coupled states: [motor torques][shaft speeds][twists][angles that a torque depends on]. Angles: one for each part of
+// the train that hangs together, that of its last shaft.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "row.hpp"
+#include "ties.hpp"
+#include "train.hpp"
+
+namespace lostmotion::model {
+
+struct MotorPlace {
+    int torque = nowhere;  // state
+    int command = nowhere, branch = nowhere;
+};
+struct ShaftPlace {
+    int speed = nowhere, angle = nowhere;  // states; the angle only if a torque depends on it
+    int contact = nowhere, load = nowhere;
+    int friction_piece = nowhere, drag_piece = nowhere;  // branches
+    double inertia = 0.0, viscous_friction = 0.0;        // with the rotors and gears on it
+    double motor_friction = 0.0;                         // [N m], of the bearings of the motors on it
+};
+struct GearPlace {
+    int twist = nowhere, contact = nowhere;
+    int hysteresis = nowhere;                                                                           // memory
+    int piece = nowhere, cell = nowhere, cell_back = nowhere, parted = nowhere, error_piece = nowhere;  // branches
+    int error_turn = nowhere;                                                                           // memory
+};
+struct BrakePlace {
+    int input = nowhere, branch = nowhere;
+};
+struct CouplingPlace {
+    int contact = nowhere, input = nowhere, branch = nowhere;
+};
+struct AngleTorquePlace {
+    int piece = nowhere, turn = nowhere;  // branch, memory
+};
+
+struct Places {
+    Layout layout;
+    std::vector<MotorPlace> motors;
+    std::vector<ShaftPlace> shafts;
+    std::vector<GearPlace> gears;
+    std::vector<BrakePlace> brakes;
+    std::vector<CouplingPlace> couplings;
+    std::vector<AngleTorquePlace> angle_torques;
+    std::vector<ContactPlace> contacts;
+    std::vector<int> last_shaft;  // of each part of the train, whose angle is kept
+
+    explicit Places(const Train& train);
+
+ private:
+    // The narrowest kernel. A train that fits into it has a place for the torque of each motor and the twist of each
+    // gear, whether they move or not: one motor, two shafts and a gear always stand in the same order.
+    static constexpr int narrowest = 4;
+
+    void place_states(const Train& train);
+    void place_contacts(const Train& train);
+    void place_inputs(const Train& train);
+    void place_memory_and_branches(const Train& train);
+};
+
+inline Places::Places(const Train& train)
+    : motors(train.motors.size()),
+      shafts(train.shafts.size()),
+      gears(train.gears.size()),
+      brakes(train.brakes.size()),
+      couplings(train.couplings.size()),
+      angle_torques(train.angle_torques.size()) {
+    for (std::size_t s = 0; s < shafts.size(); ++s) {
+        shafts[s].inertia = train.shafts[s].inertia;
+        shafts[s].viscous_friction = train.shafts[s].viscous_friction;
+    }
+    for (const ShaftMotor& m : train.motors) {
+        shafts[m.shaft].inertia += m.law.rotor_inertia;
+        shafts[m.shaft].motor_friction += m.law.friction_torque;
+    }
+    for (const Gear& g : train.gears) {
+        shafts[g.input].inertia += g.law.inertia;
+        shafts[g.input].viscous_friction += g.law.viscous_friction;
+    }
+    place_states(train);
+    place_contacts(train);
+    place_inputs(train);
+    place_memory_and_branches(train);
+    layout.arrange();
+}
+
+inline void Places::place_states(const Train& train) {
+    std::vector<bool> by_angle(shafts.size());
+    for (const AngleTorque& t : train.angle_torques) by_angle[t.shaft] = true;
+    for (const Gear& g : train.gears)
+        if (g.transmission_error.present()) by_angle[g.input] = true;
+    const bool all = motors.size() + shafts.size() + gears.size() +
+                         static_cast<std::size_t>(std::count(by_angle.begin(), by_angle.end(), true)) <=
+                     narrowest;
+    int next = 0;
+    for (std::size_t m = 0; m < motors.size(); ++m)
+        if (all || train.motors[m].law.kind == Motor::dc) motors[m].torque = next++;
+    for (ShaftPlace& s : shafts) s.speed = next++;
+    for (std::size_t g = 0; g < gears.size(); ++g)
+        if (all || !train.gears[g].rigid()) gears[g].twist = next++;
+    for (std::size_t s = 0; s < shafts.size(); ++s)
+        if (by_angle[s]) shafts[s].angle = next++;
+    layout.coupled = next;
+    // Parts that hang together, by the last shaft of each.
+    std::vector<int> last(shafts.size());
+    for (std::size_t s = 0; s < shafts.size(); ++s) last[s] = static_cast<int>(s);
+    const auto join = [&](int a, int b) {
+        const int from = std::min(last[a], last[b]), to = std::max(last[a], last[b]);
+        for (int& l : last)
+            if (l == from) l = to;
+    };
+    for (const Gear& g : train.gears) join(g.input, g.output);
+    for (const Coupling& c : train.couplings) join(c.input, c.output);
+    for (std::size_t s = 0; s < shafts.size(); ++s)
+        if (last[s] == static_cast<int>(s)) last_shaft.push_back(static_cast<int>(s));
+    layout.angles = static_cast<int>(last_shaft.size());
+}
+
+// Each shaft, then the gears that it turns, then the couplings.
+inline void Places::place_contacts(const Train& train) {
+    const auto dry = [&](std::size_t s) {
+        if (shafts[s].motor_friction > 0.0 || train.shafts[s].friction.present()) return true;
+        const auto on = [s](const auto& e) { return e.shaft == static_cast<int>(s); };
+        return std::any_of(train.brakes.begin(), train.brakes.end(), on) ||
+               std::any_of(train.gears.begin(), train.gears.end(),
+                           [s](const Gear& g) { return g.input == static_cast<int>(s) && g.has_dry_losses(); });
+    };
+    for (std::size_t s = 0; s < shafts.size(); ++s) {
+        if (dry(s)) {
+            shafts[s].contact = static_cast<int>(contacts.size());
+            contacts.push_back({ContactPlace::shaft, static_cast<int>(s), static_cast<int>(s)});
+        }
+        for (std::size_t k = 0; k < gears.size(); ++k) {
+            const Gear& g = train.gears[k];
+            if (g.input != static_cast<int>(s) || !(g.rigid() || g.law.has_hysteresis())) continue;
+            gears[k].contact = static_cast<int>(contacts.size());
+            contacts.push_back(
+                {ContactPlace::gear, static_cast<int>(k), g.input, g.output, 1.0 / g.law.ratio, -1.0, g.rigid()});
+        }
+    }
+    for (std::size_t k = 0; k < couplings.size(); ++k) {
+        const Coupling& c = train.couplings[k];
+        couplings[k].contact = static_cast<int>(contacts.size());
+        contacts.push_back({ContactPlace::coupling, static_cast<int>(k), c.input, c.output, 1.0, -1.0, false,
+                            c.kind == Coupling::freewheel});
+    }
+    layout.contacts = static_cast<int>(contacts.size());
+}
+
+inline void Places::place_inputs(const Train& train) {
+    for (MotorPlace& m : motors) m.command = layout.inputs++;
+    for (std::size_t s = 0; s < shafts.size(); ++s)
+        if (train.shafts[s].loaded) shafts[s].load = layout.inputs++;
+    for (BrakePlace& b : brakes) b.input = layout.inputs++;
+    for (std::size_t k = 0; k < couplings.size(); ++k)
+        if (train.couplings[k].commanded()) couplings[k].input = layout.inputs++;
+}
+
+inline void Places::place_memory_and_branches(const Train& train) {
+    for (std::size_t k = 0; k < gears.size(); ++k)
+        if (train.gears[k].law.has_hysteresis()) gears[k].hysteresis = layout.memory++;
+    // What is redundant while some contacts are stuck is so while all are.
+    const std::vector<std::int8_t> all_stuck(contacts.size(), 0);
+    const Ties ties = tie(contacts, static_cast<int>(shafts.size()), all_stuck.data());
+    for (std::size_t c = 0; c < contacts.size(); ++c)
+        if (ties.redundant[c]) contacts[c].locked = layout.memory++;
+
+    int& next = layout.branches;
+    for (std::size_t m = 0; m < motors.size(); ++m)
+        if (train.motors[m].limited()) motors[m].branch = next++;
+    for (std::size_t s = 0; s < shafts.size(); ++s) {
+        if (train.shafts[s].friction.pieces() > 1) shafts[s].friction_piece = next++;
+        if (train.shafts[s].drag.outermost_piece() > 0) shafts[s].drag_piece = next++;
+    }
+    for (std::size_t k = 0; k < gears.size(); ++k) {
+        const Gear& g = train.gears[k];
+        if (!g.rigid()) gears[k].piece = next++;
+        if (g.has_dry_losses()) {
+            gears[k].cell = next++;
+            gears[k].cell_back = next++;
+        }
+        if (g.parts_flanks()) gears[k].parted = next++;
+        if (g.transmission_error.present()) {
+            gears[k].error_piece = next++;
+            gears[k].error_turn = layout.memory++;
+        }
+    }
+    for (BrakePlace& b : brakes) b.branch = next++;
+    for (CouplingPlace& c : couplings)
+        if (c.input != nowhere) c.branch = next++;
+    for (AngleTorquePlace& t : angle_torques) {
+        t.piece = next++;
+        t.turn = layout.memory++;
+    }
+}
+
+}  // namespace lostmotion::model

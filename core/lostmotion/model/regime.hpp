@@ -1,0 +1,81 @@
+// One regime of a train: its key, the rates of the states and the guards that end it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "row.hpp"
+
+namespace lostmotion::model {
+
+// Which regime: the mode of each contact (slips forward +1, backward -1, stuck 0) and the branch of each piecewise law.
+struct Key {
+    std::array<std::int8_t, max_contacts> modes{};
+    std::array<std::int16_t, max_branches> branch{};
+
+    friend bool operator==(const Key&, const Key&) = default;
+    std::size_t hash() const {
+        std::uint64_t h = 0x9e3779b97f4a7c15u;
+        const auto mix = [&h](auto v) { h = (h ^ static_cast<std::uint16_t>(v)) * 0x100000001b3u; };
+        for (const auto m : modes) mix(m);
+        for (const auto b : branch) mix(b);
+        return static_cast<std::size_t>(h ^ (h >> 32));
+    }
+};
+struct KeyHash {
+    std::size_t operator()(const Key& k) const { return k.hash(); }
+};
+
+// A regime holds while each of its guards is >= 0.
+struct Guard {
+    enum Kind : std::uint8_t {
+        speed,        // a slipping contact comes to rest
+        capacity,     // a stuck contact is overcome
+        edge,         // a state leaves its piece or cell of a law
+        input_limit,  // an input crosses a limit
+        turning,      // the torque that drives a contact at its limit turns back
+        outside,      // the extended data of a law end
+    };
+    Row form;
+    Kind kind = outside;
+    int contact = -1;       // for speed and capacity; the contact that a law belongs to, if any
+    int branch = -1;        // for edges and limits: the law
+    int neighbour = 0;      // for edges and limits: the branch beyond; capacity: the sign of slip
+    bool by_touch = false;  // ends the regime also by touching zero without falling through it
+    int memory = -1;        // set if crossing shifts a memory (the turn of an angle) by `shift`
+    double shift = 0.0;
+    bool behind = false;  // an edge that the twist slips away from, so that it does not reach it
+
+    // Edge of a law or limit of an input, with a neighbour beyond.
+    bool is_edge() const { return kind == edge || kind == input_limit; }
+};
+
+// Speeds that the contacts at rest tie together: w_k = factor * w_leader, or 0.
+struct Ties {
+    std::array<int, max_shafts> leader{};
+    std::array<double, max_shafts> factor{};
+    std::array<bool, max_shafts> at_rest{};
+    std::array<bool, max_contacts> redundant{};  // stuck, but its speed is kept at zero by those before it
+};
+
+struct Regime {
+    Key key;
+    std::vector<Row> rate;  // of each state
+    std::vector<Guard> guards;
+    std::vector<Row> motor_torque;     // of each motor [N m]
+    std::vector<Row> output_torque;    // T_2 of each gear [N m]
+    std::vector<Row> input_torque;     // T_1 of each gear [N m]; while its input shaft is stuck without dry losses
+    std::vector<Row> gear_hysteresis;  // H of each gear [N m]
+    std::vector<Row> contact_torque;   // what each contact takes [N m]
+    std::array<bool, max_contacts> at_rest{};  // contacts whose speeds this regime keeps at zero
+    Ties ties;
+    // While a shaft at rest gives all that its contact can, an input by which it is driven there has to go on this way.
+    int driving_input = -1;  // -1: none
+    double driving_way = 0.0;
+    int driven_contact = -1;
+    bool solvable = true;  // false: the reactions have no unique solution (jamming)
+    bool in_data = true;   // false: a loss map is used outside its data
+};
+
+}  // namespace lostmotion::model

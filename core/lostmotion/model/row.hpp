@@ -1,0 +1,68 @@
+// Linear forms of a train while it is composed: run-time layout, fixed storage, so that nothing is allocated.
+#pragma once
+
+#include <array>
+
+namespace lostmotion::model {
+
+inline constexpr int max_shafts = 16, max_contacts = 32, max_terms = 72, max_columns = max_terms + max_contacts;
+inline constexpr int max_branches = 64, max_guards = 256, max_memory = 32, max_inputs = 24, max_states = 40;
+
+// Where the terms of a form stand: [coupled states][angles][1][memory][inputs], then [reactions of stuck contacts].
+// The names are those of the kernel's dimensions.
+struct Layout {
+    int coupled = 0, angles = 0, inputs = 0, memory = 0, contacts = 0, branches = 0;
+    int states = 0, one = 0, first_memory = 0, first_input = 0, terms = 0;
+
+    void arrange() {
+        states = coupled + angles;
+        one = states;
+        first_memory = one + 1;
+        first_input = first_memory + memory;
+        terms = first_input + inputs;
+    }
+};
+
+// sum_k c[k] * term[k]
+struct Row {
+    std::array<double, max_columns> c{};
+
+    static Row unit(int term, double factor = 1.0) {
+        Row f;
+        f.c[term] = factor;
+        return f;
+    }
+    Row& operator+=(const Row& o) {
+        for (int k = 0; k < max_columns; ++k) c[k] += o.c[k];
+        return *this;
+    }
+    Row& operator-=(const Row& o) {
+        for (int k = 0; k < max_columns; ++k) c[k] -= o.c[k];
+        return *this;
+    }
+    Row& operator*=(double a) {
+        for (int k = 0; k < max_columns; ++k) c[k] *= a;
+        return *this;
+    }
+    friend Row operator+(Row a, const Row& b) { return a += b; }
+    friend Row operator-(Row a, const Row& b) { return a -= b; }
+    friend Row operator*(double a, Row f) { return f *= a; }
+    friend Row operator/(Row f, double a) { return f *= 1.0 / a; }
+    friend Row operator-(Row f) { return f *= -1.0; }
+};
+
+// Makes the forms that an element states.
+class Terms {
+ public:
+    explicit Terms(const Layout& layout) : layout_(layout) {}
+    Row state(int k, double factor = 1.0) const { return Row::unit(k, factor); }
+    Row one(double factor = 1.0) const { return Row::unit(layout_.one, factor); }
+    Row memory(int k, double factor = 1.0) const { return Row::unit(layout_.first_memory + k, factor); }
+    Row input(int k, double factor = 1.0) const { return Row::unit(layout_.first_input + k, factor); }
+    Row reaction(int contact) const { return Row::unit(layout_.terms + contact); }
+
+ private:
+    const Layout& layout_;
+};
+
+}  // namespace lostmotion::model

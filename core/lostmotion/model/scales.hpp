@@ -1,0 +1,88 @@
+// Natural sizes of the states of a train.
+#pragma once
+
+#include <cmath>
+
+#include "assembly.hpp"
+
+namespace lostmotion::model {
+
+// Speed that a shaft has at the ratings of what is on it [rad/s].
+inline double rated_speed(const Train& train, int shaft) {
+    for (const Gear& g : train.gears)
+        if (g.input == shaft) return g.law.rated_input_speed;
+    for (const Gear& g : train.gears)
+        if (g.output == shaft) return g.law.rated_input_speed / g.law.ratio;
+    for (const ShaftMotor& m : train.motors)
+        if (m.shaft == shaft) return m.law.rated_speed;
+    return 1.0;
+}
+// Torque on a shaft at those ratings [N m].
+inline double rated_torque(const Train& train, int shaft) {
+    for (const Gear& g : train.gears)
+        if (g.output == shaft) return g.law.rated_output_torque;
+    for (const ShaftMotor& m : train.motors)
+        if (m.shaft == shaft) return m.law.rated_torque;
+    return 1.0;
+}
+
+// Sizes that the states have at rated speed and torque, for error control.
+template <class State>
+void rated_scale(const Assembly& a, State& s) {
+    const Train& train = a.train();
+    for (std::size_t m = 0; m < train.motors.size(); ++m)
+        if (const int k = a.places().motors[m].torque; k != nowhere) s[k] = train.motors[m].law.rated_torque;
+    for (std::size_t n = 0; n < train.shafts.size(); ++n) {
+        const ShaftPlace& p = a.places().shafts[n];
+        s[p.speed] = rated_speed(train, static_cast<int>(n));
+        if (p.angle != nowhere) s[p.angle] = 1.0;
+    }
+    for (std::size_t g = 0; g < train.gears.size(); ++g) {
+        const Gear& gear = train.gears[g];
+        if (const int k = a.places().gears[g].twist; k != nowhere)
+            s[k] = gear.rigid() ? 1.0 : gear.law.rated_output_torque / gear.law.curve.largest_slope();
+    }
+}
+
+// Sizes in which the coupling of the equations is balanced: all shafts and twists with like energy, from the first
+// motor on. They serve to measure rates by a matrix norm, nothing else. angle: of the parts of the train.
+template <class State>
+void balanced_scale(const Assembly& a, State& s, int first_angle) {
+    const Train& train = a.train();
+    const Places& p = a.places();
+    const auto inertia = [&](int shaft) { return p.shafts[shaft].inertia; };
+    const int first = train.motors.empty() ? 0 : train.motors[0].shaft;
+    for (std::size_t m = 0; m < train.motors.size(); ++m)
+        if (p.motors[m].torque != nowhere) s[p.motors[m].torque] = 1.0;
+    double w = 1.0;
+    if (!train.motors.empty() && train.motors[0].law.kind == Motor::dc) {
+        const Motor& motor = train.motors[0].law;
+        w = std::sqrt(motor.electrical_time_constant * motor.rated_speed /
+                      (inertia(first) * (motor.armature_voltage_constant - 1.0) * motor.rated_torque));
+    }
+    for (std::size_t n = 0; n < train.shafts.size(); ++n)
+        s[p.shafts[n].speed] = w * std::sqrt(inertia(first) / inertia(static_cast<int>(n)));
+    s[p.shafts[first].speed] = w;
+    for (int part = 0; part < a.layout().angles; ++part) s[first_angle + part] = s[p.shafts[p.last_shaft[part]].speed];
+    for (std::size_t g = 0; g < train.gears.size(); ++g) {
+        const Gear& gear = train.gears[g];
+        const double in = s[p.shafts[gear.input].speed], i = gear.law.ratio, J = inertia(gear.input);
+        double& out = s[p.shafts[gear.output].speed];
+        double twist;
+        if (gear.rigid()) {
+            out = in / i;
+            twist = out * J;
+        } else {
+            const double k = gear.law.curve.largest_slope();
+            twist = in / i / std::sqrt(k / (i * i * J));
+            out = twist * std::sqrt(k / inertia(gear.output));
+        }
+        if (p.gears[g].twist != nowhere) s[p.gears[g].twist] = twist;
+        for (int part = 0; part < a.layout().angles; ++part)
+            if (p.last_shaft[part] == gear.output) s[first_angle + part] = twist;
+    }
+    for (std::size_t n = 0; n < train.shafts.size(); ++n)
+        if (p.shafts[n].angle != nowhere) s[p.shafts[n].angle] = s[p.shafts[n].speed];
+}
+
+}  // namespace lostmotion::model

@@ -1,0 +1,119 @@
+// Reactions of stuck contacts, from the condition that their speeds stay zero.
+#pragma once
+
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "contact_place.hpp"
+#include "regime.hpp"
+
+namespace lostmotion::model {
+
+// Rates of the speeds of the stuck contacts that raise the rank, and the columns of their reactions.
+struct StuckRows {
+    std::vector<Row> rows;
+    std::vector<int> unknowns;
+
+    StuckRows(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key, const Ties& ties,
+              const std::vector<Row>& acceleration) {
+        for (std::size_t k = 0; k < contacts.size(); ++k) {
+            if (key.modes[k] != 0 || ties.redundant[k]) continue;
+            const ContactPlace& c = contacts[k];
+            rows.push_back(c.per_a * acceleration[c.a]);
+            if (c.b != nowhere) rows.back() += c.per_b * acceleration[c.b];
+            unknowns.push_back(layout.terms + static_cast<int>(k));
+        }
+    }
+};
+
+// Does a torque that the gears of a rigidly tied part pass on turn it forward or, while a contact of it is at its
+// limit, wind it up? Without friction the matrix of accelerations over reactions, -d(rows)/d(reactions), is positive
+// definite. Friction that changes the sign of its determinant jams: no motion or several (Painleve).
+inline bool moves_freely(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key,
+                         const Ties& ties, const std::vector<Row>& acceleration) {
+    const StuckRows all(contacts, layout, key, ties, acceleration);
+    std::vector<bool> done(all.rows.size());
+    for (std::size_t first = 0; first < all.rows.size(); ++first) {
+        const auto shaft = [&](std::size_t k) { return contacts[all.unknowns[k] - layout.terms].a; };
+        if (done[first]) continue;
+        std::vector<std::size_t> part;
+        for (std::size_t k = first; k < all.rows.size(); ++k)
+            if (ties.leader[shaft(k)] == ties.leader[shaft(first)]) {
+                part.push_back(k);
+                done[k] = true;
+            }
+        const std::size_t n = part.size();
+        std::vector<std::vector<double>> K(n, std::vector<double>(n));
+        for (std::size_t a = 0; a < n; ++a)
+            for (std::size_t b = 0; b < n; ++b) K[a][b] = -all.rows[part[a]].c[all.unknowns[part[b]]];
+        for (std::size_t k = 0; k < n; ++k) {
+            std::size_t pivot = k;
+            for (std::size_t row = k + 1; row < n; ++row)
+                if (std::fabs(K[row][k]) > std::fabs(K[pivot][k])) pivot = row;
+            if (pivot != k) {
+                std::swap(K[k], K[pivot]);
+                for (double& v : K[k]) v = -v;
+            }
+            if (K[k][k] == 0.0) return false;
+            for (std::size_t row = k + 1; row < n; ++row)
+                for (std::size_t col = n; col-- > k;) K[row][col] -= K[row][k] / K[k][k] * K[k][col];
+        }
+        double sign = 1.0;
+        for (std::size_t k = 0; k < n; ++k) sign *= K[k][k] > 0.0 ? 1.0 : -1.0;
+        if (sign < 0.0) return false;
+    }
+    return true;
+}
+
+// f -= factor * row. What cancels to within rounding is zero: of a torque that is zero, such as that of a shaft at rest
+// that nothing turns, no rounding may be left whose sign would mean something. (Of two shafts nothing is.)
+inline void subtract(Row& f, double factor, const Row& row, bool two_shafts) {
+    if (two_shafts) {
+        f -= factor * row;
+        return;
+    }
+    constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
+    for (int k = 0; k < max_columns; ++k) {
+        const double a = f.c[k], b = factor * row.c[k];
+        f.c[k] = std::fabs(a - b) <= few_roundings * std::fabs(a) ? 0.0 : a - b;
+    }
+}
+
+// Eliminates the reactions from the forms. False if they have no unique solution.
+inline bool solve_reactions(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key,
+                            const Ties& ties, const std::vector<Row>& acceleration, const std::vector<Row*>& forms) {
+    const bool free = moves_freely(contacts, layout, key, ties, acceleration);
+    StuckRows stuck(contacts, layout, key, ties, acceleration);
+    auto& [rows, unknowns] = stuck;
+    const std::size_t n = rows.size();
+    const bool two_shafts = acceleration.size() == 2;
+    // Gauss-Jordan elimination with row pivoting; the right-hand sides are the known terms.
+    for (std::size_t k = 0; k < n; ++k) {
+        std::size_t pivot = k;
+        for (std::size_t row = k + 1; row < n; ++row)
+            if (std::fabs(rows[row].c[unknowns[k]]) > std::fabs(rows[pivot].c[unknowns[k]])) pivot = row;
+        std::swap(rows[k], rows[pivot]);
+        const double p = rows[k].c[unknowns[k]];
+        if (p == 0.0) return false;
+        rows[k] = rows[k] / p;
+        rows[k].c[unknowns[k]] = 1.0;
+        for (std::size_t row = 0; row < n; ++row) {
+            const double factor = rows[row].c[unknowns[k]];
+            if (row == k || factor == 0.0) continue;
+            subtract(rows[row], factor, rows[k], two_shafts);
+            rows[row].c[unknowns[k]] = 0.0;
+        }
+    }
+    for (Row* f : forms)
+        for (std::size_t k = 0; k < n; ++k) {
+            const double factor = f->c[unknowns[k]];
+            if (factor == 0.0) continue;
+            subtract(*f, factor, rows[k], two_shafts);
+            f->c[unknowns[k]] = 0.0;
+        }
+    return free;
+}
+
+}  // namespace lostmotion::model

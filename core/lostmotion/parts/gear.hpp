@@ -1,0 +1,69 @@
+// A gear between two shafts of a train: ratio, compliance and loss law of a gearbox, and what a train adds to it.
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "../gearbox.hpp"
+#include "mesh_efficiency.hpp"
+#include "periodic_curve.hpp"
+
+namespace lostmotion::model {
+
+struct Gear {
+    std::string name;
+    int input = 0, output = 0;  // shafts
+    Gearbox law;
+    std::optional<MeshEfficiency> efficiencies;  // of both directions of power flow, in place of the law's losses
+    // Mesh damping [N m s/rad, at the output]: acts while the flanks touch. They part when P + c d' would pull.
+    double mesh_damping = 0.0;
+    PeriodicCurve transmission_error;  // e [rad, at the output] over the angle of the input shaft
+
+    bool rigid() const { return law.compliance == Gearbox::rigid; }
+    bool has_dry_losses() const { return efficiencies || law.losses == Gearbox::loss_map; }
+    bool has_backlash() const { return !rigid() && law.curve.slope(0) == 0.0; }
+    bool parts_flanks() const { return mesh_damping > 0.0 && has_backlash(); }
+    double rated_torque() const { return efficiencies ? 1.0 : law.rated_output_torque; }  // scales mu
+
+    // The loss law, whichever it is.
+    template <class Use>
+    auto with_losses(Use&& use) const {
+        return efficiencies ? use(*efficiencies) : use(law.map);
+    }
+    Plane loss_plane(int cell) const {
+        return with_losses([&](const auto& m) { return m.plane(cell); });
+    }
+    Plane loss_at_standstill(int j) const {
+        return with_losses([&](const auto& m) { return m.line_at_standstill(j); });
+    }
+    int loss_edges(int cell, Edge out[3]) const {
+        return with_losses([&](const auto& m) { return m.edges(cell, out); });
+    }
+    int loss_cell(double mu, double v) const {
+        return with_losses([&](const auto& m) { return m.triangle(mu, v); });
+    }
+    int load_interval(double mu) const {
+        return with_losses([&](const auto& m) { return m.load_interval(mu); });
+    }
+    int load_intervals() const {
+        return with_losses([&](const auto& m) { return m.load_intervals(); });
+    }
+    bool in_data(int cell) const {
+        return with_losses([&](const auto& m) { return m.in_data(cell); });
+    }
+    bool load_interval_in_data(int j) const {
+        return with_losses([&](const auto& m) { return m.load_interval_in_data(j); });
+    }
+    // Bounds of an interval of the load axis, infinite where there is none.
+    double load_lower(int j) const {
+        if (efficiencies) return j == 0 ? -std::numeric_limits<double>::infinity() : 0.0;
+        return law.map.load_interval_lower(j);
+    }
+    double load_upper(int j) const {
+        if (efficiencies) return j == 0 ? 0.0 : std::numeric_limits<double>::infinity();
+        return law.map.load_interval_upper(j);
+    }
+};
+
+}  // namespace lostmotion::model

@@ -1,0 +1,78 @@
+// A periodic, continuous, piecewise linear function of an angle: gravity, unbalance, cogging, torque ripple,
+// transmission error.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+namespace lostmotion::model {
+
+class PeriodicCurve {
+ public:
+    PeriodicCurve() = default;
+    // angles: [rad], rising from 0 and below the period; values there. The last piece leads back to the first value.
+    PeriodicCurve(double period, std::vector<double> angles, std::vector<double> values)
+        : period_(period), angles_(std::move(angles)), values_(std::move(values)) {
+        angles_.push_back(period_);
+        values_.push_back(values_.front());
+    }
+
+    // amplitude * sin(n phi + phase), by chords that depart from it by at most `error` everywhere.
+    static PeriodicCurve sine(double amplitude, int n, double phase, double error) {
+        // Nodes on a circle of radius c: off by c - 1 there and by 1 - c cos(h/2) between, both tan^2(h/4) if
+        // c = 2/(1 + cos(h/2)).
+        const double a = std::fabs(amplitude);
+        const double h = 4.0 * std::atan(std::sqrt(std::min(error, a) / a));
+        const int pieces = 4 * std::max(1, static_cast<int>(std::ceil(std::numbers::pi / 2.0 / h)));
+        const double width = 2.0 * std::numbers::pi / pieces;
+        const double outwards = 2.0 / (1.0 + std::cos(0.5 * width));
+        std::vector<double> angles, values;
+        for (int k = 0; k < pieces; ++k) {
+            angles.push_back(width / n * k);
+            values.push_back(amplitude * outwards * std::sin(width * k + phase));
+        }
+        return PeriodicCurve(2.0 * std::numbers::pi / n, std::move(angles), std::move(values));
+    }
+
+    bool present() const { return !values_.empty(); }
+    double period() const { return period_; }
+    int pieces() const { return static_cast<int>(values_.size()) - 1; }
+    double lower(int k) const { return angles_[k]; }
+    double upper(int k) const { return angles_[k + 1]; }
+    double slope(int k) const { return (values_[k + 1] - values_[k]) / (angles_[k + 1] - angles_[k]); }
+    // In piece k the value is at_zero(k) + slope(k) * (phi - turn), where turn is the angle at which the period began.
+    double at_zero(int k) const { return values_[k] - slope(k) * angles_[k]; }
+    int piece(double within) const {
+        int k = 0;
+        while (k + 1 < pieces() && within >= angles_[k + 1]) ++k;
+        return k;
+    }
+    double turn(double phi) const { return period_ * std::floor(phi / period_); }
+    double operator()(double phi) const {
+        const double within = phi - turn(phi);
+        const int k = piece(within);
+        return at_zero(k) + slope(k) * within;
+    }
+    // Integral from 0 to phi [value * rad].
+    double integral(double phi) const {
+        const double turns = std::floor(phi / period_), within = phi - period_ * turns;
+        double sum = 0.0, whole = 0.0;
+        for (int k = 0; k < pieces(); ++k) {
+            const auto part = [&](double to) {
+                return (to - angles_[k]) * (values_[k] + 0.5 * slope(k) * (to - angles_[k]));
+            };
+            whole += part(angles_[k + 1]);
+            if (within > angles_[k]) sum += part(std::fmin(within, angles_[k + 1]));
+        }
+        return turns * whole + sum;
+    }
+
+ private:
+    double period_ = 0.0;
+    std::vector<double> angles_, values_;
+};
+
+}  // namespace lostmotion::model

@@ -1,0 +1,34 @@
+// A shaft: a speed with inertia, viscous friction, dry friction, drag over speed and an external torque.
+#pragma once
+
+#include <string>
+
+#include "../torsion_curve.hpp"
+#include "dry_friction.hpp"
+
+namespace lostmotion::model {
+
+struct Shaft {
+    std::string name;
+    double inertia = 0.0;           // [kg m2], without the rotors and gear inertias on it
+    double viscous_friction = 0.0;  // [N m s/rad]
+    DryFriction friction;
+    bool loaded = false;  // has an input: the load torque M_Z [N m] that acts against it
+    // Torque [N m] against the motion over speed [rad/s]: odd, piecewise linear; present if it has a slope.
+    TorsionCurve drag{{}, {0.0}};
+
+    bool has_drag() const { return drag.largest_slope() > 0.0; }
+    // A quadratic drag c w |w| up to `top` [rad/s], by chords that depart from it by at most `error` [N m]; beyond, it
+    // goes on in a straight line.
+    static TorsionCurve quadratic_drag(double c, double top, double error) {
+        const int n = std::max(1, static_cast<int>(std::ceil(top / std::sqrt(4.0 * error / c))));  // c h^2/4
+        std::vector<double> breaks, slopes;
+        for (int k = 0; k < n; ++k) {
+            slopes.push_back(c * top * (2 * k + 1) / n);
+            if (k + 1 < n) breaks.push_back(top * (k + 1) / n);
+        }
+        return TorsionCurve(std::move(breaks), std::move(slopes));
+    }
+};
+
+}  // namespace lostmotion::model

@@ -1,0 +1,24 @@
+// A motor on a shaft of a train.
+#pragma once
+
+#include <limits>
+#include <string>
+
+#include "../motor.hpp"
+
+namespace lostmotion::model {
+
+struct ShaftMotor {
+    std::string name;
+    int shaft = 0;
+    Motor law;
+    double torque_limit = std::numeric_limits<double>::infinity();  // [N m] of a torque source
+
+    // A limit of the input: of the voltage, or of the torque that is asked for.
+    bool limited() const {
+        return law.kind == Motor::dc ? law.limits_voltage() : torque_limit < std::numeric_limits<double>::infinity();
+    }
+    double command_limit() const { return law.kind == Motor::dc ? law.voltage_limit : torque_limit / law.rated_torque; }
+};
+
+}  // namespace lostmotion::model

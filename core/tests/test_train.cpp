@@ -1,0 +1,189 @@
+// The equations that the elements of a train compose, against the classic drive's and closed forms.
+#include <doctest/doctest.h>
+
+#include "lostmotion/model/check.hpp"
+#include "lostmotion/model/names.hpp"
+#include "lostmotion/model/pack.hpp"
+#include "random_trains.hpp"
+#include "round_drives.hpp"
+#include "train_twins.hpp"
+
+TEST_SUITE_BEGIN("train");
+
+namespace lostmotion::model {
+namespace {
+
+// All combinations of modes, with pieces and cells drawn at random.
+template <class Random>
+int compare_all(const Drive& d, Random& random) {
+    const Twins twins(d);
+    const auto pick = [&random](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+    int compared = 0;
+    std::array<std::vector<std::int8_t>, 3> modes;
+    for (int c = 0; c < 3; ++c) {
+        const auto contact = static_cast<Contact>(c);
+        if (!d.has(contact))
+            modes[c] = {absent};
+        else if (contact == twist_contact && d.rigid())
+            modes[c] = {0};
+        else
+            modes[c] = {0, 1, -1};
+    }
+    for (const auto a : modes[0])
+        for (const auto b : modes[1])
+            for (const auto c : modes[2]) {
+                RegimeKey k;
+                k.modes = {a, b, c};
+                if (d.motor.limits_voltage()) k.amplifier = static_cast<std::int8_t>(pick(-1, 1));
+                if (!d.rigid()) {
+                    const int n = d.gearbox.curve.outermost_piece();
+                    k.piece = static_cast<std::int16_t>(pick(-n, n));
+                }
+                if (d.gearbox.losses == Gearbox::loss_map) {
+                    const LossMap& map = d.gearbox.map;
+                    k.cell = a == 0 ? pick(0, map.load_intervals() - 1) : pick(0, map.triangles() - 1);
+                    k.cell_back = a == 0 ? pick(0, map.load_intervals() - 1) : 0;
+                }
+                compared += twins.compare(k);
+            }
+    return compared;
+}
+
+}  // namespace
+
+TEST_CASE("the classic drive as a train has the same equations and guards, to the last bit") {
+    std::mt19937_64 random(1);
+    RandomDrives drives(2);
+    RoundDrives round(3);
+    int compared = 0;
+    for (int n = 0; n < 300; ++n) compared += compare_all(drives.drive(), random);
+    for (int n = 0; n < 300; ++n) compared += compare_all(round.next(1.0).drive, random);
+    CHECK(compared > 3000);
+}
+
+TEST_CASE("the classic drive as a train has the same natural sizes, to the last bit") {
+    RandomDrives drives(4);
+    for (int n = 0; n < 200; ++n) {
+        const Drive d = drives.drive();
+        const Assembly a(train_of(d));
+        std::array<double, 5> balanced{}, rated{};
+        balanced_scale(a, balanced, a.layout().coupled);
+        rated_scale(a, rated);
+        for (int k = 0; k < 5; ++k) CHECK(balanced[static_cast<std::size_t>(k)] == d.balanced_scale()[k]);
+        for (int k = 0; k < 4; ++k) CHECK(rated[static_cast<std::size_t>(k)] == d.rated_scale()[k]);
+    }
+}
+
+TEST_CASE("states, inputs and contacts of a train have names") {
+    Drive d = plain_drive(2.0, 1.0, 1.0);
+    d.motor.friction_torque = 0.1;
+    const Assembly a(train_of(d));
+    CHECK(state_names(a) ==
+          std::vector<std::string>{"motor_torque", "motor_speed", "load_speed", "gearbox_twist", "load_angle"});
+    CHECK(input_names(a) == std::vector<std::string>{"motor_command", "load_load_torque"});
+    CHECK(contact_name(a, 0) == "motor_contact");
+    CHECK(contact_name(a, 1) == "gearbox_twist_contact");
+}
+
+TEST_CASE("what is wrong with a train is said in one line with the names of its elements") {
+    Train good;
+    good.shafts.resize(3);
+    const char* names[] = {"motor", "worm", "table"};
+    for (int s = 0; s < 3; ++s) {
+        good.shafts[s].name = names[s];
+        good.shafts[s].inertia = 1.0;
+    }
+    good.motors.push_back({"m1", 0, Motor{}});
+    good.gears.resize(2);
+    good.gears[0].name = "belt";
+    good.gears[0].output = 1;
+    good.gears[0].law.ratio = 2.0;
+    good.gears[1].name = "mesh";
+    good.gears[1].input = 1;
+    good.gears[1].output = 2;
+    good.gears[1].law.ratio = 3.0;
+    CHECK(check(good) == "");
+    const auto with = [&good](auto change) {
+        Train t = good;
+        change(t);
+        return check(t);
+    };
+    const auto loop = [](double ratio) {
+        return [ratio](Train& t) {
+            Gear g;
+            g.name = "bypass";
+            g.input = 0;
+            g.output = 2;
+            g.law.ratio = ratio;
+            t.gears.push_back(g);
+        };
+    };
+    CHECK(with([](Train& t) { t.gears[1].output = 7; }) ==
+          "gear 'mesh' names shaft number 7, which the train does not have");
+    CHECK(with([](Train& t) { t.motors[0].shaft = -1; }) ==
+          "motor 'm1' names shaft number -1, which the train does not have");
+    CHECK(with([](Train& t) { t.gears[1].output = 1; }) ==
+          "gear 'mesh' joins shaft 'worm' with itself; give it another output");
+    CHECK(with([](Train& t) { t.gears.pop_back(); }) ==
+          "shaft 'table' is turned by nothing: no motor, gear or load torque acts on it; join it to the train");
+    CHECK(with([](Train& t) { t.shafts[2].inertia = 0.0; }) ==
+          "shaft 'table' has no inertia; give it one, or that of a motor or gear on it");
+    CHECK(with(loop(5.0)) ==
+          "gear 'bypass' closes a loop of rigid gears with another ratio: nothing could turn; give it "
+          "a stiffness or leave it out");
+    CHECK(with(loop(6.0)) ==
+          "gear 'bypass' closes a loop of rigid gears with the same ratio: its torque would not be "
+          "determined; give it a stiffness or leave it out");
+    CHECK(with([&](Train& t) {
+              loop(6.0)(t);
+              t.gears[2].law.compliance = Gearbox::torsion_curve;
+          }) == "");
+    CHECK(with([](Train& t) { t.gears[0].law.ratio = -2.0; }).starts_with("gear 'belt' has the ratio -2"));
+    CHECK(with([](Train& t) { t.shafts.resize(40); }) == "the train has 40 shafts; at most 16 are possible");
+    CHECK(check(Train{}) == "the train has no shaft");
+}
+
+TEST_CASE("a packed regime has the same coefficients in the kernel's order, and zeros elsewhere") {
+    RandomTrains random(31);
+    for (int n = 0; n < 100; ++n) {
+        const Assembly a(random.train(random.pick(2, 6), true));
+        const Layout& at = a.layout();
+        REQUIRE(fits<Wide>(a.train(), at));
+        Key key;
+        for (int c = 0; c < at.contacts; ++c)
+            key.modes[c] = static_cast<std::int8_t>(a.places().contacts[c].bilateral ? 0 : random.pick(-1, 1));
+        for (const ContactPlace& c : a.places().contacts)
+            if (c.one_way) key.modes[&c - a.places().contacts.data()] = -1;
+        const Regime r = a.build(key);
+        const auto p = pack<Wide>(r, a);
+        CHECK(p.complete);
+        CHECK(p.n_guards == static_cast<int>(r.guards.size()));
+        Instant x;
+        std::array<double, Wide::terms> wide{};
+        const auto put = [&](int count, int to, auto& values) {
+            for (int k = 0; k < count; ++k)
+                values[k] = wide[static_cast<std::size_t>(to + k)] = random.uniform(-1.0, 1.0);
+        };
+        put(at.coupled, 0, x.x);
+        for (int k = 0; k < at.angles; ++k)
+            x.x[at.coupled + k] = wide[static_cast<std::size_t>(Wide::coupled + k)] = random.uniform(-1.0, 1.0);
+        wide[Wide::one] = 1.0;
+        put(at.memory, Wide::first_memory, x.memory);
+        put(at.inputs, Wide::first_input, x.input[0]);
+        const auto value = [&](const PackedForm<Wide>& f) {
+            double sum = 0.0;
+            for (int k = 0; k < Wide::terms; ++k)
+                sum += f.c[static_cast<std::size_t>(k)] * wide[static_cast<std::size_t>(k)];
+            return sum;
+        };
+        for (int k = 0; k < at.coupled; ++k)
+            CHECK(value(p.rate[static_cast<std::size_t>(k)]) == doctest::Approx(evaluate(at, r.rate[k], x)));
+        for (int g = 0; g < p.n_guards; ++g)
+            CHECK(value(p.guards[static_cast<std::size_t>(g)].form) ==
+                  doctest::Approx(evaluate(at, r.guards[static_cast<std::size_t>(g)].form, x)));
+    }
+}
+
+}  // namespace lostmotion::model
+
+TEST_SUITE_END();

@@ -1,0 +1,299 @@
+// Which regime of a train follows at an event: against the classic drive's search, and against all combinations.
+#include <doctest/doctest.h>
+
+#include "gauss_principle.hpp"
+#include "properties.hpp"
+#include "random_trains.hpp"
+#include "round_drives.hpp"
+#include "train_twins.hpp"
+
+TEST_SUITE_BEGIN("train_modes");
+
+namespace lostmotion::model {
+namespace {
+
+// The classic drive, with the train's search run beside its own at every event.
+struct Shadowed {
+    using Dims = DriveDims;
+
+    explicit Shadowed(const Drive& d) : drive(d), classic(drive), twins(d), train(twins.assembly), cache_(train) {}
+
+    lostmotion::Regime build(const RegimeKey& key) const { return classic.build(key); }
+    void near_event(const GuardTable& g, GuardTable::Values& out) const { classic.near_event(g, out); }
+    void stop(State& x, std::array<bool, n_contacts>& at_rest) const { classic.stop(x, at_rest); }
+
+    template <class Cache>
+    lostmotion::Found start(Cache& cache, lostmotion::Instant& now, RegimeKey& key) const {
+        Instant mine = instant(now);
+        Key my_key;
+        const Found found = train.start(cache_, mine, my_key);
+        const lostmotion::Found expected = classic.start(cache, now, key);
+        compare(expected, now, key, found, mine, my_key, "start");
+        return expected;
+    }
+    template <class Cache>
+    lostmotion::Found next(Cache& cache, lostmotion::Instant& now, const lostmotion::Guard* fired, RegimeKey& key,
+                           const std::array<double, n_inputs>& input) const {
+        Instant mine = instant(now);
+        Key my_key = twins.key(key);
+        const Guard* my_guard = nullptr;
+        if (fired != nullptr)
+            my_guard = &cache_.regime(my_key).guards[static_cast<std::size_t>(fired - cache.regime(key).guards.data())];
+        const Found found = train.next(cache_, mine, my_guard, my_key, left(mine, input));
+        const lostmotion::Found expected = classic.next(cache, now, fired, key, input);
+        compare(expected, now, key, found, mine, my_key, fired == nullptr ? "input" : "guard");
+        return expected;
+    }
+
+    Instant instant(const lostmotion::Instant& now) const {
+        Instant out;
+        out.time = now.time;
+        for (int k = 0; k < lostmotion::n_states; ++k) out.x[twins.term[k]] = now.x[k];
+        set(out, hysteresis_capacity, now.memory.hysteresis_capacity);
+        set(out, held_torque, now.memory.held_torque);
+        for (int k = 0; k < lostmotion::n_derivatives; ++k)
+            for (int i = 0; i < lostmotion::n_inputs; ++i) out.input[k][i] = now.input[k][i];
+        for (int i = 0; i < lostmotion::n_inputs; ++i) out.input_size[i] = now.input_size[i];
+        return out;
+    }
+    static std::array<double, max_inputs> left(const Instant& now, const std::array<double, n_inputs>& input) {
+        auto out = now.input[0];
+        std::copy(input.begin(), input.end(), out.begin());
+        return out;
+    }
+    void set(Instant& out, Term term, double value) const {
+        if (twins.term[term] != nowhere)
+            out.memory[static_cast<std::size_t>(twins.term[term] - train.sizes().first_memory)] = value;
+    }
+    void compare(lostmotion::Found expected, const lostmotion::Instant& now, const RegimeKey& key, Found found,
+                 const Instant& mine, const Key& my_key, const char* what) const {
+        ++events;
+        CAPTURE(what);
+        CAPTURE(now.time);
+        CHECK(static_cast<int>(expected) == static_cast<int>(found));
+        if (expected != lostmotion::Found::yes || found != Found::yes) return;
+        const Key expected_key = twins.key(key);
+        bool same = expected_key.modes == my_key.modes;
+        for (int b = 0; b < train.assembly().layout().branches; ++b)
+            same = same && (expected_key.branch[b] == my_key.branch[b]);
+        differing += !same;
+        const Instant after = instant(now);
+        if (same) CHECK(after.x == mine.x);
+        if (same && twins.term[hysteresis_capacity] != nowhere) CHECK(after.memory[0] == mine.memory[0]);
+        if (same && twins.term[held_torque] != nowhere) {
+            const auto m = static_cast<std::size_t>(twins.term[held_torque] - train.sizes().first_memory);
+            if (key.modes == Modes{0, 0, 0}) CHECK(after.memory[m] == mine.memory[m]);
+        }
+    }
+
+    Drive drive;
+    SwitchedDrive classic;
+    Twins twins;
+    SwitchedTrain<> train;
+    mutable MapCache cache_;
+    mutable long events = 0, differing = 0;
+};
+
+struct Nothing {
+    template <class Segment>
+    bool segment(const Segment&) {
+        return true;
+    }
+};
+
+struct Count {
+    long events = 0, differing = 0;
+    void run(const Drive& d, const Signals& signals, const Start& start, double duration) {
+        const Shadowed system(d);
+        ExactSolver<Shadowed> solver(system, signals, 1e-3, d.balanced_scale());
+        Nothing nothing;
+        if (solver.begin(0.0, start.x, start.memory) == Status::done) solver.advance(duration, nothing);
+        events += system.events;
+        differing += system.differing;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("at every event of random classic drives the train's search finds what the drive's does") {
+    Count count;
+    RandomDrives random(11);
+    for (int n = 0; n < 150; ++n) {
+        const Drive d = random.drive();
+        count.run(d, random.signals(d, 0.5), {}, 0.5);
+    }
+    RoundDrives round(12);
+    for (int n = 0; n < 300; ++n) {
+        const RoundDrives::Run r = round.next(2.0);
+        count.run(r.drive, r.signals, r.start, 2.0);
+    }
+    SelfLockingDrives locking(13, true);
+    for (int n = 0; n < 60; ++n) {
+        const Drive d = locking.drive();
+        count.run(d, locking.reversing(d), {}, 0.5);
+    }
+    CHECK(count.events > 5000);
+    CHECK(count.differing == 0);
+}
+
+TEST_CASE("accelerations of random trains are those of the principle of least constraint") {
+    RandomTrains random(21);
+    int compared = 0, at_rest = 0;
+    for (int n = 0; n < 1500; ++n) {
+        Train t = random.train(random.pick(2, 6), false);
+        for (Shaft& s : t.shafts) s.friction.breakaway_torque = 0.0;  // the principle needs one capacity
+        const Assembly a(t);
+        const SwitchedTrain<> system(a);
+        MapCache cache(system);
+        Instant now = random.instant(a, n % 3 == 0 ? 0.0 : 0.3);
+        const Instant before = now;
+        Key key;
+        CAPTURE(n);
+        REQUIRE(system.start(cache, now, key) == Found::yes);
+        const Regime& r = cache.regime(key);
+        const std::vector<double> expected = least_constraint(a, before, 4000);
+        for (std::size_t s = 0; s < expected.size(); ++s) {
+            const double mine = evaluate(a.layout(), r.rate[a.places().shafts[s].speed], now);
+            CHECK(mine == doctest::Approx(expected[s]).scale(1.0).epsilon(1e-6));
+            at_rest += mine == 0.0;
+        }
+        for (const Guard& g : r.guards)
+            CHECK(evaluate(a.layout(), g.form, now) >= -rounding * magnitude(a.layout(), g.form, now));
+        ++compared;
+    }
+    CHECK(compared == 1500);
+    CHECK(at_rest > 500);
+}
+
+TEST_CASE("pivoting and trying all combinations find the same accelerations, with losses") {
+    RandomTrains random(23);
+    int compared = 0;
+    long worst = 0;
+    for (int n = 0; n < 500; ++n) {
+        const Assembly a(random.train(random.pick(2, 5), true));
+        SwitchedTrain<> all(a), pivoting(a);
+        all.few = 1e9;
+        pivoting.few = 0.0;
+        MapCache cache(all);
+        const Instant start = random.instant(a, n % 3 == 0 ? 0.0 : 0.3);
+        Instant now = start, other = start;
+        Key key, other_key;
+        CAPTURE(n);
+        const Found found = all.start(cache, now, key);
+        pivoting.trials = 0;
+        const Found other_found = pivoting.start(cache, other, other_key);
+        worst = std::max(worst, pivoting.trials);
+        CHECK(static_cast<int>(found) == static_cast<int>(other_found));
+        if (found != Found::yes || other_found != Found::yes) continue;
+        // A self-locking gear may hold or lower its load, and a torque between break-away and sliding friction may hold
+        // a shaft or move it, both in accord with the friction.
+        const auto& gears = a.train().gears;
+        if (std::any_of(gears.begin(), gears.end(),
+                        [](const Gear& g) { return g.efficiencies && g.efficiencies->overrunning() <= 0.0; }))
+            continue;
+        const auto& shafts = a.train().shafts;
+        if (std::any_of(shafts.begin(), shafts.end(), [](const Shaft& s) { return s.friction.breakaway_torque > 0.0; }))
+            continue;
+        ++compared;
+        for (const ShaftPlace& s : a.places().shafts)
+            CHECK(evaluate(a.layout(), cache.regime(key).rate[s.speed], now) ==
+                  doctest::Approx(evaluate(a.layout(), cache.regime(other_key).rate[s.speed], other)).epsilon(1e-9));
+    }
+    CHECK(compared > 200);
+    CHECK(worst < 1000);  // of a self-locking train, all ways of searching together
+}
+
+TEST_CASE("a jump that starts a chain with all its contacts at rest is found in few trials") {
+    RandomTrains random(22);
+    long worst = 0, contacts = 0;
+    for (int n = 0; n < 400; ++n) {
+        Train t;
+        t.shafts.resize(7);
+        for (Shaft& s : t.shafts) {
+            s.inertia = random.spread(0.3, 3.0);
+            s.friction.torque = random.spread(0.1, 1.0);
+            s.loaded = true;
+        }
+        for (int g = 0; g < 6; ++g) {
+            Gear gear = random.gear(g, g + 1, false);
+            gear.law.compliance = Gearbox::torsion_curve;
+            gear.law.curve = TorsionCurve({}, {50.0});
+            gear.law.hysteresis_efficiency = 0.8;
+            t.gears.push_back(gear);
+        }
+        const Assembly a(t);
+        const SwitchedTrain<> system(a);
+        MapCache cache(system);
+        Instant now;
+        for (int g = 0; g < 6; ++g) now.memory[a.places().gears[g].hysteresis] = random.spread(0.05, 1.0);
+        Key key;
+        REQUIRE(system.start(cache, now, key) == Found::yes);
+        for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-3.0, 3.0);
+        system.trials = 0;
+        CAPTURE(n);
+        REQUIRE(system.next(cache, now, static_cast<const Guard*>(nullptr), key, std::array<double, max_inputs>{}) ==
+                Found::yes);
+        worst = std::max(worst, system.trials);
+        contacts = a.layout().contacts;
+        const std::vector<double> expected = least_constraint(a, now, 20000);
+        for (std::size_t s = 0; s < expected.size(); ++s)
+            CHECK(evaluate(a.layout(), cache.regime(key).rate[a.places().shafts[s].speed], now) ==
+                  doctest::Approx(expected[s]).scale(1.0).epsilon(1e-6));
+    }
+    CHECK(contacts == 13);
+    CHECK(worst <= 100);
+}
+
+TEST_CASE("the search works on packed regimes and the kernel's own instant as on the train's") {
+    struct WideInstant {
+        double time = 0.0;
+        std::array<double, 30> x{};
+        std::array<double, 16> memory{};
+        std::array<std::array<double, 14>, n_derivatives> input{};
+        std::array<double, 14> input_size{};
+    };
+    struct WideCache {
+        const Assembly& assembly;
+        std::unordered_map<Key, std::unique_ptr<PackedRegime<Wide>>, KeyHash> regimes;
+        const PackedRegime<Wide>& regime(const Key& key) {
+            auto& r = regimes[key];
+            if (!r) r = std::make_unique<PackedRegime<Wide>>(pack<Wide>(assembly.build(key), assembly));
+            return *r;
+        }
+    };
+    RandomTrains random(24);
+    for (int n = 0; n < 200; ++n) {
+        const Assembly a(random.train(random.pick(2, 4), true));
+        const SwitchedTrain<> plain(a);
+        const SwitchedTrain<Wide> packed(a, Wide{});
+        MapCache cache(plain);
+        WideCache wide_cache{a, {}};
+        Instant now = random.instant(a, 0.2);
+        WideInstant wide;
+        std::copy_n(now.x.begin(), a.layout().coupled, wide.x.begin());
+        std::copy_n(now.memory.begin(), 16, wide.memory.begin());
+        std::copy_n(now.input_size.begin(), 14, wide.input_size.begin());
+        const auto inputs = [&] {
+            for (int k = 0; k < n_derivatives; ++k) std::copy_n(now.input[k].begin(), 14, wide.input[k].begin());
+        };
+        inputs();
+        Key key, wide_key;
+        CAPTURE(n);
+        CHECK(plain.start(cache, now, key) == packed.start(wide_cache, wide, wide_key));
+        CHECK(key == wide_key);
+        for (int jump = 0; jump < 3; ++jump) {
+            const auto before = now.input[0];
+            const auto wide_before = wide.input[0];
+            for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-2.0, 2.0);
+            inputs();
+            CHECK(plain.next(cache, now, static_cast<const Guard*>(nullptr), key, before) ==
+                  packed.next(wide_cache, wide, static_cast<const PackedGuard<Wide>*>(nullptr), wide_key, wide_before));
+            CHECK(key == wide_key);
+            CHECK(std::equal(wide.memory.begin(), wide.memory.end(), now.memory.begin()));
+        }
+    }
+}
+
+}  // namespace lostmotion::model
+
+TEST_SUITE_END();

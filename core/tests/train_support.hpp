@@ -1,0 +1,82 @@
+// Trains shared by the tests.
+#pragma once
+
+#include <memory>
+#include <unordered_map>
+
+#include "lostmotion/model/modes.hpp"
+#include "lostmotion/model/pack.hpp"
+#include "support.hpp"
+
+namespace lostmotion::model {
+
+// Elements with little more than what a test is about.
+inline Shaft shaft(double inertia) {
+    Shaft s;
+    s.inertia = inertia;
+    return s;
+}
+inline ShaftMotor torque_motor(int at) {
+    ShaftMotor m;
+    m.shaft = at;
+    m.law.kind = Motor::torque_source;
+    return m;
+}
+inline Gear rigid_gear(int input, int output, double ratio) {
+    Gear g;
+    g.input = input;
+    g.output = output;
+    g.law.ratio = ratio;
+    return g;
+}
+inline Gear spring(int input, int output, double ratio, const TorsionCurve& curve) {
+    Gear g = rigid_gear(input, output, ratio);
+    g.law.compliance = Gearbox::torsion_curve;
+    g.law.curve = curve;
+    return g;
+}
+
+// The classic drive in the long form.
+inline Train train_of(const Drive& d) {
+    Train t;
+    t.shafts.resize(2);
+    t.shafts[0].name = "motor";
+    t.shafts[1].name = "load";
+    t.shafts[1].inertia = d.load.inertia;
+    t.shafts[1].viscous_friction = d.load.viscous_friction;
+    t.shafts[1].friction.torque = d.load.friction_torque;
+    t.shafts[1].loaded = true;
+    t.motors.push_back({"motor", 0, d.motor});
+    Gear g;
+    g.name = "gearbox";
+    g.input = 0;
+    g.output = 1;
+    g.law = d.gearbox;
+    t.gears.push_back(g);
+    return t;
+}
+
+// Dimensions as the kernel's.
+struct Wide {
+    static constexpr int coupled = 24, angles = 6, inputs = 14, memory = 16, contacts = 20, guards = 96;
+    static constexpr int states = coupled + angles, one = states, first_memory = one + 1,
+                         first_input = first_memory + memory, terms = first_input + inputs;
+};
+
+// Regimes visited so far; they stay where they are.
+class MapCache {
+ public:
+    explicit MapCache(const SwitchedTrain<>& system) : system_(system) {}
+    const Regime& regime(const Key& key) {
+        auto& r = regimes_[key];
+        if (!r) r = std::make_unique<Regime>(system_.build(key));
+        return *r;
+    }
+    std::size_t size() const { return regimes_.size(); }
+
+ private:
+    const SwitchedTrain<>& system_;
+    std::unordered_map<Key, std::unique_ptr<Regime>, KeyHash> regimes_;
+};
+
+}  // namespace lostmotion::model
