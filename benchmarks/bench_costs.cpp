@@ -2,7 +2,7 @@
 // floating-point peak of this machine. Prints one line a case: table, then its cells.
 #include <cstdio>
 
-#include "lostmotion/response.hpp"
+#include "lostmotion/analysis/response.hpp"
 #include "paper_run.hpp"
 
 using namespace lostmotion;

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "lostmotion/simulation.hpp"
+#include "lostmotion/simulation/stepping.hpp"
 #include "paper_run.hpp"
 
 using namespace lostmotion;

@@ -14,8 +14,8 @@
 #include <string>
 #include <vector>
 
-#include "lostmotion/response.hpp"
-#include "lostmotion/run.hpp"
+#include "lostmotion/analysis/response.hpp"
+#include "lostmotion/simulation/run.hpp"
 
 namespace lostmotion::binding {
 

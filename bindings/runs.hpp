@@ -7,9 +7,9 @@
 #include <numeric>
 
 #include "convert.hpp"
-#include "lostmotion/batch.hpp"
-#include "lostmotion/explain.hpp"
-#include "lostmotion/simulation.hpp"
+#include "lostmotion/analysis/batch.hpp"
+#include "lostmotion/analysis/explain.hpp"
+#include "lostmotion/simulation/stepping.hpp"
 
 namespace lostmotion::binding {
 

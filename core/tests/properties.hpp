@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "lostmotion/simulation.hpp"
+#include "lostmotion/simulation/stepping.hpp"
 #include "support.hpp"
 
 namespace lostmotion {

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "lostmotion/run.hpp"
+#include "lostmotion/simulation/run.hpp"
 
 namespace lostmotion {
 

@@ -1,8 +1,8 @@
 // Sticking, sliding, jamming: the set-valued contacts.
 #include <doctest/doctest.h>
 
-#include "lostmotion/explain.hpp"
-#include "lostmotion/simulation.hpp"
+#include "lostmotion/analysis/explain.hpp"
+#include "lostmotion/simulation/stepping.hpp"
 #include "support.hpp"
 
 using namespace lostmotion;

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "lostmotion/reduction.hpp"
+#include "lostmotion/analysis/reduction.hpp"
 #include "support.hpp"
 
 using namespace lostmotion;

@@ -3,7 +3,7 @@
 
 #include <cstdio>
 
-#include "lostmotion/periodic.hpp"
+#include "lostmotion/analysis/periodic.hpp"
 #include "support.hpp"
 
 using namespace lostmotion;

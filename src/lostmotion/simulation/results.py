@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-# Entries of the energy ledger, in the order of the core's (core/lostmotion/energy.hpp).
+# Entries of the energy ledger, in the order of the core's (core/lostmotion/simulation/energy.hpp).
 ENERGY = (
     "source",
     "input_damper",

@@ -16,7 +16,7 @@ class Variable:
     derived: bool = False  # computed from the others, not read from the solver
 
 
-# Those that are read from the solver stand in the order of its channels (core/lostmotion/reader.hpp).
+# Those that are read from the solver stand in the order of its channels (core/lostmotion/simulation/reader.hpp).
 VARIABLES = (
     Variable("command", "E_C", "1", "control signal, relative armature voltage"),
     Variable("load_torque", "M_Z", "N*m", "disturbance torque on the load"),
@@ -46,5 +46,5 @@ CHANNELS = tuple(v for v in VARIABLES if not v.derived)
 CHANNEL_NAMES = tuple(v.name for v in CHANNELS)
 CONTACTS = ("input_contact", "twist_contact", "load_contact")
 
-# Names of the five states, in the order of the solver's state vector (core/lostmotion/linear_form.hpp).
+# Names of the five states, in the order of the solver's state vector (core/lostmotion/variables.hpp).
 STATES = ("motor_torque", "motor_speed", "load_speed", "twist", "load_angle")

@@ -9,10 +9,10 @@
 #include <span>
 #include <utility>
 
-#include "contact.hpp"
-#include "kernel/stride.hpp"
+#include "../contact.hpp"
+#include "../kernel/stride.hpp"
+#include "../solver/exact_solver.hpp"
 #include "reader.hpp"
-#include "solver/exact_solver.hpp"
 
 namespace lostmotion {
 

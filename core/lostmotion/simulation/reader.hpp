@@ -5,8 +5,8 @@
 #include <cassert>
 #include <cstddef>
 
-#include "drive.hpp"
-#include "kernel/stride.hpp"
+#include "../drive.hpp"
+#include "../kernel/stride.hpp"
 
 namespace lostmotion {
 

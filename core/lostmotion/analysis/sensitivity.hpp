@@ -4,8 +4,8 @@
 
 #include <optional>
 
-#include "contact.hpp"
-#include "solver/exact_solver.hpp"
+#include "../contact.hpp"
+#include "../solver/exact_solver.hpp"
 
 namespace lostmotion {
 

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "contact.hpp"
+#include "../contact.hpp"
 
 namespace lostmotion {
 

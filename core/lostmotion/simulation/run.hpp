@@ -3,9 +3,9 @@
 
 #include <vector>
 
+#include "../solver/adaptive_solver.hpp"
 #include "energy.hpp"
 #include "sampler.hpp"
-#include "solver/adaptive_solver.hpp"
 
 namespace lostmotion {
 

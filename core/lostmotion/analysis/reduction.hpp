@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "kernel/vec.hpp"
+#include "../kernel/vec.hpp"
 
 namespace lostmotion {
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "run.hpp"
+#include "../simulation/run.hpp"
 #include "sensitivity.hpp"
 
 namespace lostmotion {
