@@ -4,67 +4,62 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <limits>
+#include <memory>
 #include <span>
+#include <string>
+#include <vector>
 
+#include "../parameters.hpp"
+#include "../simulation/result_names.hpp"
+#include "../simulation/run.hpp"
 #include "reduction.hpp"
-#include "response.hpp"
+#include "workers.hpp"
 
 namespace lostmotion {
 
-// What may differ from run to run.
-struct BatchField {
-    const char* key;  // as in a scenario file
-    // Sets the value; drive: whether the drive itself changes.
-    void (*set)(Drive&, Signals&, Start&, double);
-    bool drive;
+// What a run is made of.
+struct Case {
+    Drive drive;
+    Signals signals;
+    Start start;
 };
 
-inline std::span<const BatchField> batch_fields() {
-    static constexpr auto first_sine = [](Signal& s) -> Sine& {
-        if (s.sines.empty()) s.sines.emplace_back();
-        return s.sines.front();
+// What may differ from run to run.
+struct BatchField {
+    std::string key;  // as in a scenario file
+    std::function<void(Case&, double)> set;
+    bool of_drive;  // whether the drive itself changes
+};
+
+inline void add_signal_fields(std::vector<BatchField>& fields, const std::string& prefix, std::size_t input) {
+    const auto first_sine = [input](Case& c) -> Sine& {
+        std::vector<Sine>& sines = c.signals[input].sines;
+        return sines.empty() ? sines.emplace_back() : sines.front();
     };
-    static constexpr BatchField fields[] = {
-        {"motor.rotor_inertia", [](Drive& d, Signals&, Start&, double v) { d.motor.rotor_inertia = v; }, true},
-        {"motor.friction_torque", [](Drive& d, Signals&, Start&, double v) { d.motor.friction_torque = v; }, true},
-        {"motor.rated_torque", [](Drive& d, Signals&, Start&, double v) { d.motor.rated_torque = v; }, true},
-        {"motor.rated_speed", [](Drive& d, Signals&, Start&, double v) { d.motor.rated_speed = v; }, true},
-        {"motor.electrical_time_constant",
-         [](Drive& d, Signals&, Start&, double v) { d.motor.electrical_time_constant = v; }, true},
-        {"motor.armature_voltage_constant",
-         [](Drive& d, Signals&, Start&, double v) { d.motor.armature_voltage_constant = v; }, true},
-        {"gearbox.ratio", [](Drive& d, Signals&, Start&, double v) { d.gearbox.ratio = v; }, true},
-        {"gearbox.inertia", [](Drive& d, Signals&, Start&, double v) { d.gearbox.inertia = v; }, true},
-        {"gearbox.viscous_friction", [](Drive& d, Signals&, Start&, double v) { d.gearbox.viscous_friction = v; },
-         true},
-        {"gearbox.rated_input_speed", [](Drive& d, Signals&, Start&, double v) { d.gearbox.rated_input_speed = v; },
-         true},
-        {"gearbox.rated_output_torque", [](Drive& d, Signals&, Start&, double v) { d.gearbox.rated_output_torque = v; },
-         true},
-        {"gearbox.hysteresis.efficiency",
-         [](Drive& d, Signals&, Start&, double v) { d.gearbox.hysteresis_efficiency = v; }, true},
+    fields.push_back({prefix + ".mean", [=](Case& c, double v) { c.signals[input].knots[0].value = v; }, false});
+    fields.push_back({prefix + ".amplitude", [=](Case& c, double v) { first_sine(c).amplitude = v; }, false});
+    fields.push_back({prefix + ".frequency", [=](Case& c, double v) { first_sine(c).frequency = v; }, false});
+    fields.push_back({prefix + ".phase", [=](Case& c, double v) { first_sine(c).phase = v; }, false});
+}
+
+inline const std::vector<BatchField>& batch_fields() {
+    static const std::vector<BatchField> all = [] {
+        std::vector<BatchField> fields;
+        for (const Parameter& p : parameters)
+            fields.push_back({p.key, [in = p.in](Case& c, double v) { in(c.drive) = v; }, true});
         // A factor on what the drive has, not the value itself.
-        {"gearbox.stiffness.slopes",
-         [](Drive& d, Signals&, Start&, double v) { d.gearbox.curve = d.gearbox.curve.scaled(v); }, true},
-        {"load.inertia", [](Drive& d, Signals&, Start&, double v) { d.load.inertia = v; }, true},
-        {"load.viscous_friction", [](Drive& d, Signals&, Start&, double v) { d.load.viscous_friction = v; }, true},
-        {"load.friction_torque", [](Drive& d, Signals&, Start&, double v) { d.load.friction_torque = v; }, true},
-        {"command.mean", [](Drive&, Signals& s, Start&, double v) { s[0].knots[0].value = v; }, false},
-        {"command.amplitude", [](Drive&, Signals& s, Start&, double v) { first_sine(s[0]).amplitude = v; }, false},
-        {"command.frequency", [](Drive&, Signals& s, Start&, double v) { first_sine(s[0]).frequency = v; }, false},
-        {"command.phase", [](Drive&, Signals& s, Start&, double v) { first_sine(s[0]).phase = v; }, false},
-        {"load.torque.mean", [](Drive&, Signals& s, Start&, double v) { s[1].knots[0].value = v; }, false},
-        {"load.torque.amplitude", [](Drive&, Signals& s, Start&, double v) { first_sine(s[1]).amplitude = v; }, false},
-        {"load.torque.frequency", [](Drive&, Signals& s, Start&, double v) { first_sine(s[1]).frequency = v; }, false},
-        {"load.torque.phase", [](Drive&, Signals& s, Start&, double v) { first_sine(s[1]).phase = v; }, false},
-        {"initial.motor_torque", [](Drive&, Signals&, Start& s, double v) { s.x[motor_torque] = v; }, false},
-        {"initial.motor_speed", [](Drive&, Signals&, Start& s, double v) { s.x[motor_speed] = v; }, false},
-        {"initial.load_speed", [](Drive&, Signals&, Start& s, double v) { s.x[load_speed] = v; }, false},
-        {"initial.twist", [](Drive&, Signals&, Start& s, double v) { s.x[twist] = v; }, false},
-        {"initial.load_angle", [](Drive&, Signals&, Start& s, double v) { s.x[load_angle] = v; }, false},
-    };
-    return fields;
+        fields.push_back({"gearbox.stiffness.slopes",
+                          [](Case& c, double v) { c.drive.gearbox.curve = c.drive.gearbox.curve.scaled(v); }, true});
+        add_signal_fields(fields, "command", command - first_input);
+        add_signal_fields(fields, "load.torque", load_torque - first_input);
+        for (const StateName& s : state_names)
+            fields.push_back({"initial." + std::string(s.name),
+                              [k = s.value](Case& c, double v) { c.start.x[static_cast<std::size_t>(k)] = v; }, false});
+        return fields;
+    }();
+    return all;
 }
 
 // One number to keep of each run: a reduction of the samples of a channel, by its place among those of the run.
@@ -74,9 +69,7 @@ struct Kept {
 };
 
 struct BatchInput {
-    const Drive& drive;
-    const Signals& signals;
-    Start start;
+    Case base;
     RunOptions options;
     std::span<const int> fields;     // numbers in batch_fields()
     std::span<const double> values;  // runs x fields
@@ -100,24 +93,21 @@ inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in
     const std::size_t width = in.options.channels.size() * in.options.samples;
     const std::size_t row_size = in.kept.empty() ? width : in.kept.size();
     bool drive_varies = false;
-    for (const int f : in.fields) drive_varies = drive_varies || batch_fields()[static_cast<std::size_t>(f)].drive;
-    work_through(in.runs, threads, waiting, [&](auto next, std::atomic<bool>& stop) {
-        std::unique_ptr<Workspace> workspace = drive_varies ? std::make_unique<Workspace>(in.drive) : pool.take();
+    for (const int f : in.fields) drive_varies = drive_varies || batch_fields()[static_cast<std::size_t>(f)].of_drive;
+    distribute(in.runs, threads, waiting, [&](auto next, std::atomic<bool>& stop) {
+        std::unique_ptr<Workspace> workspace = drive_varies ? std::make_unique<Workspace>(in.base.drive) : pool.take();
         RunOptions options = in.options;
         options.max_switchings = 0;
         options.interrupted = [](void* flag) { return static_cast<std::atomic<bool>*>(flag)->load(); };
         options.interrupted_context = &stop;
         std::vector<double> scratch(in.kept.empty() ? 0 : width);
         for (std::size_t k = next(); k < in.runs && !stop; k = next()) {
-            Drive drive = in.drive;
-            Signals signals = in.signals;
-            Start start = in.start;
+            Case one = in.base;
             for (std::size_t f = 0; f < in.fields.size(); ++f)
-                batch_fields()[static_cast<std::size_t>(in.fields[f])].set(drive, signals, start,
-                                                                           in.values[k * in.fields.size() + f]);
-            if (drive_varies) workspace->set(drive);
+                batch_fields()[static_cast<std::size_t>(in.fields[f])].set(one, in.values[k * in.fields.size() + f]);
+            if (drive_varies) workspace->set(one.drive);
             double* samples = in.kept.empty() ? out + k * width : scratch.data();
-            const RunReport report = run_exact(*workspace, signals, start, options, samples);
+            const RunReport report = run_exact(*workspace, one.signals, one.start, options, samples);
             const std::span<double> row(out + k * row_size, row_size);
             if (report.status != Status::done) {
                 std::ranges::fill(row, std::numeric_limits<double>::quiet_NaN());

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "../simulation/run.hpp"
+#include "rank_solve.hpp"
 #include "sensitivity.hpp"
 
 namespace lostmotion {
@@ -21,13 +22,13 @@ struct PeriodicMotion {
     double time = 0.0;  // [s] reached, if the status is not done
     Contact contact = input_contact;
     bool converged = false;
-    bool smooth = true;     // whether the Jacobian is exact: no touch or graze among the switchings
-    int periods = 0;        // followed, all in all
-    int newton_steps = 0;   // of the attempt that converged
-    double residual = 0.0;  // largest change of a state over one period / its largest magnitude within it
-    double drift = 0.0;     // of the load angle over one period [rad]; the angle itself is neutral
-    Station start;          // at t = 0
-    Jacobian jacobian;      // of the map over one period, at the start
+    bool smooth = true;          // whether the Jacobian is exact: no touch or graze among the switchings
+    int periods = 0;             // followed, all in all
+    int newton_steps = 0;        // of the attempt that converged
+    double residual = 0.0;       // largest change of a state over one period / its largest magnitude within it
+    double angle_advance = 0.0;  // of the load angle over one period [rad]; the angle itself is neutral
+    Station start;               // at t = 0
+    Jacobian jacobian;           // of the map over one period, at the start
 };
 
 struct ShootingOptions {
@@ -123,7 +124,7 @@ class Shooting {
         motion.newton_steps = steps;
         motion.start = start;
         motion.jacobian = image.sensitivity.jacobian;
-        motion.drift = image.end.x[load_angle] - start.x[load_angle];
+        motion.angle_advance = image.end.x[load_angle] - start.x[load_angle];
         return motion;
     }
 
@@ -167,39 +168,13 @@ class Shooting {
                 M[r][c] =
                     (r == c ? 1.0 : 0.0) - image.sensitivity.jacobian.row[active[r]][active[c]] * size[c] / size[r];
         }
-        // Elimination with full pivoting; what is left without a pivot is neutral and stays.
-        std::array<int, n> column{};
-        for (int k = 0; k < n; ++k) column[k] = k;
-        int rank = 0;
-        for (; rank < n; ++rank) {
-            int row = rank, col = rank;
-            for (int r = rank; r < n; ++r)
-                for (int c = rank; c < n; ++c)
-                    if (std::fabs(M[r][c]) > std::fabs(M[row][col])) row = r, col = c;
-            if (!(std::fabs(M[row][col]) > neutral)) break;
-            std::swap(M[rank], M[row]);
-            std::swap(rhs[rank], rhs[row]);
-            for (auto& line : M) std::swap(line[rank], line[col]);
-            std::swap(column[rank], column[col]);
-            for (int r = rank + 1; r < n; ++r) {
-                const double factor = M[r][rank] / M[rank][rank];
-                for (int c = rank; c < n; ++c) M[r][c] -= factor * M[rank][c];
-                rhs[r] -= factor * rhs[rank];
-            }
-        }
-        std::array<double, n> delta{};
-        for (int r = rank - 1; r >= 0; --r) {
-            double sum = rhs[r];
-            for (int c = r + 1; c < rank; ++c) sum -= M[r][c] * delta[c];
-            delta[r] = sum / M[r][r];
-        }
-        for (int k = 0; k < rank; ++k) {
-            const int component = active[column[k]];
-            const double change = delta[k] * size[column[k]];
+        const std::array<double, n> delta = solve_leaving_neutral<n>(M, rhs, neutral);
+        for (int k = 0; k < n; ++k) {
+            const double change = delta[k] * size[k];
             if (!std::isfinite(change)) return false;
-            if (component < n_states)
-                y.x[component] += change;
-            else if (component == hysteresis_component)
+            if (active[k] < n_states)
+                y.x[active[k]] += change;
+            else if (active[k] == hysteresis_component)
                 y.memory.hysteresis_capacity = std::fmax(0.0, y.memory.hysteresis_capacity + change);
             else
                 y.memory.held_torque += change;

@@ -5,12 +5,19 @@
 #include <optional>
 
 #include "../contact.hpp"
+#include "../simulation/result_names.hpp"
 #include "../solver/exact_solver.hpp"
 
 namespace lostmotion {
 
 // What a motion is made of between two instants: the states, and what the drive remembers.
 enum Component : int { hysteresis_component = n_states, held_component, n_components };
+
+inline const char* component_name(int k) {
+    return k < n_states                ? state_names[static_cast<std::size_t>(k)].name
+           : k == hysteresis_component ? "hysteresis_capacity"
+                                       : "locked_torque";
+}
 
 using Components = std::array<double, n_components>;
 

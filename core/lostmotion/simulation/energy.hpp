@@ -41,6 +41,31 @@ struct EnergyLedger {
     }
 };
 
+// What the ledger says, for everything outside the core; all in J.
+struct EnergyEntry {
+    const char* name;
+    double (*of)(const EnergyLedger&);
+};
+template <EnergyFlow flow>
+double flow_of(const EnergyLedger& e) {
+    return e.flow[flow];
+}
+inline constexpr std::array energy_entries{
+    EnergyEntry{"source", flow_of<from_source>},
+    EnergyEntry{"input_damper", flow_of<in_input_damper>},
+    EnergyEntry{"motor_friction", flow_of<in_motor_friction>},
+    EnergyEntry{"gear_losses", flow_of<in_gear>},
+    EnergyEntry{"hysteresis", flow_of<in_hysteresis>},
+    EnergyEntry{"load_damper", flow_of<in_load_damper>},
+    EnergyEntry{"load_friction", flow_of<in_load_friction>},
+    EnergyEntry{"load_work", flow_of<to_load>},
+    EnergyEntry{"kinetic_change", [](const EnergyLedger& e) { return e.kinetic_end - e.kinetic_begin; }},
+    EnergyEntry{"elastic_change", [](const EnergyLedger& e) { return e.elastic_end - e.elastic_begin; }},
+    EnergyEntry{"residual", [](const EnergyLedger& e) { return e.residual(); }},
+    EnergyEntry{"turned_over", [](const EnergyLedger& e) { return e.turned_over; }},
+};
+static_assert(energy_entries.size() == n_flows + 4);
+
 class EnergyMeter {
  public:
     explicit EnergyMeter(const Drive& drive) : drive_(drive) {}

@@ -1,4 +1,4 @@
-// What can be read of a drive at an instant: the channels of a record.
+// Reads the channels of a drive at many instants of a regime.
 #pragma once
 
 #include <array>
@@ -7,32 +7,9 @@
 
 #include "../drive.hpp"
 #include "../kernel/stride.hpp"
+#include "channels.hpp"
 
 namespace lostmotion {
-
-// At a jump a channel has its right limit.
-enum Channel : int {
-    ch_command,
-    ch_load_torque,
-    ch_motor_torque,
-    ch_motor_speed,
-    ch_load_speed,
-    ch_load_angle,
-    ch_twist,
-    ch_output_torque,
-    ch_input_torque,
-    ch_loss_coefficient,
-    ch_input_contact,
-    ch_twist_contact,
-    ch_load_contact,
-    n_channels
-};
-
-inline constexpr auto all_channels = [] {
-    std::array<int, n_channels> all{};
-    for (int c = 0; c < n_channels; ++c) all[static_cast<std::size_t>(c)] = c;
-    return all;
-}();
 
 // All channels of one instant.
 struct Reading {

@@ -6,6 +6,7 @@
 #include "../solver/adaptive_solver.hpp"
 #include "energy.hpp"
 #include "sampler.hpp"
+#include "workspace.hpp"
 
 namespace lostmotion {
 
@@ -67,24 +68,6 @@ class Recorder {
     EnergyMeter meter_;
     const RunOptions& options_;
     RunReport& report_;
-};
-
-// A drive with the regimes that runs have visited so far, for the next run. One run at a time.
-struct Workspace {
-    explicit Workspace(const Drive& d) : drive(d) {}
-    Workspace(const Workspace&) = delete;
-    Workspace& operator=(const Workspace&) = delete;
-
-    // Another drive; the memory stays.
-    void set(const Drive& d) {
-        drive = d;
-        system.drive_changed();
-        cache.forget();
-    }
-
-    Drive drive;
-    SwitchedDrive system{drive};
-    RegimeCache<SwitchedDrive> cache{system};
 };
 
 // out: channels x samples, channel by channel.

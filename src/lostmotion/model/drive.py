@@ -42,38 +42,24 @@ class Drive(Part):
         return _core_drive(self)
 
 
-def _plain(part: Any, *names: str) -> dict[str, float]:
-    return {name: value for name in names if (value := getattr(part, name)) is not None}
+PARAMETERS = tuple(key for key, _ in _core.parameters())
+"""those that are plain numbers, as the core and a scenario file name them"""
+
+
+def _number(drive: Drive, key: str) -> float | None:
+    """The value of a parameter; None if the drive has no such law, or leaves the value out."""
+    value: Any = drive
+    for name in key.split("."):
+        value = getattr(value, name, None)
+    return None if value is None else float(value)
 
 
 @lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes
 def _core_drive(drive: Drive) -> _core.Drive:
-    m, g, b = drive.motor, drive.gearbox, drive.load
-    motor, gearbox, load = _core.Motor(), _core.Gearbox(), _core.Load()
-    motor.torque_source = m.kind == "torque_source"
-    values = _plain(
-        m,
-        "rotor_inertia",
-        "friction_torque",
-        "rated_torque",
-        "rated_speed",
-        "electrical_time_constant",
-        "armature_voltage_constant",
+    g = drive.gearbox
+    return _core.Drive(
+        {key: value for key in PARAMETERS if (value := _number(drive, key)) is not None},
+        torque_source=drive.motor.kind == "torque_source",
+        torsion_curve=None if isinstance(g.stiffness, Rigid) else g.stiffness.core(),
+        loss_map=g.losses.core() if isinstance(g.losses, LossMap) else None,
     )
-    for name, value in values.items():
-        setattr(motor, name, value)
-    if m.voltage_limit is not None and m.rated_voltage is not None:
-        motor.voltage_limit = m.voltage_limit / m.rated_voltage
-    for name in ("ratio", "inertia", "viscous_friction", "rated_input_speed", "rated_output_torque"):
-        setattr(gearbox, name, getattr(g, name))
-    if not isinstance(g.stiffness, Rigid):
-        gearbox.set_torsion_curve(g.stiffness.core())
-    if g.hysteresis is not None:
-        gearbox.hysteresis_efficiency = g.hysteresis.efficiency
-    if isinstance(g.losses, LossMap):
-        gearbox.set_loss_map(g.losses.core())
-    else:
-        gearbox.efficiency = g.losses.efficiency
-    for name in ("inertia", "viscous_friction", "friction_torque"):
-        setattr(load, name, getattr(b, name))
-    return _core.Drive(motor, gearbox, load)

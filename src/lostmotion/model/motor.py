@@ -112,6 +112,13 @@ class Motor(Part):
             raise InputError("a torque source has no speed of its own")
         return self.rated_speed * self.armature_voltage_constant / (self.armature_voltage_constant - 1.0)
 
+    @property
+    def command_limit(self) -> float | None:
+        """|E_C| that the amplifier can follow; None without a limit."""
+        if self.voltage_limit is None or self.rated_voltage is None:
+            return None
+        return self.voltage_limit / self.rated_voltage
+
     def at_voltage(self, voltage: float) -> Self:
         """The same DC motor where command 1 is another voltage [V].
 

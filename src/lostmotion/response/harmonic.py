@@ -181,13 +181,8 @@ OF_EACH_POINT = {
     "multiplier": ("1", "largest Floquet multiplier"),
 }
 
-# Those that are computed by the core, and NaN where no motion was found: name -> the core's.
-CORE_NAMES = {
-    "motor_power": "motor_power",
-    "load_power": "load_power",
-    "gear_loss": "gear_loss",
-    "angle_advance": "drift",
-}
+# Those that are NaN where no motion was found.
+OF_A_MOTION = ("motor_power", "load_power", "gear_loss", "angle_advance")
 
 
 def _labelled(
@@ -245,8 +240,8 @@ def _harmonics(
 def _of_each_point(r: dict[str, Any], found: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """The values of `OF_EACH_POINT`, and whether the motion is stable."""
     points = {name: r[name].reshape(found.shape) for name in ("residual", "periods", "newton_steps")}
-    for name, key in CORE_NAMES.items():
-        points[name] = np.where(found, r[key].reshape(found.shape), np.nan)
+    for name in OF_A_MOTION:
+        points[name] = np.where(found, r[name].reshape(found.shape), np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
         efficiency = points["load_power"] / points["motor_power"]
     points["efficiency"] = np.where(points["motor_power"] > 0.0, efficiency, np.nan)

@@ -187,7 +187,7 @@ def linearize(
                 "Initial(motor_speed=100, load_speed=1, twist=2e-3) [SI], or Initial() for the drive at rest"
             )
         state = Initial()
-    rates, outputs, modes = _core.linearization(
+    rates, torques, modes = _core.linearization(
         drive.core(),
         start_state(state),
         state.hysteresis_capacity,
@@ -197,7 +197,8 @@ def linearize(
     n = len(STATES)
     A, B = rates[:, :n], rates[:, n : n + 2]
     C, D, offset = np.eye(len(OUTPUTS), n), np.zeros((len(OUTPUTS), 2)), np.zeros(len(OUTPUTS))
-    for row, values in zip((0, n, n + 1), outputs, strict=True):
+    for name, values in torques.items():
+        row = OUTPUTS.index(name)
         C[row], D[row], offset[row] = values[:n], values[n : n + 2], values[-1]
     contacts = dict(zip(CONTACTS, modes, strict=True))
     return LinearModel(A, B, C, D, rates[:, -1], offset, contacts, state, command, load_torque)

@@ -29,15 +29,14 @@ NEUTRAL = 1e-6  # a Floquet multiplier this near 1 belongs to a direction in whi
 SAME = 1e-5  # solutions that differ by less, relative to their magnitude, are one
 
 # Of the components that the core's Jacobian goes over: all but the load angle, which is neutral.
-COMPONENTS = (*STATES, "hysteresis_capacity", "locked_torque")
+COMPONENTS = tuple(_core.components())
 _ACTIVE = [k for k, name in enumerate(COMPONENTS) if name != "load_angle"]
 
 
 def reason_of(result: dict[str, Any], k: int) -> str:
     """Why a point has no periodic motion; empty if it has one."""
-    status = int(result["status"][k])
-    if status != 0:
-        return _core.status_text(status, result["time"][k], int(result["contact"][k]))
+    if error := str(result["error"][k]):
+        return error
     if not result["converged"][k]:
         return f"not periodic after {int(result['periods'][k])} periods: the states still change by {result['residual'][k]:.1e}"
     return ""
@@ -184,7 +183,7 @@ def _motion(r: dict[str, Any], drive: Drive, period: float) -> xarray.Dataset:
             "period": period,
             "gear_ratio": drive.gearbox.ratio,
             "residual": float(r["residual"][0]),
-            "angle_advance": float(r["drift"][0]),
+            "angle_advance": float(r["angle_advance"][0]),
             "multipliers_real": multipliers.real.tolist(),
             "multipliers_imag": multipliers.imag.tolist(),
             "stable": int(is_stable(multipliers)),

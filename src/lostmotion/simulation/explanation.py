@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from .. import _core
 from ..errors import InputError
@@ -14,8 +15,6 @@ from .run import core_inputs
 from .scenario import Scenario
 from .stepping import Simulation
 from .variables import CHANNEL_NAMES
-
-NAMES = ("input shaft", "twist of the gear", "load bearing")
 
 
 @dataclass(frozen=True)
@@ -113,12 +112,11 @@ def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanatio
     return _explanation(what.drive(), time, values, contacts)
 
 
-def _explanation(drive: Drive, time: float, values: list[float], contacts: list[tuple[float, ...]]) -> Explanation:
+def _explanation(drive: Drive, time: float, values: list[float], contacts: list[tuple[Any, ...]]) -> Explanation:
     named = dict(zip(CHANNEL_NAMES, values, strict=True))
     forward, backward = (
         drive.core().smallest_command(named["output_torque"], named["load_torque"], s) for s in (+1, -1)
     )
-    m = drive.motor
-    limit = math.inf if m.voltage_limit is None or m.rated_voltage is None else m.voltage_limit / m.rated_voltage
-    states = tuple(ContactState(NAMES[int(c)], int(mode), *numbers) for c, mode, *numbers in contacts)
-    return Explanation(time, named, states, forward, backward, limit)
+    limit = drive.motor.command_limit
+    states = tuple(ContactState(*contact) for contact in contacts)
+    return Explanation(time, named, states, forward, backward, math.inf if limit is None else limit)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import _core
 from ..errors import InputError
 from ..inputs.arguments import checked
 from .scenario import Scenario
@@ -21,21 +22,8 @@ if TYPE_CHECKING:
     import xarray
 
 
-# Entries of the energy ledger, in the order of the core's (core/lostmotion/simulation/energy.hpp).
-ENERGY = (
-    "source",
-    "input_damper",
-    "motor_friction",
-    "gear_losses",
-    "hysteresis",
-    "load_damper",
-    "load_friction",
-    "load_work",
-    "kinetic_change",
-    "elastic_change",
-    "residual",
-    "turned_over",
-)
+ENERGY = tuple(_core.energy_entries())
+"""entries of the energy ledger"""
 
 
 @cache

@@ -84,7 +84,7 @@ class Simulation:
         if initial is not None:
             self._initial = initial
         start = self._initial
-        self._core.set_state(0.0, start_state(start), start.hysteresis_capacity, 0.0, [0] * 7, [0.0, 0.0], False)
+        self._core.reset(start_state(start), start.hysteresis_capacity)
 
     @property
     def drive(self) -> Drive:

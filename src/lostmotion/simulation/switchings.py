@@ -8,42 +8,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import _core
 from ..errors import InputError
 from ..inputs.arguments import checked
-from .variables import CONTACTS
 
 if TYPE_CHECKING:
     import xarray
 
-# What ended a regime, in the order of Guard::Kind (core/lostmotion/regime.hpp); last: an input jumped.
-CAUSES = (
-    "came to rest",
-    "broke away",
-    "torsion piece",
-    "loss cell",
-    "loss cell",
-    "voltage limit",
-    "motor torque turned",
-    "",
-    "input changed",
-)
+CAUSES = dict(_core.causes())
+"""what ended a regime, by its number"""
 
 ATTRIBUTE = "switchings"
-# Columns of the core's table (bindings/convert.hpp). Left out is the contact, which means nothing for most causes.
-COLUMNS = (0, 1, 3, 4, 5, 6, 7, 8, 9, 10)
-NAMES = (
-    "instant",
-    "cause",
-    *(f"{contact}_{when}" for when in ("before", "after") for contact in CONTACTS),
-    "output_torque_before",
-    "output_torque_after",
-)
+NAMES = tuple(_core.switching_columns())
 
 
 def packed(table: Any) -> str:
     """The core's table of switchings as text, as an attribute can hold it: all bits of its numbers."""
-    rows = np.asarray(table, dtype="<f8")
-    return _text(rows[:, COLUMNS] if len(rows) else rows)
+    return _text(np.asarray(table, dtype="<f8"))
 
 
 def packed_again(columns: Mapping[str, Any]) -> str:
@@ -94,9 +75,8 @@ def _about(name: str) -> dict[str, Any]:
     if name == "instant":
         return {"units": "s", "long_name": "instant of switching"}
     if name == "cause":
-        flags = range(-1, len(CAUSES) - 2)
-        meanings = " ".join(CAUSES[k].replace(" ", "_") for k in flags)
-        return {"long_name": "what ended the regime", "flag_values": list(flags), "flag_meanings": meanings}
+        meanings = " ".join(cause.replace(" ", "_") for cause in CAUSES.values())
+        return {"long_name": "what ended the regime", "flag_values": list(CAUSES), "flag_meanings": meanings}
     what, _, when = name.rpartition("_")
     if what == "output_torque":
         return {"units": "N*m", "long_name": f"output torque, {'left' if when == 'before' else 'right'} limit"}

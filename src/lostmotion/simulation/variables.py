@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from .. import _core
+
 
 @dataclass(frozen=True)
 class Variable:
@@ -16,21 +18,10 @@ class Variable:
     derived: bool = False  # computed from the others, not read from the solver
 
 
-# Those that are read from the solver stand in the order of its channels (core/lostmotion/simulation/reader.hpp).
+# Those that are read from the core are named by its own table (core/lostmotion/simulation/channels.hpp).
+CHANNELS = tuple(Variable(*row) for row in _core.channels())
 VARIABLES = (
-    Variable("command", "E_C", "1", "control signal, relative armature voltage"),
-    Variable("load_torque", "M_Z", "N*m", "disturbance torque on the load"),
-    Variable("motor_torque", "M_D", "N*m", "torque of the motor"),
-    Variable("motor_speed", "w_M", "rad/s", "speed of rotor and input shaft"),
-    Variable("load_speed", "w", "rad/s", "speed of the load"),
-    Variable("load_angle", "phi", "rad", "angle of the load"),
-    Variable("twist", "d", "rad", "torsion of the gearbox, input angle / ratio - output angle"),
-    Variable("output_torque", "T_2", "N*m", "torque of the gearbox on the load"),
-    Variable("input_torque", "T_1", "N*m", "torque of the gearbox on the input shaft"),
-    Variable("loss_coefficient", "m_2B", "1", "torque lost in the gearbox, at the output, / rated output torque"),
-    Variable("input_contact", "", "1", "input shaft: +1 or -1 slipping, 0 stuck"),
-    Variable("twist_contact", "", "1", "twist: +1 or -1 slipping, 0 stuck"),
-    Variable("load_contact", "", "1", "load bearing: +1 or -1 slipping, 0 stuck"),
+    *CHANNELS,
     Variable(
         "efficiency",
         "eta",
@@ -42,9 +33,6 @@ VARIABLES = (
     Variable("motor_power", "p", "W", "mechanical power of the motor", derived=True),
 )
 
-CHANNELS = tuple(v for v in VARIABLES if not v.derived)
 CHANNEL_NAMES = tuple(v.name for v in CHANNELS)
-CONTACTS = ("input_contact", "twist_contact", "load_contact")
-
-# Names of the five states, in the order of the solver's state vector (core/lostmotion/variables.hpp).
-STATES = ("motor_torque", "motor_speed", "load_speed", "twist", "load_angle")
+CONTACTS = tuple(_core.contacts())
+STATES = tuple(_core.states())

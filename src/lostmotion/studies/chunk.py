@@ -333,7 +333,7 @@ def _in_the_core(
             values[:, j] *= float(base_value(s, key))
     errors = _out_of_range(study, parameters)
     good = np.array([e == "" for e in errors])
-    made, totals = _core.run_batch(
+    made, texts, switchings, energies = _core.run_batch(
         *core_inputs(s),
         [_fields()[key] for key, _, _ in keys],
         np.ascontiguousarray(values[good]),
@@ -347,9 +347,8 @@ def _in_the_core(
     )
     n = len(parameters)
     where = np.flatnonzero(good)
-    for row, (status, contact, time) in zip(where.tolist(), totals[:, :3].tolist(), strict=True):
-        if status != 0:
-            errors[row] = _core.status_text(int(status), time, int(contact))
+    for row, text in zip(where.tolist(), texts, strict=True):
+        errors[row] = text
 
     def spread(x: np.ndarray) -> np.ndarray:
         if len(where) == n:
@@ -363,9 +362,9 @@ def _in_the_core(
         parameters=parameters,
         samples={} if reductions else {c: spread(made[:, k]) for k, c in enumerate(channels)},
         kept={name: spread(made[:, k]) for k, name in enumerate(reductions)},
-        energy={e: spread(totals[:, 5 + k]) for k, e in enumerate(ENERGY)},
+        energy={e: spread(energies[:, k]) for k, e in enumerate(ENERGY)},
         checks={},
-        switchings=np.nan_to_num(spread(totals[:, 3])),
+        switchings=np.nan_to_num(spread(switchings)),
         errors=errors,
         ratio=np.full(n, s.gearbox.ratio) if ratio is None else ratio,
     )

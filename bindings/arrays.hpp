@@ -1,0 +1,65 @@
+// Numbers of the core as arrays and tuples of Python.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "lostmotion/variables.hpp"
+
+namespace lostmotion::binding {
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+using Array = nb::ndarray<nb::numpy, double>;
+using Values = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using StateNumbers = std::array<double, n_states>;
+using InputNumbers = std::array<double, n_inputs>;
+
+// Hands data over to Python without a copy.
+inline Array as_array(std::unique_ptr<double[]> data, const std::vector<std::size_t>& shape) {
+    double* raw = data.release();
+    nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+    return Array(raw, shape.size(), shape.data(), owner);
+}
+
+// An entry of each result, `shape` the shape of one: values(result, to) writes it.
+template <class Result, class F>
+Array column(const std::vector<Result>& results, std::vector<std::size_t> shape, F&& values) {
+    std::size_t width = 1;
+    for (const std::size_t n : shape) width *= n;
+    shape.insert(shape.begin(), results.size());
+    auto data = std::make_unique<double[]>(results.size() * width);
+    for (std::size_t k = 0; k < results.size(); ++k) values(results[k], &data[k * width]);
+    return as_array(std::move(data), shape);
+}
+
+// One number of each result.
+template <class Result, class F>
+Array numbers(const std::vector<Result>& results, F&& value) {
+    return column(results, {}, [&](const Result& r, double* to) { *to = static_cast<double>(value(r)); });
+}
+
+inline State to_state(const StateNumbers& v) {
+    State x{};
+    std::copy(v.begin(), v.end(), x.begin());
+    return x;
+}
+inline StateNumbers from_state(const State& x) {
+    StateNumbers v;
+    std::copy_n(x.begin(), n_states, v.begin());
+    return v;
+}
+
+}  // namespace lostmotion::binding

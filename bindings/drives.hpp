@@ -1,0 +1,96 @@
+// Drives and what acts on them.
+#pragma once
+
+#include <map>
+#include <mutex>
+
+#include "arrays.hpp"
+#include "lostmotion/analysis/explain.hpp"
+#include "lostmotion/parameters.hpp"
+#include "lostmotion/simulation/workspace.hpp"
+
+namespace lostmotion::binding {
+
+// A drive and what runs of it have left for the next ones. Each run takes a workspace for itself.
+class SharedDrive : public WorkspacePool {
+ public:
+    const Drive drive;
+    explicit SharedDrive(const Drive& d) : drive(d) {}
+
+    std::unique_ptr<Workspace> take() override {
+        const std::lock_guard<std::mutex> hold(mutex_);
+        if (idle_.empty()) return std::make_unique<Workspace>(drive);
+        std::unique_ptr<Workspace> w = std::move(idle_.back());
+        idle_.pop_back();
+        return w;
+    }
+    void give_back(std::unique_ptr<Workspace> w) override {
+        const std::lock_guard<std::mutex> hold(mutex_);
+        idle_.push_back(std::move(w));
+    }
+
+ private:
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<Workspace>> idle_;
+};
+
+// Without a torsion curve the gearbox is rigid, without a loss map its efficiency is constant.
+inline Drive make_drive(const std::map<std::string, double>& values, bool torque_source, const TorsionCurve* curve,
+                        const LossMap* map) {
+    Drive drive;
+    for (const auto& [key, value] : values) {
+        const Parameter* parameter = find_parameter(key);
+        if (parameter == nullptr) throw nb::value_error(("a drive has no parameter " + key).c_str());
+        parameter->in(drive) = value;
+    }
+    drive.motor.kind = torque_source ? Motor::torque_source : Motor::dc;
+    if (curve != nullptr) {
+        drive.gearbox.compliance = Gearbox::torsion_curve;
+        drive.gearbox.curve = *curve;
+    }
+    if (map != nullptr) {
+        drive.gearbox.losses = Gearbox::loss_map;
+        drive.gearbox.map = *map;
+    }
+    return drive;
+}
+
+inline Signal make_signal(const std::vector<std::array<double, 3>>& breakpoints,
+                          const std::vector<std::array<double, 3>>& sines) {
+    Signal s;
+    s.knots.clear();
+    for (const auto& [time, value, slope] : breakpoints) s.knots.push_back({time, value, slope});
+    for (const auto& [amplitude, frequency, phase] : sines) s.sines.push_back({amplitude, frequency, phase});
+    return s;
+}
+
+inline void bind_drives(nb::module_& m) {
+    using Vector = std::vector<double>;
+    nb::class_<TorsionCurve>(m, "TorsionCurve")
+        .def(nb::init<Vector, Vector>(), "breaks"_a, "slopes"_a)
+        .def("torque", &TorsionCurve::torque, "twist"_a)
+        .def("energy", &TorsionCurve::energy, "twist"_a);
+    nb::class_<LossMap>(m, "LossMap")
+        .def(nb::init<Vector, Vector, Vector>(), "speeds"_a, "loads"_a, "values"_a)
+        .def("__call__", &LossMap::operator(), "load"_a, "speed"_a);
+    nb::class_<SharedDrive>(m, "Drive")
+        .def(
+            "__init__",
+            [](SharedDrive* self, const std::map<std::string, double>& parameters, bool torque_source,
+               const TorsionCurve* curve,
+               const LossMap* map) { new (self) SharedDrive(make_drive(parameters, torque_source, curve, map)); },
+            "parameters"_a, "torque_source"_a, "torsion_curve"_a.none(), "loss_map"_a.none())
+        .def("smallest_rigid_inertia", [](const SharedDrive& d) { return d.drive.smallest_rigid_inertia(); })
+        .def(
+            "smallest_command",
+            [](const SharedDrive& d, double T_2, double M_Z, int s) { return smallest_command(d.drive, T_2, M_Z, s); },
+            "output_torque"_a, "load_torque"_a, "direction"_a);
+    nb::class_<Signal>(m, "Signal")
+        .def(
+            "__init__",
+            [](Signal* self, const std::vector<std::array<double, 3>>& breakpoints,
+               const std::vector<std::array<double, 3>>& sines) { new (self) Signal(make_signal(breakpoints, sines)); },
+            "breakpoints"_a, "sines"_a);
+}
+
+}  // namespace lostmotion::binding

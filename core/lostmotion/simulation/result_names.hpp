@@ -1,0 +1,100 @@
+// What the states, the contacts and the causes of switchings are called, for everything outside the core.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "../contact.hpp"
+#include "enum_table.hpp"
+
+namespace lostmotion {
+
+struct StateName {
+    Term value;
+    const char* name;  // a channel has the same, with unit and meaning
+};
+inline constexpr std::array<StateName, n_states> state_names{{
+    {motor_torque, "motor_torque"},
+    {motor_speed, "motor_speed"},
+    {load_speed, "load_speed"},
+    {twist, "twist"},
+    {load_angle, "load_angle"},
+}};
+static_assert(in_order(state_names));
+
+struct ContactName {
+    Contact value;
+    const char *name, *text;
+};
+inline constexpr std::array<ContactName, n_contacts> contact_names{{
+    {input_contact, "input_contact", "input shaft"},
+    {twist_contact, "twist_contact", "twist of the gear"},
+    {load_contact, "load_contact", "load bearing"},
+}};
+static_assert(in_order(contact_names));
+
+// What ended a regime. The guard that ends the model ends no regime, and an input that jumps is none.
+struct Cause {
+    Guard::Kind value;
+    const char* name;
+};
+inline constexpr std::array<Cause, Guard::outside> causes{{
+    {Guard::speed, "came to rest"},
+    {Guard::capacity, "broke away"},
+    {Guard::torsion_piece, "torsion piece"},
+    {Guard::loss_cell, "loss cell"},
+    {Guard::loss_cell_back, "loss cell"},
+    {Guard::amplifier, "voltage limit"},
+    {Guard::turning, "motor torque turned"},
+}};
+static_assert(in_order(causes));
+inline constexpr int input_changed = -1;
+inline constexpr const char* input_changed_name = "input changed";
+
+// A switching as numbers.
+struct SwitchingColumn {
+    std::string name;
+    std::function<double(const Switching&)> value;
+};
+inline const std::vector<SwitchingColumn>& switching_columns() {
+    static const std::vector<SwitchingColumn> columns = [] {
+        std::vector<SwitchingColumn> all{
+            {"instant", [](const Switching& s) { return s.time; }},
+            {"cause", [](const Switching& s) { return double(s.input_jump ? input_changed : int(s.kind)); }},
+        };
+        for (const auto& [when, key] : {std::pair{"_before", &Switching::before}, {"_after", &Switching::after}})
+            for (const ContactName& c : contact_names)
+                all.push_back({c.name + std::string(when),
+                               [c, key](const Switching& s) { return double((s.*key).modes[c.value]); }});
+        all.push_back({"output_torque_before", [](const Switching& s) { return s.torque_before; }});
+        all.push_back({"output_torque_after", [](const Switching& s) { return s.torque_after; }});
+        return all;
+    }();
+    return columns;
+}
+
+// Why a run has no continuation; empty if it has come to its end.
+inline std::string status_text(Status status, double time, Contact contact) {
+    const std::string at = "at t = " + std::to_string(time) + " s";
+    switch (status) {
+        case Status::done: return "";
+        case Status::interrupted: return "interrupted";
+        case Status::jammed:
+            return "no combination of sticking and slipping contacts is consistent " + at +
+                   ": the friction jams. Give the gearbox a compliance, or lower its losses.";
+        case Status::outside:
+            return "the state left the range that the loss map can be extended to " + at +
+                   " (1000 times its data). The drive is unstable, or its data or inputs have a wrong unit.";
+        case Status::zeno:
+            return "switching instants of the contact '" + std::string(contact_names[contact].text) + "' accumulate " +
+                   at + ": infinitely many in finite time. The model ends here.";
+        case Status::unseen:
+            return "the drive has dry contacts, which do not feel a nonlinear torque. Take them out, or make the "
+                   "torque piecewise linear.";
+    }
+    return "";
+}
+
+}  // namespace lostmotion
