@@ -26,6 +26,12 @@ class Drive {
         }
     }
 
+    // Torque [N m] that the input contact holds at most before it turns in direction s, or takes while it does: the
+    // friction of the motor and, with a loss map, what the gear loses.
+    double input_capacity(double T_2, double w_M, int s) const {
+        return motor.friction_torque + gearbox.loss_torque(T_2, w_M, s) / gearbox.ratio;
+    }
+
     // The speed of a contact, as a form.
     LinearForm contact_speed(Contact c) const {
         switch (c) {
@@ -161,11 +167,7 @@ inline Drive::Equations Drive::compose(const RegimeKey& key, const Regime& r) co
         const double s = input;
         e.F_input = Open::unit(one, s * motor.friction_torque);
         if (gearbox.losses == Gearbox::loss_map) {
-            const Plane m = gearbox.map.plane(key.cell);
-            const double T_2R = gearbox.rated_output_torque;
-            const Open M_2B_signed = Open::unit(one, s * T_2R * m.at_zero) +
-                                     Open::unit(motor_speed, T_2R * m.per_speed / gearbox.rated_input_speed) +
-                                     m.per_load * e.T_2;
+            const Open M_2B_signed = gearbox.loss_while_turning(key.cell, input, e.T_2);
             e.F_input += M_2B_signed / i;
             e.T_1 += M_2B_signed / i;
         }
@@ -312,9 +314,8 @@ inline void Drive::add_loss_guards(const RegimeKey& key, const Equations& e, Reg
             if (has_map) {
                 const int j = s > 0 ? key.cell : key.cell_back;
                 const auto kind = s > 0 ? Guard::loss_cell : Guard::loss_cell_back;
-                const Plane m = gearbox.map.line_at_standstill(j);
                 const LinearForm mu = s / T_2R * T_2;
-                F += T_2R / gearbox.ratio * (LinearForm::unit(one, m.at_zero) + m.per_load * mu);
+                F += gearbox.loss_at_rest(j, mu);
                 const double low = gearbox.map.load_interval_lower(j), high = gearbox.map.load_interval_upper(j);
                 const bool first = j == 0, last = j + 1 == gearbox.map.load_intervals();
                 add(1.0 / (high - low) * (LinearForm::unit(one, high) - mu), last ? Guard::outside : kind, j + 1);

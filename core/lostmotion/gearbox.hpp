@@ -3,6 +3,7 @@
 
 #include "loss_map.hpp"
 #include "torsion_curve.hpp"
+#include "variables.hpp"
 
 namespace lostmotion {
 
@@ -30,9 +31,30 @@ struct Gearbox {
     double hysteresis_capacity(double d) const {
         return 0.5 * (1.0 - hysteresis_efficiency) * std::fabs(curve.torque(d));
     }
-    // Torque M_2B [N m at the output] lost at relative load mu and relative speed v.
-    double loss_torque(double mu, double v) const {
-        return losses == loss_map ? rated_output_torque * map(mu, v) : 0.0;
+    // dh/dd of the same [N m/rad].
+    double hysteresis_capacity_slope(double d) const {
+        const double P = curve.torque(d);
+        return P == 0.0 ? 0.0 : hysteresis_capacity(d) / P * curve.slope(curve.locate(d));
+    }
+
+    // Torque M_2B [N m at the output] of (12) that a loss map takes while the input shaft turns with speed w_M in
+    // direction s, or that it holds at most at rest before it turns that way.
+    double loss_torque(double T_2, double w_M, int s) const {
+        if (losses != loss_map) return 0.0;
+        return rated_output_torque * map(s * T_2 / rated_output_torque, std::fabs(w_M) / rated_input_speed);
+    }
+    // The same as forms, in one cell of the map. Turning: M_2B sign(w_M).
+    template <class F>
+    F loss_while_turning(int cell, int s, const F& T_2) const {
+        const Plane m = map.plane(cell);
+        return F::unit(one, s * rated_output_torque * m.at_zero) +
+               F::unit(motor_speed, rated_output_torque * m.per_speed / rated_input_speed) + m.per_load * T_2;
+    }
+    // At rest, in an interval of the relative load mu = s T_2/T_2R: M_2B/i, what the input contact holds of it.
+    template <class F>
+    F loss_at_rest(int interval, const F& mu) const {
+        const Plane m = map.line_at_standstill(interval);
+        return rated_output_torque / ratio * (F::unit(one, m.at_zero) + m.per_load * mu);
     }
 };
 

@@ -21,17 +21,14 @@ inline ContactReport explain_contact(const Drive& drive, const Regime& r, Contac
     ContactReport report;
     report.present = drive.has(c);
     if (!report.present) return report;
-    const Gearbox& gearbox = drive.gearbox;
     report.mode = r.key.modes[c];
     report.speed = r.at_rest[c] ? 0.0 : evaluate(drive.contact_speed(c), x, m, u);
     const double T_2 = evaluate(r.output_torque, x, m, u);
     switch (c) {
         case input_contact: {
             report.torque = evaluate(r.input_friction, x, m, u);
-            const double v = std::fabs(x[motor_speed]) / gearbox.rated_input_speed,
-                         mu = T_2 / gearbox.rated_output_torque;
-            report.capacity_forward = drive.motor.friction_torque + gearbox.loss_torque(mu, v) / gearbox.ratio;
-            report.capacity_backward = drive.motor.friction_torque + gearbox.loss_torque(-mu, v) / gearbox.ratio;
+            report.capacity_forward = drive.input_capacity(T_2, x[motor_speed], +1);
+            report.capacity_backward = drive.input_capacity(T_2, x[motor_speed], -1);
             break;
         }
         case twist_contact:
@@ -50,8 +47,7 @@ inline ContactReport explain_contact(const Drive& drive, const Regime& r, Contac
 inline double breakaway_motor_torque(const Drive& drive, double T_2, int s) {
     const Gearbox& g = drive.gearbox;
     const double efficiency = g.losses == Gearbox::constant_efficiency ? g.efficiency : 1.0;
-    return T_2 / (g.ratio * efficiency) +
-           s * (drive.motor.friction_torque + g.loss_torque(s * T_2 / g.rated_output_torque, 0.0) / g.ratio);
+    return T_2 / (g.ratio * efficiency) + s * drive.input_capacity(T_2, 0.0, s);
 }
 
 // Constant command that, from rest with output torque T_2 and load torque M_Z, just moves the load forward (s = +1) or

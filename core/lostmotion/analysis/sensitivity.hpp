@@ -145,7 +145,7 @@ class Sensitivity {
         const double stiffness = drive_.rigid() ? 0.0 : curve.slope(curve.locate(d));
         if (turned) {
             jump.row[hysteresis_component] = {};
-            jump.row[hysteresis_component][twist] = hysteresis_slope(d);
+            jump.row[hysteresis_component][twist] = drive_.gearbox.hysteresis_capacity_slope(d);
         }
         // The held torque matters only while all contacts stand.
         jump.row[held_component] = {};
@@ -166,13 +166,6 @@ class Sensitivity {
             time_rate[held_component] = u[1][1];  // it follows the load torque, a friction torque off
         }
         return time_rate;
-    }
-
-    // d h/d d at a turning point (16).
-    double hysteresis_slope(double d) const {
-        const TorsionCurve& curve = drive_.gearbox.curve;
-        const double P = curve.torque(d);
-        return P == 0.0 ? 0.0 : drive_.gearbox.hysteresis_capacity(d) / P * curve.slope(curve.locate(d));
     }
 
     const Drive& drive_;

@@ -60,22 +60,20 @@ class Reader {
                (term(command, at.u[0]) + term(load_torque, at.u[1]));
     }
 
-    // With a loss map and a standing input shaft, the torque that the contact holds is shared by bearing and gear as
+    // With a loss map and an input shaft at rest, the torque that the contact holds is shared by bearing and gear as
     // their capacities are.
     bool shares() const { return has_map_ && regime_.key.modes[input_contact] == 0; }
-    // M_2B at standstill, against the torque F that is held.
-    double standing_loss(double T_2, double F) const {
-        const Gearbox& g = drive_.gearbox;
-        return g.loss_torque((F >= 0.0 ? T_2 : -T_2) / g.rated_output_torque, 0.0);
-    }
+    // M_2B at rest, against the torque F that is held.
+    double loss_at_rest(double T_2, double F) const { return drive_.gearbox.loss_torque(T_2, 0.0, way_of(F)); }
+    static int way_of(double F) { return F >= 0.0 ? +1 : -1; }
 
     Vec input_torque(const Instants& at, int k) const {
         Vec T_1 = evaluate(regime_.input_torque, at, k);
         if (!shares()) return T_1;
         const Vec T_2 = evaluate(regime_.output_torque, at, k), F = evaluate(regime_.input_friction, at, k);
         for (int lane = 0; lane < vec_width; ++lane) {
-            const double gear = standing_loss(T_2[lane], F[lane]) / drive_.gearbox.ratio;
-            const double capacity = drive_.motor.friction_torque + gear;
+            const double gear = loss_at_rest(T_2[lane], F[lane]) / drive_.gearbox.ratio;
+            const double capacity = drive_.input_capacity(T_2[lane], 0.0, way_of(F[lane]));
             if (capacity > 0.0) T_1[lane] += F[lane] * gear / capacity;
         }
         return T_1;
@@ -86,7 +84,7 @@ class Reader {
         Vec lost = evaluate(regime_.loss_torque, at, k);
         if (shares()) {
             const Vec T_2 = evaluate(regime_.output_torque, at, k), F = evaluate(regime_.input_friction, at, k);
-            for (int lane = 0; lane < vec_width; ++lane) lost[lane] = standing_loss(T_2[lane], F[lane]);
+            for (int lane = 0; lane < vec_width; ++lane) lost[lane] = loss_at_rest(T_2[lane], F[lane]);
         } else if (has_map_) {
             lost *= static_cast<double>(regime_.key.modes[input_contact]);
         } else {
