@@ -2,8 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-FORMATTED := $(wildcard core/lostmotion/*.hpp core/lostmotion/*/*.hpp core/tests/*.[ch]pp bindings/*.[ch]pp benchmarks/*.[ch]pp)
-SOURCES := $(wildcard core/lostmotion/*.hpp core/lostmotion/*/*.hpp bindings/*.cpp bindings/*.hpp scenarios/*.toml) CMakeLists.txt pyproject.toml
+FORMATTED := $(wildcard core/lostmotion/*/*.hpp core/tests/*.[ch]pp bindings/*.[ch]pp benchmarks/*.[ch]pp)
+SOURCES := $(wildcard core/lostmotion/*/*.hpp bindings/*.cpp bindings/*.hpp scenarios/*.toml) CMakeLists.txt pyproject.toml
 
 .PHONY: demo test bench docs lint format clean
 .DELETE_ON_ERROR:

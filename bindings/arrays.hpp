@@ -15,7 +15,7 @@
 #include <memory>
 #include <vector>
 
-#include "lostmotion/variables.hpp"
+#include "lostmotion/drive/variables.hpp"
 
 namespace lostmotion::binding {
 

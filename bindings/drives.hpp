@@ -6,7 +6,7 @@
 
 #include "arrays.hpp"
 #include "lostmotion/analysis/explain.hpp"
-#include "lostmotion/parameters.hpp"
+#include "lostmotion/drive/parameters.hpp"
 #include "lostmotion/simulation/workspace.hpp"
 
 namespace lostmotion::binding {

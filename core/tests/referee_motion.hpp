@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "lostmotion/load.hpp"
-#include "lostmotion/motor.hpp"
+#include "lostmotion/parts/load.hpp"
+#include "lostmotion/parts/motor.hpp"
 #include "referee_parts.hpp"
 
 namespace lostmotion::referee {

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "lostmotion/gearbox.hpp"
 #include "lostmotion/kernel/inputs.hpp"
+#include "lostmotion/parts/gearbox.hpp"
 #include "referee_polynomial.hpp"
 
 namespace lostmotion::referee {

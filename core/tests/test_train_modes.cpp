@@ -15,17 +15,23 @@ namespace {
 // The classic drive, with the train's search run beside its own at every event.
 struct Shadowed {
     using Dims = DriveDims;
+    using Key = RegimeKey;
+    using Regime = lostmotion::Regime;
+    using Guard = lostmotion::Guard;
 
     explicit Shadowed(const Drive& d) : drive(d), classic(drive), twins(d), train(twins.assembly), cache_(train) {}
 
     lostmotion::Regime build(const RegimeKey& key) const { return classic.build(key); }
+    static int n_twists() { return SwitchedDrive::n_twists(); }
+    static int twist_state(int t) { return SwitchedDrive::twist_state(t); }
+    static const LinearForm& torque_at_load(const Regime& r) { return SwitchedDrive::torque_at_load(r); }
     void near_event(const GuardTable& g, GuardTable::Values& out) const { classic.near_event(g, out); }
     void stop(State& x, std::array<bool, n_contacts>& at_rest) const { classic.stop(x, at_rest); }
 
     template <class Cache>
     lostmotion::Found start(Cache& cache, lostmotion::Instant& now, RegimeKey& key) const {
         Instant mine = instant(now);
-        Key my_key;
+        model::Key my_key;
         const Found found = train.start(cache_, mine, my_key);
         const lostmotion::Found expected = classic.start(cache, now, key);
         compare(expected, now, key, found, mine, my_key, "start");
@@ -35,8 +41,8 @@ struct Shadowed {
     lostmotion::Found next(Cache& cache, lostmotion::Instant& now, const lostmotion::Guard* fired, RegimeKey& key,
                            const std::array<double, n_inputs>& input) const {
         Instant mine = instant(now);
-        Key my_key = twins.key(key);
-        const Guard* my_guard = nullptr;
+        model::Key my_key = twins.key(key);
+        const model::Guard* my_guard = nullptr;
         if (fired != nullptr)
             my_guard = &cache_.regime(my_key).guards[static_cast<std::size_t>(fired - cache.regime(key).guards.data())];
         const Found found = train.next(cache_, mine, my_guard, my_key, left(mine, input));
@@ -66,13 +72,13 @@ struct Shadowed {
             out.memory[static_cast<std::size_t>(twins.term[term] - train.sizes().first_memory)] = value;
     }
     void compare(lostmotion::Found expected, const lostmotion::Instant& now, const RegimeKey& key, Found found,
-                 const Instant& mine, const Key& my_key, const char* what) const {
+                 const Instant& mine, const model::Key& my_key, const char* what) const {
         ++events;
         CAPTURE(what);
         CAPTURE(now.time);
         CHECK(static_cast<int>(expected) == static_cast<int>(found));
         if (expected != lostmotion::Found::yes || found != Found::yes) return;
-        const Key expected_key = twins.key(key);
+        const model::Key expected_key = twins.key(key);
         bool same = expected_key.modes == my_key.modes;
         for (int b = 0; b < train.assembly().layout().branches; ++b)
             same = same && (expected_key.branch[b] == my_key.branch[b]);

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "../parameters.hpp"
+#include "../drive/parameters.hpp"
 #include "../simulation/result_names.hpp"
 #include "../simulation/run.hpp"
 #include "reduction.hpp"

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "../contact.hpp"
+#include "../drive/contact.hpp"
 
 namespace lostmotion {
 

@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "../contact.hpp"
+#include "../drive/contact.hpp"
 #include "../simulation/result_names.hpp"
 #include "../solver/exact_solver.hpp"
 

@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "../solver/status.hpp"
 #include "assembly.hpp"
 #include "motion.hpp"
 #include "scales.hpp"
@@ -38,7 +39,7 @@ std::size_t guard_count(const R& r) {
         return r.guards.size();
 }
 
-enum class Found { yes, inconsistent, outside };
+using lostmotion::Found;
 
 // Sizes: Layout, or the kernel's dimensions. Cache: regime(key) gives a regime that stays where it is.
 template <class Sizes = Layout>

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "../kernel/form.hpp"
 #include "assembly.hpp"
 
 namespace lostmotion::model {
@@ -16,9 +17,7 @@ bool fits(const Train& train, const Layout& n) {
 }
 
 template <class D>
-struct PackedForm {
-    std::array<double, D::terms> c{};
-};
+using PackedForm = LinearFormOf<D>;
 
 template <class D, class F = PackedForm<D>>
 F pack(const Row& f, const Layout& n) {
@@ -33,15 +32,20 @@ F pack(const Row& f, const Layout& n) {
 
 template <class D>
 struct PackedGuard {
+    using Kind = Guard::Kind;
+    static constexpr Kind speed = Guard::speed, capacity = Guard::capacity, edge = Guard::edge,
+                          input_limit = Guard::input_limit, turning = Guard::turning, outside = Guard::outside;
+
     PackedForm<D> form;
-    Guard::Kind kind = Guard::outside;
+    Kind kind = outside;
     int contact = -1, branch = -1, neighbour = 0;
     bool by_touch = false;
     int memory = -1;
     double shift = 0.0;
     bool behind = false;
 
-    bool is_edge() const { return kind == Guard::edge || kind == Guard::input_limit; }
+    bool is_edge() const { return kind == edge || kind == input_limit; }
+    bool is_of_contact() const { return kind == speed || kind == capacity || kind == turning; }
 };
 
 template <class D>
@@ -59,6 +63,7 @@ struct PackedRegime {
     };
     std::array<Follower, D::coupled> followers{};
     int n_followers = 0;
+    std::array<bool, D::coupled> resting{}, following{};  // speeds kept at zero, and those that follow another
     bool solvable = true, in_data = true;
     int driving_input = -1, driven_contact = -1;
     double driving_way = 0.0;
@@ -80,9 +85,12 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
     }
     std::copy_n(r.at_rest.begin(), n.contacts, out.at_rest.begin());
     const auto& shafts = a.places().shafts;
-    for (int s = 0; s < static_cast<int>(shafts.size()); ++s)
+    for (int s = 0; s < static_cast<int>(shafts.size()); ++s) {
+        out.resting[shafts[s].speed] = r.ties.at_rest[s];
+        out.following[shafts[s].speed] = !r.ties.at_rest[s] && r.ties.leader[s] != s;
         if (const int leader = r.ties.leader[s]; !r.ties.at_rest[s] && leader != s)
             out.followers[out.n_followers++] = {shafts[s].speed, shafts[leader].speed, r.ties.factor[s]};
+    }
     out.solvable = r.solvable;
     out.driving_input = r.driving_input;
     out.driving_way = r.driving_way;

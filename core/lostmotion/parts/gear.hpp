@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "../gearbox.hpp"
+#include "gearbox.hpp"
 #include "mesh_efficiency.hpp"
 #include "periodic_curve.hpp"
 

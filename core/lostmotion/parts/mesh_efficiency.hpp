@@ -8,7 +8,7 @@
 
 #include <cmath>
 
-#include "../loss_map.hpp"
+#include "loss_map.hpp"
 
 namespace lostmotion::model {
 

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "../torsion_curve.hpp"
 #include "dry_friction.hpp"
+#include "torsion_curve.hpp"
 
 namespace lostmotion::model {
 

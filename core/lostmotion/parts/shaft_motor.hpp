@@ -4,7 +4,7 @@
 #include <limits>
 #include <string>
 
-#include "../motor.hpp"
+#include "motor.hpp"
 
 namespace lostmotion::model {
 

@@ -11,7 +11,7 @@
 
 #include <optional>
 
-#include "../contact.hpp"
+#include "../drive/contact.hpp"
 #include "../solver/exact_solver.hpp"
 
 namespace lostmotion {

@@ -5,7 +5,7 @@
 #include <cassert>
 #include <cstddef>
 
-#include "../drive.hpp"
+#include "../drive/drive.hpp"
 #include "../kernel/stride.hpp"
 #include "channels.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "../contact.hpp"
+#include "../drive/contact.hpp"
 #include "enum_table.hpp"
 
 namespace lostmotion {

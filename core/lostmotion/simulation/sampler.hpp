@@ -9,7 +9,7 @@
 #include <span>
 #include <utility>
 
-#include "../contact.hpp"
+#include "../drive/contact.hpp"
 #include "../kernel/stride.hpp"
 #include "../solver/exact_solver.hpp"
 #include "reader.hpp"

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "../contact.hpp"
+#include "../drive/contact.hpp"
 #include "../solver/exact_solver.hpp"
 
 namespace lostmotion {

@@ -58,8 +58,11 @@ class RegimeCache {
         std::array<Entry*, D::guards> neighbour{};  // what lies beyond each guard, as far as it is known
 
         void set(const System& system, const Key& key) {
-            // In place, since they are large.
-            const Regime& r = *new (&regime) Regime(system.build(key));
+            if constexpr (std::is_trivially_destructible_v<Regime>)
+                new (&regime) Regime(system.build(key));  // in place, since they are large
+            else
+                regime = system.build(key);
+            const Regime& r = regime;
             new (&rates) LinearRatesOf<D>(r.rate);
             guards = {};
             neighbour = {};

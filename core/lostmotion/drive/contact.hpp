@@ -11,10 +11,10 @@
 #include <optional>
 #include <utility>
 
+#include "../kernel/flow.hpp"
+#include "../solver/course.hpp"
+#include "../solver/switching.hpp"
 #include "drive.hpp"
-#include "kernel/flow.hpp"
-#include "solver/course.hpp"
-#include "solver/switching.hpp"
 
 namespace lostmotion {
 

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "kernel/inputs.hpp"
-#include "kernel/rates.hpp"
+#include "../kernel/inputs.hpp"
+#include "../kernel/rates.hpp"
 
 namespace lostmotion {
 

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "variables.hpp"
+#include "../drive/variables.hpp"
 
 namespace lostmotion {
 

@@ -1,9 +1,9 @@
 // The gearbox: a compliance and a loss law, chosen independently.
 #pragma once
 
+#include "../drive/variables.hpp"
 #include "loss_map.hpp"
 #include "torsion_curve.hpp"
-#include "variables.hpp"
 
 namespace lostmotion {
 

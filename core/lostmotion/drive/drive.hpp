@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "gearbox.hpp"
-#include "load.hpp"
-#include "motor.hpp"
+#include "../parts/gearbox.hpp"
+#include "../parts/load.hpp"
+#include "../parts/motor.hpp"
 #include "regime.hpp"
 
 namespace lostmotion {
