@@ -1,7 +1,7 @@
 // Which combination of modes follows.
 #pragma once
 
-#include "modes.hpp"
+#include "switched_train.hpp"
 
 namespace lostmotion::model {
 

@@ -1,7 +1,7 @@
 // One combination of modes: its pieces and cells, its locked torques, and whether it is consistent.
 #pragma once
 
-#include "modes.hpp"
+#include "switched_train.hpp"
 
 namespace lostmotion::model {
 

@@ -1,7 +1,7 @@
 // A train as the solvers see it: a switched linear system of compile-time dimensions.
 #pragma once
 
-#include "modes_settle.hpp"
+#include "modes.hpp"
 #include "pack.hpp"
 #include "scales.hpp"
 

@@ -1,0 +1,225 @@
+// The train as a switched linear system: which regime follows at an event (docs/theory.md, contacts).
+//
+// A regime holds just after t if each of its guards g is positive there. Since the flow of a regime is known, that is
+// decided at t itself: by the sign of the first of g, g', g'', ... that is not zero.
+//
+// Which contacts at rest stick is a linear complementarity problem in their torques and accelerations. Few contacts are
+// tried one combination after the other, those with most stuck first. Many are found by pivoting: from all stuck, the
+// contact whose condition is violated most changes its mode, until none is. Losses that grow with the load make the
+// problem unsymmetric, and pivoting may come back to where it was: a combination is tried once only, and where all that
+// it leads to have been tried, those before it lead on. Where a self-locking gear keeps all of these from a solution,
+// the search begins again from the modes before the event, then from others that are drawn.
+#pragma once
+
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "../solver/status.hpp"
+#include "assembly.hpp"
+#include "motion.hpp"
+#include "scales.hpp"
+
+namespace lostmotion::model {
+
+// A guard that is further from zero than this share of its terms, and of what they are at rated load and speed times
+// `far_from_event`, is not at zero.
+inline constexpr double clear_of_zero = 1e-3;
+inline constexpr double far_from_event = 1e-6;
+
+// The kernel's regimes have room for more guards than they use.
+template <class R>
+std::size_t guard_count(const R& r) {
+    if constexpr (requires { r.n_guards; })
+        return static_cast<std::size_t>(r.n_guards);
+    else
+        return r.guards.size();
+}
+
+using lostmotion::Found;
+
+// Sizes: Layout, or the kernel's dimensions. Cache: regime(key) gives a regime that stays where it is.
+template <class Sizes = Layout>
+class SwitchedTrain {
+ public:
+    explicit SwitchedTrain(const Assembly& assembly) : SwitchedTrain(assembly, assembly.layout()) {}
+    SwitchedTrain(const Assembly& assembly, const Sizes& sizes) : assembly_(assembly), n_(sizes) { set_near_event(); }
+
+    const Assembly& assembly() const { return assembly_; }
+    const Sizes& sizes() const { return n_; }
+    Regime build(const Key& key) const { return assembly_.build(key); }
+
+    // Regime at the start of a run, where nothing is known but the state.
+    template <class Cache, class Now>
+    Found start(Cache& cache, Now& now, Key& key) const;
+
+    // Regime that follows `key` at this instant: after one of its guards has reached zero, or (fired = nullptr)
+    // after an input has changed. Only the contact whose speed has reached zero has stopped, and a stop of a twist is
+    // a turning point, which sets the hysteresis capacity anew (16). All other contacts that move go on in their
+    // direction, however slowly: an input acts on the speeds through the accelerations only.
+    // input: the inputs up to this instant.
+    template <class Cache, class Now, class G, class Input>
+    Found next(Cache& cache, Now& now, const G* fired, Key& key, const Input& input) const;
+
+    using Rest = std::array<bool, max_contacts>;
+    // Sets the speeds of contacts at rest to what they are, to the last bit, and marks those that this implies.
+    template <class X, class AtRest>
+    void stop(X& x, AtRest& at_rest) const;
+
+    double few = 27.0;        // up to so many combinations are tried one after the other; more are pivoted
+    mutable long trials = 0;  // combinations tried so far
+
+ private:
+    struct Event {
+        Rest at_rest{};
+        std::array<double, max_contacts> gear{};      // T_2 of each gear before [N m]
+        std::array<double, max_contacts> coupling{};  // torque of each coupling before [N m]
+        bool with_guard = false;                      // a guard has ended the regime before
+        Guard::Kind kind = Guard::outside;            // and what it was
+        int contact = nowhere, branch = nowhere, neighbour = 0, memory = nowhere;
+        double shift = 0.0;
+        Key before{};
+        bool from_each_load = false;  // begin the search for the cell of a loss law from each load
+        bool by_value = false;        // a guard that is zero to rounding holds, whatever its derivatives
+        bool closest = false;         // take the combination that violates its guards least
+
+        // The margins of a contact that has just come to a stop are zero by chance only.
+        template <class G>
+        bool by_value_alone(const G& g) const {
+            return by_value ||
+                   (with_guard && kind == Guard::speed && g.kind == Guard::capacity && g.contact == contact);
+        }
+        // The solver has seen this regime to its end.
+        bool has_ended(const Key& key) const { return with_guard && kind != Guard::speed && key == before; }
+    };
+    using Guards = std::bitset<max_guards>;
+    // A guard of a contact that is violated.
+    struct Violation {
+        int contact = nowhere, mode = 0;  // the mode that it suggests
+        int order = 0;
+        double relative = 0.0;
+        bool turning = false;
+    };
+    struct Trial {
+        Found found = Found::inconsistent;
+        bool turns_back = false;  // all that is violated is that what drives a contact to its limit turns back
+        std::vector<Violation> violations;  // of the contacts, once piece and cell are found
+    };
+
+    int contacts() const { return assembly_.layout().contacts; }
+    const Places& places() const { return assembly_.places(); }
+    const Train& train() const { return assembly_.train(); }
+
+    void set_near_event();
+    template <class F>
+    double near_event(const F& f) const {
+        double sum = 0.0;
+        for (int k = 0; k < n_.states; ++k) sum += std::fabs(f.c[k]) * near_state_[k];
+        for (int k = 0; k < n_.inputs; ++k) sum += std::fabs(f.c[n_.first_input + k]) * near_input_[k];
+        return sum;
+    }
+
+    template <class G, class Now>
+    static void cross(const G& guard, Now& now, Key& key) {
+        if (guard.branch == nowhere) return;
+        key.branch[guard.branch] = static_cast<std::int16_t>(guard.neighbour);
+        if (guard.memory != nowhere) now.memory[guard.memory] += guard.shift;
+    }
+
+    bool at_its_limit(const Key& key) const;
+    template <class Cache, class Now>
+    Found find(Cache& cache, Now& now, Event event, Key& key) const;
+    template <class Cache, class Now>
+    Found search(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
+    template <class Cache, class Now>
+    Found enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
+    template <class Cache, class Now>
+    Found pivot(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
+    template <class Cache, class Now, class Memory>
+    void hold_where_possible(Cache& cache, Now& now, const Memory& before, Key modes, const Event& event,
+                             Key& key) const;
+    template <class Cache, class Now>
+    Trial settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const;
+    template <class Cache, class Now>
+    Found settle_at_limit(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const;
+    template <class Cache, class Now>
+    Trial walk(Cache& cache, Now& now, const Event& event, Key trial, Key& key) const;
+    template <class Cache, class Now>
+    bool breaks_away(Cache& cache, Now& now, const Event& event, double margin_size, double near, Key& key) const;
+    template <class Now>
+    void locate(const Now& now, Key& trial) const;
+    template <class Now>
+    void locate_losses(const Now& now, const std::array<double, max_contacts>& T_2, Key& trial) const;
+    template <class Now>
+    void hold(Now& now, const Event& event, const Key& modes, std::array<double, max_contacts>& T_2) const;
+    template <class Now>
+    double motor_torque(const Now& now, int motor) const;
+
+    // The guards of the speeds of contacts that move: their modes were chosen by their speeds.
+    template <class R, class AtRest>
+    static Guards moving(const R& r, const AtRest& at_rest) {
+        Guards out;
+        for (std::size_t g = 0; g < guard_count(r); ++g)
+            out[g] = r.guards[g].kind == Guard::speed && !at_rest[r.guards[g].contact];
+        return out;
+    }
+    // A guard of a law or an input that does not hold just after now; those of contacts are collected.
+    template <class R, class Now>
+    auto violated(const R& r, const Now& now, const Guards& ignored, const Event* event,
+                  std::vector<Violation>& of_contacts) const -> decltype(&r.guards[0]) {
+        Motion<Sizes, R, Now> motion(n_, r, now);
+        if (r.driving_input >= 0 && turns_back(r, now))
+            of_contacts.push_back({r.driven_contact, 0, n_derivatives, 0.0, true});
+        for (std::size_t g = 0; g < guard_count(r); ++g) {
+            const auto& guard = r.guards[g];
+            if (ignored[g] || guard.behind) continue;
+            const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);
+            if (value > clear_of_zero * size + near_event(guard.form)) continue;
+            const auto s = motion.sign(guard.form, event != nullptr && event->by_value_alone(guard));
+            if (s.sign >= 0) continue;
+            if (guard.is_edge() || guard.kind == Guard::outside) return &guard;
+            const bool of_speed = guard.kind == Guard::speed;
+            of_contacts.push_back({guard.contact, of_speed ? 0 : guard.neighbour, s.order - (of_speed ? 1 : 0),
+                                   -s.relative, guard.kind == Guard::turning});
+        }
+        return nullptr;
+    }
+    // Does the input that drives a contact at its limit turn back just after now?
+    template <class R, class Now>
+    static bool turns_back(const R& r, const Now& now) {
+        const auto way = [&](std::size_t k) {
+            return r.driving_way * now.input[k][static_cast<std::size_t>(r.driving_input)];
+        };
+        for (std::size_t k = 1; k + 1 < n_derivatives; ++k)
+            if (std::fabs(way(k)) > time_rounding * std::fabs(now.time * way(k + 1))) return way(k) < 0.0;
+        return false;
+    }
+    template <class R, class Now>
+    double violation(const R& r, const Now& now, const Event& event) const;
+    template <class R, class Now>
+    double torque_change(const R& r, const Now& now, const Event& event) const {
+        double sum = 0.0;
+        for (std::size_t g = 0; g < train().gears.size(); ++g)
+            sum += std::fabs(evaluate(n_, r.output_torque[g], now) - event.gear[g]);
+        return sum;
+    }
+    template <class Cache, class Now, class G>
+    bool goes_on(Cache& cache, Now& now, const G& fired, Key& key) const;
+    template <class Cache, class Now, class Input>
+    bool stays(Cache& cache, const Now& now, const Key& key, const Input& input) const;
+
+    static constexpr double largest_violation = 1e-6;  // that rounding may make
+    static constexpr double most = 729.0;              // combinations that are tried as a last resort
+    static constexpr std::size_t from_one_start = 300, longest_pivoting = 600;
+
+    const Assembly& assembly_;
+    Sizes n_;
+    std::array<double, max_states> near_state_{};
+    std::array<double, max_inputs> near_input_{};
+};
+
+}  // namespace lostmotion::model
+
