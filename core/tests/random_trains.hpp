@@ -1,6 +1,7 @@
 // Random trains: chains and trees of 2 to 6 shafts with gears, motors, couplings and brakes.
 #pragma once
 
+#include "lostmotion/kernel/inputs.hpp"
 #include "train_support.hpp"
 
 namespace lostmotion::model {
@@ -72,6 +73,17 @@ class RandomTrains {
             g.law.map = plane_map(uniform(0.0, 0.1), uniform(0.0, 0.1), uniform(0.0, 0.4));
         }
         return g;
+    }
+
+    // For each input a sine and a step or a ramp.
+    std::vector<Signal> signals(const Assembly& a, double duration) {
+        std::vector<Signal> out(static_cast<std::size_t>(a.layout().inputs));
+        for (Signal& s : out) {
+            s.knots = {{0.0, uniform(-2.0, 2.0), 0.0}};
+            if (coin()) s.sines = {{uniform(0.2, 3.0), spread(0.3, 10.0), uniform(0.0, 6.28)}};
+            if (coin()) s.knots.push_back({uniform(0.2, 0.8) * duration, uniform(-2.0, 2.0), coin() ? 0.0 : 1.0});
+        }
+        return out;
     }
 
     // At rest, or with some shafts in motion that nothing ties to others.

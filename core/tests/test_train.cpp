@@ -148,31 +148,31 @@ TEST_CASE("a packed regime has the same coefficients in the kernel's order, and 
     for (int n = 0; n < 100; ++n) {
         const Assembly a(random.train(random.pick(2, 6), true));
         const Layout& at = a.layout();
-        REQUIRE(fits<Wide>(a.train(), at));
+        REQUIRE(fits<WidestTest>(a.train(), at));
         Key key;
         for (int c = 0; c < at.contacts; ++c)
             key.modes[c] = static_cast<std::int8_t>(a.places().contacts[c].bilateral ? 0 : random.pick(-1, 1));
         for (const ContactPlace& c : a.places().contacts)
             if (c.one_way) key.modes[&c - a.places().contacts.data()] = -1;
         const Regime r = a.build(key);
-        const auto p = pack<Wide>(r, a);
+        const auto p = pack<WidestTest>(r, a);
         CHECK(p.complete);
         CHECK(p.n_guards == static_cast<int>(r.guards.size()));
         Instant x;
-        std::array<double, Wide::terms> wide{};
+        std::array<double, WidestTest::terms> wide{};
         const auto put = [&](int count, int to, auto& values) {
             for (int k = 0; k < count; ++k)
                 values[k] = wide[static_cast<std::size_t>(to + k)] = random.uniform(-1.0, 1.0);
         };
         put(at.coupled, 0, x.x);
         for (int k = 0; k < at.angles; ++k)
-            x.x[at.coupled + k] = wide[static_cast<std::size_t>(Wide::coupled + k)] = random.uniform(-1.0, 1.0);
-        wide[Wide::one] = 1.0;
-        put(at.memory, Wide::first_memory, x.memory);
-        put(at.inputs, Wide::first_input, x.input[0]);
-        const auto value = [&](const PackedForm<Wide>& f) {
+            x.x[at.coupled + k] = wide[static_cast<std::size_t>(WidestTest::coupled + k)] = random.uniform(-1.0, 1.0);
+        wide[WidestTest::one] = 1.0;
+        put(at.memory, WidestTest::first_memory, x.memory);
+        put(at.inputs, WidestTest::first_input, x.input[0]);
+        const auto value = [&](const PackedForm<WidestTest>& f) {
             double sum = 0.0;
-            for (int k = 0; k < Wide::terms; ++k)
+            for (int k = 0; k < WidestTest::terms; ++k)
                 sum += f.c[static_cast<std::size_t>(k)] * wide[static_cast<std::size_t>(k)];
             return sum;
         };

@@ -260,10 +260,10 @@ TEST_CASE("the search works on packed regimes and the kernel's own instant as on
     };
     struct WideCache {
         const Assembly& assembly;
-        std::unordered_map<Key, std::unique_ptr<PackedRegime<Wide>>, KeyHash> regimes;
-        const PackedRegime<Wide>& regime(const Key& key) {
+        std::unordered_map<Key, std::unique_ptr<PackedRegime<WidestTest>>, KeyHash> regimes;
+        const PackedRegime<WidestTest>& regime(const Key& key) {
             auto& r = regimes[key];
-            if (!r) r = std::make_unique<PackedRegime<Wide>>(pack<Wide>(assembly.build(key), assembly));
+            if (!r) r = std::make_unique<PackedRegime<WidestTest>>(pack<WidestTest>(assembly.build(key), assembly));
             return *r;
         }
     };
@@ -271,7 +271,7 @@ TEST_CASE("the search works on packed regimes and the kernel's own instant as on
     for (int n = 0; n < 200; ++n) {
         const Assembly a(random.train(random.pick(2, 4), true));
         const SwitchedTrain<> plain(a);
-        const SwitchedTrain<Wide> packed(a, Wide{});
+        const SwitchedTrain<WidestTest> packed(a, WidestTest{});
         MapCache cache(plain);
         WideCache wide_cache{a, {}};
         Instant now = random.instant(a, 0.2);
@@ -293,7 +293,7 @@ TEST_CASE("the search works on packed regimes and the kernel's own instant as on
             for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-2.0, 2.0);
             inputs();
             CHECK(plain.next(cache, now, static_cast<const Guard*>(nullptr), key, before) ==
-                  packed.next(wide_cache, wide, static_cast<const PackedGuard<Wide>*>(nullptr), wide_key, wide_before));
+                  packed.next(wide_cache, wide, static_cast<const PackedGuard<WidestTest>*>(nullptr), wide_key, wide_before));
             CHECK(key == wide_key);
             CHECK(std::equal(wide.memory.begin(), wide.memory.end(), now.memory.begin()));
         }

@@ -57,7 +57,7 @@ inline Train train_of(const Drive& d) {
 }
 
 // Dimensions as the kernel's.
-struct Wide {
+struct WidestTest {
     static constexpr int coupled = 24, angles = 6, inputs = 14, memory = 16, contacts = 20, guards = 96;
     static constexpr int states = coupled + angles, one = states, first_memory = one + 1,
                          first_input = first_memory + memory, terms = first_input + inputs;

@@ -56,6 +56,13 @@ struct Signal {
 template <class D>
 using SignalsOf = std::array<Signal, D::inputs>;
 
+// The same without what is always zero: a sine of no amplitude does not make an input vary.
+template <std::size_t n>
+std::array<Signal, n> without_idle_sines(std::array<Signal, n> signals) {
+    for (Signal& s : signals) std::erase_if(s.sines, [](const Sine& sine) { return sine.amplitude == 0.0; });
+    return signals;
+}
+
 // The first knot of any input after t.
 template <std::size_t n>
 double next_knot(const std::array<Signal, n>& signals, double t) {

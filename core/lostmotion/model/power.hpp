@@ -77,4 +77,17 @@ inline std::vector<PowerFlow> power_flows(const Assembly& a, const Regime& r) {
     return flows;
 }
 
+// A name that no other flow of the train has: of the element, and of what it is.
+inline std::string flow_name(const Assembly& a, const PowerFlow& f) {
+    const Train& t = a.train();
+    const auto k = static_cast<std::size_t>(f.index);
+    const std::string& element = f.element == PowerFlow::motor      ? t.motors[k].name
+                                 : f.element == PowerFlow::shaft    ? t.shafts[k].name
+                                 : f.element == PowerFlow::gear     ? t.gears[k].name
+                                 : f.element == PowerFlow::brake    ? t.brakes[k].name
+                                 : f.element == PowerFlow::coupling ? t.couplings[k].name
+                                                                    : t.angle_torques[k].name;
+    return element + ": " + f.what;
+}
+
 }  // namespace lostmotion::model

@@ -222,4 +222,3 @@ class SwitchedTrain {
 };
 
 }  // namespace lostmotion::model
-

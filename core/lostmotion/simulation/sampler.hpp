@@ -17,11 +17,16 @@
 namespace lostmotion {
 
 // Writes `count` samples at begin + k * interval, channel by channel: out[c * count + k] is that of channels[c].
-class Sampler {
+// Reader(model, regime, memory) reads them.
+template <class System, class Reader, class Model>
+class SamplerOf {
  public:
-    Sampler(const Drive& drive, double begin, double interval, std::size_t count, double* out,
-            std::span<const int> channels = all_channels)
-        : drive_(drive), begin_(begin), interval_(interval), count_(count), out_(out), channels_(channels) {}
+    using D = typename System::Dims;
+    using Instants = InstantsOf<D>;
+
+    SamplerOf(const Model& model, double begin, double interval, std::size_t count, double* out,
+              std::span<const int> channels)
+        : model_(model), begin_(begin), interval_(interval), count_(count), out_(out), channels_(channels) {}
 
     // Polled now and then; true ends the run.
     bool (*interrupted)(void*) = nullptr;
@@ -29,7 +34,7 @@ class Sampler {
 
     double left_data_at = std::numeric_limits<double>::infinity();  // first instant outside the loss map's data [s]
 
-    bool segment(const Segment<SwitchedDrive>& s) {
+    bool segment(const Segment<System>& s) {
         if (!s.entry.regime.in_data) left_data_at = std::fmin(left_data_at, s.begin);
         const std::size_t end = due(s);
         if (next_ < end) {
@@ -40,7 +45,7 @@ class Sampler {
             p.constant = s.constant;
             p.first = next_;
             p.end = next_ = end;
-            p.at_once = LongStep<DriveDims>::pays(s.entry.propagator, s.end - s.begin);
+            p.at_once = LongStep<D>::pays(s.entry.propagator, s.end - s.begin);
             if (p.at_once) {
                 p.cursor = s.at;
                 if (instant(p.first) > s.begin) p.cursor.leap_to(instant(p.first));
@@ -65,11 +70,11 @@ class Sampler {
  private:
     // The samples of one segment.
     struct Piece {
-        explicit Piece(const Cursor<DriveDims>& like) : cursor(like) {}
-        typename Segment<SwitchedDrive>::Entry* entry = nullptr;
-        Memory memory;
-        Column constant;
-        Cursor<DriveDims> cursor;
+        explicit Piece(const Cursor<D>& like) : cursor(like) {}
+        typename Segment<System>::Entry* entry = nullptr;
+        typename D::Memory memory;
+        ColumnOf<D> constant;
+        Cursor<D> cursor;
         std::size_t first = 0, end = 0;
         double rest = 0.0;     // from the cursor to the first [s]
         bool at_once = false;  // whether the segment is long enough for it
@@ -80,7 +85,7 @@ class Sampler {
         auto& propagator = p.entry->propagator;
         const int level = propagator.level_of(interval_);
         if (level < 0 && p.at_once) return write_at_once(p);
-        const Reader reader(drive_, p.entry->regime, p.memory);
+        const Reader reader(model_, p.entry->regime, p.memory);
         for (std::size_t next = p.first;;) {
             const int n = static_cast<int>(std::min<std::size_t>(p.end - next, Instants::most - next % Instants::most));
             if (level >= 0) {
@@ -104,9 +109,9 @@ class Sampler {
 
     // By one long step from sample to sample.
     [[gnu::noinline]] bool write_at_once(Piece& p) {
-        const Reader reader(drive_, p.entry->regime, p.memory);
-        const Cursor<DriveDims> first = p.cursor;
-        LongStep<DriveDims> step = p.cursor.long_step(whole_interval(p));
+        const Reader reader(model_, p.entry->regime, p.memory);
+        const Cursor<D> first = p.cursor;
+        LongStep<D> step = p.cursor.long_step(whole_interval(p));
         for (std::size_t next = p.first;;) {
             const int n = static_cast<int>(std::min<std::size_t>(p.end - next, Instants::most));
             for (int k = 0; k < n; ++k) {
@@ -133,7 +138,7 @@ class Sampler {
     }
     double instant(std::size_t k) const { return begin_ + static_cast<double>(k) * interval_; }
     // The number of the first sample after a segment.
-    std::size_t due(const Segment<SwitchedDrive>& s) const {
+    std::size_t due(const Segment<System>& s) const {
         const auto within = [&](std::size_t k) {
             const double t = instant(k);
             return t < s.end || (s.last && t <= s.end * (1.0 + 4.0 * std::numeric_limits<double>::epsilon()));
@@ -158,7 +163,7 @@ class Sampler {
         }
     }
 
-    const Drive& drive_;
+    const Model& model_;
     double begin_, interval_;
     double per_interval_ = 1.0 / interval_;  // rounded
     std::size_t count_, next_ = 0;
@@ -166,8 +171,16 @@ class Sampler {
     std::span<const int> channels_;
     std::array<std::optional<Piece>, most_pieces> pieces_;
     std::size_t n_pieces_ = 0;  // that have been collected
-    Stride<DriveDims> stride_;
+    Stride<D> stride_;
     Instants instants_;
+};
+
+// Of the drive.
+class Sampler : public SamplerOf<SwitchedDrive, Reader, Drive> {
+ public:
+    Sampler(const Drive& drive, double begin, double interval, std::size_t count, double* out,
+            std::span<const int> channels = all_channels)
+        : SamplerOf(drive, begin, interval, count, out, channels) {}
 };
 
 }  // namespace lostmotion

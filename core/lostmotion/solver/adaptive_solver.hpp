@@ -90,8 +90,8 @@ class AdaptiveSolver {
     AdaptiveSolver(const System& system, const Signals& signals, double relative_tolerance, const State& scale,
                    Remainder remainder = {})
         : system_(system),
-          signals_(signals),
-          basis_(input_basis(signals)),
+          signals_(without_idle_sines(signals)),
+          basis_(input_basis(signals_)),
           cache_(system),
           tolerance_(relative_tolerance),
           scale_(scale),

@@ -66,12 +66,12 @@ class ExactSolver {
     // shared: regimes of the same system that an earlier solver has left, if any.
     ExactSolver(const System& system, const Signals& signals, double unit, const State& scale, Cache* shared = nullptr)
         : system_(system),
-          signals_(signals),
+          signals_(without_idle_sines(signals)),
           own_(shared == nullptr ? std::make_unique<Cache>(system) : nullptr),
           cache_(shared == nullptr ? *own_ : *shared),
           scale_(scale),
           unit_(elementary(unit)),
-          turns_(cache_.serve(unit_, input_basis(signals))),
+          turns_(cache_.serve(unit_, input_basis(signals_))),
           cursors_{start(), start(), start(), start()},
           input_bound_(begin_->input().fourth_derivative_bound()) {}
     ExactSolver(const ExactSolver&) = delete;
@@ -140,7 +140,12 @@ class ExactSolver {
             Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
                                     now_.x};
             begin_->place(entry.propagator, segment.constant, now_.x, course_.rate_known ? &course_.rate : nullptr);
-            if (begin_->constant_inputs() && has_settled(entry.regime, begin_->rate())) begin_->settle();
+            if (begin_->constant_inputs()) {
+                if (has_settled(entry.regime, begin_->rate())) begin_->settle();
+            } else if (rest_unforced(entry, begin_->rate())) {
+                segment.x_end = now_.x;
+                begin_->place(entry.propagator, segment.constant, now_.x);
+            }
             if (!(time_ < knot_)) knot_ = next_knot(signals_, time_);
             double limit = std::min(t_end, knot_);
             if (const Regime& r = entry.regime; r.driving_input >= 0) [[unlikely]]
@@ -192,6 +197,22 @@ class ExactSolver {
             if (!(std::fabs(rate[k]) <= settled * scale_[k])) return false;
         }
         return true;
+    }
+    // Under inputs that vary, the states that they do not reach decay for ever: once they are below what squares allow,
+    // they are zero. Returns whether one has become so.
+    bool rest_unforced(const Entry& e, const State& rate) {
+        typename Cache::States forced = 0;
+        for (int i = 0; i < D::inputs; ++i)
+            if (begin_->input().varies(i)) forced |= e.reached[i];
+        bool changed = false;
+        for (typename Cache::States left = ~forced & Cache::all_states; left != 0; left &= left - 1) {
+            const int k = std::countr_zero(left);
+            const double most = settled * scale_[k];
+            if (now_.x[k] == 0.0 || !(std::fabs(now_.x[k]) <= most && std::fabs(rate[k]) <= most)) continue;
+            now_.x[k] = 0.0;
+            changed = true;
+        }
+        return changed;
     }
     static bool moderate(const State& rate) {
         double sum = 0.0;

@@ -26,6 +26,10 @@ class RegimeCache {
     // A set of guards, as bits.
     using Guards = std::conditional_t<(D::guards <= 32), std::uint32_t, std::uint64_t>;
     static_assert(D::guards <= 64);
+    // A set of coupled states, as bits.
+    using States = std::uint32_t;
+    static_assert(D::coupled < 32);
+    static constexpr States all_states = (States{1} << D::coupled) - 1;
 
     struct Entry {
         Entry() = default;
@@ -52,8 +56,9 @@ class RegimeCache {
         };
         std::array<TwistSpeed, D::contacts> twist_speeds;
         int n_twist_speeds = 0;
-        bool followed = false;                   // does the speed of a state follow another?
-        typename GuardTable::Values near_event;  // what each guard exceeds where it is far from an event
+        std::array<States, D::inputs> reached{};  // the states that each input acts on, by way of others, too
+        bool followed = false;                    // does the speed of a state follow another?
+        typename GuardTable::Values near_event;   // what each guard exceeds where it is far from an event
         Propagator<D> propagator;
         std::array<Entry*, D::guards> neighbour{};  // what lies beyond each guard, as far as it is known
 
@@ -76,6 +81,7 @@ class RegimeCache {
                 if (guard.behind) behind |= Guards{1} << g;
             }
             followed = std::ranges::find(r.following, true) != r.following.end();
+            find_reach();
             find_twists(system);
             if constexpr (requires { system.near_event(guards, near_event); }) system.near_event(guards, near_event);
             propagator.reset();
@@ -101,6 +107,23 @@ class RegimeCache {
         }
 
      private:
+        void find_reach() {
+            const auto of = [](const ColumnOf<D>& column) {
+                States out = 0;
+                for (int r = 0; r < D::coupled; ++r) out |= States{column[r] != 0.0} << r;
+                return out;
+            };
+            std::array<States, D::coupled> next;
+            for (int k = 0; k < D::coupled; ++k) next[k] = of(rates.rate.column[k]);
+            for (int i = 0; i < D::inputs; ++i) {
+                States& all = reached[i] = of(rates.input_column[i]);
+                for (States before = 0; before != all;) {
+                    before = all;
+                    for (int k = 0; k < D::coupled; ++k)
+                        if (before >> k & 1) all |= next[k];
+                }
+            }
+        }
         void find_twists(const System& system) {
             n_twists = n_twist_speeds = 0;
             for (int t = 0; t < system.n_twists(); ++t) {

@@ -1,0 +1,219 @@
+// Integrals over time of products of two linear forms of the motion: energies.
+//
+// Between switchings each power is a product of two linear forms of an analytic state, whose time derivatives at both
+// ends of a panel are known. They are integrated by the two-point Hermite rule with derivatives up to order four
+// (exact for polynomials of degree nine); its difference from the rule with one derivative less sets the panel length.
+// Where the panel spans many of the shortest time constants, rounding spoils the derivatives: of a fast part of the
+// motion that has died out they are nothing but rounding times its rate to the fourth. There the powers are taken at
+// the nodes of the Gauss-Kronrod pair of 7 and 15 points (Kronrod 1965; R. Piessens et al., QUADPACK, Springer 1983).
+// Segments of thousands of periods are taken at once (long_step.hpp).
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "../solver/exact_solver.hpp"
+
+namespace lostmotion {
+
+// Up to N powers at once.
+template <class D, int N>
+class PowerIntegral {
+ public:
+    using State = StateOf<D>;
+    using LinearForm = LinearFormOf<D>;
+    using Flows = std::array<double, N>;
+
+    Flows flow{};              // [J] so far
+    double turned_over = 0.0;  // [J] sum of the magnitudes of all flows, panel by panel (or of apparent energies)
+
+ private:
+    static constexpr int orders = 5;  // value and four derivatives
+    using Powers = std::array<Flows, orders>;
+
+ public:
+    // Every power is a product of two linear forms; all are evaluated at once, as columns.
+    class Factors {
+     public:
+        void set(int flow, const LinearForm& a, const LinearForm& b) {
+            left.set(flow, a);
+            right.set(flow, b);
+        }
+        void hold(const typename D::Memory& m) {
+            left.constants(m, left_constant);
+            right.constants(m, right_constant);
+        }
+
+        void powers(const Propagator<D>& p, Cursor<D>& c, Powers& out) const {
+            const auto u = c.input().template jet<orders>();
+            Powers a, b;
+            State x = c.x();
+            for (int k = 0; k < orders; ++k) {
+                if (k == 1) x = c.rate();
+                if (k > 1) x = p.rates().higher(x, u[k - 1]);
+                if (k == 0) {
+                    left.evaluate(left_constant, x, u[0], a[0]);
+                    right.evaluate(right_constant, x, u[0], b[0]);
+                } else {
+                    left.rates(x, u[k], a[k]);
+                    right.rates(x, u[k], b[k]);
+                }
+            }
+            for (int f = 0; f < N; ++f) {
+                out[0][f] = a[0][f] * b[0][f];
+                out[1][f] = a[1][f] * b[0][f] + a[0][f] * b[1][f];
+                out[2][f] = a[2][f] * b[0][f] + 2.0 * a[1][f] * b[1][f] + a[0][f] * b[2][f];
+                out[3][f] = a[3][f] * b[0][f] + 3.0 * (a[2][f] * b[1][f] + a[1][f] * b[2][f]) + a[0][f] * b[3][f];
+                out[4][f] = a[4][f] * b[0][f] + 4.0 * (a[3][f] * b[1][f] + a[1][f] * b[3][f]) +
+                            6.0 * a[2][f] * b[2][f] + a[0][f] * b[4][f];
+            }
+        }
+
+        // The powers alone.
+        void powers(const Cursor<D>& c, Flows& out) const {
+            const auto u = c.input().values();
+            Flows a, b;
+            left.evaluate(left_constant, c.x(), u, a);
+            right.evaluate(right_constant, c.x(), u, b);
+            for (int f = 0; f < N; ++f) out[f] = a[f] * b[f];
+        }
+
+        FormTable<D, N> left, right;
+        Flows left_constant{}, right_constant{};
+    };
+
+    // A segment with these factors.
+    template <class Segment>
+    void add(const Segment& s, const Factors& factors) {
+        Propagator<D>& p = s.entry.propagator;
+        if (LongStep<D>::pays(p, s.end - s.begin)) {
+            add_long(s, factors);
+            return;
+        }
+        if (!cursor_) end_ = cursor_.emplace(s.at.input());
+        Cursor<D>&cursor = *cursor_, &end = *end_;
+        cursor = s.at;
+        Powers here, there;
+        factors.powers(p, cursor, here);
+        int level = std::min(level_, p.level_below(s.end - s.begin));
+        double t = s.begin;
+        for (long count = 1; t < s.end; ++count) {
+            if (count % 64 == 0) cursor.anchor(t);
+            double length = p.length(level);
+            const bool whole = length <= s.end - t;
+            if (!whole) length = s.end - t;
+            if (whole) {
+                end.step_from(cursor, level);
+            } else {
+                end = cursor;
+                end.move_to(s.end, s.x_end);
+            }
+            factors.powers(p, end, there);
+            const double error = level < first_stiff_level ? add_panel(here, there, length, level == 0)
+                                                           : add_stiff_panel(factors, cursor, length);
+            if (error > 1.0) {
+                --level;
+                continue;
+            }
+            t = whole ? t + length : s.end;
+            cursor = end;
+            here = there;
+            // Twice the length has 2^9 times the error.
+            if (error < 0x1p-9 && p.can_double(level, s.end - t)) ++level;
+        }
+        level_ = level;
+    }
+
+ private:
+    // Returns the error of the panel in units of what is allowed; beyond 1 (unless it is the shortest) nothing is
+    // added.
+    double add_panel(const Powers& a, const Powers& b, double h, bool shortest) {
+        Flows sums;
+        double difference = 0.0;
+        for (int f = 0; f < N; ++f) {
+            const double s0 = a[0][f] + b[0][f], s1 = h * (a[1][f] - b[1][f]), s2 = h * h * (a[2][f] + b[2][f]),
+                         s3 = h * h * h * (a[3][f] - b[3][f]), s4 = h * h * h * h * (a[4][f] + b[4][f]);
+            sums[f] = h * (s0 / 2.0 + s1 / 9.0 + s2 / 72.0 + s3 / 1008.0 + s4 / 30240.0);
+            const double lower = h * (s0 / 2.0 + 3.0 * s1 / 28.0 + s2 / 84.0 + s3 / 1680.0);
+            difference += std::fabs(sums[f] - lower);
+        }
+        return add(sums, difference, panel_tolerance, h, shortest);
+    }
+
+    // The same of a segment that is taken at once, exact but for rounding. What is turned over is the apparent energy:
+    // root mean square times root mean square.
+    template <class Segment>
+    [[gnu::noinline]] void add_long(const Segment& s, const Factors& factors) {
+        const double length = s.end - s.begin;
+        const LongProducts<D> products(s.entry.propagator, s.constant, s.at.x(), s.at.input(), length);
+        for (int f = 0; f < N; ++f) {
+            const std::vector<double> a = products.step().coefficients(factors.left, f, factors.left_constant[f]),
+                                      b = products.step().coefficients(factors.right, f, factors.right_constant[f]);
+            flow[f] += products(a, b);
+            turned_over += std::sqrt(std::fmax(0.0, products(a, a)) * std::fmax(0.0, products(b, b)));
+        }
+        elapsed_ += length;
+        mean_power_ = turned_over / elapsed_;
+    }
+
+    // The same by the powers at nodes, from where a cursor stands.
+    double add_stiff_panel(const Factors& factors, const Cursor<D>& from, double h) {
+        Cursor<D>& node = node_.emplace(from);
+        Flows sums{}, coarse{}, power;
+        for (int k = 0; k < kronrod_nodes; ++k)
+            for (const double side : {-1.0, +1.0}) {
+                if (k == kronrod_nodes - 1 && side > 0.0) continue;  // the one in the middle
+                node.advance_from(from, 0.5 * h * (1.0 + side * kronrod[k].node));
+                factors.powers(node, power);
+                for (int f = 0; f < N; ++f) {
+                    sums[f] += 0.5 * h * kronrod[k].weight * power[f];
+                    coarse[f] += 0.5 * h * kronrod[k].gauss_weight * power[f];
+                }
+            }
+        double difference = 0.0;
+        for (int f = 0; f < N; ++f) difference += std::fabs(sums[f] - coarse[f]);
+        return add(sums, difference, stiff_tolerance, h, false);
+    }
+
+    double add(const Flows& sums, double difference, double tolerance, double h, bool shortest) {
+        double size = 0.0;
+        for (const double s : sums) size += std::fabs(s);
+        const double allowed = tolerance * std::fmax(size, mean_power_ * h);
+        const double error = allowed > 0.0 ? difference / allowed : 0.0;
+        if (!shortest && error > 1.0) return error;
+        for (int f = 0; f < N; ++f) flow[f] += sums[f];
+        turned_over += size;
+        elapsed_ += h;
+        mean_power_ = turned_over / elapsed_;
+        return std::fmin(error, 1.0);
+    }
+
+    // The rule that is used is two orders finer than this, the difference from the coarser one.
+    static constexpr double panel_tolerance = 2e-9;
+    // The Gauss rule of 7 points is exact to degree 13, the Kronrod rule to degree 22.
+    static constexpr double stiff_tolerance = 1e-11;
+    static constexpr int first_stiff_level = 8;  // 64 of the shortest time constants
+
+    // Of the positive half of [-1, 1], the outermost first.
+    struct KronrodNode {
+        double node, weight, gauss_weight;
+    };
+    static constexpr int kronrod_nodes = 8;
+    static constexpr std::array<KronrodNode, kronrod_nodes> kronrod{{
+        {0.991455371120812639206854697526329, 0.022935322010529224963732008058970, 0.0},
+        {0.949107912342758524526189684047851, 0.063092092629978553290700663189204, 0.129484966168869693270611432679082},
+        {0.864864423359769072789712788640926, 0.104790010322250183839876322541518, 0.0},
+        {0.741531185599394439863864773280788, 0.140653259715525918745189590510238, 0.279705391489276667901467771423780},
+        {0.586087235467691130294144691838259, 0.169004726639267902826583426598550, 0.0},
+        {0.405845151377397166906606412076961, 0.190350578064785409913256402421014, 0.381830050505118944950369775488975},
+        {0.207784955007898467600689403773245, 0.204432940075298892414161999234649, 0.0},
+        {0.0, 0.209482141084727828012999174891714, 0.417959183673469387755102040816327},
+    }};
+
+    std::optional<Cursor<D>> cursor_, end_, node_;  // kept from segment to segment for their memory
+    int level_ = 4;
+    double elapsed_ = 0.0, mean_power_ = 0.0;
+};
+
+}  // namespace lostmotion

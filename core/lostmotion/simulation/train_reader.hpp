@@ -1,0 +1,110 @@
+// What can be read of a train at an instant: the channels of a record.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "../kernel/stride.hpp"
+#include "../model/names.hpp"
+#include "../model/system.hpp"
+
+namespace lostmotion {
+
+// At a jump a channel has its right limit.
+struct TrainChannel {
+    enum Kind { input, state, motor_torque, output_torque, input_torque, contact_torque, contact_mode } kind;
+    int index;  // of the input, state, motor, gear or contact
+    std::string name, unit, meaning;
+};
+
+inline std::vector<TrainChannel> train_channels(const model::Assembly& a) {
+    using C = TrainChannel;
+    const model::Train& t = a.train();
+    const model::Places& p = a.places();
+    std::vector<C> out;
+    const auto inputs = model::input_names(a);
+    for (std::size_t k = 0; k < inputs.size(); ++k) {
+        const bool load = inputs[k].ends_with("_load_torque");
+        out.push_back({C::input, static_cast<int>(k), inputs[k], load ? "N*m" : "",
+                       load ? "torque against the shaft" : "command"});
+    }
+    for (std::size_t k = 0; k < t.motors.size(); ++k)
+        out.push_back(
+            {C::motor_torque, static_cast<int>(k), t.motors[k].name + "_torque", "N*m", "torque of the motor"});
+    for (std::size_t k = 0; k < t.shafts.size(); ++k)
+        out.push_back({C::state, p.shafts[k].speed, t.shafts[k].name + "_speed", "rad/s", "speed of the shaft"});
+    for (std::size_t k = 0; k < t.shafts.size(); ++k)
+        if (p.shafts[k].angle != model::nowhere)
+            out.push_back({C::state, p.shafts[k].angle, t.shafts[k].name + "_angle", "rad", "angle of the shaft"});
+    for (int part = 0; part < a.layout().angles; ++part) {
+        const auto last = static_cast<std::size_t>(p.last_shaft[static_cast<std::size_t>(part)]);
+        if (p.shafts[last].angle == model::nowhere)
+            out.push_back(
+                {C::state, a.layout().coupled + part, t.shafts[last].name + "_angle", "rad", "angle of the shaft"});
+    }
+    for (std::size_t k = 0; k < t.gears.size(); ++k) {
+        const int gear = static_cast<int>(k);
+        const std::string& name = t.gears[k].name;
+        if (!t.gears[k].rigid())
+            out.push_back(
+                {C::state, p.gears[k].twist, name + "_twist", "rad", "angle of input/ratio less that of output"});
+        out.push_back({C::output_torque, gear, name + "_output_torque", "N*m", "torque on the output shaft"});
+        out.push_back({C::input_torque, gear, name + "_input_torque", "N*m", "torque taken from the input shaft"});
+    }
+    for (int c = 0; c < a.layout().contacts; ++c) {
+        const std::string name = model::contact_name(a, c);
+        out.push_back({C::contact_torque, c, name + "_torque", "N*m", "what the dry contact takes"});
+        out.push_back({C::contact_mode, c, name, "", "slips forward (+1) or backward (-1), or is stuck (0)"});
+    }
+    return out;
+}
+
+// Reads the channels in one regime, as many instants at once as the instruction set holds numbers.
+template <class D>
+class TrainReader {
+ public:
+    using Memory = typename D::Memory;
+    using Instants = InstantsOf<D>;
+    // What a reader is made for.
+    struct Model {
+        const model::Assembly& assembly;
+        std::vector<TrainChannel> channels;
+    };
+
+    TrainReader(const Model& m, const model::TrainRegime<D>& r, const Memory& memory)
+        : model_(m), regime_(r), memory_(memory) {}
+
+    Vec read(int channel, const Instants& at, int k) const {
+        const TrainChannel& c = model_.channels[static_cast<std::size_t>(channel)];
+        const auto index = static_cast<std::size_t>(c.index);
+        switch (c.kind) {
+            case TrainChannel::input: return load(&at.u[index][k]);
+            case TrainChannel::state: {
+                const int layout = model_.assembly.layout().coupled;
+                return load(&at.x[c.index < layout ? index : D::coupled + index - static_cast<std::size_t>(layout)][k]);
+            }
+            case TrainChannel::motor_torque: return evaluate(row(regime_.rows.motor_torque[index]), at, k);
+            case TrainChannel::output_torque: return evaluate(regime_.output_torque[index], at, k);
+            case TrainChannel::input_torque: return evaluate(row(regime_.rows.input_torque[index]), at, k);
+            case TrainChannel::contact_torque: return evaluate(regime_.contact_torque[index], at, k);
+            default: return Vec{} + (regime_.at_rest[index] ? 0.0 : static_cast<double>(regime_.key.modes[index]));
+        }
+    }
+
+ private:
+    LinearFormOf<D> row(const model::Row& r) const { return model::pack<D>(r, model_.assembly.layout()); }
+
+    // None of the forms depends on an angle that follows.
+    Vec evaluate(const LinearFormOf<D>& f, const Instants& at, int k) const {
+        const Vec own = sum_in_fours<D::coupled>([&](auto j) { return f.c[j] * load(&at.x[j][k]); });
+        Vec forced = f.c[D::first_input] * load(&at.u[0][k]);
+        for (int i = 1; i < D::inputs; ++i) forced += f.c[D::first_input + i] * load(&at.u[i][k]);
+        return constant_part<D>(f, memory_) + own + forced;
+    }
+
+    const Model& model_;
+    const model::TrainRegime<D>& regime_;
+    const Memory& memory_;
+};
+
+}  // namespace lostmotion
