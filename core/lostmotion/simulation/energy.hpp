@@ -209,8 +209,8 @@ class EnergyMeter {
         return add(sums, difference, panel_tolerance, h, shortest);
     }
 
-    // The same of a segment that is taken at once, exact but for rounding. What is turned over is the apparent energy:
-    // root mean square times root mean square.
+    // The same of a segment that is taken at once, exact but for rounding. What is turned over is taken as the apparent
+    // energy: root mean square times root mean square.
     [[gnu::noinline]] void add_long(const Segment<SwitchedDrive>& s) {
         const Factors factors(drive_, s.entry.regime, s.memory);
         const double length = s.end - s.begin;
@@ -225,7 +225,7 @@ class EnergyMeter {
         mean_power_ = ledger.turned_over / elapsed_;
     }
 
-    // The same by the powers at nodes, from where a cursor stands.
+    // The same by the powers at nodes, from the instant of a cursor.
     double add_stiff_panel(const Factors& factors, const Cursor<DriveDims>& from, double h) {
         Cursor<DriveDims>& node = node_.emplace(from);
         Flows sums{}, coarse{}, power;
@@ -245,13 +245,13 @@ class EnergyMeter {
     }
 
     double add(const Flows& sums, double difference, double tolerance, double h, bool shortest) {
-        double size = 0.0;
-        for (const double s : sums) size += std::fabs(s);
-        const double allowed = tolerance * std::fmax(size, mean_power_ * h);
+        double turnover = 0.0;
+        for (const double s : sums) turnover += std::fabs(s);
+        const double allowed = tolerance * std::fmax(turnover, mean_power_ * h);
         const double error = allowed > 0.0 ? difference / allowed : 0.0;
         if (!shortest && error > 1.0) return error;
         for (int f = 0; f < n_flows; ++f) ledger.flow[f] += sums[f];
-        ledger.turned_over += size;
+        ledger.turned_over += turnover;
         elapsed_ += h;
         mean_power_ = ledger.turned_over / elapsed_;
         return std::fmin(error, 1.0);

@@ -50,7 +50,7 @@ class Sampler {
             }
             p.cursor.keep(p.constant);
         }
-        return s.last || n_pieces_ == most_pieces ? write() : true;
+        return s.last || n_pieces_ == max_pieces ? write() : true;
     }
     // Writes what has been collected. Only needed if the last segment has not come.
     bool write() {
@@ -74,7 +74,7 @@ class Sampler {
         double rest = 0.0;     // from the cursor to the first [s]
         bool at_once = false;  // whether the segment is long enough for it
     };
-    static constexpr std::size_t most_pieces = 4;
+    static constexpr std::size_t max_pieces = 4;
 
     [[gnu::noinline]] bool write(Piece& p) {
         auto& propagator = p.entry->propagator;
@@ -164,7 +164,7 @@ class Sampler {
     std::size_t count_, next_ = 0;
     double* out_;
     std::span<const int> channels_;
-    std::array<std::optional<Piece>, most_pieces> pieces_;
+    std::array<std::optional<Piece>, max_pieces> pieces_;
     std::size_t n_pieces_ = 0;  // that have been collected
     Stride<DriveDims> stride_;
     Instants instants_;
