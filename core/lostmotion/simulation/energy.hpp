@@ -13,58 +13,10 @@
 
 #include "../drive/contact.hpp"
 #include "../solver/exact_solver.hpp"
+#include "energy_ledger.hpp"
+#include "quadrature.hpp"
 
 namespace lostmotion {
-
-enum EnergyFlow : int {
-    from_source,        // M_D w_M
-    in_input_damper,    // b_MR w_M^2
-    in_motor_friction,  // T_10 |w_M|
-    in_gear,           // (T_1 - T_2/i) w_M: the losses of the mesh; negative where a constant efficiency creates energy
-    in_hysteresis,     // H dd/dt
-    in_load_damper,    // b_ZR w^2
-    in_load_friction,  // dry friction of the load's bearing
-    to_load,           // M_Z w
-    n_flows
-};
-
-struct EnergyLedger {
-    std::array<double, n_flows> flow{};                                                     // [J] since the start
-    double kinetic_begin = 0.0, kinetic_end = 0.0, elastic_begin = 0.0, elastic_end = 0.0;  // [J]
-    double turned_over = 0.0;  // [J] sum of the magnitudes of all flows, panel by panel (or of apparent energies)
-
-    // What the balance fails by [J].
-    double residual() const {
-        double sum = flow[from_source] - (kinetic_end - kinetic_begin) - (elastic_end - elastic_begin);
-        for (int k = from_source + 1; k < n_flows; ++k) sum -= flow[k];
-        return sum;
-    }
-};
-
-// What the ledger says, for everything outside the core; all in J.
-struct EnergyEntry {
-    const char* name;
-    double (*of)(const EnergyLedger&);
-};
-template <EnergyFlow flow>
-double flow_of(const EnergyLedger& e) {
-    return e.flow[flow];
-}
-inline constexpr std::array energy_entries{
-    EnergyEntry{"source", flow_of<from_source>},
-    EnergyEntry{"input_damper", flow_of<in_input_damper>},
-    EnergyEntry{"motor_friction", flow_of<in_motor_friction>},
-    EnergyEntry{"gear_losses", flow_of<in_gear>},
-    EnergyEntry{"hysteresis", flow_of<in_hysteresis>},
-    EnergyEntry{"load_damper", flow_of<in_load_damper>},
-    EnergyEntry{"load_friction", flow_of<in_load_friction>},
-    EnergyEntry{"load_work", flow_of<to_load>},
-    EnergyEntry{"kinetic_change", [](const EnergyLedger& e) { return e.kinetic_end - e.kinetic_begin; }},
-    EnergyEntry{"elastic_change", [](const EnergyLedger& e) { return e.elastic_end - e.elastic_begin; }},
-    EnergyEntry{"residual", [](const EnergyLedger& e) { return e.residual(); }},
-    EnergyEntry{"turned_over", [](const EnergyLedger& e) { return e.turned_over; }},
-};
-static_assert(energy_entries.size() == n_flows + 4);
 
 class EnergyMeter {
  public:
@@ -262,22 +214,6 @@ class EnergyMeter {
     // The Gauss rule of 7 points is exact to degree 13, the Kronrod rule to degree 22.
     static constexpr double stiff_tolerance = 1e-11;
     static constexpr int first_stiff_level = 8;  // 64 of the shortest time constants
-
-    // Of the positive half of [-1, 1], the outermost first.
-    struct KronrodNode {
-        double node, weight, gauss_weight;
-    };
-    static constexpr int kronrod_nodes = 8;
-    static constexpr std::array<KronrodNode, kronrod_nodes> kronrod{{
-        {0.991455371120812639206854697526329, 0.022935322010529224963732008058970, 0.0},
-        {0.949107912342758524526189684047851, 0.063092092629978553290700663189204, 0.129484966168869693270611432679082},
-        {0.864864423359769072789712788640926, 0.104790010322250183839876322541518, 0.0},
-        {0.741531185599394439863864773280788, 0.140653259715525918745189590510238, 0.279705391489276667901467771423780},
-        {0.586087235467691130294144691838259, 0.169004726639267902826583426598550, 0.0},
-        {0.405845151377397166906606412076961, 0.190350578064785409913256402421014, 0.381830050505118944950369775488975},
-        {0.207784955007898467600689403773245, 0.204432940075298892414161999234649, 0.0},
-        {0.0, 0.209482141084727828012999174891714, 0.417959183673469387755102040816327},
-    }};
 
     const Drive& drive_;
     std::optional<Cursor<DriveDims>> cursor_, end_, node_;  // kept from segment to segment for their memory
