@@ -62,9 +62,7 @@ inline void bind_names(nb::module_& m) {
             return keys;
         },
         nb::sig("def batch_fields() -> list[str]"));
-    m.def(
-        "reductions", [] { return std::vector<std::string>(reduction_names.begin(), reduction_names.end()); },
-        nb::sig("def reductions() -> list[str]"));
+    m.def("reductions", [] { return names_of(reduction_names); }, nb::sig("def reductions() -> list[str]"));
 }
 
 }  // namespace lostmotion::binding

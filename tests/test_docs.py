@@ -202,3 +202,34 @@ def test_the_prose_uses_the_words_of_the_field(wrong: str) -> None:
             continue
         for line in re.sub(former, "", path.read_text()).splitlines():
             assert not re.search(wrong, line), f"{path.name}: {line.strip()} ({PLAIN_WORDS[wrong]})"
+
+
+THEORY = (ROOT / "docs" / "theory.md").read_text()
+ROWS = [
+    line.strip("| ").split(" | ") for line in THEORY.splitlines() if re.match(r"\| .*`\w+\.(hpp|py)`|\| .*`\w+/", line)
+]
+
+
+def test_every_numbered_equation_of_the_theory_is_in_its_table() -> None:
+    text, table = THEORY.split("## Where each equation is")
+    numbered = set(re.findall(r"(?<!\^\{)\((\d+[ab]?)\)", text))  # and not the order of a derivative
+    assert len(numbered) >= 10
+    assert numbered == set(re.findall(r"\((\d+[ab]?)\)", "".join(row[0] for row in ROWS)))
+    assert len(ROWS) == len(re.findall(r"^\|", table, re.M)) - 2
+
+
+@pytest.mark.parametrize("equation, where, test", ROWS, ids=[row[0] for row in ROWS])
+def test_the_table_of_equations_names_functions_and_tests_that_exist(equation: str, where: str, test: str) -> None:
+    file, *functions = re.findall(r"`([^`]+)`", where)
+    home = ROOT / ("core" if file.endswith(".hpp") else "src") / "lostmotion"
+    code = re.sub(r"//.*|#.*", "", (home / file).read_text())
+    assert functions
+    for function in functions:
+        # Defined there, not only called: nothing but a type, or `def`, in front of it.
+        assert re.search(rf"^(?!.*\breturn )[\w:<>&*,\[\] ]*[\w>&*\]] {function}\(", code, re.M), function
+    file, *names = re.findall(r"`([^`]+)`", test)
+    if file.endswith(".cpp"):
+        titles = re.findall(r'TEST_CASE\("(.*?)"\)', (ROOT / "core" / "tests" / file).read_text())
+        assert re.findall(r'"(.*)"', test)[0] in titles
+    else:
+        assert names and all(f"def {name}(" in (ROOT / "tests" / file).read_text() for name in names)

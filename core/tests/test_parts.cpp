@@ -158,9 +158,9 @@ TEST_SUITE("parts") {
                 peak = std::max(peak, std::fabs(x));
             }
             CHECK(reduce(Reduction::peak, v.data(), n) == peak);
-            CHECK(reduce(Reduction::least, v.data(), n) == *std::min_element(v.begin(), v.end()));
-            CHECK(reduce(Reduction::largest, v.data(), n) == *std::max_element(v.begin(), v.end()));
-            CHECK(reduce(Reduction::last, v.data(), n) == v.back());
+            CHECK(reduce(Reduction::min, v.data(), n) == *std::min_element(v.begin(), v.end()));
+            CHECK(reduce(Reduction::max, v.data(), n) == *std::max_element(v.begin(), v.end()));
+            CHECK(reduce(Reduction::final, v.data(), n) == v.back());
             CHECK(reduce(Reduction::mean, v.data(), n) ==
                   doctest::Approx(static_cast<double>(sum / n)).epsilon(1e-14).scale(1.0));
             CHECK(reduce(Reduction::rms, v.data(), n) ==

@@ -293,7 +293,8 @@ TEST_CASE("the search works on packed regimes and the kernel's own instant as on
             for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-2.0, 2.0);
             inputs();
             CHECK(plain.next(cache, now, static_cast<const Guard*>(nullptr), key, before) ==
-                  packed.next(wide_cache, wide, static_cast<const PackedGuard<WidestTest>*>(nullptr), wide_key, wide_before));
+                  packed.next(wide_cache, wide, static_cast<const PackedGuard<WidestTest>*>(nullptr), wide_key,
+                              wide_before));
             CHECK(key == wide_key);
             CHECK(std::equal(wide.memory.begin(), wide.memory.end(), now.memory.begin()));
         }

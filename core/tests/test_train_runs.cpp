@@ -84,7 +84,7 @@ TEST_CASE("the classic drive as a train has the same samples, to the last bit") 
     CHECK(compared > 150);
 }
 
-TEST_CASE("the energies of random trains balance, and no element gives any") {
+TEST_CASE("the energies of random trains balance") {
     RandomTrains random(32);
     int done = 0;
     double worst = 0.0;
@@ -97,7 +97,6 @@ TEST_CASE("the energies of random trains balance, and no element gives any") {
         CHECK(!r.report.too_many_guards);
         if (r.report.status != Status::done) continue;
         ++done;
-        if (std::fabs(r.report.residual()) > 1e-9 * r.report.turned_over) MESSAGE(n << " residual " << r.report.residual() << " turned " << r.report.turned_over << " stored " << r.report.stored_end << " shafts " << train.shafts.size() << " flows " << r.report.energy.size());
         worst = std::max(worst, std::fabs(r.report.residual()) / std::max(1e-9, r.report.turned_over));
     }
     MESSAGE(done << " trains, worst residual " << worst << " of what is turned over");

@@ -43,7 +43,7 @@ inline ContactReport explain_contact(const Drive& drive, const Regime& r, Contac
     return report;
 }
 
-// Motor torque [N m] that just turns the standing input shaft forward (s = +1) or backward (s = -1) against T_2.
+// Motor torque [N m] that just turns the input shaft from rest, forward (s = +1) or backward (s = -1), against T_2.
 inline double breakaway_motor_torque(const Drive& drive, double T_2, int s) {
     const Gearbox& g = drive.gearbox;
     const double efficiency = g.losses == Gearbox::constant_efficiency ? g.efficiency : 1.0;

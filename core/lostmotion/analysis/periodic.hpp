@@ -10,7 +10,7 @@
 
 namespace lostmotion {
 
-// Where a motion stands, with all that it takes to go on.
+// All that it takes to continue a motion.
 struct Station {
     State x{};
     Memory memory;
@@ -22,7 +22,7 @@ struct PeriodicMotion {
     double time = 0.0;  // [s] reached, if the status is not done
     Contact contact = input_contact;
     bool converged = false;
-    bool smooth = true;          // whether the Jacobian is exact: no touch or graze among the switchings
+    bool smooth = true;          // whether the Jacobian is exact: no grazing among the switchings
     int periods = 0;             // followed, all in all
     int newton_steps = 0;        // of the attempt that converged
     double residual = 0.0;       // largest change of a state over one period / its largest magnitude within it
@@ -108,15 +108,15 @@ class Shooting {
 
     double residual(const Station& a, const Image& image) const {
         const Station& b = image.end;
-        double worst = std::fabs(b.memory.hysteresis_capacity - a.memory.hysteresis_capacity) / torque_size();
+        double worst = std::fabs(b.memory.hysteresis_capacity - a.memory.hysteresis_capacity) / torque_magnitude();
         if (b.key.modes[0] == 0 && b.key.modes[1] == 0 && b.key.modes[2] == 0)
-            worst = std::fmax(worst, std::fabs(b.memory.held_torque - a.memory.held_torque) / torque_size());
+            worst = std::fmax(worst, std::fabs(b.memory.held_torque - a.memory.held_torque) / torque_magnitude());
         for (int k = 0; k < n_states; ++k)
-            if (k != load_angle && image.sensitivity.size[k] > 0.0)
-                worst = std::fmax(worst, std::fabs(b.x[k] - a.x[k]) / image.sensitivity.size[k]);
+            if (k != load_angle && image.sensitivity.magnitude[k] > 0.0)
+                worst = std::fmax(worst, std::fabs(b.x[k] - a.x[k]) / image.sensitivity.magnitude[k]);
         return worst;
     }
-    double torque_size() const { return drive_.gearbox.rated_output_torque; }
+    double torque_magnitude() const { return drive_.gearbox.rated_output_torque; }
 
     PeriodicMotion& finish(PeriodicMotion& motion, const Station& start, const Image& image, int steps) const {
         motion.converged = true;
@@ -149,28 +149,28 @@ class Shooting {
     // y + (1 - J)^-1 (image - y), leaving out the directions in which the motion is neutral.
     bool step_from(Station& y, const Image& image) {
         constexpr std::array<int, n_components - 1> active{motor_torque, motor_speed,          load_speed,
-                                                           twist,        hysteresis_component, held_component};
+                                                           twist,        hysteresis_component, locked_component};
         constexpr int n = active.size();
         std::array<std::array<double, n>, n> M{};
-        std::array<double, n> rhs{}, size{};
+        std::array<double, n> rhs{}, scale{};
         const auto value = [](const Station& s, int k) {
             return k < n_states                ? s.x[k]
                    : k == hysteresis_component ? s.memory.hysteresis_capacity
                                                : s.memory.held_torque;
         };
         for (int r = 0; r < n; ++r) {
-            size[r] = active[r] < n_states ? image.sensitivity.size[active[r]] : torque_size();
-            if (!(size[r] > 0.0)) size[r] = 1.0;
+            scale[r] = active[r] < n_states ? image.sensitivity.magnitude[active[r]] : torque_magnitude();
+            if (!(scale[r] > 0.0)) scale[r] = 1.0;
         }
         for (int r = 0; r < n; ++r) {
-            rhs[r] = (value(image.end, active[r]) - value(y, active[r])) / size[r];
+            rhs[r] = (value(image.end, active[r]) - value(y, active[r])) / scale[r];
             for (int c = 0; c < n; ++c)
                 M[r][c] =
-                    (r == c ? 1.0 : 0.0) - image.sensitivity.jacobian.row[active[r]][active[c]] * size[c] / size[r];
+                    (r == c ? 1.0 : 0.0) - image.sensitivity.jacobian.row[active[r]][active[c]] * scale[c] / scale[r];
         }
         const std::array<double, n> delta = solve_leaving_neutral<n>(M, rhs, neutral);
         for (int k = 0; k < n; ++k) {
-            const double change = delta[k] * size[k];
+            const double change = delta[k] * scale[k];
             if (!std::isfinite(change)) return false;
             if (active[k] < n_states)
                 y.x[active[k]] += change;
@@ -179,7 +179,7 @@ class Shooting {
             else
                 y.memory.held_torque += change;
         }
-        // What stands at the end of the period stands at its beginning, to the last bit.
+        // What is at rest at the end of the period is at rest at its beginning, to the last bit.
         y.key = image.end.key;
         std::array<bool, n_contacts> at_rest = workspace_.cache.regime(y.key).at_rest;
         workspace_.system.stop(y.x, at_rest);
@@ -187,7 +187,7 @@ class Shooting {
         return true;
     }
 
-    static constexpr double neutral = 1e-9;  // of a pivot, in units of the sizes
+    static constexpr double neutral = 1e-9;  // of a pivot, in units of the scales
 
     Workspace& workspace_;
     const Drive& drive_;

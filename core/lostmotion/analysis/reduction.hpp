@@ -8,11 +8,24 @@
 #include <limits>
 
 #include "../kernel/vec.hpp"
+#include "../simulation/enum_table.hpp"
 
 namespace lostmotion {
 
-enum class Reduction : int { peak, rms, mean, last, least, largest };
-inline constexpr std::array<const char*, 6> reduction_names{"peak", "rms", "mean", "final", "least", "largest"};
+enum class Reduction : int { peak, rms, mean, final, min, max };
+struct ReductionName {
+    Reduction value;
+    const char* name;
+};
+inline constexpr std::array<ReductionName, 6> reduction_names{{
+    {Reduction::peak, "peak"},
+    {Reduction::rms, "rms"},
+    {Reduction::mean, "mean"},
+    {Reduction::final, "final"},
+    {Reduction::min, "least"},
+    {Reduction::max, "largest"},
+}};
+static_assert(in_order(reduction_names));
 
 using Eight = Pack<8>;
 
@@ -47,14 +60,14 @@ inline double reduce(Reduction r, const double* v, std::size_t n) {
     if (n == 0) return std::numeric_limits<double>::quiet_NaN();
     const auto count = static_cast<double>(n);
     const auto itself = [](auto x) { return x; };
-    const auto largest = [](auto a, auto b) { return most(a, b); };
+    const auto larger = [](auto a, auto b) { return most(a, b); };
     switch (r) {
-        case Reduction::peak: return best_of(v, n, largest, [](auto x) { return absolute(x); });
+        case Reduction::peak: return best_of(v, n, larger, [](auto x) { return absolute(x); });
         case Reduction::rms: return std::sqrt(sum_over(v, n, [](auto x) { return x * x; }) / count);
         case Reduction::mean: return sum_over(v, n, itself) / count;
-        case Reduction::last: return v[n - 1];
-        case Reduction::least: return -best_of(v, n, largest, [](auto x) { return -1.0 * x; });
-        default: return best_of(v, n, largest, itself);
+        case Reduction::final: return v[n - 1];
+        case Reduction::min: return -best_of(v, n, larger, [](auto x) { return -1.0 * x; });
+        default: return best_of(v, n, larger, itself);
     }
 }
 

@@ -11,7 +11,7 @@
 namespace lostmotion {
 
 // What a motion is made of between two instants: the states, and what the drive remembers.
-enum Component : int { hysteresis_component = n_states, held_component, n_components };
+enum Component : int { hysteresis_component = n_states, locked_component, n_components };
 
 inline const char* component_name(int k) {
     return k < n_states                ? state_names[static_cast<std::size_t>(k)].name
@@ -44,7 +44,7 @@ inline Components gradient(const LinearForm& f) {
     Components g{};
     for (int k = 0; k < n_states; ++k) g[k] = f.c[k];
     g[hysteresis_component] = f.c[hysteresis_capacity];
-    g[held_component] = f.c[held_torque];
+    g[locked_component] = f.c[held_torque];
     return g;
 }
 
@@ -56,13 +56,13 @@ class Sensitivity {
     Sensitivity(const Drive& drive, RegimeCache<SwitchedDrive>& cache) : drive_(drive), cache_(cache) {}
 
     Jacobian jacobian = Jacobian::identity();
-    State size{};        // largest magnitude of each state at the ends of the segments
-    bool smooth = true;  // false: a switching by a touch, or with a rate that is lost in rounding
+    State magnitude{};   // largest magnitude of each state at the ends of the segments
+    bool smooth = true;  // false: a switching by grazing, or with a rate that is lost in rounding
 
     bool segment(const Segment<SwitchedDrive>& s) {
         if (!input_) input_.emplace(s.at.input());
         for (int k = 0; k < n_states; ++k)
-            size[k] = std::fmax(size[k], std::fmax(std::fabs(s.at.x()[k]), std::fabs(s.x_end[k])));
+            magnitude[k] = std::fmax(magnitude[k], std::fmax(std::fabs(s.at.x()[k]), std::fabs(s.x_end[k])));
         const Regime& r = s.entry.regime;
         regime_ = &r;
         x_ = s.x_end;
@@ -124,7 +124,7 @@ class Sensitivity {
         return f;
     }
 
-    // Derivative of what a switching sets anew: speeds that stop, the hysteresis, the torque that is held. Returns its
+    // Derivative of what a switching sets anew: speeds that stop, the hysteresis, the locked torque. Returns its
     // derivative with respect to time.
     Components reset(const Switching& w, const Regime& old, const InputRates& u, Jacobian& jump) const {
         Components time_rate{};
@@ -139,31 +139,32 @@ class Sensitivity {
                 for (int c = 0; c < n_components; ++c)
                     jump.row[load_speed][c] = jump.row[motor_speed][c] / drive_.gearbox.ratio;
         }
-        const bool turned = at_rest[twist_contact] && !old.at_rest[twist_contact] && drive_.gearbox.has_hysteresis();
+        const bool at_turning_point =
+            at_rest[twist_contact] && !old.at_rest[twist_contact] && drive_.gearbox.has_hysteresis();
         const TorsionCurve& curve = drive_.gearbox.curve;
         const double d = x_[twist];
         const double stiffness = drive_.rigid() ? 0.0 : curve.slope(curve.locate(d));
-        if (turned) {
+        if (at_turning_point) {
             jump.row[hysteresis_component] = {};
             jump.row[hysteresis_component][twist] = drive_.gearbox.hysteresis_capacity_slope(d);
         }
-        // The held torque matters only while all contacts stand.
-        jump.row[held_component] = {};
+        // The locked torque matters only while all contacts are at rest.
+        jump.row[locked_component] = {};
         const Modes& modes = w.after.modes;
         if (modes[0] != 0 || modes[1] != 0 || modes[2] != 0) return time_rate;
-        const double T_2 = evaluate(old.output_torque, x_, memory_, u[0]), held = w.memory.held_torque;
-        if (held == T_2) {
-            jump.row[held_component] = gradient(old.output_torque);
-            time_rate[held_component] =
+        const double T_2 = evaluate(old.output_torque, x_, memory_, u[0]), locked = w.memory.held_torque;
+        if (locked == T_2) {
+            jump.row[locked_component] = gradient(old.output_torque);
+            time_rate[locked_component] =
                 old.output_torque.c[command] * u[1][0] + old.output_torque.c[load_torque] * u[1][1];
-        } else if (!drive_.rigid() && std::fabs(std::fabs(held - curve.torque(d)) - w.memory.hysteresis_capacity) <=
-                                          rounding * std::fabs(held)) {
-            const double sign = held > curve.torque(d) ? 1.0 : -1.0;
-            jump.row[held_component] = jump.row[hysteresis_component];
-            for (double& v : jump.row[held_component]) v *= sign;
-            jump.row[held_component][twist] += stiffness;
+        } else if (!drive_.rigid() && std::fabs(std::fabs(locked - curve.torque(d)) - w.memory.hysteresis_capacity) <=
+                                          rounding * std::fabs(locked)) {
+            const double sign = locked > curve.torque(d) ? 1.0 : -1.0;
+            jump.row[locked_component] = jump.row[hysteresis_component];
+            for (double& v : jump.row[locked_component]) v *= sign;
+            jump.row[locked_component][twist] += stiffness;
         } else {
-            time_rate[held_component] = u[1][1];  // it follows the load torque, a friction torque off
+            time_rate[locked_component] = u[1][1];  // it follows the load torque, a friction torque off
         }
         return time_rate;
     }

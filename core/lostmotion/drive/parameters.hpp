@@ -1,5 +1,5 @@
 // The parameters of a drive that are plain numbers: what they are called in a scenario file, their SI unit, and where
-// they stand. Python's drive and what varies in a batch are made from this table.
+// they are kept. Python's drive and what varies in a batch are made from this table.
 #pragma once
 
 #include <array>

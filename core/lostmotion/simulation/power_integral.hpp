@@ -9,11 +9,13 @@
 // Segments of thousands of periods are taken at once (long_step.hpp).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
 
 #include "../solver/exact_solver.hpp"
+#include "quadrature.hpp"
 
 namespace lostmotion {
 
@@ -39,7 +41,10 @@ class PowerIntegral {
         void set(int flow, const LinearForm& a, const LinearForm& b) {
             left.set(flow, a);
             right.set(flow, b);
+            used_ = std::max(used_, flow + 1);
         }
+        // How many there are: up to eight, all.
+        int count() const { return N <= 8 ? N : used_; }
         void hold(const typename D::Memory& m) {
             left.constants(m, left_constant);
             right.constants(m, right_constant);
@@ -60,7 +65,7 @@ class PowerIntegral {
                     right.rates(x, u[k], b[k]);
                 }
             }
-            for (int f = 0; f < N; ++f) {
+            for (int f = 0; f < count(); ++f) {
                 out[0][f] = a[0][f] * b[0][f];
                 out[1][f] = a[1][f] * b[0][f] + a[0][f] * b[1][f];
                 out[2][f] = a[2][f] * b[0][f] + 2.0 * a[1][f] * b[1][f] + a[0][f] * b[2][f];
@@ -76,11 +81,14 @@ class PowerIntegral {
             Flows a, b;
             left.evaluate(left_constant, c.x(), u, a);
             right.evaluate(right_constant, c.x(), u, b);
-            for (int f = 0; f < N; ++f) out[f] = a[f] * b[f];
+            for (int f = 0; f < count(); ++f) out[f] = a[f] * b[f];
         }
 
         FormTable<D, N> left, right;
         Flows left_constant{}, right_constant{};
+
+     private:
+        int used_ = 0;
     };
 
     // A segment with these factors.
@@ -110,7 +118,7 @@ class PowerIntegral {
                 end.move_to(s.end, s.x_end);
             }
             factors.powers(p, end, there);
-            const double error = level < first_stiff_level ? add_panel(here, there, length, level == 0)
+            const double error = level < first_stiff_level ? add_panel(factors.count(), here, there, length, level == 0)
                                                            : add_stiff_panel(factors, cursor, length);
             if (error > 1.0) {
                 --level;
@@ -128,17 +136,17 @@ class PowerIntegral {
  private:
     // Returns the error of the panel in units of what is allowed; beyond 1 (unless it is the shortest) nothing is
     // added.
-    double add_panel(const Powers& a, const Powers& b, double h, bool shortest) {
+    double add_panel(int n, const Powers& a, const Powers& b, double h, bool shortest) {
         Flows sums;
         double difference = 0.0;
-        for (int f = 0; f < N; ++f) {
+        for (int f = 0; f < n; ++f) {
             const double s0 = a[0][f] + b[0][f], s1 = h * (a[1][f] - b[1][f]), s2 = h * h * (a[2][f] + b[2][f]),
                          s3 = h * h * h * (a[3][f] - b[3][f]), s4 = h * h * h * h * (a[4][f] + b[4][f]);
             sums[f] = h * (s0 / 2.0 + s1 / 9.0 + s2 / 72.0 + s3 / 1008.0 + s4 / 30240.0);
             const double lower = h * (s0 / 2.0 + 3.0 * s1 / 28.0 + s2 / 84.0 + s3 / 1680.0);
             difference += std::fabs(sums[f] - lower);
         }
-        return add(sums, difference, panel_tolerance, h, shortest);
+        return add(n, sums, difference, panel_tolerance, h, shortest);
     }
 
     // The same of a segment that is taken at once, exact but for rounding. What is turned over is the apparent energy:
@@ -146,8 +154,9 @@ class PowerIntegral {
     template <class Segment>
     [[gnu::noinline]] void add_long(const Segment& s, const Factors& factors) {
         const double length = s.end - s.begin;
+        const int n = factors.count();
         const LongProducts<D> products(s.entry.propagator, s.constant, s.at.x(), s.at.input(), length);
-        for (int f = 0; f < N; ++f) {
+        for (int f = 0; f < n; ++f) {
             const std::vector<double> a = products.step().coefficients(factors.left, f, factors.left_constant[f]),
                                       b = products.step().coefficients(factors.right, f, factors.right_constant[f]);
             flow[f] += products(a, b);
@@ -161,28 +170,29 @@ class PowerIntegral {
     double add_stiff_panel(const Factors& factors, const Cursor<D>& from, double h) {
         Cursor<D>& node = node_.emplace(from);
         Flows sums{}, coarse{}, power;
+        const int n = factors.count();
         for (int k = 0; k < kronrod_nodes; ++k)
             for (const double side : {-1.0, +1.0}) {
                 if (k == kronrod_nodes - 1 && side > 0.0) continue;  // the one in the middle
                 node.advance_from(from, 0.5 * h * (1.0 + side * kronrod[k].node));
                 factors.powers(node, power);
-                for (int f = 0; f < N; ++f) {
+                for (int f = 0; f < n; ++f) {
                     sums[f] += 0.5 * h * kronrod[k].weight * power[f];
                     coarse[f] += 0.5 * h * kronrod[k].gauss_weight * power[f];
                 }
             }
         double difference = 0.0;
-        for (int f = 0; f < N; ++f) difference += std::fabs(sums[f] - coarse[f]);
-        return add(sums, difference, stiff_tolerance, h, false);
+        for (int f = 0; f < n; ++f) difference += std::fabs(sums[f] - coarse[f]);
+        return add(n, sums, difference, stiff_tolerance, h, false);
     }
 
-    double add(const Flows& sums, double difference, double tolerance, double h, bool shortest) {
+    double add(int n, const Flows& sums, double difference, double tolerance, double h, bool shortest) {
         double size = 0.0;
-        for (const double s : sums) size += std::fabs(s);
+        for (int f = 0; f < n; ++f) size += std::fabs(sums[f]);
         const double allowed = tolerance * std::fmax(size, mean_power_ * h);
         const double error = allowed > 0.0 ? difference / allowed : 0.0;
         if (!shortest && error > 1.0) return error;
-        for (int f = 0; f < N; ++f) flow[f] += sums[f];
+        for (int f = 0; f < n; ++f) flow[f] += sums[f];
         turned_over += size;
         elapsed_ += h;
         mean_power_ = turned_over / elapsed_;
@@ -194,22 +204,6 @@ class PowerIntegral {
     // The Gauss rule of 7 points is exact to degree 13, the Kronrod rule to degree 22.
     static constexpr double stiff_tolerance = 1e-11;
     static constexpr int first_stiff_level = 8;  // 64 of the shortest time constants
-
-    // Of the positive half of [-1, 1], the outermost first.
-    struct KronrodNode {
-        double node, weight, gauss_weight;
-    };
-    static constexpr int kronrod_nodes = 8;
-    static constexpr std::array<KronrodNode, kronrod_nodes> kronrod{{
-        {0.991455371120812639206854697526329, 0.022935322010529224963732008058970, 0.0},
-        {0.949107912342758524526189684047851, 0.063092092629978553290700663189204, 0.129484966168869693270611432679082},
-        {0.864864423359769072789712788640926, 0.104790010322250183839876322541518, 0.0},
-        {0.741531185599394439863864773280788, 0.140653259715525918745189590510238, 0.279705391489276667901467771423780},
-        {0.586087235467691130294144691838259, 0.169004726639267902826583426598550, 0.0},
-        {0.405845151377397166906606412076961, 0.190350578064785409913256402421014, 0.381830050505118944950369775488975},
-        {0.207784955007898467600689403773245, 0.204432940075298892414161999234649, 0.0},
-        {0.0, 0.209482141084727828012999174891714, 0.417959183673469387755102040816327},
-    }};
 
     std::optional<Cursor<D>> cursor_, end_, node_;  // kept from segment to segment for their memory
     int level_ = 4;

@@ -36,7 +36,7 @@ struct RunReport {
     std::size_t switching_count = 0;
     EnergyLedger energy;
     double left_data_at = 0.0;  // [s], infinity if never
-    long steps = 0;             // looks of the exact solver, steps of the adaptive one
+    long steps = 0;             // event checks of the exact solver, steps of the adaptive one
 };
 
 // Observer of the exact solver that samples, keeps switchings and meters energy.

@@ -55,7 +55,7 @@ class SamplerOf {
             }
             p.cursor.keep(p.constant);
         }
-        return s.last || n_pieces_ == most_pieces ? write() : true;
+        return s.last || n_pieces_ == max_pieces ? write() : true;
     }
     // Writes what has been collected. Only needed if the last segment has not come.
     bool write() {
@@ -79,7 +79,7 @@ class SamplerOf {
         double rest = 0.0;     // from the cursor to the first [s]
         bool at_once = false;  // whether the segment is long enough for it
     };
-    static constexpr std::size_t most_pieces = 4;
+    static constexpr std::size_t max_pieces = 4;
 
     [[gnu::noinline]] bool write(Piece& p) {
         auto& propagator = p.entry->propagator;
@@ -169,7 +169,7 @@ class SamplerOf {
     std::size_t count_, next_ = 0;
     double* out_;
     std::span<const int> channels_;
-    std::array<std::optional<Piece>, most_pieces> pieces_;
+    std::array<std::optional<Piece>, max_pieces> pieces_;
     std::size_t n_pieces_ = 0;  // that have been collected
     Stride<D> stride_;
     Instants instants_;

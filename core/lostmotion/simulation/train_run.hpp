@@ -71,6 +71,8 @@ class TrainMeter {
         if (!(s.end > s.begin)) return;
         typename Integral::Factors factors;
         const model::Layout& n = assembly_.layout();
+        for (std::size_t k = 0; k < names_.size(); ++k)
+            factors.set(static_cast<int>(k), {}, {});  // none in this regime
         for (const model::PowerFlow& f : model::power_flows(assembly_, s.entry.regime.rows))
             factors.set(place(f), model::pack<D>(f.torque, n), model::pack<D>(f.speed, n));
         factors.hold(s.memory);
