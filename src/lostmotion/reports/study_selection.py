@@ -122,12 +122,11 @@ def pareto_figure(table: pa.Table, ranked: list[Candidate], front: list[Candidat
         axes.plot([c.values[x] for c in group], [c.values[y] for c in group], linestyle="", markersize=4, **style)
     ordered = sorted(front, key=lambda c: c.values[x])
     axes.plot([c.values[x] for c in ordered], [c.values[y] for c in ordered], color=ACCENT, label="Pareto front")
-    middle = sum(axes.get_xlim()) / 2.0
     for c in ordered[:MAX_NAMES]:
-        point, side, shift = (c.values[x], c.values[y]), "left", 4  # the side on which the name begins
-        if c.values[x] > middle:
-            side, shift = "right", -4
-        axes.annotate(c.name, point, textcoords="offset points", xytext=(shift, 4), fontsize=6, ha=side)
+        point = (c.values[x], c.values[y])
+        axes.annotate(c.name, point, textcoords="offset points", xytext=(4, 4), fontsize=6)
+    low, high = axes.get_xlim()
+    axes.set_xlim(low, high + 0.25 * (high - low))  # room for the name of the last
     axes.set(
         xlabel=f"{labelled(table, x)}, {select.objectives[x]}", ylabel=f"{labelled(table, y)}, {select.objectives[y]}"
     )
