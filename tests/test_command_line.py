@@ -40,8 +40,8 @@ def test_shipped_scenarios_are_known_by_name(tmp_path: Path) -> None:
     assert by_name.returncode == 0
     assert by_name.stdout == by_file.stdout
     listed = lostmotion("scenarios", cwd=tmp_path).stdout
-    for path in SCENARIOS:
-        assert f"{path.stem} " in listed
+    for path, line in zip(SCENARIOS, listed.splitlines(), strict=True):
+        assert line.split(maxsplit=1) == [path.stem, lm.load(path).title]
 
 
 def test_a_file_comes_before_a_shipped_name_and_may_build_on_one(tmp_path: Path, monkeypatch) -> None:
@@ -143,6 +143,15 @@ def test_the_template_of_a_motor_sheet_can_be_used_as_it_is(tmp_path: Path, kind
     assert f'kind = "{expected}"' in text
     for figure in lm.MotorSheet.model_fields:
         assert figure in ("note", "sources", "gaps") or f"{figure} = " in text
+
+
+def test_a_file_with_another_part_or_with_several_is_told_by_what_is_in_it(tmp_path: Path) -> None:
+    assert lostmotion("catalogue", "new", "--kind", "motor", "-o", "my-motor.toml", cwd=tmp_path).returncode == 0
+    done = lostmotion("rig", "my-motor.toml", cwd=tmp_path)
+    assert done.stderr == (
+        "lostmotion: my-motor.toml: a gearbox is wanted here, and this file has none; name a file with one\n"
+    )
+    assert done.returncode == 1
 
 
 def test_the_template_of_a_gearbox_sheet_takes_its_kind() -> None:

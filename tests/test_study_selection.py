@@ -13,6 +13,7 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
 from lostmotion.reports.study import best_lines
+from lostmotion.reports.study_selection import pareto_figure
 from lostmotion.sizing.drive_check import check_drive
 from lostmotion.studies.chunk import scenario_of_run
 from lostmotion.studies.select import Selection
@@ -214,3 +215,17 @@ def test_best_takes_a_direction(selection: tuple[lm.Study, Path]):
         best_lines(directory, "energy:most")
     with pytest.raises(lm.InputError, match="no such column of numbers"):
         best_lines(directory, "gearbox")
+
+
+def test_the_names_of_the_pareto_front_stand_within_the_axes(selection: tuple[lm.Study, Path]):
+    study, directory = selection
+    table = read_table(directory)
+    ranked = candidates(table, study)
+    assert study.select is not None
+    figure = pareto_figure(table, ranked, pareto_front(ranked, study.select), study.select)
+    figure.canvas.draw()
+    (axes,) = figure.axes
+    assert len(axes.texts) == 3
+    for text in axes.texts:
+        assert axes.bbox.padded(1).contains(*text.get_window_extent().min), text.get_text()
+        assert axes.bbox.padded(1).contains(*text.get_window_extent().max), text.get_text()

@@ -207,3 +207,10 @@ def test_numbers_may_be_text_with_a_unit_on_the_rig_too() -> None:
     assert same.identical(rig.efficiency_map([3000.0 * np.pi / 30.0], [0.5])) or np.allclose(
         same["efficiency"], rig.efficiency_map([3000.0 * np.pi / 30.0], [0.5])["efficiency"], rtol=1e-12
     )
+
+
+def test_a_misspelt_argument_is_told_with_its_function() -> None:
+    with pytest.raises(TypeError, match=r"^linearize\(\) got an unexpected keyword argument 'speed'$"):
+        lm.linearize(SCENARIO, speed=1.0)  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match=r"^study\(\) missing a required argument: 'directory'$"):
+        lm.study("tolerance.toml")  # type: ignore[arg-type, call-arg]

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 def scenarios() -> None:
     """List the scenarios that come with the package; `run`, `response` and `drive check` take their names."""
-    from ..simulation.scenario_files import load, shipped_scenarios
+    from ..inputs.toml_files import read_toml
+    from ..simulation.scenario_files import shipped_scenarios
 
     found = shipped_scenarios()
     width = max(map(len, found))
-    for name in found:
-        print(f"{name:<{width}}  {load(name).title}")
+    for name, path in found.items():
+        print(f"{name:<{width}}  {read_toml(path, 'a scenario')['title']}")
 
 
 def schema() -> None:

@@ -103,9 +103,8 @@ def find(reference: str, table: str) -> GearboxSheet | MotorSheet:
         records = read_sheets(Path(reference))
         own = [r for r in records if isinstance(r, kind)]
         if len(own) != 1:
-            raise InputError(
-                f"{reference}: holds {len(own)} records of kind {table} among {len(records)}; it must hold one to be named here"
-            )
+            found = f"{len(own)} of them: {', '.join(r.name for r in own)}" if own else "none"
+            raise InputError(f"{reference}: a {table} is wanted here, and this file has {found}; name a file with one")
         return own[0]
     named = {r.name: r for r in catalogue()}
     if isinstance(named.get(reference), kind):

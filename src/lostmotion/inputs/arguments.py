@@ -55,7 +55,10 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        bound = signature.bind(*args, **kwargs)
+        try:
+            bound = signature.bind(*args, **kwargs)
+        except TypeError as error:
+            raise TypeError(f"{function.__qualname__}() {error}") from None
         for name, annotation in wanted.items():
             if name in bound.arguments:
                 bound.arguments[name] = _read(name, bound.arguments[name], annotation, known)

@@ -145,7 +145,7 @@ def overview(result: xarray.Dataset) -> Figure:
 
     panels = [
         Panel("", "time [s]", "command [-]", (curve("command", ink),)),
-        Panel("", "time [s]", "torque [N·m]", (curve("motor_torque", ink),)),
+        Panel("", "time [s]", "motor torque [N·m]", (curve("motor_torque", ink),)),
         Panel(
             "",
             "time [s]",

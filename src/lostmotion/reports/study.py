@@ -186,6 +186,8 @@ def scatter(table: pa.Table, study: Study, max_columns: int = 6) -> Figure:
             if v.names is not None:
                 few = len(v.names) <= MAX_LABELS and r == len(keep) - 1
                 axes.set_xticks(range(len(v.names)), v.names if few else [""] * len(v.names), rotation=90, fontsize=6)
+            else:
+                axes.locator_params(axis="x", nbins=4)
             if r == len(keep) - 1:
                 axes.set_xlabel(labelled(table, v.title), fontsize=8)
             if c == 0:

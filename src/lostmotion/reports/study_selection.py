@@ -125,6 +125,8 @@ def pareto_figure(table: pa.Table, ranked: list[Candidate], front: list[Candidat
     for c in ordered[:MAX_NAMES]:
         point = (c.values[x], c.values[y])
         axes.annotate(c.name, point, textcoords="offset points", xytext=(4, 4), fontsize=6)
+    low, high = axes.get_xlim()
+    axes.set_xlim(low, high + 0.25 * (high - low))  # room for the name of the last
     axes.set(
         xlabel=f"{labelled(table, x)}, {select.objectives[x]}", ylabel=f"{labelled(table, y)}, {select.objectives[y]}"
     )
