@@ -15,7 +15,7 @@ def scenarios() -> None:
 
 
 def schema() -> None:
-    """Print the JSON Schema of scenario files.
+    """Print the JSON Schema of scenario files, of drives and of drive trains.
 
     Editors complete and check scenario files with it.
 
@@ -24,6 +24,6 @@ def schema() -> None:
     """
     import json
 
-    from ..simulation.scenario import json_schema
+    from ..simulation.train_scenario import file_schema
 
-    print(json.dumps(json_schema(), indent=2))
+    print(json.dumps(file_schema(), indent=2))
