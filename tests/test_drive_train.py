@@ -383,3 +383,34 @@ def test_a_saved_result_of_a_train_is_read_back_and_run_again(tmp_path: Path, en
     assert lm.simulate(lm.load(path)).identical(result)
     halved = lm.load(path, ["gears.belt.ratio=1"])
     assert halved.gears["belt"].ratio == 1.0
+
+
+def test_a_self_locking_worm_holds_lowers_smoothly_or_chatters() -> None:
+    """Efficiencies of its drawing: eta_b = tan(g - r)/tan g with g = 4 deg, tan r = 0.084; i = 50, load 20 N m."""
+    tan_g = math.tan(math.radians(4.0))
+    eta_b = (tan_g - 0.084) / (1.0 + 0.084 * tan_g) / tan_g
+    smooth = lm.simulate(lm.load("worm-lowering", {"shafts.drum.inertia": 0.5}))
+    held = smooth.sel(time=slice(0.0, 0.099))
+    assert float(abs(held["drum_speed"]).max()) < 1e-12  # the motor is off
+    # What the motor has left turns the worm against 1e-3 N m s/rad of oil.
+    speed = (0.15 - 0.01 - 20.0 * abs(eta_b) / 50.0) / 1e-3
+    assert float(smooth["worm_speed"].sel(time=1.19, method="nearest")) == pytest.approx(-speed, rel=1e-5)
+    assert not np.any(smooth["worm_contact"].sel(time=slice(0.11, 1.19)) == 0)
+    # The paradox of rigid friction, |eta_b| J_2 > J_1 i^2, is chatter of the compliant mesh: the worm locks while the motor pushes.
+    assert abs(eta_b) * 2.0 > 1e-4 * 50.0**2 > abs(eta_b) * 0.5
+    chatter = lm.simulate(lm.load("worm-lowering"))
+    locked = chatter["worm_contact"].sel(time=slice(0.11, 1.19)).values == 0
+    assert np.count_nonzero(np.diff(locked.astype(int)) == 1) >= 2
+
+
+def test_a_bias_above_half_the_torque_of_the_ring_keeps_the_backlash_closed() -> None:
+    biased = lm.simulate(lm.load("two-motors-one-ring"))
+    settled = biased.sel(time=slice(1.0, None))  # the flanks have met
+    gap = 0.5 * 4.0 * math.pi / 10800.0
+    assert np.all(settled["first_gear_twist"] > gap)
+    assert np.all(settled["second_gear_twist"] < -gap)
+    changes = {f"command.{name}_motor.mean": 0.0 for name in ("first", "second")}
+    loose = lm.simulate(lm.load("two-motors-one-ring", changes)).sel(time=slice(1.0, None))
+    for name in ("first", "second"):
+        assert float(loose[f"{name}_gear_twist"].min()) < -gap
+        assert float(loose[f"{name}_gear_twist"].max()) > gap
