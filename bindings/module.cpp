@@ -2,6 +2,7 @@
 #include "names.hpp"
 #include "runs.hpp"
 #include "stepping.hpp"
+#include "train.hpp"
 
 using namespace lostmotion::binding;
 
@@ -13,4 +14,5 @@ NB_MODULE(CORE_MODULE, m) {
     bind_runs(m);
     bind_analysis(m);
     bind_stepping(m);
+    bind_train(m);
 }

@@ -14,6 +14,7 @@ from lostmotion.cli import app
 from lostmotion.inputs.schema import options, unit_in_schema
 from lostmotion.model import signals
 from lostmotion.simulation.scenario import json_schema
+from lostmotion.simulation.train_scenario import train_schema
 from lostmotion.simulation.variables import VARIABLES
 from lostmotion.units.grammar import PREFIXED, SPELLINGS
 
@@ -42,16 +43,27 @@ def limits_of(node: dict[str, Any]) -> str:
     return ", ".join(dict.fromkeys(found))
 
 
+ELEMENTS = ("additionalProperties",)  # tables by name, such as [gears.NAME]
+
+
+def has_elements(node: Mapping[str, Any]) -> bool:
+    """Whether a key holds tables by name."""
+    return any(isinstance(node.get(key), dict) for key in ELEMENTS)
+
+
 def tables_in(node: dict[str, Any], schema: dict[str, Any]) -> list[Mapping[str, Any]]:
     """The tables that a key may hold."""
-    entries = [option["items"] for option in options(schema, node) if isinstance(option.get("items"), dict)]
+    places = list(options(schema, node))
+    entries = [place[key] for place in places for key in ("items", *ELEMENTS) if isinstance(place.get(key), dict)]
     found = [table for place in (node, *entries) for table in options(schema, place)]
     return [table for table in found if "properties" in table]
 
 
-def write_table(title: str, table: Mapping[str, Any], schema: dict[str, Any], lines: list[str], done: set[str]) -> None:
+def write_table(
+    title: str, table: Mapping[str, Any], schema: dict[str, Any], lines: list[str], done: set[str], heading: str = ""
+) -> None:
     lines += [
-        f"## `[{title}]`" if title != "top level" else "## The whole file",
+        f"## `{heading}`" if heading else "## The whole file",
         "",
         purpose_of(table),
         "",
@@ -67,17 +79,16 @@ def write_table(title: str, table: Mapping[str, Any], schema: dict[str, Any], li
         meaning = (node.get("description") or (purpose_of(inner[0]) if inner else "")).replace("\n", " ")
         kind = "table" if inner else unit_of(node)
         lines.append(f"| `{key}` | {kind} | {limits_of(node)} | {default} | {meaning} |")
-        later += [(f"{title}.{key}" if title != "top level" else key, t) for t in inner]
+        place = f"{key}.NAME" if has_elements(node) else key
+        later += [(f"{title}.{place}" if title != "top level" else place, t) for t in inner]
     lines.append("")
     for name, inner in later:
         identity = f"{name}:{inner.get('title', '')}"
         if identity not in done:
             done.add(identity)
-            kind = inner["properties"].get("kind", {}).get("const") or inner["properties"].get("kind", {}).get(
-                "default"
-            )
-            shown = f'{name}] kind = "{kind}"' if kind and "." in name else f"{name}]"
-            write_table(shown.removesuffix("]"), inner, schema, lines, done)
+            kind = inner["properties"].get("kind", {}).get("const")
+            heading = f'[{name}] kind = "{kind}"' if kind else f"[{name}]"
+            write_table(name, inner, schema, lines, done, heading)
 
 
 def scenario_reference() -> str:
@@ -95,7 +106,22 @@ def scenario_reference() -> str:
     write_table("top level", schema, schema, lines, set())
     lines += changes()
     lines += units()
-    return "\n".join(lines).replace("[top level]", "top level")
+    return "\n".join(lines)
+
+
+def train_reference() -> str:
+    """The long form."""
+    schema = train_schema()
+    lines = [
+        "# Scenario files of drive trains",
+        "",
+        "The long form of a [scenario](scenario.md): instead of `[motor]`, `[gearbox]` and `[load]` there are shafts and what joins, turns,",
+        "holds and loads them, each with a NAME of its own: letters, digits and `_`. Result variables are called after the names.",
+        "[Drive trains](../drive-trains.md) introduces it. Numbers, units, signals, `base` and `--set` are as in the short form.",
+        "",
+    ]
+    write_table("top level", schema, schema, lines, set())
+    return "\n".join(lines)
 
 
 def changes() -> list[str]:
@@ -161,6 +187,10 @@ def variables() -> str:
     lines += ["| variable | symbol | unit | meaning |", "|---|---|---|---|"]
     lines += [f"| `{v.name}` | {v.symbol} | {v.unit.replace('*', '·')} | {v.meaning} |" for v in VARIABLES]
     lines += [
+        "",
+        "Those of a [drive train](../drive-trains.md) are called after its elements: `<shaft>_speed`, `<shaft>_angle`, `<shaft>_load_torque`,",
+        "`<gear>_twist`, `<gear>_output_torque`, `<gear>_input_torque`, `<motor>_torque`, `<motor>_command`, and of each dry contact its mode",
+        "(`<shaft>_contact`, `<gear>_twist_contact`, `<clutch>_contact`) and, with `_torque` behind, what it takes.",
         "",
         "`lm.switchings_of(result)` gives the switchings as a dataset of their own: instants, what ended the regime, the modes of the",
         "contacts before and after, and the left and right limit of the output torque; in a NetCDF file they are the group `switchings`.",
@@ -260,6 +290,7 @@ def generate(out: Path = OUT) -> None:
     out.mkdir(exist_ok=True)
     pages = {
         "scenario": scenario_reference(),
+        "train": train_reference(),
         "variables": variables(),
         "commands": commands(),
         "gallery": gallery(out),

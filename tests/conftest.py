@@ -8,7 +8,11 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
+ALL_SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
+TRAINS = [path for path in ALL_SCENARIOS if "[shafts." in path.read_text()]
+"""in the long form"""
+SCENARIOS = [path for path in ALL_SCENARIOS if path not in TRAINS]
+"""in the short form"""
 
 
 @pytest.fixture(scope="session")

@@ -52,6 +52,8 @@ def compute() -> Groups:
     for path in sorted((ROOT / "scenarios").glob("*.toml")):
         scenario, name = lm.load(path), path.stem
         groups |= {f"{name}.{what}": values for what, values in of_run(scenario).items()}
+        if isinstance(scenario, lm.TrainScenario):
+            continue
         s = scenario.command
         if not (s.steps or s.ramps or scenario.load.torque.ramps):
             groups[f"{name}.periodic_motion"] = of_periodic_motion(scenario)
@@ -66,18 +68,20 @@ def compute() -> Groups:
     return groups
 
 
-def of_run(scenario: lm.Scenario) -> Groups:
+def of_run(scenario: lm.Scenario | lm.TrainScenario) -> Groups:
     result = lm.simulate(scenario)
+    derived = {v.name for v in lm.VARIABLES if v.derived}
     switchings = lm.switchings_of(result)
     groups: Groups = {
-        "samples": {v.name: result[v.name].values for v in lm.VARIABLES if not v.derived},
+        "samples": {str(name): result[name].values for name in result if name not in derived},
         "switchings": {str(name): switchings[name].values for name in switchings},
         "end_state": json.loads(result.attrs["end_state"]),
         "energy": lm.energy_of(result),
     }
-    losses = scenario.drive().gearbox.losses
-    if isinstance(losses, lm.LossMap):  # not of the core; where it differs, all else does
-        groups["input"] = {"loss_map": np.ravel(losses.values)}
+    gears = scenario.gears.values() if isinstance(scenario, lm.TrainScenario) else (scenario.gearbox,)
+    for gear in gears:
+        if isinstance(gear.losses, lm.LossMap):  # not of the core; where it differs, all else does
+            groups["input"] = {"loss_map": np.ravel(gear.losses.values)}
     return groups
 
 

@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 import lostmotion as lm
-from conftest import ROOT, SCENARIOS
+from conftest import ALL_SCENARIOS, ROOT, SCENARIOS
 from lostmotion.cli import app
 from lostmotion.reports import plots
 from lostmotion.reports.listing import list_records
@@ -31,8 +31,8 @@ def lostmotion(*arguments: object, cwd: Path, **options) -> subprocess.Completed
 
 
 def test_shipped_scenarios_are_known_by_name(tmp_path: Path) -> None:
-    assert list(lm.shipped_scenarios()) == [p.stem for p in SCENARIOS]
-    for path in SCENARIOS:
+    assert list(lm.shipped_scenarios()) == [p.stem for p in ALL_SCENARIOS]
+    for path in ALL_SCENARIOS:
         assert lm.load(path.stem) == lm.load(path)
     by_name, by_file = (
         lostmotion("run", what, cwd=tmp_path) for what in (SMALL, SCENARIOS[0].parent / f"{SMALL}.toml")
@@ -40,7 +40,7 @@ def test_shipped_scenarios_are_known_by_name(tmp_path: Path) -> None:
     assert by_name.returncode == 0
     assert by_name.stdout == by_file.stdout
     listed = lostmotion("scenarios", cwd=tmp_path).stdout
-    for path, line in zip(SCENARIOS, listed.splitlines(), strict=True):
+    for path, line in zip(ALL_SCENARIOS, listed.splitlines(), strict=True):
         assert line.split(maxsplit=1) == [path.stem, lm.load(path).title]
 
 

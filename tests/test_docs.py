@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import lostmotion as lm
-from conftest import ROOT, SCENARIOS
+from conftest import ALL_SCENARIOS, ROOT
 from lostmotion.cli import app as lm_app
 
 
@@ -142,7 +142,7 @@ def test_generated_pages_name_every_key_and_variable() -> None:
                 parameter.opts if parameter.param_type_name == "option" else [parameter.metavar.split(" ")[0]]
             ):
                 assert option == "--help" or option in section
-    for path in SCENARIOS:
+    for path in ALL_SCENARIOS:
         assert generate.introduction(path), f"{path} needs a comment below its title, for the gallery"
     reference = generate.scenario_reference()
     for table in (
@@ -158,6 +158,20 @@ def test_generated_pages_name_every_key_and_variable() -> None:
         assert f"[{table}" in reference
     for key in (*lm.Motor.model_fields, *lm.Gearbox.model_fields, *lm.Load.model_fields, *lm.LossMap.model_fields):
         assert f"| `{key}` |" in reference
+    of_trains = generate.train_reference()
+    parts = (
+        lm.Shaft,
+        lm.ShaftMotor,
+        lm.Gear,
+        lm.WormMesh,
+        lm.MeshEfficiency,
+        lm.Brake,
+        lm.Clutch,
+        lm.Freewheel,
+        lm.Gravity,
+    )
+    for key in (*lm.TrainScenario.model_fields, *(key for part in parts for key in part.model_fields)):
+        assert f"| `{key}` |" in of_trains
     for variable in lm.VARIABLES:
         assert f"| `{variable.name}` |" in generate.variables()
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from conftest import ROOT, SCENARIOS
+from conftest import ALL_SCENARIOS, ROOT, SCENARIOS
 from lostmotion.simulation.scenario import json_schema
 
 
@@ -165,7 +165,7 @@ def test_scenarios_of_the_package_are_those_of_the_repository() -> None:
     from importlib.resources import files
 
     packaged = {p.name: p.read_text() for p in files("lostmotion").joinpath("scenarios").iterdir()}
-    assert packaged == {p.name: p.read_text() for p in SCENARIOS}
+    assert packaged == {p.name: p.read_text() for p in ALL_SCENARIOS}
 
 
 def test_an_override_reaches_an_entry_of_a_list() -> None:

@@ -295,8 +295,14 @@ def test_every_unit_of_the_schema_can_be_written():
             return own.union(*map(units, node.values()))
         return set().union(*map(units, node)) if isinstance(node, list) else set()
 
-    found = units(scenario) | units(lm.GearboxSheet.model_json_schema()) | units(lm.MotorSheet.model_json_schema())
-    assert {"", "N*m", "rad/s", "Hz", "degC", "K/W", "m^2/s"} <= found
+    train = lm.TrainScenario.model_json_schema()
+    found = (
+        units(scenario)
+        | units(train)
+        | units(lm.GearboxSheet.model_json_schema())
+        | units(lm.MotorSheet.model_json_schema())
+    )
+    assert {"", "N*m", "rad/s", "Hz", "degC", "K/W", "m^2/s", "kg", "N*m*s^2/rad^2"} <= found
     for unit in found:
         assert to_si(f"3 {unit}", unit) == 3.0
 

@@ -23,20 +23,37 @@ if TYPE_CHECKING:
     from .data_sheets.sheet import Source as Source
     from .errors import InputError as InputError
     from .errors import MissingLibraryError as MissingLibraryError
+    from .model.angle_torques import ErrorCurve as ErrorCurve
+    from .model.angle_torques import ErrorHarmonic as ErrorHarmonic
+    from .model.angle_torques import Gravity as Gravity
+    from .model.angle_torques import TorqueCurve as TorqueCurve
+    from .model.angle_torques import TorqueHarmonic as TorqueHarmonic
+    from .model.couplings import Brake as Brake
+    from .model.couplings import Clutch as Clutch
+    from .model.couplings import Freewheel as Freewheel
     from .model.drive import Drive as Drive
+    from .model.gear import Gear as Gear
     from .model.gearbox import Gearbox as Gearbox
     from .model.gearbox import GearboxLimits as GearboxLimits
     from .model.load import Load as Load
     from .model.losses import ConstantEfficiency as ConstantEfficiency
     from .model.losses import LossMap as LossMap
+    from .model.losses import MeshEfficiency as MeshEfficiency
+    from .model.losses import WormMesh as WormMesh
     from .model.motor import Motor as Motor
     from .model.motor import MotorLimits as MotorLimits
+    from .model.motor import ShaftMotor as ShaftMotor
+    from .model.shaft import DragCurve as DragCurve
+    from .model.shaft import FrictionCurve as FrictionCurve
+    from .model.shaft import QuadraticDrag as QuadraticDrag
+    from .model.shaft import Shaft as Shaft
     from .model.signals import CommandSignal as CommandSignal
     from .model.signals import TorqueSignal as TorqueSignal
     from .model.torsion import Hysteresis as Hysteresis
     from .model.torsion import LinearStiffness as LinearStiffness
     from .model.torsion import Rigid as Rigid
     from .model.torsion import TorsionCurve as TorsionCurve
+    from .model.train import DriveTrain as DriveTrain
     from .reports.accessor import ResultAccessor as ResultAccessor
     from .response.bandwidth import bandwidth as bandwidth
     from .response.bandwidth import characteristics as characteristics
@@ -63,6 +80,9 @@ if TYPE_CHECKING:
     from .simulation.stepping import Simulation as Simulation
     from .simulation.stepping import SimulationState as SimulationState
     from .simulation.switchings import switchings_of as switchings_of
+    from .simulation.train_scenario import ShaftTable as ShaftTable
+    from .simulation.train_scenario import TrainInitial as TrainInitial
+    from .simulation.train_scenario import TrainScenario as TrainScenario
     from .simulation.variables import VARIABLES as VARIABLES
     from .simulation.variables import Variable as Variable
     from .sizing.drive_check import Finding as Finding
@@ -86,13 +106,18 @@ _HOMES = {
     "data_sheets.records": ("catalogue",),
     "data_sheets.sheet": ("Source",),
     "errors": ("InputError", "MissingLibraryError"),
+    "model.angle_torques": ("ErrorCurve", "ErrorHarmonic", "Gravity", "TorqueCurve", "TorqueHarmonic"),
+    "model.couplings": ("Brake", "Clutch", "Freewheel"),
     "model.drive": ("Drive",),
+    "model.gear": ("Gear",),
     "model.gearbox": ("Gearbox", "GearboxLimits"),
     "model.load": ("Load",),
-    "model.losses": ("ConstantEfficiency", "LossMap"),
-    "model.motor": ("Motor", "MotorLimits"),
+    "model.losses": ("ConstantEfficiency", "LossMap", "MeshEfficiency", "WormMesh"),
+    "model.motor": ("Motor", "MotorLimits", "ShaftMotor"),
+    "model.shaft": ("DragCurve", "FrictionCurve", "QuadraticDrag", "Shaft"),
     "model.signals": ("CommandSignal", "TorqueSignal"),
     "model.torsion": ("Hysteresis", "LinearStiffness", "Rigid", "TorsionCurve"),
+    "model.train": ("DriveTrain",),
     "reports.accessor": ("ResultAccessor",),
     "response.bandwidth": ("bandwidth", "characteristics"),
     "response.harmonic": ("frequency_response", "to_control"),
@@ -107,6 +132,7 @@ _HOMES = {
     "simulation.sources": ("load",),
     "simulation.stepping": ("Simulation", "SimulationState"),
     "simulation.switchings": ("switchings_of",),
+    "simulation.train_scenario": ("ShaftTable", "TrainInitial", "TrainScenario"),
     "simulation.variables": ("VARIABLES", "Variable"),
     "sizing.drive_check": ("Finding", "check_drive"),
     "studies.engine": ("study",),

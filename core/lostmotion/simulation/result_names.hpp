@@ -76,7 +76,8 @@ inline const std::vector<SwitchingColumn>& switching_columns() {
 }
 
 // Why a run has no continuation; empty if it has come to its end.
-inline std::string status_text(Status status, double time, Contact contact) {
+// contact: what it is called.
+inline std::string status_text(Status status, double time, const std::string& contact) {
     const std::string at = "at t = " + std::to_string(time) + " s";
     switch (status) {
         case Status::done: return "";
@@ -88,13 +89,17 @@ inline std::string status_text(Status status, double time, Contact contact) {
             return "the state left the range that the loss map can be extended to " + at +
                    " (1000 times its data). The drive is unstable, or its data or inputs have a wrong unit.";
         case Status::zeno:
-            return "switching instants of the contact '" + std::string(contact_names[contact].text) + "' accumulate " +
-                   at + ": infinitely many in finite time. The model ends here.";
+            return "switching instants of the contact '" + contact + "' accumulate " + at +
+                   ": infinitely many in finite time. The model ends here.";
         case Status::unseen:
             return "the drive has dry contacts, which do not feel a nonlinear torque. Take them out, or make the "
                    "torque piecewise linear.";
     }
     return "";
+}
+
+inline std::string status_text(Status status, double time, Contact contact) {
+    return status_text(status, time, std::string(contact_names[contact].text));
 }
 
 }  // namespace lostmotion

@@ -18,10 +18,10 @@ def check(
     lostmotion drive check drive.toml --set task.cycle="2 s"
     """
     from ..errors import InputError
-    from ..simulation.sources import load
+    from ..simulation.sources import load_drive
     from ..sizing.drive_check import check_drive
 
-    loaded = load(scenario, overrides or ())
+    loaded = load_drive(scenario, overrides or ())
     try:
         with busy("Checking"):
             findings = check_drive(loaded)

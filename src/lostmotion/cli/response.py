@@ -59,7 +59,7 @@ def response(
     lostmotion response drive.toml --amplitudes 0.025,1 --frequencies 0.1..100:60
     lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
     """
-    from ..simulation.sources import load
+    from ..simulation.sources import load_drive
     from .grids import parse_grid
 
     _check_names(source, variable)
@@ -67,7 +67,9 @@ def response(
     grid = parse_grid(frequencies, "frequencies", "Hz")
     try_directory(output)
     name = Path(scenario).stem
-    loaded = {name: load(scenario, overrides or ())} | {Path(other).stem: load(other) for other in compare or ()}
+    loaded = {name: load_drive(scenario, overrides or ())} | {
+        Path(other).stem: load_drive(other) for other in compare or ()
+    }
     from ..response.harmonic import Source, frequency_response
 
     responses = {}

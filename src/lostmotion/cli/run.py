@@ -51,7 +51,9 @@ def run(
     lostmotion run result.csv --explain 0.25
     """
     from ..errors import InputError
+    from ..simulation.scenario import Scenario
     from ..simulation.sources import load
+    from ..simulation.train_scenario import TrainScenario
 
     _try_files(output, plot)
     loaded = load(scenario, overrides or ())
@@ -60,6 +62,10 @@ def run(
             f"--explain {explain}: must lie between 0 and simulation.duration, {loaded.simulation.duration} s"
         )
     _check_solver(solver, tolerance)
+    if explain is not None and isinstance(loaded, TrainScenario):
+        raise InputError(
+            "--explain: is for a drive of [motor], [gearbox] and [load]; leave it out, or see the contacts in the result"
+        )
     from ..simulation.run import run as work
 
     try:
@@ -70,7 +76,7 @@ def run(
     from ..reports.run import summary
 
     print(summary(result))
-    if explain is not None:
+    if explain is not None and isinstance(loaded, Scenario):
         from ..simulation.explanation import explain as explain_instant
 
         print(explain_instant(loaded, explain))
@@ -84,8 +90,10 @@ def run(
         with busy("Drawing"):
             from ..atomic_writer import write_whole
             from ..reports.plots import overview
+            from ..reports.train_figures import train_overview
 
-            write_whole(plot, overview(result.dataset()).savefig)
+            figure = train_overview if isinstance(loaded, TrainScenario) else overview
+            write_whole(plot, figure(result.dataset()).savefig)
         print(f"Figure written to {plot}")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def scenarios() -> None:
-    """List the scenarios that come with the package; `run`, `response` and `drive check` take their names."""
+    """List the scenarios that come with the package; `run` takes their names, `response` and `drive check` those of drives."""
     from ..inputs.toml_files import read_toml
     from ..simulation.scenario_files import shipped_scenarios
 
@@ -15,7 +15,7 @@ def scenarios() -> None:
 
 
 def schema() -> None:
-    """Print the JSON Schema of scenario files.
+    """Print the JSON Schema of scenario files, of drives and of drive trains.
 
     Editors complete and check scenario files with it.
 
@@ -24,6 +24,6 @@ def schema() -> None:
     """
     import json
 
-    from ..simulation.scenario import json_schema
+    from ..simulation.train_scenario import file_schema
 
-    print(json.dumps(json_schema(), indent=2))
+    print(json.dumps(file_schema(), indent=2))

@@ -30,8 +30,10 @@ class Conditions(Part):
     """wear"""
 
 
-def gearbox_table(reference: str, changes: Mapping[str, Any]) -> tuple[dict[str, Any], BuiltMap | None]:
-    """Values of `[gearbox]` for a record with `changes`, and the loss map's origin.
+def gearbox_table(
+    reference: str, changes: Mapping[str, Any], where: str = "gearbox"
+) -> tuple[dict[str, Any], BuiltMap | None]:
+    """Values of `[gearbox]`, or of the table `where`, for a record with `changes`, and the loss map's origin.
 
     A change takes the place of what it names and of nothing else: the hysteresis stays that of the record as printed,
     whatever its stiffness is changed to, and wear that adds backlash leaves it as it is.
@@ -44,7 +46,7 @@ def gearbox_table(reference: str, changes: Mapping[str, Any]) -> tuple[dict[str,
     known = {*Gearbox.model_fields, *Conditions.model_fields}
     for key in changes:
         if key not in known:
-            raise InputError(f"key gearbox.{key}: {unknown_key(key, known)}")
+            raise InputError(f"key {where}.{key}: {unknown_key(key, known)}")
     record = find(reference, "gearbox")
     assert isinstance(record, GearboxSheet)
     scalars = {key: value for key, value in changes.items() if key in SCALARS}
@@ -52,11 +54,11 @@ def gearbox_table(reference: str, changes: Mapping[str, Any]) -> tuple[dict[str,
         sheet = GearboxSheet(**_given(record) | scalars)
         conditions = Conditions(**{key: changes[key] for key in Conditions.model_fields if key in changes})
     except InputError as error:
-        raise InputError(f"gearbox from {shown(reference)}: {error}") from None
+        raise InputError(f"{where} from {shown(reference)}: {error}") from None
     for key, what in sheet.missing().items():
         if key not in changes:
             raise InputError(
-                f"gearbox from {shown(reference)}: the record lacks {key}, {what}; give gearbox.{key} beside `from`"
+                f"{where} from {shown(reference)}: the record lacks {key}, {what}; give {where}.{key} beside {_naming(where)}"
             )
     built = None
     if not _whole(changes.get("losses")):
@@ -74,8 +76,13 @@ def gearbox_table(reference: str, changes: Mapping[str, Any]) -> tuple[dict[str,
     _change(table, changes)
     if "hysteresis" not in changes:
         table["hysteresis"] = _hysteresis(record, sheet, table["stiffness"])
-    _wear(table, changes, conditions)
+    _wear(table, changes, conditions, where)
     return table, built
+
+
+def _naming(where: str) -> str:
+    """The key of a table that names its record."""
+    return "`gearbox`" if where.startswith("gears.") else "`from`"
 
 
 def _given(sheet: GearboxSheet | MotorSheet) -> dict[str, Any]:
@@ -121,13 +128,13 @@ def _curve(stiffness: Any) -> TorsionCurve | LinearStiffness | None:
     return None
 
 
-def _wear(table: dict[str, Any], changes: Mapping[str, Any], conditions: Conditions) -> None:
+def _wear(table: dict[str, Any], changes: Mapping[str, Any], conditions: Conditions, where: str) -> None:
     """Adds the backlash, and refuses conditions that would have no effect."""
     if "losses" in changes:
         for key, default in (("loss_factor", 1.0), ("temperature", None)):
             if getattr(conditions, key) != default:
                 raise InputError(
-                    f"key gearbox.{key}: acts on the record's own losses; leave it out beside gearbox.losses"
+                    f"key {where}.{key}: acts on the record's own losses; leave it out beside {where}.losses"
                 )
     if conditions.added_backlash == 0.0:
         return
@@ -136,7 +143,7 @@ def _wear(table: dict[str, Any], changes: Mapping[str, Any], conditions: Conditi
         table["stiffness"] = curve.model_dump() | {"backlash": curve.backlash + conditions.added_backlash}
     elif curve is not None or _whole(table["stiffness"]):
         raise InputError(
-            'key gearbox.added_backlash: needs a torsion curve; leave it out, or give gearbox.stiffness the kind "curve"'
+            f'key {where}.added_backlash: needs a torsion curve; leave it out, or give {where}.stiffness the kind "curve"'
         )
 
 
@@ -198,8 +205,8 @@ CLOSES = {
 }
 
 
-def motor_table(reference: str, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of `[motor]` for a record with `changes`, each of which takes the place of what it names.
+def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor") -> dict[str, Any]:
+    """Values of `[motor]`, or of the table `where`, for a record with `changes`, each of which takes the place of what it names.
 
     Raises
     ------
@@ -213,13 +220,13 @@ def motor_table(reference: str, changes: Mapping[str, Any]) -> dict[str, Any]:
     try:
         table = MotorSheet(**_given(record) | gaps).motor().model_dump()
     except ValueError as error:
-        keys = [f"motor.{key}" for key, gap in CLOSES.items() if gap in missing and key not in changes]
+        keys = [f"{where}.{key}" for key, gap in CLOSES.items() if gap in missing and key not in changes]
         remedy = f"; give {' and '.join(keys)} beside `from`" if keys else ""
-        raise InputError(f"motor from {shown(reference)}: {error}{remedy}") from None
+        raise InputError(f"{where} from {shown(reference)}: {error}{remedy}") from None
     if changes.get("kind") == "torque_source":
         table = as_torque_source(table)
     elif "rated_voltage" in changes:
-        table = at_voltage(table, changes["rated_voltage"], changes)
+        table = at_voltage(table, changes["rated_voltage"], changes, where)
     _change(table, changes)
     return table
 
@@ -229,7 +236,7 @@ def as_torque_source(table: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in table.items() if key not in DC_KEYS}
 
 
-def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str]) -> dict[str, Any]:
+def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str], where: str = "motor") -> dict[str, Any]:
     """Values of `[motor]` with another rated voltage, as `Motor.at_voltage`.
 
     Parameters
@@ -250,7 +257,7 @@ def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str]) -
     if {"rated_speed", "armature_voltage_constant"} <= set(given):
         return changed
     try:
-        motor = Motor(**table)
+        motor = Motor(**{key: value for key, value in table.items() if key in Motor.model_fields})
         value = argument("rated_voltage", voltage, "V")
     except InputError:
         return changed  # which the scenario refuses, with the name of the key
@@ -259,7 +266,7 @@ def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str]) -
     try:
         moved = motor.at_voltage(value)
     except InputError as error:
-        raise InputError(f"key motor.rated_voltage: {error}") from None
+        raise InputError(f"key {where}.rated_voltage: {error}") from None
     follow = ("rated_speed", "armature_voltage_constant")
     return changed | {key: getattr(moved, key) for key in follow}
 

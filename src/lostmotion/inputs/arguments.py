@@ -37,6 +37,7 @@ WANTED = {
     "Initial": "a state, such as Initial(motor_speed=100)",
     "Scenario": "a Scenario, such as load(path) returns",
     "Simulation": "a Simulation",
+    "TrainScenario": "a TrainScenario, such as load(path) returns",
     "Study": "a Study, such as load_study(path) returns",
 }
 SILENT = ("None", "RawResult")  # accepted, and not asked for

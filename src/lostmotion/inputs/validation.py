@@ -139,7 +139,8 @@ class _Problem:
         return f"{shown(self.value)} {self._wanted()}"
 
     def _kinds(self) -> list[str]:
-        return [kind for node in self.nodes for kind in node.get("discriminator", {}).get("mapping", {})]
+        kinds = [kind for node in self.nodes for kind in node.get("discriminator", {}).get("mapping", {})]
+        return list(dict.fromkeys(kinds))
 
     def _wanted(self) -> str:
         """What a value must be, by the kind of its problem."""

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, Self
+from typing import Self
 
 from pydantic import model_validator
 
 from .. import _core
 from ..inputs.part import Part
+from .gear import Gear
 from .gearbox import Gearbox
 from .load import Load
 from .losses import LossMap
-from .motor import Motor
+from .motor import Motor, ShaftMotor
+from .parameters import numbers
+from .shaft import Shaft
 from .torsion import Rigid
+from .train import DriveTrain
 
 
 class Drive(Part):
@@ -37,29 +41,28 @@ class Drive(Part):
             )
         return self
 
+    def train(self) -> DriveTrain:
+        """The same drive as a train: shafts `motor` and `load`, joined by the gear `gearbox`, and on the first the motor `motor`."""
+        load = Shaft(**{name: getattr(self.load, name) for name in Load.model_fields})
+        values = {name: getattr(self.motor, name) for name in Motor.model_fields}
+        return DriveTrain(
+            shafts={"motor": Shaft(), "load": load},
+            motors={"motor": ShaftMotor(shaft="motor", **values)},
+            gears={"gearbox": Gear.of(self.gearbox, input="motor", output="load")},
+        )
+
     def core(self) -> _core.Drive:
         """The solver's drive; the last ones are kept for equal parts."""
         return _core_drive(self)
 
 
-PARAMETERS = tuple(key for key, _ in _core.parameters())
-"""those that are plain numbers, as the core and a scenario file name them"""
-
-
-def _number(drive: Drive, key: str) -> float | None:
-    """The value of a parameter; None if the drive has no such law, or leaves the value out."""
-    value: Any = drive
-    for name in key.split("."):
-        value = getattr(value, name, None)
-    return None if value is None else float(value)
-
-
 @lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes
 def _core_drive(drive: Drive) -> _core.Drive:
-    g = drive.gearbox
+    values = numbers(drive.motor, "motor") | numbers(drive.gearbox, "gearbox") | numbers(drive.load, "load")
+    stiffness, losses = drive.gearbox.stiffness, drive.gearbox.losses
     return _core.Drive(
-        {key: value for key in PARAMETERS if (value := _number(drive, key)) is not None},
+        values,
         torque_source=drive.motor.kind == "torque_source",
-        torsion_curve=None if isinstance(g.stiffness, Rigid) else g.stiffness.core(),
-        loss_map=g.losses.core() if isinstance(g.losses, LossMap) else None,
+        torsion_curve=None if isinstance(stiffness, Rigid) else stiffness.core(),
+        loss_map=losses.core() if isinstance(losses, LossMap) else None,
     )

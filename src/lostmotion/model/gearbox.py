@@ -34,8 +34,8 @@ class GearboxLimits(Part):
     max_input_speed: Annotated[Speed, Positive] | None = None
 
 
-class Gearbox(Part):
-    """A compliance and a loss law, each chosen freely."""
+class Transmission(Part):
+    """What gearboxes and gears of a drive train have in common: ratio, inertia, compliance."""
 
     ratio: Annotated[Number, Positive]
     """i_C, input speed / output speed"""
@@ -43,24 +43,33 @@ class Gearbox(Part):
     """J_R, on the input shaft"""
     viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
     """b_MR, on the input shaft"""
-    rated_input_speed: Annotated[Speed, Positive]
+    rated_input_speed: Annotated[Speed, Positive] | None = None
     """n_1R"""
-    rated_output_torque: Annotated[Torque, Positive]
+    rated_output_torque: Annotated[Torque, Positive] | None = None
     """T_2R"""
     stiffness: Annotated[TorsionCurve | LinearStiffness | Rigid, Field(discriminator="kind")]
     hysteresis: Hysteresis | None = None
-    losses: Annotated[ConstantEfficiency | LossMap, Field(discriminator="kind")]
     limits: GearboxLimits | None = None
     note: str = ""
     """what a reader of the results must know, such as that a loss table is a stand-in"""
-
-    def __repr__(self) -> str:
-        laws = f"stiffness {self.stiffness.kind}, losses {self.losses.kind}"
-        rated = f"{self.rated_output_torque:.4g} N·m at {practical(self.rated_input_speed, 'rad/s', 4)}"
-        return f"Gearbox({self.ratio:g}:1, {rated}, {laws})"
 
     @model_validator(mode="after")
     def _hysteresis_needs_compliance(self) -> Self:
         if self.hysteresis is not None and self.hysteresis.efficiency < 1.0 and isinstance(self.stiffness, Rigid):
             raise ValueError("has hysteresis but is rigid; leave hysteresis out or give it a stiffness")
         return self
+
+
+class Gearbox(Transmission):
+    """A compliance and a loss law, each chosen freely."""
+
+    rated_input_speed: Annotated[Speed, Positive]
+    """n_1R"""
+    rated_output_torque: Annotated[Torque, Positive]
+    """T_2R"""
+    losses: Annotated[ConstantEfficiency | LossMap, Field(discriminator="kind")]
+
+    def __repr__(self) -> str:
+        laws = f"stiffness {self.stiffness.kind}, losses {self.losses.kind}"
+        rated = f"{self.rated_output_torque:.4g} N·m at {practical(self.rated_input_speed, 'rad/s', 4)}"
+        return f"Gearbox({self.ratio:g}:1, {rated}, {laws})"

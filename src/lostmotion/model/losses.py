@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -10,10 +11,14 @@ from pydantic import Field, field_validator, model_validator
 from .. import _core
 from ..inputs.part import Part
 from ..inputs.quantities import (
+    Angle,
+    Length,
     Limit,
     NotNegative,
     Number,
+    Positive,
     Switch,
+    Whole,
 )
 
 
@@ -77,3 +82,72 @@ class LossMap(Part):
     def core(self) -> _core.LossMap:
         speeds, loads, values = self.whole()
         return _core.LossMap(speeds, loads, [x for row in values for x in row])
+
+
+class MeshEfficiency(Part):
+    """An efficiency for each direction of power flow, as printed for worm gears. Only in drive trains."""
+
+    kind: Literal["mesh_efficiency"] = "mesh_efficiency"
+    drive_efficiency: Annotated[Number, Limit(gt=0.0, le=1.0)]
+    """eta_f, while the input drives"""
+    backdrive_efficiency: Annotated[Number, Limit(le=1.0)]
+    """eta_b, while the output drives; 0 or less: self-locking"""
+
+    def efficiencies(self) -> tuple[float, float]:
+        """(eta_f, eta_b)."""
+        return self.drive_efficiency, self.backdrive_efficiency
+
+
+class WormMesh(Part):
+    """A worm and its wheel with friction: eta_f = tan g/tan(g + r), eta_b = tan(g - r)/tan g. Only in drive trains.
+
+    The lead angle g is given, or follows from module, number of starts and reference diameter of the worm; the friction
+    angle r is given, or follows from the coefficient of friction. It is self-locking where g < r.
+    """
+
+    kind: Literal["worm"] = "worm"
+    lead_angle: Annotated[Angle, Positive] | None = None
+    """g, at the reference diameter"""
+    module: Annotated[Length, Positive] | None = None
+    """axial module m"""
+    starts: Annotated[Whole, Field(ge=1, le=20)] | None = None
+    """threads z of the worm"""
+    diameter: Annotated[Length, Positive] | None = None
+    """reference diameter d of the worm; tan g = m z/d"""
+    friction_angle: Annotated[Angle, NotNegative] | None = None
+    """r"""
+    friction_coefficient: Annotated[Number, NotNegative] | None = None
+    """in the mesh; r is its arc tangent"""
+
+    @model_validator(mode="after")
+    def _is_a_worm(self) -> Self:
+        geometry = ("module", "starts", "diameter")
+        given = [key for key in geometry if getattr(self, key) is not None]
+        if self.lead_angle is not None and given:
+            raise ValueError(f"has lead_angle and {', '.join(given)}, which say the same; give one or the other")
+        if self.lead_angle is None and len(given) < len(geometry):
+            lacking = ", ".join(key for key in geometry if key not in given)
+            raise ValueError(f"lacks {lacking if given else 'lead_angle, or module, starts and diameter'}; add it")
+        if (self.friction_angle is None) == (self.friction_coefficient is None):
+            says = "lacks" if self.friction_angle is None else "has both"
+            raise ValueError(f"{says} friction_angle and friction_coefficient; give one of them")
+        g, r = self.angles()
+        if not g + r < 0.5 * math.pi:
+            raise ValueError(
+                f"has a lead angle of {math.degrees(g):.4g} deg and a friction angle of {math.degrees(r):.4g} deg; "
+                "their sum must be below 90 deg, or nothing could drive it"
+            )
+        return self
+
+    def angles(self) -> tuple[float, float]:
+        """(lead angle, friction angle) [rad]."""
+        g, r = self.lead_angle, self.friction_angle
+        if g is None:
+            g = math.atan(self.module * self.starts / self.diameter)  # type: ignore[operator]
+        if r is None:
+            r = math.atan(self.friction_coefficient)  # type: ignore[arg-type]
+        return g, r
+
+    def efficiencies(self) -> tuple[float, float]:
+        """(eta_f, eta_b)."""
+        return _core.worm_efficiencies(*self.angles())

@@ -103,7 +103,7 @@ class Motor(Part):
             rated = f"torque source, rated {self.rated_torque:.4g} N·m"
         else:
             rated = f"dc, {self.rated_torque:.4g} N·m at {practical(self.rated_speed, 'rad/s', 4)}"
-        return f"Motor({rated}, rotor {self.rotor_inertia:.4g} kg·m²)"
+        return f"{type(self).__name__}({rated}, rotor {self.rotor_inertia:.4g} kg·m²)"
 
     @property
     def no_load_speed(self) -> float:
@@ -145,3 +145,20 @@ class Motor(Part):
         return self.model_copy(
             update={"rated_voltage": voltage, "armature_voltage_constant": k_N, "rated_speed": speed}
         )
+
+
+class ShaftMotor(Motor):
+    """A motor on a shaft of a drive train."""
+
+    shaft: str
+    """that it turns"""
+    torque_limit: Annotated[Torque, Positive] | None = None
+    """largest torque of a torque source"""
+
+    @model_validator(mode="after")
+    def _limit_fits_kind(self) -> Self:
+        if self.torque_limit is not None and self.kind != "torque_source":
+            raise ValueError(
+                'has a torque_limit, which a motor of kind "dc" does not; give voltage_limit, or the kind "torque_source"'
+            )
+        return self

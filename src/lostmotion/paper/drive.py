@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from ..errors import InputError
 from ..response.linear import RigidConstants, rigid_constants
 from ..simulation.scenario import Scenario
-from ..simulation.scenario_files import load
+from ..simulation.sources import load_drive
 
 MODELS = ("1-DOF-L", "2-DOF-L", "2-DOF-NL")
 AMPLITUDES = {"large": 1.0275, "small": 0.025}
@@ -34,7 +34,7 @@ def paper_scenario(model: str, amplitude: str) -> Scenario:
     """
     if model not in MODELS or amplitude not in AMPLITUDES:
         raise InputError(f"there is no run {model!r}, {amplitude!r}; models: {MODELS}, amplitudes: {tuple(AMPLITUDES)}")
-    return load(f"paper-{model.lower().replace('-', '', 1)}-{amplitude}")
+    return load_drive(f"paper-{model.lower().replace('-', '', 1)}-{amplitude}")
 
 
 @dataclass(frozen=True)

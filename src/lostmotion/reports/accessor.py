@@ -10,8 +10,9 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.validation import shown
 from ..response.harmonic import of_output
-from ..simulation.results import energy_of, scenario_of
+from ..simulation.results import energy_of, is_train_result, scenario_of
 from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainScenario
 from .run import summary
 
 if TYPE_CHECKING:
@@ -47,11 +48,13 @@ class ResultAccessor:
         InputError
             The dataset is of another kind.
         """
-        from . import plots, response_figures
+        from . import plots, response_figures, train_figures
 
         if "response" in self._dataset:
             of_output(self._dataset, output)
             return response_figures.bode_figure({"": self._dataset}, output)
+        if is_train_result(self._dataset):
+            return train_figures.train_overview(self._dataset)
         lacking = [name for name in plots.OVERVIEW if name not in self._dataset]
         if len(lacking) == len(plots.OVERVIEW):
             raise InputError("this dataset is neither a run nor a frequency response; there is no figure of it")
@@ -78,7 +81,7 @@ class ResultAccessor:
         return summary(self._dataset)
 
     @property
-    def scenario(self) -> Scenario:
+    def scenario(self) -> Scenario | TrainScenario:
         """The scenario that the run came from."""
         return scenario_of(self._dataset)
 

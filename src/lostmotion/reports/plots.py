@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..simulation.results import scenario_of
+from ..simulation.scenario import Scenario
 from .panels import COMMAND_STYLE, STYLES, Curve, Panel
 
 if TYPE_CHECKING:
@@ -180,7 +181,9 @@ def overview(result: xarray.Dataset) -> Figure:
 def _ratio(result: xarray.Dataset) -> float:
     if "gear_ratio" in result.attrs:  # a periodic motion, which knows its drive only
         return float(result.attrs["gear_ratio"])
-    return scenario_of(result).gearbox.ratio
+    scenario = scenario_of(result)
+    assert isinstance(scenario, Scenario)
+    return scenario.gearbox.ratio
 
 
 @in_our_looks

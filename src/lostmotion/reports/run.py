@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..simulation.results import RawResult, energy_of
+from ..simulation.results import RawResult, energy_of, is_train_result
+from ..simulation.train_scenario import TrainScenario
 
 if TYPE_CHECKING:
     import xarray
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
 
 def summary(result: xarray.Dataset | RawResult) -> str:
     """A run in a few lines: the end, the extremes, the contacts, the energy."""
+    if is_train_result(result):
+        return train_summary(result)
 
     def last(name: str) -> float:
         return float(np.asarray(result[name])[-1])
@@ -50,4 +53,38 @@ def summary(result: xarray.Dataset | RawResult) -> str:
             lines.append(f"  energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}")
     lines += [f"  warning: {result.attrs['warning']}"] if "warning" in result.attrs else []
     lines += [f"  note: {result.attrs['note']}"] if "note" in result.attrs else []
+    return "\n".join(lines)
+
+
+def train_summary(result: xarray.Dataset | RawResult) -> str:
+    """A run of a drive train in a few lines: each element at the end and at its peak, and the energy."""
+    scenario = TrainScenario.from_json(result.attrs["scenario"])
+    train = scenario.train()
+
+    def end_and_peak(name: str, unit: str, factor: float = 1.0) -> str:
+        values = factor * np.asarray(result[name])
+        return f"{values[-1]:.5g} {unit}, peak {np.max(np.abs(values)):.5g}"
+
+    time = float(np.asarray(result["time"])[-1])
+    lines = [
+        result.attrs["title"] or "(no title)",
+        f"  {time:g} s, {result.attrs['switching_count']} events, solver {result.attrs['solver']}; at the end:",
+    ]
+    for name in train.motors:
+        lines.append(f"  motor {name}: {end_and_peak(f'{name}_torque', 'N·m')}")
+    for name in train.shafts:
+        angle = f"{name}_angle"
+        at = f"; at {float(np.asarray(result[angle])[-1]):.6g} rad" if angle in result else ""
+        lines.append(f"  shaft {name}: {end_and_peak(f'{name}_speed', 'rad/s')}{at}")
+    for name, gear in train.gears.items():
+        twist = "" if gear.stiffness.kind == "rigid" else f"; twist {end_and_peak(f'{name}_twist', 'mrad', 1e3)}"
+        lines.append(f"  gear {name}: {end_and_peak(f'{name}_output_torque', 'N·m')}{twist}")
+    if "energy" in result.attrs:
+        e = energy_of(result)
+        apart = ("residual", "turned_over")
+        parts = ", ".join(f"{name} {value:.4g}" for name, value in e.items() if value != 0.0 and name not in apart)
+        lines.append(f"  energy [J]: {parts or 'none'}")
+        if e["turned_over"] > 0.0:
+            lines.append(f"  energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}")
+    lines += [f"  {kind}: {result.attrs[kind]}" for kind in ("warning", "note") if kind in result.attrs]
     return "\n".join(lines)

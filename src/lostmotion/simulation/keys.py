@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ..data_sheets.components import as_torque_source, at_voltage
+from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
 from ..inputs.validation import shown
 
@@ -28,31 +30,68 @@ def parse_override(text: str) -> tuple[str, Any]:
     return key.strip(), parsed["value"] if len(parsed) == 1 else value.strip()
 
 
+# Keys that others depend on, in the order in which they are changed: a part as a whole, its record, and what other values
+# of a motor follow from.
+_FIRST = tuple(
+    re.compile(pattern)
+    for pattern in (
+        r"gearbox|motor|(gears|motors)\.[^.]+",
+        r"(gearbox|motor|motors\.[^.]+)\.from|gears\.[^.]+\.gearbox",
+        r"(motor|motors\.[^.]+)\.kind",
+        r"(motor|motors\.[^.]+)\.rated_voltage",
+    )
+)
+_SIGNALS = re.compile(r"command|load\.torque")
+_TRAIN_SIGNALS = re.compile(r"command\.[^.]+|shafts\.[^.]+\.torque")
+
+
 def set_values(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None:
     """Changes values by dotted key. What others depend on comes before them, in whatever order they are given."""
-    before = ("gearbox", "motor", "gearbox.from", "motor.from", "motor.kind", "motor.rated_voltage")
     changes = list(changes)
-    given = [key.removeprefix("motor.") for key, _ in changes]
-    for key, value in sorted(changes, key=lambda change: before.index(change[0]) if change[0] in before else 99):
+    given = [key for key, _ in changes]
+    signals = _TRAIN_SIGNALS if "shafts" in data else _SIGNALS
+
+    def rank(change: tuple[str, Any]) -> int:
+        return next((n for n, pattern in enumerate(_FIRST) if pattern.fullmatch(change[0])), len(_FIRST))
+
+    for key, value in sorted(changes, key=rank):
+        _change_what_follows(data, key, value, given)
         first, *rest = key.split(".")
-        node = data.get(first)
-        if isinstance(node, dict) and "from" not in node:  # beside `from` the record sees to it
-            if key == "motor.kind" and value == "torque_source":
-                node = as_torque_source(node)
-            elif key == "motor.rated_voltage":
-                node = at_voltage(node, value, given)
-        data[first] = _changed(node, rest, value, first)
+        data[first] = _changed(data.get(first), rest, value, first, signals)
 
 
-def _changed(node: Any, keys: list[str], value: Any, where: str) -> Any:
+def _change_what_follows(data: dict[str, Any], key: str, value: Any, given: Sequence[str]) -> None:
+    """What goes with the kind or the rated voltage of a motor; beside `from` the record sees to it."""
+    where, _, last = key.rpartition(".")
+    *table, name = where.split(".")
+    parent = data.get("motors") if table == ["motors"] else data if where == "motor" else None
+    node = parent.get(name) if isinstance(parent, dict) else None
+    if not isinstance(node, dict) or "from" in node:
+        return
+    if last == "kind" and value == "torque_source":
+        changed = as_torque_source(node)
+    elif last == "rated_voltage":
+        changed = at_voltage(node, value, [k.removeprefix(f"{where}.") for k in given], where)
+    else:
+        return
+    if table:
+        data["motors"] = {**data["motors"], name: changed}
+    else:
+        data["motor"] = changed
+
+
+def _changed(node: Any, keys: list[str], value: Any, where: str, signals: re.Pattern[str]) -> Any:
     """A node of a scenario file with one value changed; lists are counted from 0."""
     if not keys:
         return value
     if keys == ["from"] and where in ("gearbox", "motor"):  # the record takes the place of the whole table
         return {"from": value}
+    table, _, name = where.partition(".")
+    if table in RECORDS and name and keys == [RECORDS[table][0]] and isinstance(node, dict):
+        return {**without_record(table, node), keys[0]: value}
     if where in ("gearbox", "motor") and isinstance(node, str):
         node = {"from": node}
-    if where in ("command", "load.torque") and isinstance(node, int | float | str):
+    if signals.fullmatch(where) and isinstance(node, int | float | str):
         node = {"mean": node}
     key, *rest = keys
     inner = f"{where}.{key}"
@@ -62,11 +101,11 @@ def _changed(node: Any, keys: list[str], value: Any, where: str) -> Any:
             place = list_index(entries, key)
         except ValueError as error:
             raise InputError(f"key {inner}: {error}") from None
-        return [_changed(x, rest, value, inner) if n == place else x for n, x in enumerate(entries)]
+        return [_changed(x, rest, value, inner, signals) if n == place else x for n, x in enumerate(entries)]
     if node is not None and not isinstance(node, dict):
         raise InputError(f"key {inner}: {where} is the value {shown(node)}, not a table; it has no {key}")
-    table = node or {}
-    return {**table, key: _changed(table.get(key), rest, value, inner)}
+    fields = node or {}
+    return {**fields, key: _changed(fields.get(key), rest, value, inner, signals)}
 
 
 def list_index(entries: Sequence[Any], part: str) -> int:

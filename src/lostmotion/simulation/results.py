@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
@@ -16,7 +17,9 @@ from ..inputs.arguments import checked
 from .scenario import Scenario
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import packed
-from .variables import CHANNEL_NAMES, STATES, VARIABLES
+from .train_scenario import TrainScenario, is_train
+from .train_variables import train_variables
+from .variables import CHANNEL_NAMES, STATES, VARIABLES, Variable
 
 if TYPE_CHECKING:
     import xarray
@@ -43,6 +46,9 @@ class RawResult:
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.time if name == "time" else self.values[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name == "time" or name in self.values
 
     def dataset(self) -> xarray.Dataset:
         """The labelled dataset."""
@@ -83,7 +89,7 @@ def labelled(time: Any, data: dict[str, Any], attributes: dict[str, Any]) -> xar
 
     variables = {
         v.name: ("time", data[v.name], {"units": v.unit, "long_name": v.meaning, "symbol": v.symbol})
-        for v in VARIABLES
+        for v in variables_of(attributes)
         if v.name in data
     }
     coordinates = xr.Coordinates(
@@ -91,6 +97,20 @@ def labelled(time: Any, data: dict[str, Any], attributes: dict[str, Any]) -> xar
         indexes={"time": xr.indexes.PandasIndex(time, "time")},
     )
     return xr.Dataset(variables, coords=coordinates, attrs=attributes)
+
+
+def is_train_result(result: xarray.Dataset | RawResult) -> bool:
+    """Whether it is the run of a drive train."""
+    return is_train(json.loads(result.attrs.get("scenario", "{}")))
+
+
+def variables_of(attributes: Mapping[str, Any]) -> tuple[Variable, ...]:
+    """The variables that a result with these attributes may have: those of a drive, or of its train."""
+    tables = json.loads(attributes.get("scenario", "{}"))
+    if not is_train(tables):
+        return VARIABLES
+    scenario = TrainScenario(**tables)
+    return train_variables(scenario.train(), scenario.loaded())
 
 
 def add_derived(data: dict[str, Any], ratio: Any) -> None:
@@ -112,8 +132,8 @@ def gear_efficiency(data: dict[str, Any], ratio: Any) -> Any:
 
 
 @checked
-def scenario_of(dataset: xarray.Dataset) -> Scenario:
-    """The scenario that a result came from.
+def scenario_of(dataset: xarray.Dataset) -> Scenario | TrainScenario:
+    """The scenario that a result came from: of a drive a `Scenario`, of a drive train a `TrainScenario`.
 
     Raises
     ------
@@ -124,7 +144,8 @@ def scenario_of(dataset: xarray.Dataset) -> Scenario:
         raise InputError(
             "this dataset carries no scenario; give a result of simulate or open_result, attributes included"
         )
-    return Scenario.from_json(dataset.attrs["scenario"])
+    text = dataset.attrs["scenario"]
+    return TrainScenario.from_json(text) if is_train(json.loads(text)) else Scenario.from_json(text)
 
 
 @checked

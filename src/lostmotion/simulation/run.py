@@ -13,6 +13,9 @@ from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from .results import RawResult, raw_result
 from .scenario import Initial, LoadTable, Scenario, SimulationTable
+from .train_results import run_train
+from .train_scenario import TrainScenario
+from .train_variables import train_variables
 from .variables import STATES
 
 if TYPE_CHECKING:
@@ -29,7 +32,7 @@ BYTES_PER_SAMPLE = 170  # of a result while it is made, measured
 
 @checked
 def simulate(
-    scenario_or_drive: Scenario | Drive,
+    scenario_or_drive: Scenario | TrainScenario | Drive,
     *,
     command: CommandSignal | float | None = None,
     load_torque: TorqueSignal | float | None = None,
@@ -40,12 +43,13 @@ def simulate(
     relative_tolerance: Number | None = None,
     energy: bool = True,
 ) -> xarray.Dataset:
-    """Simulate a drive.
+    """Simulate a drive, or a drive train.
 
     Parameters
     ----------
     scenario_or_drive
-        A scenario, whose values the other arguments replace, or a drive alone.
+        A scenario, whose values the other arguments replace, or a drive alone. What acts on a drive train stands in its
+        scenario alone (`TrainScenario.replace` changes it), so that of it duration and sample_interval can be given here.
     command
         E_C [-]; default 0 for a drive alone.
     load_torque
@@ -64,7 +68,7 @@ def simulate(
     Returns
     -------
     xarray.Dataset
-        The variables of `lostmotion.VARIABLES` over the coordinate ``time`` [s], the switching instants, and in the
+        The variables of `lostmotion.VARIABLES`, or those of the elements of the train, over the coordinate ``time`` [s], the switching instants, and in the
         attributes the energy ledger, the end state and the scenario.
 
     Raises
@@ -76,19 +80,27 @@ def simulate(
     KeyboardInterrupt
         Ctrl-C ends the run at once.
     """
-    scenario = as_scenario(
-        scenario_or_drive,
-        command=command,
-        load_torque=load_torque,
-        duration=duration,
-        sample_interval=sample_interval,
-        initial=initial,
-    )
+    changes: dict[str, Any] = {"command": command, "load_torque": load_torque, "initial": initial}
+    times: dict[str, Any] = {"duration": duration, "sample_interval": sample_interval}
+    scenario: Scenario | TrainScenario
+    if isinstance(scenario_or_drive, TrainScenario):
+        if given := [name for name, value in changes.items() if value is not None]:
+            raise InputError(
+                f"{given[0]}: a drive train has several; give them in its scenario, such as scenario.replace(**{{'command.NAME': 0.5}})"
+            )
+        new = {f"simulation.{name}": value for name, value in times.items() if value is not None}
+        scenario = scenario_or_drive.replace(**new) if new else scenario_or_drive
+    else:
+        scenario = as_scenario(scenario_or_drive, **changes, **times)
     return run(scenario, solver=solver, relative_tolerance=relative_tolerance, energy=energy).dataset()
 
 
 def run(
-    scenario: Scenario, *, solver: SolverName = "exact", relative_tolerance: float | None = None, energy: bool = True
+    scenario: Scenario | TrainScenario,
+    *,
+    solver: SolverName = "exact",
+    relative_tolerance: float | None = None,
+    energy: bool = True,
 ) -> RawResult:
     """As `simulate`, of a scenario, with the result as plain arrays."""
     if solver not in ("exact", "dormand-prince"):
@@ -103,9 +115,12 @@ def run(
     if not low <= tolerance <= high:
         raise InputError(f"relative_tolerance {tolerance:g} must lie between {low:g} and {high:g}")
     table = scenario.simulation
-    check_memory(table.samples)
-    result = _core.run(
-        *core_inputs(scenario),
+    width = BYTES_PER_SAMPLE
+    if isinstance(scenario, TrainScenario):
+        width = 16 * len(train_variables(scenario.train(), scenario.loaded()))
+    check_memory(table.samples, width)
+    how = "exact" if exact else f"dormand-prince, relative tolerance {tolerance:g}"
+    options: tuple[Any, ...] = (
         table.duration,
         table.sample_interval,
         table.samples,
@@ -113,19 +128,21 @@ def run(
         0.0 if exact else tolerance,
         MAX_SWITCHINGS,
     )
-    how = "exact" if exact else f"dormand-prince, relative tolerance {tolerance:g}"
+    if isinstance(scenario, TrainScenario):
+        return run_train(scenario, options, how, ledger=energy and exact)
+    result = _core.run(*core_inputs(scenario), *options)
     return raw_result(scenario, result, how, ledger=energy and exact)
 
 
-def check_memory(samples: int) -> None:
-    """Refuse a run whose samples do not fit into the memory that is free.
+def check_memory(samples: int, width: int = BYTES_PER_SAMPLE) -> None:
+    """Refuse a run whose samples, `width` bytes each, do not fit into the memory that is free.
 
     Raises
     ------
     InputError
         It says what they need and what there is.
     """
-    needed, free = samples * BYTES_PER_SAMPLE, free_memory()
+    needed, free = samples * width, free_memory()
     if free is not None and needed > free:
         raise InputError(
             f"simulation.sample_interval: {samples:.3g} samples need {needed / 1e9:.3g} GB of memory, and {free / 1e9:.3g}"

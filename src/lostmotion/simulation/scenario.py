@@ -21,6 +21,10 @@ from .keys import set_values
 
 MAX_SAMPLES = 100_000_000
 
+# In the JSON Schema of files, beside what a scenario has.
+BASE = {"type": "string", "description": "scenario file that this one changes"}
+RECORD_NAME = {"type": "string", "description": "name of a record of the catalogue, or a file with one (.toml)"}
+
 
 class LoadTable(Load):
     """The driven body and the disturbance torque on it."""
@@ -148,18 +152,17 @@ def from_tables(tables: Mapping[str, Any]) -> Scenario:
 def json_schema() -> dict[str, Any]:
     """JSON Schema of scenario files, for editors."""
     schema = Scenario.model_json_schema()
-    schema["properties"]["base"] = {"type": "string", "description": "scenario file that this one changes"}
+    schema["properties"]["base"] = BASE
     schema["required"] = []  # with a base, none
     for table in ("gearbox", "motor"):
         whole = schema["properties"][table]
-        name = {"type": "string", "description": "name of a record of the catalogue, or a file with one (.toml)"}
         conditions = Conditions.model_json_schema()["properties"] if table == "gearbox" else {}
         from_record = {
             "type": "object",
-            "properties": {"from": name} | conditions,
+            "properties": {"from": RECORD_NAME} | conditions,
             "required": ["from"],
             "description": f"A {table} of the catalogue, or of a sheet file; other keys take the place of its values. A table "
             "that says its kind takes the place of the whole one, any other changes the keys that it gives.",
         }
-        schema["properties"][table] = {"anyOf": [whole, name, from_record]}
+        schema["properties"][table] = {"anyOf": [whole, RECORD_NAME, from_record]}
     return schema

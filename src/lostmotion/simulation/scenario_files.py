@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..data_sheets.components import gearbox_table
+from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
 from ..inputs.toml_files import RESULTS, read_toml
 from ..inputs.validation import did_you_mean, shown
@@ -15,6 +16,7 @@ from ..model.gearbox import Gearbox
 from .keys import parse_override, set_values
 from .scenario import Scenario, from_tables
 from .series_files import read_series
+from .train_scenario import TrainScenario, is_train, train_from_tables
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -47,7 +49,7 @@ def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
     raise InputError(f"{name}: there is no such file (.toml) and no such scenario; {hint}")
 
 
-def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
+def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario | TrainScenario:
     """Read a scenario file.
 
     Parameters
@@ -67,8 +69,8 @@ def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) ->
     return changed(read_tables(path, overrides), path)
 
 
-def changed(tables: dict[str, Any], path: Path) -> Scenario:
-    """The scenario of the tables of a file, whose name stands in messages.
+def changed(tables: dict[str, Any], path: Path) -> Scenario | TrainScenario:
+    """The scenario of the tables of a file, in the short or the long form. The file's name stands in messages.
 
     Raises
     ------
@@ -76,7 +78,7 @@ def changed(tables: dict[str, Any], path: Path) -> Scenario:
         With one line that names the file, the key, the value and the remedy.
     """
     try:
-        return from_tables(tables)
+        return train_from_tables(tables) if is_train(tables) else from_tables(tables)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -116,12 +118,7 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
         raise InputError(f"{path}: key base: leads back to this file; break the circle")
     data = read_toml(path, "a scenario")
     _read_series(data, path, ())
-    for table in ("gearbox", "motor"):
-        if isinstance(data.get(table), str):
-            data[table] = {"from": data[table]}
-        record = data.get(table, {}).get("from") if isinstance(data.get(table), dict) else None
-        if isinstance(record, str) and record.endswith(".toml"):
-            data[table]["from"] = str(path.parent / record)
+    _find_records(data, path.parent)
     if "base" not in data:
         return data
     base = data.pop("base")
@@ -133,13 +130,36 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
             f"`lostmotion run {base} --set KEY=VALUE`"
         )
     based = _read(find_scenario(base, path.parent), (*including, path.resolve()))
-    motor = data.get("motor")
-    if isinstance(motor, dict) and "rated_voltage" in motor and "from" not in motor:
-        try:
-            set_values(based, [(f"motor.{key}", value) for key, value in motor.items()])
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
+    try:
+        _change_voltages(based, data)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     return _merge(based, data)
+
+
+def _change_voltages(based: dict[str, Any], data: Mapping[str, Any]) -> None:
+    """A rated voltage over a base takes with it what belongs to it."""
+    motors = {"motor": data.get("motor")}
+    if isinstance(data.get("motors"), dict):
+        motors |= {f"motors.{name}": motor for name, motor in data["motors"].items()}
+    for where, motor in motors.items():
+        if isinstance(motor, dict) and "rated_voltage" in motor and "from" not in motor:
+            set_values(based, [(f"{where}.{key}", value) for key, value in motor.items()])
+
+
+def _find_records(data: dict[str, Any], directory: Path) -> None:
+    """Files with a record are relative to the scenario."""
+    for table in ("gearbox", "motor"):
+        if isinstance(data.get(table), str):
+            data[table] = {"from": data[table]}
+    naming = [(data.get(table), "from") for table in ("gearbox", "motor")]
+    for table, (key, _) in RECORDS.items():
+        if isinstance(data.get(table), dict):
+            naming += [(element, key) for element in data[table].values()]
+    for element, key in naming:
+        record = element.get(key) if isinstance(element, dict) else None
+        if isinstance(element, dict) and isinstance(record, str) and record.endswith(".toml"):
+            element[key] = str(directory / record)
 
 
 def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...]) -> None:
@@ -163,15 +183,19 @@ def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...]) -> Non
             raise InputError(f"{path}: key {'.'.join(where)}.file: {error}") from None
 
 
-def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Tables are merged; one of another `kind`, or `from` a record, takes the place of the old one."""
+def _merge(base: dict[str, Any], changes: dict[str, Any], where: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Tables are merged; one of another `kind`, or with a record, takes the place of the old one."""
     merged = dict(base)
     for key, value in changes.items():
         old = base.get(key)
-        if not isinstance(value, dict) or not isinstance(old, dict) or "from" in value:
+        if not isinstance(value, dict) or not isinstance(old, dict):
+            merged[key] = value
+        elif len(where) == 1 and where[0] in RECORDS and RECORDS[where[0]][0] in value:
+            merged[key] = without_record(where[0], old) | value
+        elif "from" in value:
             merged[key] = value
         elif value.get("kind", old.get("kind")) == old.get("kind"):
-            merged[key] = _merge(old, value)
+            merged[key] = _merge(old, value, (*where, key))
         else:
             merged[key] = value
     return merged

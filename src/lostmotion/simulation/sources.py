@@ -13,10 +13,14 @@ from . import scenario_files
 from .result_files import FORMATS, open_result
 from .scenario import Scenario
 from .scenario_files import changed, override
+from .train_scenario import TrainScenario
 
 
-def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
+def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario | TrainScenario:
     """The scenario of a file, of a shipped example, or of a saved result.
+
+    In the short form (tables `[motor] [gearbox] [load]`) it is a `Scenario`, in the long form (`[shafts.NAME]` ...) a
+    `TrainScenario`.
 
     Parameters
     ----------
@@ -43,3 +47,19 @@ def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) 
     tables = json.loads(result.attrs["scenario"])
     override(tables, overrides, path)
     return changed(tables, path)
+
+
+def load_drive(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
+    """As `load`, where only the short form will do.
+
+    Raises
+    ------
+    InputError
+        Also if the scenario is in the long form.
+    """
+    scenario = load(source, overrides)
+    if isinstance(scenario, TrainScenario):
+        raise InputError(
+            f"{source}: is a drive train ([shafts]), which can be run; this takes a drive of [motor], [gearbox] and [load]"
+        )
+    return scenario

@@ -17,23 +17,31 @@ if TYPE_CHECKING:
 
 CAUSES = dict(_core.causes())
 """what ended a regime, by its number"""
+TRAIN_CAUSES = dict(_core.train_causes())
+"""the same of a drive train"""
 
 ATTRIBUTE = "switchings"
 NAMES = tuple(_core.switching_columns())
+CONTACTS_OF_TRAIN = "contacts"  # attribute of the result of a train: the names of its contacts, apart by blanks
+TORQUES = ("output_torque_before", "output_torque_after")
+
+
+def names_in(attributes: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the columns of the switchings of a result with these attributes."""
+    if CONTACTS_OF_TRAIN not in attributes:
+        return NAMES
+    contacts = str(attributes[CONTACTS_OF_TRAIN]).split()
+    return ("instant", "cause", *(f"{contact}_{when}" for when in ("before", "after") for contact in contacts))
 
 
 def packed(table: Any) -> str:
     """The core's table of switchings as text, as an attribute can hold it: all bits of its numbers."""
-    return _text(np.asarray(table, dtype="<f8"))
+    return base64.b64encode(np.ascontiguousarray(table, dtype="<f8").tobytes()).decode()
 
 
-def packed_again(columns: Mapping[str, Any]) -> str:
+def packed_again(columns: Mapping[str, Any], attributes: Mapping[str, Any]) -> str:
     """The same from the columns of `switchings_of`."""
-    return _text(np.stack([np.asarray(columns[name], dtype="<f8") for name in NAMES], axis=1))
-
-
-def _text(rows: np.ndarray) -> str:
-    return base64.b64encode(rows.tobytes()).decode()
+    return packed(np.stack([np.asarray(columns[name], dtype="<f8") for name in names_in(attributes)], axis=1))
 
 
 @checked
@@ -49,8 +57,8 @@ def switchings_of(result: xarray.Dataset) -> xarray.Dataset:
     -------
     xarray.Dataset
         ``instant`` [s]; ``cause``, what ended the regime (its attributes name the flags); for each contact its mode before and
-        after (``input_contact_before``, ...; 2: there is none); ``output_torque_before`` and ``output_torque_after`` [N·m],
-        the left and right limit. Of a long run the first 100,000; ``switching_count`` of the result counts all.
+        after (``input_contact_before``, ...; 2: there is none); of a drive, not of a train, ``output_torque_before`` and
+        ``output_torque_after`` [N·m], the left and right limit. Of a long run the first 100,000; ``switching_count`` of the result counts all.
 
     Raises
     ------
@@ -63,21 +71,23 @@ def switchings_of(result: xarray.Dataset) -> xarray.Dataset:
         raise InputError(
             "this dataset has no switchings; give a result of simulate or open_result, attributes included"
         )
-    rows = np.frombuffer(base64.b64decode(result.attrs[ATTRIBUTE]), dtype="<f8").reshape(-1, len(NAMES))
+    names = names_in(result.attrs)
+    causes = TRAIN_CAUSES if CONTACTS_OF_TRAIN in result.attrs else CAUSES
+    rows = np.frombuffer(base64.b64decode(result.attrs[ATTRIBUTE]), dtype="<f8").reshape(-1, len(names))
     variables = {}
-    for name, values in zip(NAMES, rows.T, strict=True):
-        own = values.copy() if name.startswith(("instant", "output")) else values.astype(np.int8)
-        variables[name] = ("switching", own, _about(name))
+    for name, values in zip(names, rows.T, strict=True):
+        own = values.copy() if name == "instant" or name in TORQUES else values.astype(np.int8)
+        variables[name] = ("switching", own, _about(name, causes))
     return xr.Dataset(variables)
 
 
-def _about(name: str) -> dict[str, Any]:
+def _about(name: str, causes: Mapping[int, str]) -> dict[str, Any]:
     if name == "instant":
         return {"units": "s", "long_name": "instant of switching"}
     if name == "cause":
-        meanings = " ".join(cause.replace(" ", "_") for cause in CAUSES.values())
-        return {"long_name": "what ended the regime", "flag_values": list(CAUSES), "flag_meanings": meanings}
+        meanings = " ".join(cause.replace(" ", "_") for cause in causes.values())
+        return {"long_name": "what ended the regime", "flag_values": list(causes), "flag_meanings": meanings}
     what, _, when = name.rpartition("_")
-    if what == "output_torque":
+    if name in TORQUES:
         return {"units": "N*m", "long_name": f"output torque, {'left' if when == 'before' else 'right'} limit"}
     return {"long_name": f"mode of the {what.replace('_', ' ')} {when} the switching; 2: there is none"}

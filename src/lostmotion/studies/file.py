@@ -12,7 +12,7 @@ from ..inputs.toml_files import read_toml
 from ..simulation.result_files import FORMATS
 from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import find_scenario, read_tables
-from ..simulation.sources import load
+from ..simulation.sources import load_drive
 from .records import TABLE_OF
 from .study import Study
 
@@ -35,7 +35,7 @@ def load_study(path: str | Path) -> Study:
     if not isinstance(changes, dict):
         raise InputError(f'{path}: key set: must be a table, such as set = {{ "load.inertia" = 2 }}')
     where = find_scenario(base, path.parent)
-    scenario = load(where, changes)
+    scenario = load_drive(where, changes)
     written = {} if where.suffix in FORMATS else read_tables(where, changes)  # a result has all values written out
     for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:
         _find_sheets(entry, path.parent)

@@ -1,0 +1,49 @@
+"""A gear of a drive train: a stage between two shafts."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from ..inputs.quantities import NotNegative, ViscousFriction
+from .angle_torques import TransmissionError
+from .gearbox import Gearbox, Transmission
+from .losses import ConstantEfficiency, LossMap, MeshEfficiency, WormMesh
+from .torsion import LinearStiffness, Rigid, TorsionCurve
+
+
+class Gear(Transmission):
+    """A stage between two shafts: a gearbox, a belt, a worm, or, with the ratio 1, a coupling."""
+
+    input: str
+    """shaft"""
+    output: str
+    """shaft"""
+    stiffness: Annotated[TorsionCurve | LinearStiffness | Rigid, Field(discriminator="kind")] = Rigid()
+    """left out, rigid"""
+    losses: Annotated[ConstantEfficiency | LossMap | MeshEfficiency | WormMesh, Field(discriminator="kind")] = (
+        ConstantEfficiency(efficiency=1.0)
+    )
+    """left out, none"""
+    mesh_damping: Annotated[ViscousFriction, NotNegative] = 0.0
+    """at the output, while the flanks touch; they part when it would pull"""
+    transmission_error: TransmissionError | None = None
+    """e over the angle of the input shaft, at the output: twist = input angle/ratio - output angle - e"""
+
+    def __repr__(self) -> str:
+        laws = f"stiffness {self.stiffness.kind}, losses {self.losses.kind}"
+        return f"Gear({self.input} -> {self.output}, {self.ratio:g}:1, {laws})"
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if isinstance(self.losses, LossMap):
+            for key in ("rated_input_speed", "rated_output_torque"):
+                if getattr(self, key) is None:
+                    raise ValueError(f"lacks {key}, by which the loss map is scaled; add it")
+        return self
+
+    @classmethod
+    def of(cls, gearbox: Gearbox, *, input: str, output: str) -> Self:
+        """The gearbox between two shafts."""
+        return cls(input=input, output=output, **{name: getattr(gearbox, name) for name in Gearbox.model_fields})

@@ -1,0 +1,137 @@
+"""A shaft of a drive train: inertia, friction and drag."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from .. import _core
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Inertia,
+    NotNegative,
+    Positive,
+    QuadraticFriction,
+    Speed,
+    Torque,
+    ViscousFriction,
+)
+
+SHARE = 1e-3  # of the largest value, by which straight lines depart from a smooth law if no error is given
+
+
+def _check_points(speeds: tuple[float, ...], torques: tuple[float, ...]) -> None:
+    """Refuse points that are no curve over speed."""
+    if len(speeds) != len(torques):
+        raise ValueError(f"has {len(speeds)} speeds and {len(torques)} torques; give as many of each")
+    if speeds[0] != 0.0:
+        raise ValueError(f"has speeds that begin at {speeds[0]}; the first must be 0")
+    for k, (a, b) in enumerate(itertools.pairwise(speeds)):
+        if b <= a:
+            raise ValueError(f"speeds must rise, but speeds[{k + 1}] = {b} follows {a}")
+
+
+class FrictionCurve(Part):
+    """Dry friction torque over the magnitude of the speed: straight lines through the points, constant beyond the last."""
+
+    speeds: tuple[Annotated[Speed, NotNegative], ...] = Field(min_length=2, max_length=100)
+    """rising from 0"""
+    torques: tuple[Annotated[Torque, NotNegative], ...]
+
+    @model_validator(mode="after")
+    def _is_a_curve(self) -> Self:
+        _check_points(self.speeds, self.torques)
+        return self
+
+
+class DragCurve(Part):
+    """Torque against the motion over the magnitude of the speed: straight lines, the last of which goes on."""
+
+    kind: Literal["curve"] = "curve"
+    speeds: tuple[Annotated[Speed, NotNegative], ...] = Field(min_length=2, max_length=100)
+    """rising from 0"""
+    torques: tuple[Annotated[Torque, NotNegative], ...]
+    """the first is 0: what holds at rest is friction"""
+
+    @model_validator(mode="after")
+    def _is_a_curve(self) -> Self:
+        _check_points(self.speeds, self.torques)
+        if self.torques[0] != 0.0:
+            raise ValueError(f"has a torque of {self.torques[0]} N*m at rest; what holds at rest is friction_torque")
+        if self.torques[-1] < self.torques[-2]:
+            raise ValueError("falls at its end, so that it would drive at high speed; add a point")
+        if not any(self.torques):
+            raise ValueError("has no torque at any speed; leave drag out")
+        return self
+
+    def core(self) -> _core.TorsionCurve:
+        points = list(zip(self.speeds, self.torques, strict=True))
+        slopes = [(T2 - T1) / (w2 - w1) for (w1, T1), (w2, T2) in itertools.pairwise(points)]
+        return _core.TorsionCurve(list(self.speeds[1:-1]), slopes)
+
+
+class QuadraticDrag(Part):
+    """Torque ``coefficient * w * |w|`` of a fan or a pump, by straight lines up to `max_speed`; beyond, the last goes on."""
+
+    kind: Literal["quadratic"] = "quadratic"
+    coefficient: Annotated[QuadraticFriction, Positive]
+    max_speed: Annotated[Speed, Positive]
+    error: Annotated[Torque, Positive] | None = None
+    """by which the straight lines depart from the parabola at most; left out, 0.1 % of the torque at max_speed"""
+
+    def core(self) -> _core.TorsionCurve:
+        top = self.coefficient * self.max_speed**2
+        return _core.quadratic_drag(self.coefficient, self.max_speed, SHARE * top if self.error is None else self.error)
+
+
+class Shaft(Part):
+    """A shaft of a drive train. Rotors of motors and inertias of gears on it are added to it."""
+
+    inertia: Annotated[Inertia, NotNegative] = 0.0
+    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
+    friction_torque: Annotated[Torque, NotNegative] = 0.0
+    """T_C, dry friction while it slips"""
+    breakaway_torque: Annotated[Torque, NotNegative] | None = None
+    """T_S, dry friction at rest; left out, the same"""
+    stribeck_speed: Annotated[Speed, Positive] | None = None
+    """w_S: the friction falls from T_S to T_C by `T_C + (T_S - T_C) exp(-(w/w_S)^2)`; left out, at once"""
+    friction_error: Annotated[Torque, Positive] | None = None
+    """by which straight lines depart from that curve at most; left out, 0.1 % of T_S - T_C"""
+    friction_curve: FrictionCurve | None = None
+    """dry friction over speed, in place of friction_torque and stribeck_speed"""
+    drag: Annotated[DragCurve | QuadraticDrag, Field(discriminator="kind")] | None = None
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.inertia:.4g} kg·m²)"
+
+    @model_validator(mode="after")
+    def _friction_is_clear(self) -> Self:
+        slipping = self.friction_torque
+        if self.friction_curve is not None:
+            for key in ("friction_torque", "stribeck_speed"):
+                if getattr(self, key):
+                    raise ValueError(f"has {key} and friction_curve, which say the same; give one")
+            slipping = self.friction_curve.torques[0]
+        if self.breakaway_torque is not None and self.breakaway_torque < slipping:
+            raise ValueError(
+                f"has breakaway_torque = {self.breakaway_torque} N*m, less than its friction in motion, {slipping} N*m; "
+                "give at least that, or leave it out"
+            )
+        if self.stribeck_speed is not None and not (self.breakaway_torque or 0.0) > slipping:
+            raise ValueError("has a stribeck_speed, which needs a breakaway_torque above friction_torque; give it")
+        if self.friction_error is not None and self.stribeck_speed is None:
+            raise ValueError("has a friction_error, which belongs to stribeck_speed; leave it out")
+        return self
+
+    def friction(self) -> tuple[float, float, list[float], list[float]]:
+        """(T_C, T_S, speeds [rad/s], torques [N·m]) of its dry friction; the lists are empty where there is no curve."""
+        breakaway = self.breakaway_torque or 0.0
+        if self.friction_curve is not None:
+            return 0.0, breakaway, list(self.friction_curve.speeds), list(self.friction_curve.torques)
+        if self.stribeck_speed is None:
+            return self.friction_torque, breakaway, [], []
+        error = SHARE * (breakaway - self.friction_torque) if self.friction_error is None else self.friction_error
+        speeds, torques = _core.stribeck_curve(self.friction_torque, breakaway, self.stribeck_speed, error)
+        return self.friction_torque, breakaway, speeds, torques

@@ -1,0 +1,148 @@
+"""A drive train: shafts joined by gears and clutches, turned by motors, held by brakes, as frozen objects in SI units."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Iterator
+from typing import Annotated, Any, Self, TypeVar
+
+from pydantic import AfterValidator, Field, model_validator
+
+from .. import _core
+from ..errors import InputError
+from ..inputs.named import Named, nothing
+from ..inputs.part import Part
+from ..inputs.validation import did_you_mean, shown
+from .angle_torques import AngleTorque, Gravity
+from .couplings import Brake, Clutch, Freewheel
+from .gear import Gear
+from .losses import LossMap, MeshEfficiency, WormMesh
+from .motor import ShaftMotor
+from .parameters import numbers
+from .shaft import Shaft
+from .torsion import Rigid
+
+V = TypeVar("V")
+
+Elements = Annotated[dict[str, V], AfterValidator(Named)]
+"""by name, in the order of the equations"""
+
+# What the core calls an element (core/lostmotion/model/check.hpp), and the tables that it may stand in.
+TABLES = {
+    "shaft": ("shafts",),
+    "motor": ("motors",),
+    "gear": ("gears",),
+    "brake": ("brakes",),
+    "coupling": ("clutches", "freewheels"),
+    "angle torque": ("gravity", "angle_torques"),
+}
+
+
+class TrainElements(Part):
+    """All of a drive train but its shafts."""
+
+    motors: Elements[ShaftMotor] = Field(default_factory=nothing)
+    gears: Elements[Gear] = Field(default_factory=nothing)
+    brakes: Elements[Brake] = Field(default_factory=nothing)
+    clutches: Elements[Clutch] = Field(default_factory=nothing)
+    freewheels: Elements[Freewheel] = Field(default_factory=nothing)
+    gravity: Elements[Gravity] = Field(default_factory=nothing)
+    angle_torques: Elements[AngleTorque] = Field(default_factory=nothing)
+
+    def commanded(self) -> list[str]:
+        """Names of what has a command: motors, brakes and friction clutches."""
+        clutches = (name for name, clutch in self.clutches.items() if clutch.kind == "friction")
+        return [*self.motors, *self.brakes, *clutches]
+
+    def references(self) -> Iterator[tuple[str, str]]:
+        """Each key that names a shaft, and the name."""
+        for table in TrainElements.model_fields:
+            for name, element in getattr(self, table).items():
+                for key in ("shaft", "input", "output"):
+                    if key in type(element).model_fields:
+                        yield f"{table}.{name}.{key}", getattr(element, key)
+
+
+class DriveTrain(TrainElements):
+    """Shafts, and what joins, turns, holds and loads them."""
+
+    shafts: Elements[Shaft] = Field(min_length=1)
+
+    def __repr__(self) -> str:
+        names = {table: ", ".join(getattr(self, table)) for table in ("shafts", *TrainElements.model_fields)}
+        return f"DriveTrain({'; '.join(f'{table} {listed}' for table, listed in names.items() if listed)})"
+
+    @model_validator(mode="after")
+    def _hangs_together(self) -> Self:
+        unknown = [
+            f"key {key}: {shown(shaft)} is no shaft; "
+            + did_you_mean(shaft, self.shafts, f"the shafts are {', '.join(self.shafts)}")
+            for key, shaft in self.references()
+            if shaft not in self.shafts
+        ]
+        if unknown:
+            raise InputError("; ".join(unknown))
+        self.check(self.shafts)
+        return self
+
+    def check(self, loaded: Collection[str]) -> None:
+        """Refuse a train that cannot move, or whose motion is not determined.
+
+        Parameters
+        ----------
+        loaded
+            Names of the shafts that a load torque acts on.
+
+        Raises
+        ------
+        InputError
+            With the key of the element, what is wrong with it, and the remedy.
+        """
+        problem = self.core(loaded).check()
+        if not problem:
+            return
+        found = re.fullmatch("(shaft|motor|gear|brake|coupling|angle torque) '([^']*)' (.*)", problem)
+        if found is None:
+            raise InputError(problem)
+        kind, name, text = found.groups()
+        table = next((table for table in TABLES[kind] if name in getattr(self, table)), TABLES[kind][0])
+        raise InputError(f"key {table}.{name}: {text}")
+
+    def core(self, loaded: Collection[str]) -> _core.Train:
+        """The solver's train, where a load torque acts on some of the shafts."""
+        train = _core.Train()
+        for name, s in self.shafts.items():
+            drag = None if s.drag is None else s.drag.core()
+            train.add_shaft(name, s.inertia, s.viscous_friction, s.friction(), drag, name in loaded)
+        for name, m in self.motors.items():
+            limit = math.inf if m.torque_limit is None else m.torque_limit
+            train.add_motor(name, m.shaft, numbers(m, "motor"), m.kind == "torque_source", limit)
+        for name, g in self.gears.items():
+            _add_gear(train, name, g)
+        for name, b in self.brakes.items():
+            train.add_brake(name, b.shaft, b.torque)
+        for name, c in self.clutches.items():
+            add = train.add_clutch if c.kind == "friction" else train.add_safety_clutch
+            add(name, c.input, c.output, c.torque)
+        for name, f in self.freewheels.items():
+            train.add_freewheel(name, f.input, f.output)
+        turning: dict[str, Any] = {**self.gravity, **self.angle_torques}
+        for name, t in turning.items():
+            train.add_angle_torque(name, t.shaft, t.core())
+        return train
+
+
+def _add_gear(train: _core.Train, name: str, gear: Gear) -> None:
+    stiffness, losses, error = gear.stiffness, gear.losses, gear.transmission_error
+    train.add_gear(
+        name,
+        gear.input,
+        gear.output,
+        numbers(gear, "gearbox"),
+        torsion_curve=None if isinstance(stiffness, Rigid) else stiffness.core(),
+        loss_map=losses.core() if isinstance(losses, LossMap) else None,
+        efficiencies=losses.efficiencies() if isinstance(losses, MeshEfficiency | WormMesh) else None,
+        mesh_damping=gear.mesh_damping,
+        transmission_error=None if error is None else error.core(),
+    )

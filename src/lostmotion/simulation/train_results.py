@@ -1,0 +1,86 @@
+"""Runs of drive trains, and their results."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..model.torsion import Rigid
+from ..model.train import DriveTrain
+from .results import RawResult, installed_version
+from .switchings import ATTRIBUTE as SWITCHINGS
+from .switchings import CONTACTS_OF_TRAIN, packed
+from .train_scenario import TrainScenario
+from .train_state import start_values
+
+
+def run_train(scenario: TrainScenario, options: tuple[Any, ...], how: str, *, ledger: bool) -> RawResult:
+    """A run of a drive train.
+
+    Parameters
+    ----------
+    options
+        Duration [s], sample interval [s], samples, whether to keep the energy ledger, relative tolerance (0: exact), and how
+        many switchings are kept.
+    """
+    train = scenario.train()
+    core = train.core(scenario.loaded())
+    signals = scenario.signals()
+    inputs = [signals[name].core() for name in core.input_names()]
+    capacities = {name: h for name, h in scenario.initial.hysteresis_capacities.items() if h}
+    result = _core.run_train(core, inputs, start_values(train, scenario.initial), capacities, *options)
+    time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
+    data = dict(zip((name for name, _, _ in core.channels()), result["values"], strict=True))
+    _add_derived(train, data, time)
+    attributes = _attributes(scenario, result, how, ledger=ledger)
+    return RawResult(time, data, attributes | {CONTACTS_OF_TRAIN: " ".join(core.contact_names())})
+
+
+def _attributes(scenario: TrainScenario, result: dict[str, Any], how: str, *, ledger: bool) -> dict[str, Any]:
+    attributes = {
+        "title": scenario.title,
+        "scenario": scenario.to_json(),
+        "solver": how,
+        "lostmotion_version": installed_version(),
+        "switching_count": int(result["switching_count"]),
+        "end_state": json.dumps(result["end_state"]),
+        "steps": int(result["steps"]),
+        SWITCHINGS: packed(result["switchings"]),
+    }
+    if ledger:
+        attributes["energy"] = json.dumps(result["energy"])
+    if np.isfinite(result["left_data_at"]):
+        attributes["warning"] = (
+            f"from t = {result['left_data_at']:.6g} s on a loss map is used outside its data; there it continues with the slope "
+            "of its edge. Extend the losses of the gear."
+        )
+    if notes := [f"{name}: {gear.note}" for name, gear in scenario.gears.items() if gear.note]:
+        attributes["note"] = " ".join(notes)
+    return attributes
+
+
+def _add_derived(train: DriveTrain, data: dict[str, np.ndarray], time: np.ndarray) -> None:
+    """Adds what the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
+    for name, gear in train.gears.items():
+        if isinstance(gear.stiffness, Rigid):
+            data.setdefault(f"{name}_twist", np.zeros_like(time))
+    known = [name for name in train.shafts if f"{name}_angle" in data]
+    while known:
+        shaft = known.pop()
+        for name, gear in train.gears.items():
+            if shaft not in (gear.input, gear.output):
+                continue
+            other = gear.output if shaft == gear.input else gear.input
+            if f"{other}_angle" in data:
+                continue
+            angle, twist = data[f"{shaft}_angle"], data[f"{name}_twist"]
+            if other == gear.input:  # without a transmission error, which needs that angle in the solver
+                data[f"{other}_angle"] = gear.ratio * (angle + twist)
+            else:
+                error = gear.transmission_error
+                e = 0.0 if error is None else np.vectorize(error.core())(angle)
+                data[f"{other}_angle"] = angle / gear.ratio - twist - e
+            known.append(other)

@@ -1,0 +1,185 @@
+"""A scenario in the long form: a drive train, what acts on it and what is wanted of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import Field, model_validator
+
+from ..data_sheets.components import Conditions
+from ..data_sheets.train_components import RECORDS, use_train_records
+from ..errors import InputError
+from ..inputs.named import nothing
+from ..inputs.part import Part
+from ..inputs.quantities import Angle, NotNegative, Speed, Torque
+from ..inputs.validation import did_you_mean
+from ..model.shaft import Shaft
+from ..model.signals import CommandSignal, TorqueSignal
+from ..model.train import DriveTrain, Elements, TrainElements
+from .keys import set_values
+from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, json_schema
+from .train_state import start_values
+from .train_variables import check_names
+
+
+class ShaftTable(Shaft):
+    """A shaft and the load torque on it."""
+
+    torque: TorqueSignal | None = None
+    """M_Z, against its motion; left out, none can act on it"""
+
+
+class TrainInitial(Part):
+    """State at t = 0; what is left out is 0."""
+
+    speeds: Elements[Speed] = Field(default_factory=nothing)
+    """of shafts"""
+    angles: Elements[Angle] = Field(default_factory=nothing)
+    """of shafts; those of others follow through the gears"""
+    twists: Elements[Angle] = Field(default_factory=nothing)
+    """of gears with a stiffness"""
+    motor_torques: Elements[Torque] = Field(default_factory=nothing)
+    """of DC motors"""
+    hysteresis_capacities: Elements[Annotated[Torque, NotNegative]] = Field(default_factory=nothing)
+    """of gears with hysteresis: what the last turning point before t = 0 left behind"""
+
+
+class TrainScenario(TrainElements):
+    """A drive train, what acts on it, and what is wanted of it."""
+
+    title: str = ""
+    shafts: Elements[ShaftTable] = Field(min_length=1)
+    command: Elements[CommandSignal] = Field(default_factory=nothing)
+    """of each motor (1 is rated voltage, or with a torque source rated torque; left out, 0), brake and friction clutch (1 is the full torque, 0 none)"""
+    initial: TrainInitial = TrainInitial()
+    simulation: SimulationTable
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        train = self.train()
+        train.check(self.loaded())
+        check_names(train, self.loaded())
+        known = self.commanded()
+        for name in self.command:
+            if name not in known:
+                meant = did_you_mean(name, known, f"those with a command are {', '.join(known) or 'none'}")
+                raise InputError(f"key command.{name}: is no motor, brake or friction clutch of this train; {meant}")
+        idle = [f"command.{name}" for name in known if name not in self.command and name not in self.motors]
+        if idle:
+            keys = f"key {idle[0]}: is" if len(idle) == 1 else f"keys {', '.join(idle)}: are"
+            raise InputError(f"{keys} missing; add a number from 0 (open) to 1 (full torque), or a signal")
+        start_values(train, self.initial)
+        return self
+
+    def train(self) -> DriveTrain:
+        """The drive train without its surroundings."""
+        shafts = {
+            name: Shaft(**{key: getattr(s, key) for key in Shaft.model_fields}) for name, s in self.shafts.items()
+        }
+        return DriveTrain(shafts=shafts, **{table: getattr(self, table) for table in TrainElements.model_fields})
+
+    def loaded(self) -> list[str]:
+        """Names of the shafts that a load torque acts on."""
+        return [name for name, shaft in self.shafts.items() if shaft.torque is not None]
+
+    def signals(self) -> dict[str, CommandSignal | TorqueSignal]:
+        """All that acts on the train, by the name of its result variable."""
+        commands = {f"{name}_command": self.command.get(name, CommandSignal()) for name in self.commanded()}
+        torques = {f"{name}_load_torque": s.torque for name, s in self.shafts.items() if s.torque is not None}
+        return {**commands, **torques}
+
+    def __repr__(self) -> str:
+        title = f"{self.title!r}, " if self.title else ""
+        time = f"{self.simulation.duration:.4g} s, {self.simulation.samples} samples"
+        return f"TrainScenario({title}{self.train()!r}, {time})"
+
+    def replace(self, **changes: Any) -> TrainScenario:
+        """The same scenario with changes by dotted key, such as ``**{"gears.belt.ratio": 3}``, checked anew."""
+        data = self.model_dump()
+        set_values(data, changes.items())
+        use_train_records(data)
+        return TrainScenario(**data)
+
+    def to_json(self) -> str:
+        """All values in SI, as JSON that `from_json` reads."""
+        return self.model_dump_json(exclude_none=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> TrainScenario:
+        return cls.model_validate_json(text)
+
+    @classmethod
+    def _described_by(cls) -> dict[str, Any]:
+        return train_schema()
+
+
+def is_train(tables: Mapping[str, Any]) -> bool:
+    """Whether the tables of a scenario are in the long form."""
+    return any(table in tables for table in ("shafts", *TrainElements.model_fields))
+
+
+def train_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
+    """The scenario of such tables.
+
+    Raises
+    ------
+    InputError
+        A record is unknown or lacks what a run needs; a value cannot be used.
+    """
+    data = dict(tables)
+    use_train_records(data)
+    return TrainScenario(**data)
+
+
+def train_schema() -> dict[str, Any]:
+    """JSON Schema of scenario files in the long form, for editors."""
+    schema = TrainScenario.model_json_schema()
+    schema["properties"] = {key: schema["properties"][key] for key in ("title", "shafts")} | schema["properties"]
+    schema["properties"]["base"] = BASE
+    schema["required"] = []  # with a base, none
+    for table, (key, own) in RECORDS.items():
+        elements = schema["properties"][table]
+        whole = elements["additionalProperties"]
+        conditions = Conditions.model_json_schema()["properties"] if table == "gears" else {}
+        part = schema["$defs"][whole["$ref"].rsplit("/", 1)[1]]
+        from_record = {
+            "type": "object",
+            "properties": {key: RECORD_NAME} | conditions | {name: part["properties"][name] for name in own},
+            "required": [key, *(name for name in own if name in part["required"])],
+            "description": f"As {part['title']}, with the values of a record of the catalogue, or of a sheet file; other keys take the "
+            "place of its values.",
+        }
+        elements["additionalProperties"] = {"anyOf": [whole, from_record]}
+    return schema
+
+
+def file_schema() -> dict[str, Any]:
+    """JSON Schema of scenario files, in the short or the long form."""
+    of_drive, of_train = json_schema(), json.loads(json.dumps(train_schema()).replace('"#/$defs/', '"#/$defs/train_'))
+    definitions = of_drive.pop("$defs") | {f"train_{name}": node for name, node in of_train.pop("$defs").items()}
+    return {"title": "Scenario file", "anyOf": [of_drive, of_train], "$defs": definitions}
+
+
+def in_long_form(scenario: Scenario) -> TrainScenario:
+    """A scenario in the short form as one in the long form: shafts `motor` and `load`, gear `gearbox`, motor `motor`."""
+    train = scenario.drive().train()
+    start = scenario.initial
+    load = {key: getattr(train.shafts["load"], key) for key in Shaft.model_fields}
+    initial = TrainInitial(
+        speeds={"motor": start.motor_speed, "load": start.load_speed},
+        angles={"load": start.load_angle},
+        twists={"gearbox": start.twist} if start.twist else {},
+        motor_torques={"motor": start.motor_torque} if start.motor_torque else {},
+        hysteresis_capacities={"gearbox": start.hysteresis_capacity} if start.hysteresis_capacity else {},
+    )
+    return TrainScenario(
+        title=scenario.title,
+        shafts={"motor": ShaftTable(), "load": ShaftTable(**load, torque=scenario.load.torque)},
+        motors=train.motors,
+        gears=train.gears,
+        command={"motor": scenario.command},
+        initial=initial,
+        simulation=scenario.simulation,
+    )

@@ -1,0 +1,116 @@
+"""The state of a drive train at the beginning of a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from ..errors import InputError
+from ..inputs.validation import did_you_mean
+from ..model.gear import Gear
+from ..model.torsion import Rigid
+from ..model.train import DriveTrain
+
+ROUNDING = 1e-12  # relative, between values that belong together
+
+
+def start_values(train: DriveTrain, initial: Any) -> dict[str, float]:
+    """Values at t = 0 by the name of their result variable; what is not among them is 0.
+
+    Raises
+    ------
+    InputError
+        A name is unknown, or values contradict each other.
+    """
+    stiff = [name for name, g in train.gears.items() if not isinstance(g.stiffness, Rigid)]
+    lossy = [name for name in stiff if (h := train.gears[name].hysteresis) is not None and h.efficiency < 1.0]
+    electric = [name for name, m in train.motors.items() if m.kind == "dc"]
+    _check("speeds", initial.speeds, train.shafts, "shaft")
+    _check("angles", initial.angles, train.shafts, "shaft")
+    _check("twists", initial.twists, stiff, "gear with a stiffness")
+    _check("motor_torques", initial.motor_torques, electric, 'motor of kind "dc"')
+    _check("hysteresis_capacities", initial.hysteresis_capacities, lossy, "gear with hysteresis")
+    for name, gear in train.gears.items():
+        if isinstance(gear.stiffness, Rigid):
+            _check_rigid(name, gear, initial.speeds)
+    angles = angles_at_start(train, initial.angles, initial.twists)
+    values = {
+        f"{name}_{what}": v for what, of in (("speed", initial.speeds), ("angle", angles)) for name, v in of.items()
+    }
+    values |= {f"{name}_twist": v for name, v in initial.twists.items()}
+    values |= {f"{name}_torque": v for name, v in initial.motor_torques.items()}
+    return values
+
+
+def _check(key: str, given: Iterable[str], known: Iterable[str], what: str) -> None:
+    known = list(known)
+    for name in given:
+        if name not in known:
+            meant = did_you_mean(name, known, f"there are {', '.join(known)}" if known else "there is none")
+            raise InputError(f"key initial.{key}.{name}: is no {what} of this train; {meant}")
+
+
+def _check_rigid(name: str, gear: Gear, speeds: Mapping[str, float]) -> None:
+    fast, slow = speeds.get(gear.input, 0.0), speeds.get(gear.output, 0.0)
+    if abs(fast / gear.ratio - slow) > ROUNDING * abs(slow):
+        raise InputError(
+            f"key initial.speeds: {gear.input} = {fast} rad/s and {gear.output} = {slow} rad/s do not fit the rigid gear "
+            f"{name}; their quotient must be its ratio, {gear.ratio:g}"
+        )
+
+
+def angles_at_start(train: DriveTrain, given: Mapping[str, float], twists: Mapping[str, float]) -> dict[str, float]:
+    """The angles of all shafts [rad], from those that are given through the gears to the others.
+
+    Raises
+    ------
+    InputError
+        Two that are given contradict each other.
+    """
+    angles, origin = dict(given), {shaft: shaft for shaft in given}
+    waiting = list(given)
+    unreached = list(train.shafts)  # where none is given, the last shaft of a chain is at 0
+    while waiting or unreached:
+        if not waiting:
+            start = unreached.pop()
+            if start in angles:
+                continue
+            angles[start], origin[start] = 0.0, start
+            waiting.append(start)
+        shaft = waiting.pop(0)
+        for name, gear in train.gears.items():
+            if shaft not in (gear.input, gear.output):
+                continue
+            other = gear.output if shaft == gear.input else gear.input
+            angle = _through(gear, twists.get(name, 0.0), angles[shaft], forward=shaft == gear.input)
+            if other not in angles:
+                angles[other], origin[other] = angle, origin[shaft]
+                waiting.append(other)
+            elif origin[other] != origin[shaft] and not math.isclose(
+                angles[other], angle, rel_tol=ROUNDING, abs_tol=ROUNDING
+            ):
+                one, two = origin[other], origin[shaft]
+                raise InputError(
+                    f"key initial.angles.{two}: {given[two]} rad does not fit {one} = {given[one]} rad through the gear {name} and "
+                    "its twist; give one of them"
+                )
+    return angles
+
+
+def _through(gear: Gear, twist: float, angle: float, *, forward: bool) -> float:
+    """The angle at the other side of a gear: twist = input angle/ratio - output angle - transmission error."""
+    error = gear.transmission_error
+    if forward:
+        return angle / gear.ratio - twist - (error.core()(angle) if error is not None else 0.0)
+    if error is None:
+        return gear.ratio * (angle + twist)
+    e = error.core()
+    # Of angle_in - ratio e(angle_in) = ratio (angle + twist); e is small against the angle of a turn.
+    wanted = gear.ratio * (angle + twist)
+    found = wanted
+    for _ in range(200):
+        found, before = wanted + gear.ratio * e(found), found
+        if found == before:
+            break
+    return found
