@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 import struct
 import sys
 import tempfile
@@ -174,9 +175,13 @@ def as_toml(value: Any) -> str:
     return json.dumps(value)
 
 
+def as_key(name: str) -> str:
+    return name if re.fullmatch("[A-Za-z0-9_-]+", name) else json.dumps(name)
+
+
 def record(groups: Groups) -> None:
     tables = (
-        "\n".join([f"[{name}]", *(f"{k} = {as_toml(entry(v))}" for k, v in values.items())])
+        "\n".join([f"[{name}]", *(f"{as_key(k)} = {as_toml(entry(v))}" for k, v in values.items())])
         for name, values in groups.items()
     )
     FILE.write_text("\n\n".join([HEADER.rstrip(), *tables]) + "\n", encoding="utf-8")
