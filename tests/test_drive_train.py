@@ -385,6 +385,93 @@ def test_a_saved_result_of_a_train_is_read_back_and_run_again(tmp_path: Path, en
     assert halved.gears["belt"].ratio == 1.0
 
 
+def two_shafts(**tables: Any) -> lm.TrainScenario:
+    """Two shafts, a torque source on the first, and these tables."""
+    base: dict[str, Any] = {
+        "shafts": {"a": {"inertia": 1e-3}, "b": {"inertia": 2e-3, "torque": 0.0}},
+        "motors": {"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 1e-4}},
+        "command": {"m": {"mean": 0.3, "amplitude": 1.0, "frequency": 2.0}},
+        "simulation": {"duration": 0.6, "sample_interval": 1e-3},
+    }
+    return lm.TrainScenario(**base | {name: {**base.get(name, {}), **table} for name, table in tables.items()})
+
+
+SOFT = {"input": "a", "output": "b", "ratio": 2.0, "stiffness": {"kind": "linear", "stiffness": 50.0}}
+STIFF = {"input": "a", "output": "b", "ratio": 2.0}
+STRIBECK = {"friction_torque": 0.1, "breakaway_torque": 0.2, "stribeck_speed": 1.0, "friction_error": 0.002}
+FAN = {"kind": "quadratic", "coefficient": 1e-5, "max_speed": 300.0, "error": 0.005}
+GAP = {"kind": "curve", "backlash": 0.1, "slopes": [100.0]}
+ERROR = {"kind": "sine", "amplitude": 1e-3, "order": 5, "error": 1e-5}
+ELEMENTS = {
+    "brake": two_shafts(
+        gears={"g": SOFT},
+        brakes={"k": {"shaft": "b", "torque": 3.0}},
+        command={"k": {"steps": [{"height": 1.0, "time": 0.2}, {"height": -1.0, "time": 0.4}]}},
+    ),
+    "clutch": two_shafts(
+        clutches={"c": {"input": "a", "output": "b", "torque": 0.6}},
+        command={"c": {"ramps": [{"rise": 1.0, "duration": 0.3, "begin": 0.1}]}},
+    ),
+    "safety clutch": two_shafts(clutches={"c": {"kind": "safety", "input": "a", "output": "b", "torque": 0.6}}),
+    "freewheel": two_shafts(freewheels={"f": {"input": "a", "output": "b"}}),
+    "gravity": two_shafts(gears={"g": SOFT}, gravity={"arm": {"shaft": "b", "mass": 0.5, "radius": 0.2}}),
+    "cogging": two_shafts(
+        gears={"g": STIFF},
+        angle_torques={"cog": {"kind": "sine", "shaft": "a", "amplitude": 0.02, "order": 12, "error": 0.001}},
+    ),
+    "transmission error": two_shafts(gears={"g": SOFT | {"mesh_damping": 0.01, "transmission_error": ERROR}}),
+    "friction over speed": two_shafts(gears={"g": SOFT}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, **STRIBECK}}),
+    "drag": two_shafts(gears={"g": STIFF}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, "drag": FAN}}),
+    "damped play": two_shafts(gears={"g": SOFT | {"stiffness": GAP, "mesh_damping": 0.2}}),
+    "torque limit": two_shafts(
+        gears={"g": STIFF},
+        motors={"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 1e-4, "torque_limit": 0.5}},
+    ),
+    "worm and brake": train(),
+}
+
+
+@pytest.mark.parametrize("scenario", ELEMENTS.values(), ids=ELEMENTS)
+def test_both_solvers_agree_on_every_element(scenario: lm.TrainScenario) -> None:
+    exact = lm.simulate(scenario)
+    coarse, fine = (
+        lm.simulate(scenario, solver="dormand-prince", relative_tolerance=tolerance) for tolerance in (1e-8, 1e-10)
+    )
+    for name in exact:
+        if str(name).endswith(("_speed", "_angle", "_twist")):
+            size = float(abs(exact[name]).max()) or 1.0
+            open_by = float(abs(coarse[name] - fine[name]).max()) / size  # what the tolerance leaves open
+            assert float(abs(exact[name] - fine[name]).max()) / size <= 2.0 * open_by + 1e-9, name
+    ledger = lm.energy_of(exact)
+    assert abs(ledger["residual"]) <= 1e-9 * ledger["turned_over"]
+
+
+def test_a_pendulum_swings_with_its_period() -> None:
+    small = 0.02  # rad; the period of a pendulum is longer by small^2/16
+    scenario = lm.TrainScenario(
+        shafts={"arm": {"inertia": 2.0 * 0.3**2}},
+        gravity={"mass": {"shaft": "arm", "mass": 2.0, "radius": 0.3, "error": 1e-7}},
+        initial={"angles": {"arm": small}},
+        simulation={"duration": 3.0, "sample_interval": 1e-3},
+    )
+    result = lm.simulate(scenario)
+    expected = small * np.cos(math.sqrt(9.80665 / 0.3) * result["time"].values)
+    phase = math.sqrt(9.80665 / 0.3) * 3.0  # by a small^2/16th of which it lags at the end
+    assert float(abs(result["arm_angle"] - expected).max()) < 1.5 * small * phase * small**2 / 16.0
+
+
+def test_friction_that_jams_ends_in_one_line() -> None:
+    worm = {"losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.5, "backdrive_efficiency": -0.2}}
+    scenario = lm.TrainScenario(
+        shafts={"worm": {"inertia": 1e-4}, "drum": {"inertia": 2.0, "torque": 20.0}},
+        gears={"g": {"input": "worm", "output": "drum", "ratio": 50.0, **worm}},
+        initial={"speeds": {"worm": -100.0, "drum": -2.0}},
+        simulation={"duration": 0.1, "sample_interval": 1e-3},
+    )
+    with pytest.raises(lm.SolverError, match="the friction jams"):
+        lm.simulate(scenario)
+
+
 def test_a_self_locking_worm_holds_lowers_smoothly_or_chatters() -> None:
     """Efficiencies of its drawing: eta_b = tan(g - r)/tan g with g = 4 deg, tan r = 0.084; i = 50, load 20 N m."""
     tan_g = math.tan(math.radians(4.0))
