@@ -172,6 +172,15 @@ def test_angles_at_the_start_follow_through_the_gears() -> None:
         train(**{"initial.angles": {"motor": 1.0, "table": 0.2}})
 
 
+def test_gravity_and_a_torque_over_angle_need_names_of_their_own() -> None:
+    torques = {
+        "gravity": {"arm": {"shaft": "table", "mass": 1.0, "radius": 0.1}},
+        "angle_torques": {"arm": {"kind": "sine", "shaft": "table", "amplitude": 0.1}},
+    }
+    with pytest.raises(lm.InputError, match=r"^keys gravity.arm, angle_torques.arm: have the same name; rename one"):
+        lm.TrainScenario(**TRAIN | torques)
+
+
 def test_a_name_that_no_variable_can_have_is_refused() -> None:
     with pytest.raises(lm.InputError, match='key shafts: must not have the name "my shaft"; a name is made of'):
         lm.TrainScenario(**TRAIN | {"shafts": TRAIN["shafts"] | {"my shaft": {"inertia": 1}}})

@@ -83,6 +83,10 @@ class DriveTrain(TrainElements):
         ]
         if unknown:
             raise InputError("; ".join(unknown))
+        if twice := [name for name in self.gravity if name in self.angle_torques]:
+            raise InputError(
+                f"keys gravity.{twice[0]}, angle_torques.{twice[0]}: have the same name; rename one of them"
+            )
         self.check(self.shafts)
         return self
 
