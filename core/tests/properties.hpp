@@ -49,6 +49,44 @@ class SelfLockingDrives : public RandomDrives {
     bool hysteresis_;
 };
 
+// Drives at rest that nothing holds but the mesh, and that not before a load comes: no friction, no loss without load.
+// Their gears lock or nearly do so, and what sets them in motion rises from zero.
+class UnloadedDrives : public RandomDrives {
+ public:
+    using RandomDrives::RandomDrives;
+
+    Drive drive() {
+        Drive d;
+        const double J = spread(1e-6, 1e-4), T = spread(1.0, 300.0), i = uniform(5.0, 100.0), k = spread(1e2, 1e5);
+        d.motor.rotor_inertia = d.gearbox.inertia = J;
+        d.motor.rated_torque = T / i;
+        d.motor.rated_speed = 300.0;
+        d.motor.electrical_time_constant = 1e-4;
+        d.motor.armature_voltage_constant = uniform(1.5, 6.0);
+        Gearbox& g = d.gearbox;
+        g.ratio = i;
+        g.rated_input_speed = 300.0;
+        g.rated_output_torque = T;
+        g.compliance = Gearbox::torsion_curve;
+        g.curve = coin() ? TorsionCurve({0.3 * T / k}, {0.2 * k, k}) : TorsionCurve({}, {k});
+        if (coin()) g.hysteresis_efficiency = uniform(0.7, 0.99);
+        g.losses = Gearbox::loss_map;
+        const double moving = 1.5 * uniform(0.5, 1.5), still = 1.2 * moving, fast = coin(0.2) ? 0.05 : 0.0;
+        g.map = LossMap({0.0, 1.0}, {-1.5, 0.0, 1.5}, {still, moving, 0.0, fast, still, moving});
+        d.load.inertia = J * i * i * spread(0.1, 10.0);
+        if (coin()) d.load.viscous_friction = 0.1 * T;
+        return d;
+    }
+    Signals from_zero(const Drive& d) {
+        const double T = d.gearbox.rated_output_torque;
+        Signals s{sine(coin(0.3) ? 0.0 : uniform(0.1, 1.0), uniform(0.5, 5.0)),
+                  sine(T * uniform(0.0, 1.0), uniform(0.5, 8.0))};
+        if (coin()) s[0].knots[0].value = uniform(-1.0, 1.0);
+        if (coin()) s[1].knots[0].value = 0.2 * T;
+        return s;
+    }
+};
+
 // Inputs that move for a while and are constant, or zero, from then on.
 inline Signals that_end(Signals s, double at, bool in_zero) {
     for (Signal& signal : s) {

@@ -140,6 +140,28 @@ TEST_SUITE("dying_out") {
             }
         }
     }
+    TEST_CASE("drives that nothing holds start from rest as with a friction of 1e-12 of the rated torque") {
+        UnloadedDrives random(7);
+        double worst = 0.0;
+        for (int n = 0; n < 2000; ++n) {
+            const Drive drive = random.drive();
+            const Signals signals = random.from_zero(drive);
+            Drive held = drive;
+            held.motor.friction_torque = 1e-12 * drive.motor.rated_torque;
+            const Samples s = run(drive, signals, 0.02, 1e-3), h = run(held, signals, 0.02, 1e-3);
+            CAPTURE(n);
+            CHECK(s.report.status == Status::done);
+            REQUIRE(h.report.status == Status::done);
+            const double gap = difference_at_end(drive, s, h.report.x);
+            CHECK(gap < 1e-6);
+            worst = std::fmax(worst, gap);
+            if (n % 50 == 0) {
+                CHECK(run(drive, signals, 0.02, 1e-3, {}, 1e-8).report.status == Status::done);
+                CHECK(referee::referee_agrees(drive, signals, 0.01, 1e-3, run(drive, signals, 0.01, 1e-3), 1e-8));
+            }
+        }
+        std::printf("dying out: 2000 drives start from rest, largest effect of a friction of 1e-12 %.1e\n", worst);
+    }
     TEST_CASE("everything that holds a load vanishes with it: a swinging load on a locked input") {
         // w = 0.25 cos 8 t; capacity b |T_2|/i and held torque |T_2|/i pass zero together at t = pi/16 k.
         Drive d = plain_drive(2.0, 1.0, 4.0);

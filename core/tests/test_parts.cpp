@@ -90,6 +90,24 @@ TEST_SUITE("parts") {
         CHECK(mirrored(0.5, 0.3) == Approx(0.02 + 0.012 + 0.03));
         CHECK(mirrored(-0.5, 0.3) == Approx(mirrored(0.5, 0.3)));
     }
+    TEST_CASE("a loss map without loss at no load and standstill has none there in any cell, to the last bit") {
+        RandomDrives random(11);
+        for (int n = 0; n < 1000; ++n) {
+            std::vector<double> speeds{0.0}, loads{0.0}, values;
+            for (int k = 0; k < 3; ++k) {
+                speeds.push_back(speeds.back() + random.uniform(0.1, 1.0));
+                loads.insert(loads.begin(), loads.front() - random.uniform(0.1, 1.0));
+                loads.push_back(loads.back() + random.uniform(0.1, 1.0));
+            }
+            for (const double mu : loads)
+                for (const double v : speeds) values.push_back(mu == 0.0 && v == 0.0 ? 0.0 : random.uniform(0.0, 1.0));
+            const LossMap map(speeds, loads, values);
+            for (const double mu : {-1e-9, 1e-9}) {
+                for (const double v : {0.0, 1e-12, 1e-6}) CHECK(map.plane(map.triangle(mu, v)).at_zero == 0.0);
+                CHECK(map.line_at_standstill(map.load_interval(mu)).at_zero == 0.0);
+            }
+        }
+    }
     TEST_CASE("propagation agrees with an exponential in extended precision, over nine decades of time") {
         RandomDrives random(3);
         for (int n = 0; n < 12; ++n) {

@@ -64,13 +64,16 @@ class LossMap {
         p.per_speed = (value(row, i + 1) - value(row, i)) / dv;
         p.per_load = (value(j + 1, column) - value(j, column)) / dm;
         p.at_zero = value(row, column) - p.per_speed * speeds_[column] - p.per_load * loads_[row];
+        // Without load at standstill, rounding must not leave a loss where there is none: nothing else may hold.
+        const int far_row = upper ? j : j + 1, far_column = rising(j) == upper ? i + 1 : i;
+        if (no_loss_at_origin(row, far_column) || no_loss_at_origin(far_row, column)) p.at_zero = 0.0;
         return p;
     }
     // On the line v = 0, as a function of mu alone.
     Plane line_at_standstill(int j) const {
         Plane p;
         p.per_load = (value(j + 1, 0) - value(j, 0)) / (loads_[j + 1] - loads_[j]);
-        p.at_zero = value(j, 0) - p.per_load * loads_[j];
+        p.at_zero = no_loss_at_origin(j + 1, 0) ? 0.0 : value(j, 0) - p.per_load * loads_[j];
         return p;
     }
 
@@ -118,6 +121,8 @@ class LossMap {
  private:
     int cells_along_speed() const { return static_cast<int>(speeds_.size()) - 1; }
     double value(std::size_t j, std::size_t i) const { return values_[j * speeds_.size() + i]; }
+    // Is this node that of no load at standstill, and without loss?
+    bool no_loss_at_origin(int j, int i) const { return loads_[j] == 0.0 && speeds_[i] == 0.0 && value(j, i) == 0.0; }
     // Diagonals rise for mu > 0 and fall for mu < 0, so that a map mirrored in its data is mirrored in its triangles.
     bool rising(int j) const { return loads_[j] + loads_[j + 1] >= 0.0; }
 
