@@ -19,7 +19,7 @@ test-core: $(VENV)/tools
 	echo '#include <doctest/doctest.h>' | c++ -E -x c++ - >/dev/null 2>&1 || { apt-get update -q && apt-get install -qy doctest-dev; }
 	$(BIN)/cmake -S . -B build/core -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_TESTS=ON -DLOSTMOTION_WERROR=ON >build/core.log
 	$(BIN)/cmake --build build/core
-	$(BIN)/ctest --test-dir build/core --output-on-failure
+	$(BIN)/ctest --test-dir build/core --output-on-failure --parallel 2
 
 # 100,000 random drives of each kind; CASES and SEED choose others.
 CASES ?= 100000
