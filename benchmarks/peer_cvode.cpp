@@ -118,7 +118,7 @@ class Cvode {
             for (int k = 0; k < old.n_guards; ++k)
                 if (found[k] < 0) fired = &old.guards[k];
             if (fired == nullptr) continue;  // a guard that rises from zero, where the regime began
-            if (system_.next(cache_, now, fired, key) != Found::yes) return false;
+            if (system_.next(cache_, now, fired, key, now.input[0]) != Found::yes) return false;
             enter(now, key);
         }
         return true;
@@ -136,7 +136,7 @@ class Cvode {
         user_.regime = &r;
         user_.memory = now.memory;
         user_.left_zero = {};
-        user_.linear = LinearRates(r);
+        user_.linear = LinearRates(r.rate);
         user_.constant = user_.linear.constant(now.memory);
         std::copy_n(now.x.begin(), n_states, N_VGetArrayPointer(y_));
         CVodeReInit(memory_, now.time, y_);
