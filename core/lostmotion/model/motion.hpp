@@ -2,14 +2,12 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
 #include <utility>
 
+#include "../kernel/flow.hpp"
 #include "row.hpp"
 
 namespace lostmotion::model {
-
-inline constexpr int n_derivatives = 6;
 
 // All that a regime's equations depend on at one instant. The kernel's is the same with its own dimensions.
 struct Instant {
@@ -19,12 +17,6 @@ struct Instant {
     std::array<std::array<double, max_inputs>, n_derivatives> input{};  // [k]: k-th derivatives
     std::array<double, max_inputs> input_size{};
 };
-
-// A form counts as zero within this multiple of the sum of the magnitudes of its terms. Its coefficients come from an
-// elimination and carry more than one rounding.
-inline constexpr double rounding = 0x1p14 * std::numeric_limits<double>::epsilon();
-// Rounding of an instant, relative to the time since the start.
-inline constexpr double time_rounding = 4.0 * std::numeric_limits<double>::epsilon();
 
 // Added up as the kernel does: the constants, the inputs, the coupled states in fours, the angles.
 template <class Sizes, class F, class Now>

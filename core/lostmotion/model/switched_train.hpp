@@ -25,11 +25,6 @@
 
 namespace lostmotion::model {
 
-// A guard that is further from zero than this share of its terms, and of what they are at rated load and speed times
-// `far_from_event`, is not at zero.
-inline constexpr double clear_of_zero = 1e-3;
-inline constexpr double far_from_event = 1e-6;
-
 // The kernel's regimes have room for more guards than they use.
 template <class R>
 std::size_t guard_count(const R& r) {
