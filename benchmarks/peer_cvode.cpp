@@ -129,7 +129,7 @@ class Cvode {
         input_.anchor(t);
         now.time = t;
         now.input = input_.jet();
-        now.input_size = input_.sizes();
+        now.input_magnitudes = input_.magnitudes();
     }
     void enter(const Instant& now, const RegimeKey& key) {
         const Regime& r = cache_.regime(key);

@@ -72,7 +72,7 @@ inline void write_row(const LinearForm& form, const Memory& memory, double* to) 
 inline nb::tuple linearization(const SharedDrive& shared, const StateNumbers& x, double capacity, const InputNumbers& u,
                                const InputNumbers& slope) {
     Signals signals = ramped_inputs<DriveDims>();
-    for (int i = 0; i < n_inputs; ++i) signals[i].knots[0] = {0.0, u[i], slope[i]};
+    for (int i = 0; i < n_inputs; ++i) signals[i].breakpoints[0] = {0.0, u[i], slope[i]};
     const SwitchedDrive system(shared.drive);
     ExactSolver<SwitchedDrive> solver(system, signals, 1e-3, shared.drive.balanced_scale());
     check(solver.begin(0.0, to_state(x), {capacity, 0.0}), 0.0, input_contact);

@@ -58,8 +58,8 @@ inline Drive make_drive(const std::map<std::string, double>& values, bool torque
 inline Signal make_signal(const std::vector<std::array<double, 3>>& breakpoints,
                           const std::vector<std::array<double, 3>>& sines) {
     Signal s;
-    s.knots.clear();
-    for (const auto& [time, value, slope] : breakpoints) s.knots.push_back({time, value, slope});
+    s.breakpoints.clear();
+    for (const auto& [time, value, slope] : breakpoints) s.breakpoints.push_back({time, value, slope});
     for (const auto& [amplitude, frequency, phase] : sines) s.sines.push_back({amplitude, frequency, phase});
     return s;
 }
@@ -80,7 +80,7 @@ inline void bind_drives(nb::module_& m) {
                const TorsionCurve* curve,
                const LossMap* map) { new (self) SharedDrive(make_drive(parameters, torque_source, curve, map)); },
             "parameters"_a, "torque_source"_a, "torsion_curve"_a.none(), "loss_map"_a.none())
-        .def("smallest_rigid_inertia", [](const SharedDrive& d) { return d.drive.smallest_rigid_inertia(); })
+        .def("min_rigid_inertia", [](const SharedDrive& d) { return d.drive.min_rigid_inertia(); })
         .def(
             "smallest_command",
             [](const SharedDrive& d, double T_2, double M_Z, int s) { return smallest_command(d.drive, T_2, M_Z, s); },

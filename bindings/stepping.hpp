@@ -12,7 +12,7 @@ inline CourseNumbers from_course(const CourseOf<DriveDims>& c, bool steady) {
     CourseNumbers v{};
     auto next = std::copy(c.input.begin(), c.input.end(), std::copy(c.rate.begin(), c.rate.end(), v.begin()));
     const auto& twist = c.twist[0];
-    for (const double x : {double(c.rate_known), double(twist.off_zero), twist.touch_size, twist.doubt,
+    for (const double x : {double(c.rate_known), double(twist.off_zero), twist.grazing_magnitude, twist.doubt,
                            twist.most_doubt, double(steady)})
         *next++ = x;
     return v;
@@ -60,8 +60,8 @@ inline nb::tuple explain_now(Simulation& s) {
 
 inline nb::tuple get_state(const Simulation& s) {
     const auto& n = s.snapshot();
-    return nb::make_tuple(n.time, from_state(n.x), n.memory.hysteresis_capacity, n.memory.held_torque, from_key(n.key),
-                          n.input, n.started, from_course(n.course, n.steady));
+    return nb::make_tuple(n.time, from_state(n.x), n.memory.hysteresis_capacity, n.memory.locked_torque,
+                          from_key(n.key), n.input, n.started, from_course(n.course, n.steady));
 }
 
 inline void set_state(Simulation& s, double time, const StateNumbers& x, double capacity, double locked_torque,

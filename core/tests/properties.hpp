@@ -41,7 +41,7 @@ class SelfLockingDrives : public RandomDrives {
         const double T = d.gearbox.rated_output_torque;
         Signals s{coin() ? Signal{} : sine(uniform(0.1, 1.0), spread(0.5, 5.0)),
                   sine(T * uniform(0.1, 0.8), spread(0.5, 10.0), uniform(-pi, pi))};
-        if (coin(0.3)) s[1].knots[0].value = T * uniform(-0.3, 0.3);
+        if (coin(0.3)) s[1].breakpoints[0].value = T * uniform(-0.3, 0.3);
         return s;
     }
 
@@ -81,8 +81,8 @@ class UnloadedDrives : public RandomDrives {
         const double T = d.gearbox.rated_output_torque;
         Signals s{sine(coin(0.3) ? 0.0 : uniform(0.1, 1.0), uniform(0.5, 5.0)),
                   sine(T * uniform(0.0, 1.0), uniform(0.5, 8.0))};
-        if (coin()) s[0].knots[0].value = uniform(-1.0, 1.0);
-        if (coin()) s[1].knots[0].value = 0.2 * T;
+        if (coin()) s[0].breakpoints[0].value = uniform(-1.0, 1.0);
+        if (coin()) s[1].breakpoints[0].value = 0.2 * T;
         return s;
     }
 };
@@ -91,11 +91,11 @@ class UnloadedDrives : public RandomDrives {
 inline Signals that_end(Signals s, double at, bool in_zero) {
     for (Signal& signal : s) {
         signal.sines.clear();
-        std::vector<Knot> knots;
-        for (const Knot& k : signal.knots)
-            if (k.time < at) knots.push_back(k);
-        knots.push_back({at, in_zero ? 0.0 : knots.back().value, 0.0});
-        signal.knots = knots;
+        std::vector<Breakpoint> breakpoints;
+        for (const Breakpoint& k : signal.breakpoints)
+            if (k.time < at) breakpoints.push_back(k);
+        breakpoints.push_back({at, in_zero ? 0.0 : breakpoints.back().value, 0.0});
+        signal.breakpoints = breakpoints;
     }
     return s;
 }
@@ -118,7 +118,7 @@ inline double difference_at_end(const Drive& drive, const Samples& run, const St
 // All values of the inputs times 1 + 1e-14: what this changes in a motion, rounding may change as well.
 inline Signals perturbed(Signals signals) {
     for (Signal& s : signals) {
-        for (Knot& k : s.knots) k.value *= 1.0 + 1e-14, k.slope *= 1.0 + 1e-14;
+        for (Breakpoint& k : s.breakpoints) k.value *= 1.0 + 1e-14, k.slope *= 1.0 + 1e-14;
         for (Sine& q : s.sines) q.amplitude *= 1.0 + 1e-14;
     }
     return signals;
@@ -145,7 +145,7 @@ struct Splitting {
     double amplification = 0.0;  // what becomes of a relative change of the inputs by 1e-14
 };
 
-// A run in one go against the same run that looks at its contacts anew at an instant.
+// A run in one go against the same run that event_checks at its contacts anew at an instant.
 inline Splitting split_run(const Drive& drive, const Signals& signals, double duration, double at) {
     Splitting out;
     const double interval = duration / 200.0;

@@ -79,9 +79,9 @@ class RandomTrains {
     std::vector<Signal> signals(const Assembly& a, double duration) {
         std::vector<Signal> out(static_cast<std::size_t>(a.layout().inputs));
         for (Signal& s : out) {
-            s.knots = {{0.0, uniform(-2.0, 2.0), 0.0}};
+            s.breakpoints = {{0.0, uniform(-2.0, 2.0), 0.0}};
             if (coin()) s.sines = {{uniform(0.2, 3.0), spread(0.3, 10.0), uniform(0.0, 6.28)}};
-            if (coin()) s.knots.push_back({uniform(0.2, 0.8) * duration, uniform(-2.0, 2.0), coin() ? 0.0 : 1.0});
+            if (coin()) s.breakpoints.push_back({uniform(0.2, 0.8) * duration, uniform(-2.0, 2.0), coin() ? 0.0 : 1.0});
         }
         return out;
     }
@@ -110,7 +110,7 @@ class RandomTrains {
         for (int i = 0; i < a.layout().inputs; ++i) {
             now.input[0][i] = coin(0.2) ? 0.0 : uniform(-2.0, 2.0);
             now.input[1][i] = coin() ? 0.0 : uniform(-1.0, 1.0);
-            now.input_size[i] = std::fabs(now.input[0][i]);
+            now.input_magnitudes[i] = std::fabs(now.input[0][i]);
         }
         return now;
     }

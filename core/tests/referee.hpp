@@ -67,7 +67,8 @@ class Referee {
                 earlier(earlier(end, next_knot_after(case_.signals[0], t_)), next_knot_after(case_.signals[1], t_));
             const bool whole = motion.step >= stop - t_;
             const Quad step = whole ? stop - t_ : motion.step;
-            // What happens at a knot to within rounding happens at the knot: it is looked for a little beyond it.
+            // What happens at a breakpoint to within rounding happens at the breakpoint: it is looked for a little
+            // beyond it.
             const Quad same_instant = whole ? Quad(1e-26) * (stop + case_.duration) : Quad(0);
             std::vector<Quad> zeros;
             const Quad first = first_zeros(motion, step + same_instant, zeros);

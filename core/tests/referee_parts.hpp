@@ -166,24 +166,24 @@ class Map {
     std::vector<StandstillCell> standstill_;
 };
 
-// The knot that holds just after t.
-inline const Knot& knot_after(const Signal& signal, Quad t) {
+// The breakpoint that holds just after t.
+inline const Breakpoint& knot_after(const Signal& signal, Quad t) {
     std::size_t k = 0;
-    while (k + 1 < signal.knots.size() && Quad(signal.knots[k + 1].time) <= t) ++k;
-    return signal.knots[k];
+    while (k + 1 < signal.breakpoints.size() && Quad(signal.breakpoints[k + 1].time) <= t) ++k;
+    return signal.breakpoints[k];
 }
 inline Quad next_knot_after(const Signal& signal, Quad t) {
-    for (std::size_t k = 1; k < signal.knots.size(); ++k)
-        if (Quad(signal.knots[k].time) > t) return signal.knots[k].time;
+    for (std::size_t k = 1; k < signal.breakpoints.size(); ++k)
+        if (Quad(signal.breakpoints[k].time) > t) return signal.breakpoints[k].time;
     return HUGE_VALQ;
 }
 
 // Taylor series of an input about t, from the right.
 inline Series series(const Signal& signal, Quad t) {
-    const Knot& knot = knot_after(signal, t);
+    const Breakpoint& breakpoint = knot_after(signal, t);
     Series c;
-    c[0] = Quad(knot.value) + Quad(knot.slope) * (t - Quad(knot.time));
-    c[1] = knot.slope;
+    c[0] = Quad(breakpoint.value) + Quad(breakpoint.slope) * (t - Quad(breakpoint.time));
+    c[1] = breakpoint.slope;
     static const Quad two_pi = 4 * acosq(Quad(0));
     for (const Sine& sine : signal.sines) {
         const Quad w = two_pi * Quad(sine.frequency), angle = w * t + Quad(sine.phase);

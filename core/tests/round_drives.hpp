@@ -99,15 +99,15 @@ class RoundDrives {
         if (kind == 0) return constant(size * pick({-1.0, -0.5, 0.0, 0.25, 0.5, 1.0}));
         Signal s;
         if (kind == 3) {
-            s.knots[0].value = size * pick({-0.5, 0.0, 0.0, 0.5});
+            s.breakpoints[0].value = size * pick({-0.5, 0.0, 0.0, 0.5});
             s.sines.push_back({size * pick({0.5, 1.0, 2.0}), pick({0.5, 1.0, 2.0}), pick({0.0, 1.0})});
             return s;
         }
-        s.knots.clear();
+        s.breakpoints.clear();
         double t = 0.0, value = 0.0;
         while (t < duration) {
             const double span = pick({0.125, 0.25, 0.5}), next = size * pick({-1.0, -0.5, 0.0, 0.0, 0.25, 0.5, 1.0});
-            s.knots.push_back({t, kind == 1 ? next : value, kind == 1 ? 0.0 : (next - value) / span});
+            s.breakpoints.push_back({t, kind == 1 ? next : value, kind == 1 ? 0.0 : (next - value) / span});
             value = next;
             t += span;
         }

@@ -22,7 +22,7 @@ struct Tally {
     }
 };
 
-bool jams(const Drive& d) { return d.rigid() && d.smallest_rigid_inertia() <= 0.0; }
+bool jams(const Drive& d) { return d.rigid() && d.min_rigid_inertia() <= 0.0; }
 
 // The exact run of a drive against the referee's.
 void adjudicate(Tally& t, const std::string& which, const Drive& drive, const Signals& signals, double duration,

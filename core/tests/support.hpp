@@ -53,12 +53,12 @@ inline Signal sine(double amplitude, double frequency, double phase = 0.0) {
 }
 inline Signal constant(double value) {
     Signal s;
-    s.knots[0].value = value;
+    s.breakpoints[0].value = value;
     return s;
 }
-inline Signal lines(std::vector<Knot> knots) {
+inline Signal lines(std::vector<Breakpoint> breakpoints) {
     Signal s;
-    s.knots = std::move(knots);
+    s.breakpoints = std::move(breakpoints);
     return s;
 }
 
@@ -164,19 +164,19 @@ class RandomDrives {
 
     Signal signal(double size, double duration) {
         Signal s;
-        if (coin(0.4)) s.knots[0].value = size * uniform(-1.0, 1.0);
+        if (coin(0.4)) s.breakpoints[0].value = size * uniform(-1.0, 1.0);
         if (coin(0.6)) {
             const int n = 1 + static_cast<int>(uniform(0.0, 3.0));
             for (int k = 0; k < n; ++k)
                 s.sines.push_back({size * uniform(0.1, 1.0), spread(0.3, 30.0) / duration, uniform(-pi, pi)});
         }
         if (coin(0.4)) {
-            double t = 0.0, value = s.knots[0].value;
-            s.knots.clear();
+            double t = 0.0, value = s.breakpoints[0].value;
+            s.breakpoints.clear();
             while (t < duration) {
                 const double span = duration * uniform(0.1, 0.5), next = size * uniform(-1.0, 1.0);
                 const bool jump = coin(0.3);
-                s.knots.push_back({t, jump ? next : value, jump ? 0.0 : (next - value) / span});
+                s.breakpoints.push_back({t, jump ? next : value, jump ? 0.0 : (next - value) / span});
                 value = next;
                 t += span;
             }

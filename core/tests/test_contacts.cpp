@@ -64,7 +64,7 @@ TEST_SUITE("contacts") {
         };
         for (const double a : {0.0, 0.9}) {
             const auto of_time = [a](double t) { return 1.1 * std::sin(2.0 * pi * t) + a * std::sin(10.0 * pi * t); };
-            const Signal signal{{Knot{}}, {{1.1, 1.0, 0.0}, {a, 5.0, 0.0}}};
+            const Signal signal{{Breakpoint{}}, {{1.1, 1.0, 0.0}, {a, 5.0, 0.0}}};
             Drive d = plain_drive(2.0, 1.0, 1.0);
             d.motor.friction_torque = 8.0;
             d.load.friction_torque = 0.5;
@@ -100,7 +100,7 @@ TEST_SUITE("contacts") {
         for (std::size_t k = 0; k < T_2.size(); ++k) {
             CHECK(s(ch_output_torque, k) == Approx(T_2[k]));
             CHECK(adaptive(ch_output_torque, k) == Approx(T_2[k]));
-            const Knot& at = steps.knots[k];
+            const Breakpoint& at = steps.breakpoints[k];
             REQUIRE(simulation.advance(0.1, at.value, at.value + 0.1 * at.slope, 0.0, 0.0) == Status::done);
             const auto& now = simulation.snapshot();
             const double T = evaluate(simulation.regime().output_torque, now.x, now.memory, now.input);
@@ -133,7 +133,7 @@ TEST_SUITE("contacts") {
         RandomDrives random(7);
         for (int n = 0; n < 150; ++n) {
             const Drive drive = random.drive();
-            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) continue;
+            if (drive.rigid() && drive.min_rigid_inertia() <= 0.0) continue;
             const Samples s = run(drive, random.signals(drive, 0.4), 0.4, 0.01);
             REQUIRE(s.report.status == Status::done);
             const auto& flow = s.report.energy.flow;
@@ -181,7 +181,7 @@ TEST_SUITE("contacts") {
         d.gearbox.rated_output_torque = 70.0;
         const double a = 1.0 - -0.5;
         d.gearbox.map = LossMap({0.0, 1.0}, {-1.0, 0.0, 1.0}, {a, a, 0.0, 0.0, 2.0, 2.0});
-        CHECK(d.smallest_rigid_inertia() < 0.0);
+        CHECK(d.min_rigid_inertia() < 0.0);
         Start start;
         start.x[motor_speed] = 60.0;
         start.x[load_speed] = 1.0;
@@ -233,10 +233,10 @@ TEST_SUITE("contacts") {
         RandomDrives random(11);
         for (int n = 0; n < 60; ++n) {
             Drive drive = random.drive();
-            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) continue;
+            if (drive.rigid() && drive.min_rigid_inertia() <= 0.0) continue;
             Signals signals = random.signals(drive, 0.3), mirrored = signals;
             for (Signal& s : mirrored) {
-                for (Knot& k : s.knots) {
+                for (Breakpoint& k : s.breakpoints) {
                     k.value = -k.value;
                     k.slope = -k.slope;
                 }

@@ -43,7 +43,7 @@ TEST_SUITE("differential") {
         for (int n = 0; n < drives; ++n) {
             const Drive drive = random.drive();
             const Signals signals = random.signals(drive, duration);
-            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) {
+            if (drive.rigid() && drive.min_rigid_inertia() <= 0.0) {
                 ++refused;
                 continue;
             }

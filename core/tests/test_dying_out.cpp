@@ -32,7 +32,7 @@ TEST_SUITE("dying_out") {
             check_same(plain, step.report.x, step.report.memory);
             CHECK(step.report.switching_count == plain.report.switching_count);
         }
-        std::vector<Knot> samples;
+        std::vector<Breakpoint> samples;
         for (int k = 0; k < 3000; ++k) samples.push_back({1e-3 * k, 0.3, 0.0});
         const Samples sampled = run(drive, {lines(samples), lines({{0.0, 0.0, 0.0}, {1.5, 0.0, 0.0}})}, 3.0);
         check_same(plain, sampled.report.x, sampled.report.memory);
@@ -98,7 +98,7 @@ TEST_SUITE("dying_out") {
             const int kind = n % 4;
             const double duration = kind < 2 ? 0.25 : 2.0, at = duration * random.uniform(0.02, 0.98);
             Signals signals = random.signals(drive, 0.25);
-            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) continue;
+            if (drive.rigid() && drive.min_rigid_inertia() <= 0.0) continue;
             if (kind > 0) signals = that_end(signals, kind == 1 ? 0.02 : 0.2, kind == 3);
             const Splitting s = split_run(drive, signals, duration, at);
             CAPTURE(n);
@@ -186,7 +186,7 @@ TEST_SUITE("dying_out") {
         RandomDrives random(5);
         for (int n = 0; n < 40; ++n) {
             const Drive drive = random.drive();
-            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) continue;
+            if (drive.rigid() && drive.min_rigid_inertia() <= 0.0) continue;
             Signals signals = random.signals(drive, 0.01);
             const bool load = random.coin();
             signals[load ? 1 : 0].sines.push_back(

@@ -65,7 +65,7 @@ class Steady {
         A_[0][1] = -(k_N - 1) * M_R / (Quad(d.motor.rated_speed) * tau);
         B_[0][0] = k_N * M_R / tau;
         if constexpr (n == 4) {
-            const Quad k = d.gearbox.curve.largest_slope();
+            const Quad k = d.gearbox.curve.max_slope();
             A_[1] = {1 / J, -b_M / J, 0, -k / (i * eta * J)};
             A_[2] = {0, 0, -b_Z / J_Z, k / J_Z};
             A_[3] = {0, 1 / i, -1, 0};
@@ -79,7 +79,7 @@ class Steady {
         }
         Vector left{};  // of what the motion begins with, the share that dies out
         for (std::size_t u = 0; u < n_inputs; ++u) {
-            const Vector still = settled(u, signals[u].knots[0].value);
+            const Vector still = settled(u, signals[u].breakpoints[0].value);
             for (std::size_t r = 0; r < n; ++r) mean_[r] += still[r], left[r] -= still[r];
             for (const Sine& s : signals[u].sines) {
                 answers_.push_back(answer(u, s));
@@ -126,7 +126,7 @@ class Steady {
     }
     // The same of a state and an input.
     Quad mean_power(std::size_t r, std::size_t input) const {
-        Quad sum = mean_[r] * Quad(signals_[input].knots[0].value);
+        Quad sum = mean_[r] * Quad(signals_[input].breakpoints[0].value);
         for (const Answer& a : answers_)
             if (a.input == input) sum += a.sine[r] * a.amplitude / 2;
         return sum;
@@ -186,8 +186,8 @@ constexpr std::array<double, n_coupled> sizes{0.5, 300.0, 3.0, 2e-3};
 Signals sines() {
     Signals s{sine(1.0275, 1.0), sine(5.0, 2.9, -1.1)};
     s[0].sines.push_back({0.3, 7.3, 0.4});
-    s[0].knots[0].value = 0.1;
-    s[1].knots[0].value = -3.0;
+    s[0].breakpoints[0].value = 0.1;
+    s[1].breakpoints[0].value = -3.0;
     return s;
 }
 
@@ -252,7 +252,7 @@ TEST_SUITE("long_runs") {
         const auto check = [&](EnergyFlow flow, Quad power) {
             CHECK(e.flow[flow] / years == Approx(double(power)).epsilon(1e-9));
         };
-        const Quad i = d.gearbox.ratio, k = d.gearbox.curve.largest_slope();
+        const Quad i = d.gearbox.ratio, k = d.gearbox.curve.max_slope();
         check(from_source, steady.mean_product(motor_torque, motor_speed));
         check(in_input_damper, d.gearbox.viscous_friction * steady.mean_product(motor_speed, motor_speed));
         check(in_gear, k / i * (1 / Quad(d.gearbox.efficiency) - 1) * steady.mean_product(twist, motor_speed));
@@ -262,15 +262,15 @@ TEST_SUITE("long_runs") {
         CHECK(std::fabs(e.residual()) < 1e-13 * e.turned_over);
     }
     // Steps of 1e-13 make stretches so short that they are taken look after look and panel after panel; a voltage limit
-    // that is never reached makes a condition, and with it looks. Their clock sums up 1e5 steps of 10 ms, each rounded
-    // to 1e-13 s.
+    // that is never reached makes a condition, and with it event_checks. Their clock sums up 1e5 steps of 10 ms, each
+    // rounded to 1e-13 s.
     TEST_CASE("a long run is what one look after another finds") {
         Drive limited = linear_drive();
         limited.motor.voltage_limit = 10.0;
         Signals signals = sines();
-        signals[0].knots.push_back({5.5, 0.2, 0.0});
+        signals[0].breakpoints.push_back({5.5, 0.2, 0.0});
         Signals chopped = signals;
-        for (int k = 1; k < 12; ++k) chopped[0].knots.push_back({50.0 * k, 0.2 + 1e-13 * (k % 2), 0.0});
+        for (int k = 1; k < 12; ++k) chopped[0].breakpoints.push_back({50.0 * k, 0.2 + 1e-13 * (k % 2), 0.0});
         const auto same = [](double a, double b, double size) { return std::fabs(a - b) < 1e-8 * size; };
         for (const double interval : {2.7, 27.0, 300.0}) {
             const Samples a = run(linear_drive(), signals, 600.0, interval);
@@ -294,8 +294,8 @@ TEST_SUITE("long_runs") {
         const double at = 5e8, rise = 1e-10;
         Signals signals = sines();
         const Steady<4> steady(linear_drive(), signals);
-        signals[0].knots.push_back({at, 0.35, 0.0});
-        signals[1].knots.push_back({at + 0.125, -3.0, rise});
+        signals[0].breakpoints.push_back({at, 0.35, 0.0});
+        signals[1].breakpoints.push_back({at + 0.125, -3.0, rise});
         for (const double interval : {years, 1e6}) {
             const Samples s = run(linear_drive(), signals, years, interval);
             REQUIRE(s.report.status == Status::done);
@@ -307,7 +307,7 @@ TEST_SUITE("long_runs") {
                 CHECK(std::fabs(s.report.x[k] - double(end.x[k] + ramp.x[k])) < 1e-13 * sizes[k]);
             CHECK(std::fabs(s.report.energy.residual()) < 1e-13 * s.report.energy.turned_over);
         }
-        signals[1].knots.pop_back();
+        signals[1].breakpoints.pop_back();
         const Samples s = run(linear_drive(), signals, years, 1e6);
         auto end = steady.at(years);
         steady.add_step(end, 0, 0.25, years - at);
@@ -364,7 +364,7 @@ TEST_SUITE("long_runs") {
             const double duration = random.spread(1e6, 1e9);
             for (int i = 0; i < n_inputs; ++i) {
                 const double size = i == 0 ? 1.0 : 0.2 * d.gearbox.rated_output_torque;
-                if (random.coin()) signals[i].knots[0].value = size * random.uniform(-1.0, 1.0);
+                if (random.coin()) signals[i].breakpoints[0].value = size * random.uniform(-1.0, 1.0);
                 for (int k = random.coin() ? 2 : 1; k > 0; --k)
                     signals[i].sines.push_back(
                         {size * random.uniform(0.1, 1.0), random.spread(0.05, 200.0), random.uniform(-pi, pi)});

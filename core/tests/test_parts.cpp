@@ -121,7 +121,7 @@ TEST_SUITE("parts") {
                 if (key.modes[c] == 0 && !(c == twist_contact && drive.rigid())) key.modes[c] = 1;
             const Regime r = drive.build(key);
             Propagator<DriveDims> p;
-            InputTurns turns(1e-3, input_basis(Signals{}));
+            PhaseRotations turns(1e-3, input_basis(Signals{}));
             const LinearRates rates(r.rate);
             p.prepare(rates, turns, drive.balanced_scale());
             const State scale = drive.balanced_scale();
@@ -134,14 +134,14 @@ TEST_SUITE("parts") {
                         // In balanced units; doubling adds about one rounding a level.
                         const double change = j == load_angle ? 0.0
                                               : i == load_angle
-                                                  ? rates.turning[0] * step.integral.coupled(load_speed, j)
+                                                  ? rates.angle_coefficient[0] * step.integral.coupled(load_speed, j)
                                                   : step.change(i, j);
                         CHECK(std::fabs(change - e) * scale[j] / scale[i] < 1e-10);
                     }
             }
         }
     }
-    TEST_CASE("a guard's growth bound really bounds the exponential") {
+    TEST_CASE("a guard's exponential_bound bound really bounds the exponential") {
         RandomDrives random(4);
         for (int n = 0; n < 20; ++n) {
             const Drive drive = random.drive();
@@ -151,7 +151,7 @@ TEST_SUITE("parts") {
             RegimeKey key;
             REQUIRE(system.start(cache, now, key) == Found::yes);
             Propagator<DriveDims> p;
-            InputTurns turns(1e-3, input_basis(Signals{}));
+            PhaseRotations turns(1e-3, input_basis(Signals{}));
             const LinearRates rates(drive.build(key).rate);
             p.prepare(rates, turns, drive.balanced_scale());
             for (int level = 3; level < 9; ++level)
@@ -159,7 +159,7 @@ TEST_SUITE("parts") {
                     for (int j = 0; j < n_coupled; ++j)
                         for (int i = 0; i < n_coupled; ++i)
                             CHECK(std::fabs(p.level(inner).change(i, j) + (i == j ? 1.0 : 0.0)) <=
-                                  p.level(level).growth(i, j) * (1.0 + 1e-9) + 1e-300);
+                                  p.level(level).exponential_bound(i, j) * (1.0 + 1e-9) + 1e-300);
         }
     }
     TEST_CASE("reductions are what they are called, for any number of samples") {

@@ -16,7 +16,7 @@ TEST_SUITE("periodic") {
         for (int n = 0; n < 200; ++n) {
             const Drive drive = random.drive();
             const double f = random.spread(0.5, 30.0), amplitude = random.spread(0.02, 1.0);
-            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) continue;
+            if (drive.rigid() && drive.min_rigid_inertia() <= 0.0) continue;
             CAPTURE(n);
             const Signals signals{sine(amplitude, f), constant(0.0)};
             Workspace workspace(drive);

@@ -283,7 +283,7 @@ TEST_SUITE("referee") {
         for (int n = 0; n < 40; ++n) {
             const Drive drive = random.drive();
             const Signals signals = random.signals(drive, duration);
-            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) continue;
+            if (drive.rigid() && drive.min_rigid_inertia() <= 0.0) continue;
             CAPTURE(n);
             const Samples exact = run(drive, signals, duration, interval);
             // Double precision, some hundred switchings, each of which multiplies what was before.

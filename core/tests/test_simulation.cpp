@@ -18,7 +18,7 @@ TEST_SUITE("simulation") {
         RandomDrives random(21);
         for (int n = 0; n < 20; ++n) {
             const Drive drive = random.drive();
-            if (drive.rigid() && drive.smallest_rigid_inertia() <= 0.0) continue;
+            if (drive.rigid() && drive.min_rigid_inertia() <= 0.0) continue;
             Simulation a(drive, 1e-3);
             for (int k = 0; k < 137; ++k) REQUIRE(a.advance(1e-3, given(k), given(k + 1), 0.0, 0.0) == Status::done);
             Simulation b(drive, 1e-3);
@@ -47,9 +47,9 @@ TEST_SUITE("simulation") {
     }
     TEST_CASE("stepping with ramped inputs equals one run with the same straight lines") {
         const Drive drive = paper_drive(plane_map(0.02, 0.04, 0.06));
-        std::vector<Knot> knots;
-        for (int k = 0; k < 100; ++k) knots.push_back({0.01 * k, given(k), (given(k + 1) - given(k)) / 0.01});
-        const Samples s = run(drive, {lines(knots), Signal{}}, 1.0, 0.01);
+        std::vector<Breakpoint> breakpoints;
+        for (int k = 0; k < 100; ++k) breakpoints.push_back({0.01 * k, given(k), (given(k + 1) - given(k)) / 0.01});
+        const Samples s = run(drive, {lines(breakpoints), Signal{}}, 1.0, 0.01);
         Simulation stepped(drive, 0.01);
         for (int k = 0; k < 100; ++k) REQUIRE(stepped.advance(0.01, given(k), given(k + 1), 0.0, 0.0) == Status::done);
         for (int k = 0; k < n_states; ++k)

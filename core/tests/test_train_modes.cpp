@@ -56,10 +56,10 @@ struct Shadowed {
         out.time = now.time;
         for (int k = 0; k < lostmotion::n_states; ++k) out.x[twins.term[k]] = now.x[k];
         set(out, hysteresis_capacity, now.memory.hysteresis_capacity);
-        set(out, held_torque, now.memory.held_torque);
+        set(out, locked_torque, now.memory.locked_torque);
         for (int k = 0; k < lostmotion::n_derivatives; ++k)
             for (int i = 0; i < lostmotion::n_inputs; ++i) out.input[k][i] = now.input[k][i];
-        for (int i = 0; i < lostmotion::n_inputs; ++i) out.input_size[i] = now.input_size[i];
+        for (int i = 0; i < lostmotion::n_inputs; ++i) out.input_magnitudes[i] = now.input_magnitudes[i];
         return out;
     }
     static std::array<double, max_inputs> left(const Instant& now, const std::array<double, n_inputs>& input) {
@@ -86,8 +86,8 @@ struct Shadowed {
         const Instant after = instant(now);
         if (same) CHECK(after.x == mine.x);
         if (same && twins.term[hysteresis_capacity] != nowhere) CHECK(after.memory[0] == mine.memory[0]);
-        if (same && twins.term[held_torque] != nowhere) {
-            const auto m = static_cast<std::size_t>(twins.term[held_torque] - train.sizes().first_memory);
+        if (same && twins.term[locked_torque] != nowhere) {
+            const auto m = static_cast<std::size_t>(twins.term[locked_torque] - train.sizes().first_memory);
             if (key.modes == Modes{0, 0, 0}) CHECK(after.memory[m] == mine.memory[m]);
         }
     }
@@ -256,7 +256,7 @@ TEST_CASE("the search works on packed regimes and the kernel's own instant as on
         std::array<double, 30> x{};
         std::array<double, 16> memory{};
         std::array<std::array<double, 14>, n_derivatives> input{};
-        std::array<double, 14> input_size{};
+        std::array<double, 14> input_magnitudes{};
     };
     struct WideCache {
         const Assembly& assembly;
@@ -278,7 +278,7 @@ TEST_CASE("the search works on packed regimes and the kernel's own instant as on
         WideInstant wide;
         std::copy_n(now.x.begin(), a.layout().coupled, wide.x.begin());
         std::copy_n(now.memory.begin(), 16, wide.memory.begin());
-        std::copy_n(now.input_size.begin(), 14, wide.input_size.begin());
+        std::copy_n(now.input_magnitudes.begin(), 14, wide.input_magnitudes.begin());
         const auto inputs = [&] {
             for (int k = 0; k < n_derivatives; ++k) std::copy_n(now.input[k].begin(), 14, wide.input[k].begin());
         };

@@ -117,7 +117,7 @@ class TrainRun {
         for (int i = 0; i < layout().inputs; ++i) {
             const TestInput& p = piece(static_cast<std::size_t>(i), t);
             for (int k = 0; k < n_derivatives; ++k) now.input[k][i] = p.derivative(k, t);
-            now.input_size[i] = std::fabs(p.value) + std::fabs(p.slope * (t - p.from)) + std::fabs(p.amplitude);
+            now.input_magnitudes[i] = std::fabs(p.value) + std::fabs(p.slope * (t - p.from)) + std::fabs(p.amplitude);
         }
     }
     // Advances to `to`, or to where a guard falls through zero.

@@ -71,7 +71,7 @@ struct Twins {
         for (int g = 0; g < a.n_guards; ++g) {
             CHECK(same(a.guards[g].form, b.guards[g].form));
             CHECK(a.guards[g].neighbour == b.guards[g].neighbour);
-            CHECK(a.guards[g].by_touch == b.guards[g].by_touch);
+            CHECK(a.guards[g].by_grazing == b.guards[g].by_grazing);
         }
         const int contact[3] = {p.shafts[0].contact, p.gears[0].contact, p.shafts[1].contact};
         for (int c = 0; c < 3; ++c)

@@ -38,7 +38,7 @@ inline void add_signal_fields(std::vector<BatchField>& fields, const std::string
         std::vector<Sine>& sines = c.signals[input].sines;
         return sines.empty() ? sines.emplace_back() : sines.front();
     };
-    fields.push_back({prefix + ".mean", [=](Case& c, double v) { c.signals[input].knots[0].value = v; }, false});
+    fields.push_back({prefix + ".mean", [=](Case& c, double v) { c.signals[input].breakpoints[0].value = v; }, false});
     fields.push_back({prefix + ".amplitude", [=](Case& c, double v) { first_sine(c).amplitude = v; }, false});
     fields.push_back({prefix + ".frequency", [=](Case& c, double v) { first_sine(c).frequency = v; }, false});
     fields.push_back({prefix + ".phase", [=](Case& c, double v) { first_sine(c).phase = v; }, false});

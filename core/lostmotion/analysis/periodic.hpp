@@ -110,7 +110,7 @@ class Shooting {
         const Station& b = image.end;
         double worst = std::fabs(b.memory.hysteresis_capacity - a.memory.hysteresis_capacity) / torque_magnitude();
         if (b.key.modes[0] == 0 && b.key.modes[1] == 0 && b.key.modes[2] == 0)
-            worst = std::fmax(worst, std::fabs(b.memory.held_torque - a.memory.held_torque) / torque_magnitude());
+            worst = std::fmax(worst, std::fabs(b.memory.locked_torque - a.memory.locked_torque) / torque_magnitude());
         for (int k = 0; k < n_states; ++k)
             if (k != load_angle && image.sensitivity.magnitude[k] > 0.0)
                 worst = std::fmax(worst, std::fabs(b.x[k] - a.x[k]) / image.sensitivity.magnitude[k]);
@@ -156,7 +156,7 @@ class Shooting {
         const auto value = [](const Station& s, int k) {
             return k < n_states                ? s.x[k]
                    : k == hysteresis_component ? s.memory.hysteresis_capacity
-                                               : s.memory.held_torque;
+                                               : s.memory.locked_torque;
         };
         for (int r = 0; r < n; ++r) {
             scale[r] = active[r] < n_states ? image.sensitivity.magnitude[active[r]] : torque_magnitude();
@@ -177,7 +177,7 @@ class Shooting {
             else if (active[k] == hysteresis_component)
                 y.memory.hysteresis_capacity = std::fmax(0.0, y.memory.hysteresis_capacity + change);
             else
-                y.memory.held_torque += change;
+                y.memory.locked_torque += change;
         }
         // What is at rest at the end of the period is at rest at its beginning, to the last bit.
         y.key = image.end.key;

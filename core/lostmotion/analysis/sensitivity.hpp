@@ -44,7 +44,7 @@ inline Components gradient(const LinearForm& f) {
     Components g{};
     for (int k = 0; k < n_states; ++k) g[k] = f.c[k];
     g[hysteresis_component] = f.c[hysteresis_capacity];
-    g[locked_component] = f.c[held_torque];
+    g[locked_component] = f.c[locked_torque];
     return g;
 }
 
@@ -152,7 +152,7 @@ class Sensitivity {
         jump.row[locked_component] = {};
         const Modes& modes = w.after.modes;
         if (modes[0] != 0 || modes[1] != 0 || modes[2] != 0) return time_rate;
-        const double T_2 = evaluate(old.output_torque, x_, memory_, u[0]), locked = w.memory.held_torque;
+        const double T_2 = evaluate(old.output_torque, x_, memory_, u[0]), locked = w.memory.locked_torque;
         if (locked == T_2) {
             jump.row[locked_component] = gradient(old.output_torque);
             time_rate[locked_component] =

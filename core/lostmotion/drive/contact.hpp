@@ -34,7 +34,7 @@ class SwitchedDrive {
     }
     // What each guard has to exceed, beside its share of its terms, to be far from an event.
     void near_event(const GuardTable& guards, GuardTable::Values& out) const {
-        guards.rate_sizes(near_state_, near_input_, out);
+        guards.rate_magnitudes(near_state_, near_input_, out);
     }
     // The twists of gears, whose rates are the speeds that end a regime by touching zero.
     static constexpr int n_twists() { return 1; }
@@ -54,7 +54,7 @@ class SwitchedDrive {
         direct(now.x, key);
         std::array<bool, n_contacts> at_rest = at_exact_rest(now.x);
         if (drive_.rigid()) at_rest[twist_contact] = true;
-        const double P = drive_.rigid() ? now.memory.held_torque : drive_.gearbox.curve.torque(now.x[twist]);
+        const double P = drive_.rigid() ? now.memory.locked_torque : drive_.gearbox.curve.torque(now.x[twist]);
         return find(cache, now, {at_rest, P}, key);
     }
 
@@ -209,9 +209,9 @@ class SwitchedDrive {
         const Modes* end() const { return modes_.data() + size_; }
 
      private:
-        static constexpr int most = 27;
-        std::array<Modes, most> modes_;
-        std::array<int, most> rank_;
+        static constexpr int max_count = 27;
+        std::array<Modes, max_count> modes_;
+        std::array<int, max_count> rank_;
         int size_ = 0;
     };
     Combinations combinations_after(const Event& event, const Modes& before) const {
@@ -249,7 +249,7 @@ class SwitchedDrive {
             RegimeKey key;
             Memory memory;
             bool found = false;
-        } best{closest ? largest_violation : std::numeric_limits<double>::infinity(), key, before};
+        } best{closest ? max_violation : std::numeric_limits<double>::infinity(), key, before};
         for (const Modes& modes : combinations) {
             if (event.search == Search::from_before && modes == event.refuted) continue;
             now.memory = before;
@@ -382,10 +382,10 @@ class SwitchedDrive {
             const LinearForm& form = entry.regime.guards[k].form;
             const double value = evaluate(form, now.x, now.memory, now.input[0]);
             const double size = magnitude(form, now.x, now.memory, now.input[0]);
-            const double rate = flow.rate(form, 1), rate_size = flow.rate_size(form, 1);
+            const double rate = flow.rate(form, 1), rate_magnitude = flow.rate_magnitude(form, 1);
             const bool zero = std::fabs(value) <= flow.noise(size, rate);
             if (zero && rate < 0.0 && !event.by_value_alone(entry.regime.guards[k]))
-                worst = std::fmax(worst, -rate / rate_size);
+                worst = std::fmax(worst, -rate / rate_magnitude);
             else if (!zero && value < 0.0)
                 worst = std::fmax(worst, -value / size);
         }
@@ -401,7 +401,7 @@ class SwitchedDrive {
         GuardTable::Values constant, value, size;
         guards.constants(now.memory, constant);
         guards.evaluate(constant, now.x, now.input[0], value);
-        guards.sizes(magnitudes(now.memory), magnitudes(now.x), now.input_size, size);
+        guards.magnitudes(magnitudes(now.memory), magnitudes(now.x), now.input_magnitudes, size);
         unsigned near = 0;
         for (int g = 0; g < guards.rows(); g += vec_width)
             near |= (all_bits & ~above(load(&value[g]), clear_of_zero * load(&size[g]) + load(&entry.near_event[g])))
@@ -474,11 +474,11 @@ class SwitchedDrive {
             high = std::min(high, P + h);
         }
         if (low > high) return false;
-        now.memory.held_torque = std::clamp(T_2, low, high);
+        now.memory.locked_torque = std::clamp(T_2, low, high);
         return true;
     }
 
-    static constexpr double largest_violation = 1e-6;  // that rounding may make
+    static constexpr double max_violation = 1e-6;  // that rounding may make
 
     const Drive& drive_;
     State near_state_{};  // magnitudes of states and inputs whose part in a guard it must exceed

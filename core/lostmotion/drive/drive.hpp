@@ -44,7 +44,7 @@ class Drive {
 
     // The smallest acceleration-per-torque of the rigidly coupled drive over all cells of the map. If it is not
     // positive, rigid friction jams (Painleve): there are instants with no motion or with several.
-    double smallest_rigid_inertia() const {
+    double min_rigid_inertia() const {
         const double i2 = gearbox.ratio * gearbox.ratio;
         double least = gearbox.losses == Gearbox::constant_efficiency ? 1.0 / gearbox.efficiency : 1.0;
         if (gearbox.losses == Gearbox::loss_map)
@@ -67,7 +67,7 @@ class Drive {
             s[load_speed] = s[motor_speed] / i;
             s[twist] = s[load_angle] = s[load_speed] * J;
         } else {
-            const double k = gearbox.curve.largest_slope();
+            const double k = gearbox.curve.max_slope();
             s[twist] = s[motor_speed] / i / std::sqrt(k / (i * i * J));
             s[load_speed] = s[twist] * std::sqrt(k / load.inertia);
             s[load_angle] = s[twist];
@@ -77,7 +77,7 @@ class Drive {
     // Sizes that the states have at rated speed and torque, for error control.
     State rated_scale() const {
         const double w = gearbox.rated_input_speed, i = gearbox.ratio;
-        const double d = rigid() ? 1.0 : gearbox.rated_output_torque / gearbox.curve.largest_slope();
+        const double d = rigid() ? 1.0 : gearbox.rated_output_torque / gearbox.curve.max_slope();
         return State{{motor.rated_torque, w, w / i, d, 1.0}};
     }
 
@@ -151,7 +151,7 @@ inline Drive::Equations Drive::compose(const RegimeKey& key, const Regime& r) co
     const Open P =
         rigid() ? Open{} : Open::unit(twist, curve.slope(key.piece)) + Open::unit(one, curve.offset(key.piece));
     if (all_stuck)
-        e.H = Open::unit(held_torque) - P;
+        e.H = Open::unit(locked_torque) - P;
     else if (slip == 0)
         e.H = reaction(twist_contact);
     else if (slip != absent)
@@ -248,7 +248,7 @@ inline void Drive::add_guards(const RegimeKey& key, const Equations& e, Regime& 
         if (mode != +1 && mode != -1) continue;
         add(static_cast<double>(mode) * contact_speed(c), Guard::speed, c, 0);
         // (16) sets the hysteresis anew whenever the twist rate reaches zero, whether it then changes sign or not.
-        r.guards[r.n_guards - 1].by_touch = c == twist_contact;
+        r.guards[r.n_guards - 1].by_grazing = c == twist_contact;
     }
     if (key.modes[twist_contact] == 0 && !rigid()) {
         const LinearForm h = LinearForm::unit(hysteresis_capacity), H = closed(e.H);

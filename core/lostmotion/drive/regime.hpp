@@ -50,8 +50,8 @@ struct Guard {
     LinearForm form;
     Kind kind = outside;
     Contact contact = input_contact;  // for speed and capacity
-    int neighbour = 0;      // for pieces, cells and the amplifier: the index beyond; capacity: the sign of slip
-    bool by_touch = false;  // ends the regime also by touching zero without falling through it
+    int neighbour = 0;        // for pieces, cells and the amplifier: the index beyond; capacity: the sign of slip
+    bool by_grazing = false;  // ends the regime also by touching zero without falling through it
 
     bool behind = false;  // an edge of the curve that the twist slips away from, so that it does not reach it
 

@@ -17,7 +17,7 @@ enum Term : int {
     load_angle,           // phi [rad]
     one,                  // the constant 1
     hysteresis_capacity,  // h [N m], set anew at every turning point of the twist (eq. 16)
-    held_torque,          // T_2 [N m] frozen while all contacts stand
+    locked_torque,        // T_2 [N m] frozen while all contacts stand
     command,              // E_C [-]
     load_torque,          // M_Z [N m]
     n_terms
@@ -29,16 +29,16 @@ enum Contact : int { input_contact, twist_contact, load_contact, n_contacts };
 // What the solver must remember beside the state: the two piecewise-constant torques of the twist contact.
 struct Memory {
     double hysteresis_capacity = 0.0;  // h [N m]
-    double held_torque = 0.0;          // T_2 [N m], used while all three contacts are stuck
+    double locked_torque = 0.0;        // T_2 [N m], used while all three contacts are stuck
 
-    double operator[](int k) const { return k == 0 ? hysteresis_capacity : held_torque; }
+    double operator[](int k) const { return k == 0 ? hysteresis_capacity : locked_torque; }
 };
-inline Memory magnitudes(const Memory& m) { return {std::fabs(m.hysteresis_capacity), std::fabs(m.held_torque)}; }
+inline Memory magnitudes(const Memory& m) { return {std::fabs(m.hysteresis_capacity), std::fabs(m.locked_torque)}; }
 
 inline constexpr int max_guards = 16;
 
 struct DriveDims : Dims<4, 1, 2, 2, n_contacts, max_guards> {
-    static constexpr int first_turning = load_speed, twists = 1;
+    static constexpr int first_angle_speed = load_speed, twists = 1;
     using Memory = lostmotion::Memory;
     using Contact = lostmotion::Contact;
 };

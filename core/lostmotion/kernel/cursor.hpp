@@ -79,11 +79,11 @@ class Cursor {
         if (carries_rate_) {
             Lanes x = load(from.x_), rate = load(from.rate());
             propagator_->step(level, x, rate, from.input_.weights());
-            input_.advance_from(from.input_, length, propagator_->turns(level));
+            input_.advance_from(from.input_, length, propagator_->rotations(level));
             arrive(x, rate);
         } else {
             const Lanes x = propagator_->step(level, load(from.x_), load(from.rate()), from.input_.weights());
-            input_.advance_from(from.input_, length, propagator_->turns(level));
+            input_.advance_from(from.input_, length, propagator_->rotations(level));
             arrive(x);
         }
     }
@@ -99,7 +99,7 @@ class Cursor {
         Lanes x = load(from.x_), rate = load(from.rate());
         const auto step = [&](int k) __attribute__((always_inline)) {
             p.step(k, x, rate, input_.weights());
-            input_.advance(p.length(k), p.turns(k));
+            input_.advance(p.length(k), p.rotations(k));
         };
         const int top = p.longest_level() - 1;
         for (std::uint64_t m = n >> top; m > 0; --m) step(top + 1);
@@ -118,7 +118,7 @@ class Cursor {
             h = advance_by_levels(from, h);
         else if (this != &from)
             *this = from;
-        nudge(h);
+        taylor_step(h);
     }
     // Over a long stretch at once, to an instant.
     [[gnu::noinline]] void leap_to(double to) {
@@ -136,16 +136,16 @@ class Cursor {
     }
     [[gnu::noinline]] LongStep<D> long_step(double length) const { return {*propagator_, *constant_, input_, length}; }
     // By one base interval at most, forward or backward; the inputs turn on from where they are.
-    void nudge(double s) {
+    void taylor_step(double s) {
         if (s == 0.0) return;
         Expansion<D> here;
         expand(here);
-        nudge(here, s);
+        taylor_step(here, s);
     }
     void expand(Expansion<D>& out) const { propagator_->taylor().expand(load(rate()), input_, out); }
-    void nudge(const Expansion<D>& here, double s) {
+    void taylor_step(const Expansion<D>& here, double s) {
         const Lanes x = load(x_) + here.change(s);
-        input_.turn(s);
+        input_.rotate(s);
         if (carries_rate_) {
             arrive(x, {coupled(rate_) + here.rate_change(s), propagator_->rates().angle_rate(x.coupled)});
         } else {

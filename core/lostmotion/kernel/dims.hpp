@@ -8,15 +8,15 @@ namespace lostmotion {
 
 // Which coupled speed each angle follows: known when compiled, or from run to run.
 template <class D>
-struct TurningSpeeds {
+struct AngleSpeeds {
     std::array<int, static_cast<std::size_t>(D::angles)> state{};
     int operator[](int angle) const { return state[static_cast<std::size_t>(angle)]; }
     void set(int angle, int speed) { state[static_cast<std::size_t>(angle)] = speed; }
 };
 template <class D>
-    requires requires { D::first_turning; }
-struct TurningSpeeds<D> {
-    constexpr int operator[](int angle) const { return D::first_turning + angle; }
+    requires requires { D::first_angle_speed; }
+struct AngleSpeeds<D> {
+    constexpr int operator[](int angle) const { return D::first_angle_speed + angle; }
     void set(int, int) {}
 };
 

@@ -39,7 +39,7 @@ class Flow {
             if (std::fabs(value) > noise(size, next)) return value > 0.0 ? +1 : -1;
             if (by_value_alone) return 0;
             value = next;
-            size = rate_size(form, k);
+            size = rate_magnitude(form, k);
         }
         return 0;
     }
@@ -51,7 +51,7 @@ class Flow {
     }
     // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
     double rate(const LinearForm& f, int k) { return evaluate_rate<D>(f, derivative(k), now_.input[k]); }
-    double rate_size(const LinearForm& f, int k) {
+    double rate_magnitude(const LinearForm& f, int k) {
         const State& terms = size(k);
         const auto& u = now_.input[k];
         double sum = 0.0;
@@ -71,7 +71,7 @@ class Flow {
     }
     const State& size(int k) {
         if (sized_ == 0) {
-            size_[1] = rates_.size(magnitudes(now_.x), magnitudes(now_.memory), now_.input_size);
+            size_[1] = rates_.size(magnitudes(now_.x), magnitudes(now_.memory), now_.input_magnitudes);
             sized_ = 1;
         }
         for (; sized_ < k; ++sized_)

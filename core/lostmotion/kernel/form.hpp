@@ -123,7 +123,7 @@ struct InstantOf {
     StateOf<D> x{};
     typename D::Memory memory{};
     InputJetOf<D> input{};
-    InputsOf<D> input_size{};  // sums of the magnitudes of the inputs' parts
+    InputsOf<D> input_magnitudes{};  // sums of the magnitudes of the inputs' parts
 };
 
 // The part of a form that depends on neither state nor inputs: constant within a regime.
@@ -214,18 +214,29 @@ class FormTable {
         rates(rate, driven_ ? input.rates() : Inputs{}, out);
     }
     // Sums of the magnitudes of the terms, from magnitudes of what the forms depend on.
-    void sizes(const Memory& m, const State& x, const Inputs& u, Values& out) const {
+    void magnitudes(const Memory& m, const State& x, const Inputs& u, Values& out) const {
         for (int g = 0; g < rows_; g += vec_width) {
             Vec kept = m[0] * absolute(at(D::first_memory, g));
             for (int k = 1; k < D::memory; ++k) kept += m[k] * absolute(at(D::first_memory + k, g));
             store(absolute(at(D::one, g)) + kept + terms<true>(g, x, u), &out[g]);
         }
     }
+    // The same of one form.
     template <class Input>
-    void sizes(const Memory& m, const State& x, const Input& input, Values& out) const {
-        sizes(m, x, driven_ ? input.sizes() : Inputs{}, out);
+    double magnitude(int row, const Memory& m, const State& x, const Input& input) const {
+        const auto c = [&](int term) { return std::fabs(column_[term][row]); };
+        double kept = m[0] * c(D::first_memory);
+        for (int k = 1; k < D::memory; ++k) kept += m[k] * c(D::first_memory + k);
+        double sum = sum_in_fours<D::coupled>([&](auto k) { return c(k) * x[k]; });
+        if (driven_) {
+            const Inputs u = input.magnitudes();
+            double forced = c(D::first_input) * u[0];
+            for (int i = 1; i < D::inputs; ++i) forced += c(D::first_input + i) * u[i];
+            sum += forced;
+        }
+        return c(D::one) + kept + sum;
     }
-    void rate_sizes(const State& rate, const Inputs& input_rate, Values& out) const {
+    void rate_magnitudes(const State& rate, const Inputs& input_rate, Values& out) const {
         for (int g = 0; g < rows_; g += vec_width) store(terms<true>(g, rate, input_rate), &out[g]);
     }
     // Time derivatives, from those of state and inputs.

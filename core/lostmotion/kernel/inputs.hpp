@@ -23,30 +23,30 @@ struct Sine {
     double phase = 0.0;      // [rad]
 };
 
-// From `time` on the piecewise-linear part is value + slope * (t - time), until the next knot.
-struct Knot {
+// From `time` on the piecewise-linear part is value + slope * (t - time), until the next breakpoint.
+struct Breakpoint {
     double time = 0.0;   // [s]
     double value = 0.0;  // unit of the signal
     double slope = 0.0;  // unit of the signal per second
 };
 
 struct Signal {
-    std::vector<Knot> knots{Knot{}};  // sorted by time; the first holds from the start of the run
+    std::vector<Breakpoint> breakpoints{Breakpoint{}};  // sorted by time; the first holds from the start of the run
     std::vector<Sine> sines;
 
-    // Index of the knot that holds at t (on a knot: the one that begins there).
+    // Index of the breakpoint that holds at t (on a breakpoint: the one that begins there).
     std::size_t segment(double t) const {
-        std::size_t low = 0, high = knots.size();
+        std::size_t low = 0, high = breakpoints.size();
         while (high - low > 1) {
             const std::size_t middle = (low + high) / 2;
-            (knots[middle].time <= t ? low : high) = middle;
+            (breakpoints[middle].time <= t ? low : high) = middle;
         }
         return low;
     }
-    // The next knot after t at which the signal changes its value or its slope.
-    double next_knot(double t) const {
-        for (std::size_t k = segment(t) + 1; k < knots.size(); ++k) {
-            const Knot &before = knots[k - 1], &at = knots[k];
+    // The next breakpoint after t at which the signal changes its value or its slope.
+    double next_breakpoint(double t) const {
+        for (std::size_t k = segment(t) + 1; k < breakpoints.size(); ++k) {
+            const Breakpoint &before = breakpoints[k - 1], &at = breakpoints[k];
             if (at.slope != 0.0 || before.slope != 0.0 || at.value != before.value) return at.time;
         }
         return std::numeric_limits<double>::infinity();
@@ -63,11 +63,11 @@ std::array<Signal, n> without_idle_sines(std::array<Signal, n> signals) {
     return signals;
 }
 
-// The first knot of any input after t.
+// The first breakpoint of any input after t.
 template <std::size_t n>
-double next_knot(const std::array<Signal, n>& signals, double t) {
+double next_breakpoint(const std::array<Signal, n>& signals, double t) {
     double next = std::numeric_limits<double>::infinity();
-    for (const Signal& s : signals) next = std::min(next, s.next_knot(t));
+    for (const Signal& s : signals) next = std::min(next, s.next_breakpoint(t));
     return next;
 }
 
@@ -75,7 +75,7 @@ double next_knot(const std::array<Signal, n>& signals, double t) {
 template <class D>
 SignalsOf<D> ramped_inputs() {
     SignalsOf<D> signals;
-    for (Signal& s : signals) s.knots[0].slope = 1.0;
+    for (Signal& s : signals) s.breakpoints[0].slope = 1.0;
     return signals;
 }
 
@@ -113,7 +113,7 @@ std::vector<InputBasis> input_basis(const std::array<Signal, n>& signals) {
         }
     for (int i = 0; i < n_inputs; ++i) {
         bool slopes = false;
-        for (const Knot& k : signals[i].knots) slopes |= k.slope != 0.0;
+        for (const Breakpoint& k : signals[i].breakpoints) slopes |= k.slope != 0.0;
         if (slopes) basis.push_back({InputBasis::ramp, i, 0.0});
     }
     while (basis.empty() || basis.size() % 2 != 0) basis.push_back({InputBasis::nothing, 0, 0.0});
@@ -121,14 +121,14 @@ std::vector<InputBasis> input_basis(const std::array<Signal, n>& signals) {
 }
 
 // How far beyond a whole number of periods, in periods.
-inline double turned(double frequency, double time) {
+inline double fraction_of_turn(double frequency, double time) {
     const double turns = frequency * time, part = turns - std::floor(turns);
     // After a thousand periods the rounding of their number would be seen.
     return turns < 0x1p10 ? part : part + std::fma(frequency, time, -turns);
 }
 
-// By how much a pair of functions turns over a length of time: cos and sin of the angle (of a ramp, 1 and 0).
-struct Turn {
+// Rotation of a pair of functions over a length of time: cos and sin of the angle (of a ramp, 1 and 0).
+struct PhaseRotation {
     double cos, sin;
 
     // A sine and a cosine, turned.
@@ -139,9 +139,9 @@ struct Turn {
 
 // By how much the functions of a basis turn over lengths of time that are a unit times a power of two. What several
 // regimes ask for is computed once.
-class InputTurns {
+class PhaseRotations {
  public:
-    InputTurns(double unit, std::vector<InputBasis> basis) : unit_(unit), basis_(std::move(basis)) {}
+    PhaseRotations(double unit, std::vector<InputBasis> basis) : unit_(unit), basis_(std::move(basis)) {}
 
     double unit() const { return unit_; }  // [s]
     const std::vector<InputBasis>& basis() const { return basis_; }
@@ -151,9 +151,9 @@ class InputTurns {
         return omega;
     }
     // For each pair; h = unit * 2^exponent.
-    const Turn* over(int exponent) {
+    const PhaseRotation* over(int exponent) {
         assert(std::abs(exponent) <= reach);
-        std::vector<Turn>& turn = turns_[static_cast<std::size_t>(exponent + reach)];
+        std::vector<PhaseRotation>& turn = rotations_[static_cast<std::size_t>(exponent + reach)];
         if (turn.empty()) {
             const double h = std::ldexp(unit_, exponent);
             for (std::size_t q = 0; q < basis_.size(); q += 2) {
@@ -169,7 +169,7 @@ class InputTurns {
 
     double unit_;
     std::vector<InputBasis> basis_;
-    std::array<std::vector<Turn>, 2 * reach + 1> turns_;
+    std::array<std::vector<PhaseRotation>, 2 * reach + 1> rotations_;
 };
 
 // The inputs at one instant, as the state of the linear system that generates them.
@@ -194,16 +194,17 @@ class InputState {
     // Of another with the same signals.
     InputState& operator=(const InputState& o) {
         time_ = o.time_;
-        knot_ = o.knot_;
+        breakpoint_ = o.breakpoint_;
         linear_ = o.linear_;
         slope_ = o.slope_;
         for (int q = 0; q < size_; q += 2) pair_of(o, q).store(weights_ + q);
         return *this;
     }
 
-    // Sets all from absolute time, so that no phase error accumulates however long the run. At a knot: the right limit.
+    // Sets all from absolute time, so that no phase error accumulates however long the run. At a breakpoint: the right
+    // limit.
     void anchor(double t) {
-        for (int i = 0; i < n_inputs; ++i) knot_[i] = &(*signals_)[i].knots[(*signals_)[i].segment(t)];
+        for (int i = 0; i < n_inputs; ++i) breakpoint_[i] = &(*signals_)[i].breakpoints[(*signals_)[i].segment(t)];
         follow(t);
     }
     // The same, the left limit.
@@ -211,23 +212,23 @@ class InputState {
         for (int i = 0; i < n_inputs; ++i) {
             const Signal& s = (*signals_)[i];
             std::size_t k = s.segment(t);
-            while (k > 0 && s.knots[k].time >= t) --k;
-            knot_[i] = &s.knots[k];
+            while (k > 0 && s.breakpoints[k].time >= t) --k;
+            breakpoint_[i] = &s.breakpoints[k];
         }
         follow(t);
     }
-    // The same, on the stretches between knots that were last anchored to, also at their far end.
+    // The same, on the stretches between breakpoints that were last anchored to, also at their far end.
     void follow(double t) {
         time_ = t;
         for (int i = 0; i < n_inputs; ++i) {
-            const Knot& k = *knot_[i];
+            const Breakpoint& k = *breakpoint_[i];
             linear_[i] = k.value + k.slope * (t - k.time);
             slope_[i] = k.slope;
         }
         int q = 0;
         for (int i = 0; i < n_inputs; ++i)
             for (const Sine& s : (*signals_)[i].sines) {
-                const double angle = 2.0 * std::numbers::pi * turned(s.frequency, t) + s.phase;
+                const double angle = 2.0 * std::numbers::pi * fraction_of_turn(s.frequency, t) + s.phase;
                 const auto [sine, cosine] = sine_cosine(angle);
                 weights_[q++] = s.amplitude * sine;
                 weights_[q++] = s.amplitude * cosine;
@@ -254,8 +255,9 @@ class InputState {
     }
 
     // Sums of the magnitudes of the parts: what the rounding of the values is relative to.
-    Inputs sizes() const {
-        return sum(magnitudes(linear_), [this](int q) { return std::fabs(weights_[q]) + std::fabs(weights_[q + 1]); });
+    Inputs magnitudes() const {
+        return sum(lostmotion::magnitudes(linear_),
+                   [this](int q) { return std::fabs(weights_[q]) + std::fabs(weights_[q + 1]); });
     }
     const Inputs& slope() const { return slope_; }
     // The piecewise-linear parts alone.
@@ -304,9 +306,9 @@ class InputState {
             }
         return bound;
     }
-    // The first instant from now on at which an input no longer goes this way, before `limit` and the next knot; else
-    // `limit`. From slope v and curvature a follows v + a s - B s^2/2 <= its slope after s, where B bounds the third
-    // derivative, so that none is stepped over.
+    // The first instant from now on at which an input no longer goes this way, before `limit` and the next breakpoint;
+    // else `limit`. From slope v and curvature a follows v + a s - B s^2/2 <= its slope after s, where B bounds the
+    // third derivative, so that none is stepped over.
     double turning(int i, double way, double limit) const {
         double B = 0.0;
         for (const Sine& s : (*signals_)[i].sines)
@@ -323,7 +325,7 @@ class InputState {
     }
 
     // Moves on by h, for once; sines and cosines of small angles from their series.
-    void turn(double h) {
+    void rotate(double h) {
         time_ += h;
         for (int i = 0; i < n_inputs; ++i) linear_[i] += slope_[i] * h;
         for (int q = 0; q < sines_end_[n_inputs - 1]; q += 2) {
@@ -331,19 +333,19 @@ class InputState {
             const auto [sine, cosine] =
                 a2 < 1e-6 ? SineCosine{a * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0)), 1.0 - a2 / 2.0 * (1.0 - a2 / 12.0)}
                           : sine_cosine(a);
-            (Turn{cosine, sine} * pair_of(*this, q)).store(weights_ + q);
+            (PhaseRotation{cosine, sine} * pair_of(*this, q)).store(weights_ + q);
         }
     }
 
     // Moves on by h, by which the pairs turn as given.
-    [[gnu::always_inline]] void advance(double h, const Turn* turns) { advance_from(*this, h, turns); }
-    // To h beyond where another with the same signals stands, on the same stretch between knots.
-    [[gnu::always_inline]] void advance_from(const InputState& from, double h, const Turn* turns) {
+    [[gnu::always_inline]] void advance(double h, const PhaseRotation* rotations) { advance_from(*this, h, rotations); }
+    // To h beyond where another with the same signals stands, on the same stretch between breakpoints.
+    [[gnu::always_inline]] void advance_from(const InputState& from, double h, const PhaseRotation* rotations) {
         time_ = from.time_ + h;
-        knot_ = from.knot_;
+        breakpoint_ = from.breakpoint_;
         slope_ = from.slope_;
         for (int i = 0; i < n_inputs; ++i) linear_[i] = from.linear_[i] + slope_[i] * h;
-        for (int q = 0; q < size_; q += 2) (*turns++ * pair_of(from, q)).store(weights_ + q);
+        for (int q = 0; q < size_; q += 2) (*rotations++ * pair_of(from, q)).store(weights_ + q);
     }
 
  private:
@@ -372,7 +374,7 @@ class InputState {
     int size_;
     std::array<int, n_inputs> sines_end_{};  // of each input
     double time_ = 0.0;
-    std::array<const Knot*, n_inputs> knot_{};
+    std::array<const Breakpoint*, n_inputs> breakpoint_{};
     Inputs linear_{}, slope_{};
     double* weights_;  // of cosine: a sin(psi); sine: a cos(psi); ramp: slope
     std::array<double, 4> few_{};

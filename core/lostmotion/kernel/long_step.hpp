@@ -81,7 +81,7 @@ class LongStep {
         for (std::size_t i = 0; i < n_inputs; ++i) z[line + i] += h_ * z[slope + i];
         for (std::size_t q = 0; q < sines_.size(); ++q) {
             const auto now = Pack<2>::load(z + sine + 2 * q);
-            (now + Turn{sines_[q].cosine_change.high, sines_[q].sin.high} * now).store(z + sine + 2 * q);
+            (now + PhaseRotation{sines_[q].cosine_change.high, sines_[q].sin.high} * now).store(z + sine + 2 * q);
         }
     }
 
@@ -104,7 +104,7 @@ class LongStep {
         }
         change_.swap(doubled_);
         round();
-        for (Turning& t : sines_) {
+        for (RotatingSine& t : sines_) {
             const DoubleDouble c = t.cosine_change, s = t.sin;
             t.cosine_change = 2.0 * c + (c * c + -s * s);
             t.sin = 2.0 * (s + c * s);
@@ -139,7 +139,7 @@ class LongStep {
             out[r] = scaled(rate);
         }
         for (std::size_t j = 0; j < D::angles; ++j)
-            out[n_coupled + j] = scaled(rates_.turning[j] * z[rates_.turning_speed[j]]);
+            out[n_coupled + j] = scaled(rates_.angle_coefficient[j] * z[rates_.angle_speed[j]]);
         return out;
     }
 
@@ -157,7 +157,7 @@ class LongStep {
  private:
     static constexpr int terms = 24;  // 16^-24/24! < 1e-52
 
-    struct Turning {
+    struct RotatingSine {
         std::size_t input;
         DoubleDouble omega;               // [rad/s]
         DoubleDouble cosine_change, sin;  // over the length
@@ -207,7 +207,7 @@ class LongStep {
                 z = next_term(z, k);
                 for (std::size_t r = 0; r < n_states; ++r) change_[j][r] += z[r];
                 if (j > sine && (j - sine) % 2 == 1) {  // of a cosine
-                    Turning& t = sines_[(j - sine) / 2];
+                    RotatingSine& t = sines_[(j - sine) / 2];
                     t.sin += z[j - 1];
                     t.cosine_change += z[j];
                 }
@@ -220,7 +220,7 @@ class LongStep {
     Column constant_;
     std::array<Tie, n_coupled> ties_{};
     double h_;
-    std::vector<Turning> sines_;
+    std::vector<RotatingSine> sines_;
     std::vector<std::array<DoubleDouble, n_states>> change_, doubled_;  // D(h), column by column
     std::vector<State> rounded_;
     std::vector<double> z_;

@@ -1,4 +1,4 @@
-// Polynomials that stand for a guard: over one look the cubic Hermite interpolant, enclosed by its Bernstein
+// Polynomials that stand for a guard: over one event check the cubic Hermite interpolant, enclosed by its Bernstein
 // coefficients; near its zero the Taylor series.
 #pragma once
 
@@ -17,7 +17,7 @@ struct Cubic {
     Cubic(double value, double slope, double end_value, double end_slope, double h)
         : c0(value), c1(value + h / 3.0 * slope), c2(end_value - h / 3.0 * end_slope), c3(end_value) {}
 
-    double least() const { return std::min(std::min(c0, c1), std::min(c2, c3)); }  // a lower bound
+    double min() const { return std::min(std::min(c0, c1), std::min(c2, c3)); }  // a lower bound
     double operator()(double s) const {
         const double r = 1.0 - s;
         return r * r * (r * c0 + 3.0 * s * c1) + s * s * (3.0 * r * c2 + s * c3);

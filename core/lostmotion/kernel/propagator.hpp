@@ -23,9 +23,9 @@ namespace lostmotion {
 // Everything needed to step by one length h in one regime.
 template <class D>
 struct StepOf {
-    IntegralOf<D> integral;  // G(h)
-    MatrixOf<D> growth;      // bound on |exp(A s)|, element by element, for 0 <= s <= h; 1e200 if it is no less
-    MatrixOf<D> change;      // E(h) = exp(A h) - 1
+    IntegralOf<D> integral;         // G(h)
+    MatrixOf<D> exponential_bound;  // bound on |exp(A s)|, element by element, for 0 <= s <= h; 1e200 if it is no less
+    MatrixOf<D> change;             // E(h) = exp(A h) - 1
 };
 
 // What a pair of functions of the inputs brings over one length.
@@ -67,16 +67,16 @@ class Propagator {
 
     static constexpr int max_levels = 40;
     static constexpr int usual_levels = 12;
-    static constexpr double unbounded = 1e200;  // growth from here on is no longer computed
+    static constexpr double unbounded = 1e200;  // exponential_bound from here on is no longer computed
     static constexpr double base_norm = 0.25;   // |A| h of the base interval, in scaled units
 
-    // turns: its unit is a length of which some power-of-two multiple or fraction is the base interval.
+    // rotations: its unit is a length of which some power-of-two multiple or fraction is the base interval.
     // scale: natural sizes of the states; only for choosing the base interval.
-    // rates and turns must outlive this.
-    void prepare(const LinearRates& rates, InputTurns& turns, const State& scale) {
-        turns_ = &turns;
-        n_pairs_ = static_cast<int>(turns.basis().size() / 2);
-        const double fastest = turns.fastest();
+    // rates and rotations must outlive this.
+    void prepare(const LinearRates& rates, PhaseRotations& rotations, const State& scale) {
+        rotations_ = &rotations;
+        n_pairs_ = static_cast<int>(rotations.basis().size() / 2);
+        const double fastest = rotations.fastest();
         double norm = fastest;  // of A in scaled units, or the highest input frequency [1/s]
         for (int r = 0; r < D::coupled; ++r) {
             double sum = 0.0;
@@ -84,8 +84,9 @@ class Propagator {
             norm = std::fmax(norm, sum);
         }
         for (int j = 0; j < D::angles; ++j)
-            norm = std::fmax(norm, std::fabs(rates.turning[j]) * scale[rates.turning_speed[j]] / scale[D::coupled + j]);
-        base_ = turns.unit();
+            norm = std::fmax(
+                norm, std::fabs(rates.angle_coefficient[j]) * scale[rates.angle_speed[j]] / scale[D::coupled + j]);
+        base_ = rotations.unit();
         exponent_ = 0;
         for (; norm * base_ > base_norm; base_ *= 0.5) --exponent_;
         per_first_ = 0.5 / base_;
@@ -107,13 +108,14 @@ class Propagator {
         while (levels_ <= k) add_doubled();
         return steps_[k];
     }
-    // The level or, if the motion grows beyond all bounds before it ends, the highest whose `growth` is a bound.
+    // The level or, if the motion grows beyond all bounds before it ends, the highest whose `exponential_bound` is a
+    // bound.
     int bounded_level(int k) {
         level(k);
         return std::min(k, bounded_);
     }
     const Response* responses(int k) const { return responses_.data() + k * n_pairs_; }
-    const Turn* turns(int k) const { return turns_of_level_[k]; }
+    const PhaseRotation* rotations(int k) const { return rotations_of_level_[k]; }
 
     double length(int k) const { return base_ * power_of_two[k]; }
     double per_first() const { return per_first_; }  // 1 / length(1), rounded
@@ -143,7 +145,7 @@ class Propagator {
         for (int p = 1; p < n_pairs_; ++p) forced = forced + response[p] * (weights + 2 * p);
         return x + (free + forced);
     }
-    // The same for x and x' at once, without a look at the rates of the regime in between.
+    // The same for x and x' at once, without the rates of the regime in between.
     [[gnu::always_inline]] void step(int k, Lanes& x, Lanes& rate, const double* weights) {
         const Step& s = level(k);
         const Response* response = responses(k);
@@ -193,7 +195,7 @@ class Propagator {
 
     // The row of an angle in exp(A h) - 1.
     Coupled angle_change(const Integral& over_h, int j) const {
-        return rates().turning[j] * over_h.coupled.row(rates().turning_speed[j]);
+        return rates().angle_coefficient[j] * over_h.coupled.row(rates().angle_speed[j]);
     }
 
     // Room for one level more. What an earlier use has left there is written over.
@@ -217,10 +219,10 @@ class Propagator {
         for (int k = 0; k < D::coupled; ++k) positive.column[k][k] = std::fmax(rates().rate.column[k][k], 0.0);
         positive.scale(h);
         const Matrix twice = positive * positive;
-        s.growth = Taylor<D>::template power_series<0>(positive, twice, positive * twice);
+        s.exponential_bound = Taylor<D>::template power_series<0>(positive, twice, positive * twice);
         for (int p = 0; p < n_pairs_; ++p)
             for (int c = 0; c < 2; ++c) {
-                const InputBasis& function = turns_->basis()[static_cast<std::size_t>(2 * p + c)];
+                const InputBasis& function = rotations_->basis()[static_cast<std::size_t>(2 * p + c)];
                 responses_[static_cast<std::size_t>(p)].set(
                     c, function.kind == InputBasis::nothing ? Lanes{} : taylor_.response(function, h));
             }
@@ -229,7 +231,7 @@ class Propagator {
 
     // cos(omega length) - 1 of a pair, without cancellation.
     double cosine_change(int k, int pair) {
-        const double half = turns_->over(exponent_ + k - 1)[pair].sin;
+        const double half = rotations_->over(exponent_ + k - 1)[pair].sin;
         return -2.0 * half * half;
     }
 
@@ -244,10 +246,11 @@ class Propagator {
             (2.0 * load(integral) + a.change * integral).store(b.integral.coupled.column[c].data());
             // |exp(A (h + s))| <= |exp(A s)| |exp(A h)|, of which the second is known.
             const Coupled size = absolute(Matrix::identity().at(c) + load(change));
-            least(most(a.growth.at(c), a.growth * size), unbounded).store(b.growth.column[c].data());
+            at_most(max_of(a.exponential_bound.at(c), a.exponential_bound * size), unbounded)
+                .store(b.exponential_bound.column[c].data());
         }
         for (int c = 0; c < D::coupled; ++c)
-            for (const double bound : b.growth.column[c])
+            for (const double bound : b.exponential_bound.column[c])
                 if (!(bound < unbounded)) bounded_ = std::min(bounded_, k);
         std::array<Coupled, D::angles> angle;
         for (int j = 0; j < D::angles; ++j) {
@@ -256,7 +259,7 @@ class Propagator {
         }
         b.integral.length = 2.0 * a.integral.length;
         for (int p = 0; p < n_pairs_; ++p) {
-            const InputBasis* basis = &turns_->basis()[static_cast<std::size_t>(2 * p)];
+            const InputBasis* basis = &rotations_->basis()[static_cast<std::size_t>(2 * p)];
             const Response& from = responses(k)[p];
             Response& to = responses_[static_cast<std::size_t>((k + 1) * n_pairs_ + p)];
             const auto held = [&](int input) { return a.integral * rates().input_column[input]; };
@@ -268,7 +271,7 @@ class Propagator {
                 return out;
             };
             if (basis->kind == InputBasis::cosine) {
-                const Turn turn = turns(k)[p];
+                const PhaseRotation turn = rotations(k)[p];
                 const Lanes cosine = from.of(0), sine = from.of(1), constant = held(basis->input);
                 to.set(0, kept(0) + (turn.cos * cosine + (-turn.sin * sine + cosine_change(k, p) * constant)));
                 to.set(1, kept(1) + (turn.cos * sine + (turn.sin * cosine + turn.sin * constant)));
@@ -282,12 +285,12 @@ class Propagator {
         finish_level();
     }
 
-    // What follows from length and responses: the turns of the inputs, and the rates.
+    // What follows from length and responses: the phase rotations of the inputs, and the rates.
     void finish_level() {
         const int k = levels_++;
-        const Turn* turn = turns_of_level_[k] = turns_->over(exponent_ + k);
+        const PhaseRotation* turn = rotations_of_level_[k] = rotations_->over(exponent_ + k);
         for (int p = 0; p < n_pairs_; ++p) {
-            const InputBasis* basis = &turns_->basis()[static_cast<std::size_t>(2 * p)];
+            const InputBasis* basis = &rotations_->basis()[static_cast<std::size_t>(2 * p)];
             Response& r = responses_[static_cast<std::size_t>(k * n_pairs_ + p)];
             for (int c = 0; c < 2; ++c) {
                 const double input = basis[c].kind == InputBasis::nothing  ? 0.0
@@ -306,13 +309,13 @@ class Propagator {
     double long_stretch_ = 0.0;  // [s]
     int exponent_ = 0;           // of two: base / unit
     int longest_ = 0;            // level
-    int bounded_ = max_levels;   // the highest level whose growth is bounded, as far as they are computed
+    int bounded_ = max_levels;   // the highest level whose exponential_bound is bounded, as far as they are computed
     int n_pairs_ = 0;            // of functions of the inputs
-    InputTurns* turns_ = nullptr;
+    PhaseRotations* rotations_ = nullptr;
     int levels_ = 0;
     std::vector<Step> steps_;          // one a level, kept when others are computed
     std::vector<Response> responses_;  // levels x n_pairs
-    std::array<const Turn*, max_levels> turns_of_level_{};
+    std::array<const PhaseRotation*, max_levels> rotations_of_level_{};
 };
 
 }  // namespace lostmotion

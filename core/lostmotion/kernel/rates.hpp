@@ -79,8 +79,8 @@ struct LinearRatesOf {
 
     MatrixOf<D> rate;
     std::array<double, D::angles>
-        turning{};  // of each angle: 1 or, if its shaft is at rest, 0: its rate over its speed
-    [[no_unique_address]] TurningSpeeds<D> turning_speed;
+        angle_coefficient{};  // of each angle: 1 or, if its shaft is at rest, 0: its rate over its speed
+    [[no_unique_address]] AngleSpeeds<D> angle_speed;
     std::array<Column, D::inputs> input_column{};
     Column fixed{};                              // the constant: its column for 1 ...
     std::array<Column, D::memory> per_memory{};  // ... and those for the memory
@@ -91,9 +91,9 @@ struct LinearRatesOf {
         for (int j = 0; j < D::angles; ++j) {
             const LinearFormOf<D>& angle = of[D::coupled + j];
             for (int k = 0; k < D::coupled; ++k)
-                if (angle.c[k] != 0.0) turning_speed.set(j, k);
-            turning[j] = angle.c[turning_speed[j]];
-            for (int k = 0; k < D::terms; ++k) assert(k == turning_speed[j] || angle.c[k] == 0.0);
+                if (angle.c[k] != 0.0) angle_speed.set(j, k);
+            angle_coefficient[j] = angle.c[angle_speed[j]];
+            for (int k = 0; k < D::terms; ++k) assert(k == angle_speed[j] || angle.c[k] == 0.0);
         }
         for (int r = 0; r < D::coupled; ++r) {
             const LinearFormOf<D>& f = of[r];
@@ -122,7 +122,7 @@ struct LinearRatesOf {
     // The rates of the angles.
     [[gnu::always_inline]] std::array<double, D::angles> angle_rate(const Coupled& x) const {
         std::array<double, D::angles> out;
-        for (int j = 0; j < D::angles; ++j) out[j] = turning[j] * x[turning_speed[j]];
+        for (int j = 0; j < D::angles; ++j) out[j] = angle_coefficient[j] * x[angle_speed[j]];
         return out;
     }
     [[gnu::always_inline]] Lanes operator()(const Coupled& x, const Column& constant, const Inputs& u) const {
@@ -152,7 +152,7 @@ struct LinearRatesOf {
         State out;
         (sum_in_fours<D::coupled>([&](auto k) { return derivative[k] * absolute(rate.at(k)); }) + forced)
             .store(out.data());
-        for (int j = 0; j < D::angles; ++j) out[D::coupled + j] = turning[j] * derivative[turning_speed[j]];
+        for (int j = 0; j < D::angles; ++j) out[D::coupled + j] = angle_coefficient[j] * derivative[angle_speed[j]];
         return out;
     }
 };

@@ -15,9 +15,9 @@ namespace lostmotion {
 // States and inputs at up to `most` instants of one regime, variable by variable.
 template <class D>
 struct InstantsOf {
-    static constexpr int most = 64;
-    static_assert(most % vec_width == 0);
-    using Column = std::array<double, most>;
+    static constexpr int max_count = 64;
+    static_assert(max_count % vec_width == 0);
+    using Column = std::array<double, max_count>;
 
     alignas(64) std::array<Column, D::states> x{};
     alignas(64) std::array<Column, D::inputs> u{};
@@ -44,9 +44,9 @@ class Stride {
         const InputState<D>& input = from.input();
         const LinearRatesOf<D>& rates = propagator.rates();
         const ResponseOf<D>* responses = propagator.responses(level);
-        const Turn* turns = propagator.turns(level);
+        const PhaseRotation* rotations = propagator.rotations(level);
         for (int j = 0; j < D::angles; ++j)
-            turning_[j] = rates.turning[j] * step_->integral.coupled.row(rates.turning_speed[j]);
+            angle_row_[j] = rates.angle_coefficient[j] * step_->integral.coupled.row(rates.angle_speed[j]);
         x_ = from.x();
         linear_ = input.linear();
         Coupled driving = load(constant), ramp{};
@@ -66,9 +66,9 @@ class Stride {
             const double* weights = input.weights() + q;
             if (basis.kind == InputBasis::cosine) {
                 sines_end_[basis.input] = sines + 1;
-                Turning& t = sines_[sines++];  // in place, for the sake of speed
+                RotatingSine& t = sines_[sines++];  // in place, for the sake of speed
                 t.sine_cosine = Pack<2>::load(weights);
-                t.turn = turns[q / 2];
+                t.rotation = rotations[q / 2];
                 t.by_sine = step_->integral * rates.input_column[basis.input] + response.of(0);
                 t.by_cosine = response.of(1);
             } else {
@@ -92,12 +92,12 @@ class Stride {
                 return;
             }
             Lanes driven = forced;
-            for (Turning& t : sines_) {
+            for (RotatingSine& t : sines_) {
                 driven = driven + (t.sine_cosine[0] * t.by_sine + t.sine_cosine[1] * t.by_cosine);
-                t.sine_cosine = t.turn * t.sine_cosine;
+                t.sine_cosine = t.rotation * t.sine_cosine;
             }
             Lanes own{step_->change * x.coupled, {}};
-            for (int j = 0; j < D::angles; ++j) own.angle[j] = (turning_[j] * x.coupled).sum();
+            for (int j = 0; j < D::angles; ++j) own.angle[j] = (angle_row_[j] * x.coupled).sum();
             x = own + (x + driven);  // so that one sum less waits for the step before
             forced = forced + growth_;
             for (int i = 0; i < n_inputs; ++i) linear_[i] += increase_[i];
@@ -107,18 +107,18 @@ class Stride {
     const State& x() const { return x_; }
 
  private:
-    struct Turning {
+    struct RotatingSine {
         Pack<2> sine_cosine;  // the sine itself, and its derivative over omega
-        Turn turn;
+        PhaseRotation rotation;
         Lanes by_sine, by_cosine;
     };
 
     const StepOf<D>* step_ = nullptr;
-    std::array<Coupled, D::angles> turning_;  // the rows of the angles in exp(A h) - 1
+    std::array<Coupled, D::angles> angle_row_;  // the rows of the angles in exp(A h) - 1
     State x_{};
     Lanes forced_, growth_;
     InputsOf<D> linear_{}, increase_{};
-    std::vector<Turning> sines_;  // input by input
+    std::vector<RotatingSine> sines_;  // input by input
     std::array<std::size_t, D::inputs> sines_end_{};
 };
 

@@ -32,10 +32,10 @@ class Expansion {
     static constexpr int terms = Polynomial::degree;  // good for a base interval: 0.25^13/13! < 1e-17
     using Coupled = CoupledOf<D>;
 
-    std::array<InputsOf<D>, terms + 1> input;  // [k]: their k-th derivative
-    std::array<double, D::angles> angle_rate;  // of the angles
-    std::array<double, D::angles> turning;     // their rates over their speeds
-    [[no_unique_address]] TurningSpeeds<D> turning_speed;
+    std::array<InputsOf<D>, terms + 1> input;         // [k]: their k-th derivative
+    std::array<double, D::angles> angle_rate;         // of the angles
+    std::array<double, D::angles> angle_coefficient;  // their rates over their speeds
+    [[no_unique_address]] AngleSpeeds<D> angle_speed;
     std::array<Coupled, terms> coupled;  // derivatives of the other states, from the first on
 
     // By how much the state changes over s.
@@ -50,11 +50,11 @@ class Expansion {
             sum.coupled = sum.coupled + ((by<0>(c, v[0]) + by<1>(c, v[1])) + (by<2>(c, v[2]) + by<3>(c, v[3])));
             const Pack<4> next = c * four_over_next(part);
             for (int j = 0; j < D::angles; ++j) {
-                const int speed = turning_speed[j];
+                const int speed = angle_speed[j];
                 sum.angle[j] += (next * Pack<4>::of({v[0][speed], v[1][speed], v[2][speed], v[3][speed]})).sum();
             }
         }
-        for (int j = 0; j < D::angles; ++j) sum.angle[j] = s * (angle_rate[j] + turning[j] * sum.angle[j]);
+        for (int j = 0; j < D::angles; ++j) sum.angle[j] = s * (angle_rate[j] + angle_coefficient[j] * sum.angle[j]);
         return sum;
     }
 
@@ -190,13 +190,13 @@ class Taylor {
         sum.coupled.scale(h);
         // An angle is turned by the integral of its speed's row.
         for (int j = 0; j < D::angles; ++j) {
-            const int speed = rates_->turning_speed[j];
+            const int speed = rates_->angle_speed[j];
             const Coupled first = Matrix::identity().row(speed), second = one.row(speed), third = two.row(speed);
             Coupled row{};
             for (int k = terms - 3; k >= 0; k -= 3)
                 row = three.after(row) + (over_factorial[k + 2] * first +
                                           (over_factorial[k + 3] * second + over_factorial[k + 4] * third));
-            (rates_->turning[j] * h * h * row).store(sum.angle[j].data());
+            (rates_->angle_coefficient[j] * h * h * row).store(sum.angle[j].data());
         }
         return sum;
     }
@@ -230,8 +230,8 @@ class Taylor {
 
     [[gnu::always_inline]] void expand(const Lanes& rate, const Varies& varies, Expansion<D>& out) const {
         out.angle_rate = rate.angle;
-        out.turning = rates_->turning;
-        out.turning_speed = rates_->turning_speed;
+        out.angle_coefficient = rates_->angle_coefficient;
+        out.angle_speed = rates_->angle_speed;
         const auto recur = [&](auto forced) __attribute__((always_inline)) {
             auto& v = out.coupled;
             v[0] = rate.coupled;

@@ -153,7 +153,7 @@ template <int n>
     return out;
 }
 
-inline Vec least(Vec a, Vec b) { return a < b ? a : b; }
+inline Vec min_of(Vec a, Vec b) { return a < b ? a : b; }
 template <class V>
 V absolute(V a) {
     return a < -a ? -a : a;
@@ -164,15 +164,15 @@ Pack<n> absolute(Pack<n> a) {
     return a;
 }
 // The greater of two numbers, for each pair.
-inline double most(double a, double b) { return a < b ? b : a; }
+inline double max_of(double a, double b) { return a < b ? b : a; }
 template <int n>
-Pack<n> most(Pack<n> a, const Pack<n>& b) {
+Pack<n> max_of(Pack<n> a, const Pack<n>& b) {
     for (int p = 0; p < Pack<n>::parts; ++p) a.part[p] = a.part[p] < b.part[p] ? b.part[p] : a.part[p];
     return a;
 }
 // Each number, but `bound` at most.
 template <int n>
-Pack<n> least(Pack<n> a, double bound) {
+Pack<n> at_most(Pack<n> a, double bound) {
     const auto limit = typename Pack<n>::Part{} + bound;
     for (auto& part : a.part) part = part < limit ? part : limit;
     return a;

@@ -331,7 +331,7 @@ inline void Assembly::add_speed_guards(Regime& r) const {
         const int mode = r.key.modes[c];
         if (mode == 0) continue;
         // (16) sets the hysteresis anew whenever the twist rate reaches zero, whether it then changes sign or not.
-        add(r, static_cast<double>(mode) * contact_speed(c), Guard::speed, c, nowhere, 0).by_touch =
+        add(r, static_cast<double>(mode) * contact_speed(c), Guard::speed, c, nowhere, 0).by_grazing =
             places_.contacts[c].kind == ContactPlace::gear;
     }
 }

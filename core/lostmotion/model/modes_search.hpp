@@ -128,7 +128,7 @@ bool SwitchedTrain<Sizes>::breaks_away(Cache& cache, Now& now, const Event& even
         Motion<Sizes, std::decay_t<decltype(r)>, Now> motion(n_, r, now);
         const double mode = event.neighbour;
         if (train().shafts.size() == 2 ||
-            motion.sign(mode * assembly_.contact_speed(event.contact)).relative >= -largest_violation) {
+            motion.sign(mode * assembly_.contact_speed(event.contact)).relative >= -max_violation) {
             key = slips;
             return true;
         }
@@ -186,7 +186,7 @@ Found SwitchedTrain<Sizes>::search(Cache& cache, Now& now, const Event& event, c
             combinations *= places().contacts[c].one_way ? 2.0 : 3.0;
     if (combinations <= few) return enumerate(cache, now, event, from, key);
     const Found found = pivot(cache, now, event, from, key);
-    return found == Found::yes || combinations > most ? found : enumerate(cache, now, event, from, key);
+    return found == Found::yes || combinations > max_tried ? found : enumerate(cache, now, event, from, key);
 }
 
 // Those with most contacts stuck first. While everything stands the torques stay as they were, and give way only if
@@ -221,8 +221,8 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
     }
     const auto before = now.memory;  // all that a trial may change
     Found worst = Found::inconsistent;
-    const double largest = event.closest ? largest_violation : std::numeric_limits<double>::infinity();
-    double least = largest;
+    const double limit = event.closest ? max_violation : std::numeric_limits<double>::infinity();
+    double smallest = limit;
     Key closest;
     auto of_closest = before;
     for (const bool limit : {false, true})
@@ -237,13 +237,13 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
                 if (found != Found::yes) continue;
                 const double v = event.closest ? violation(cache.regime(key), now, event)
                                                : torque_change(cache.regime(key), now, event);
-                if (v < least) {
-                    least = v;
+                if (v < smallest) {
+                    smallest = v;
                     closest = key;
                     of_closest = now.memory;
                 }
             }
-    if (least == largest) {
+    if (smallest == limit) {
         now.memory = before;
         key = from;
         return worst;
@@ -266,7 +266,7 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
     };
     std::vector<Tried> tried;
     std::vector<std::size_t> path;  // of those tried, as far as they may lead on
-    double least = largest_violation;
+    double smallest = max_violation;
     Key closest;
     auto of_closest = before;
     Found worst = Found::inconsistent;
@@ -312,8 +312,8 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
         }
         if (trial.found == Found::yes) {
             const double v = violation(cache.regime(key), now, event);
-            if (v < least) {
-                least = v;
+            if (v < smallest) {
+                smallest = v;
                 closest = key;
                 of_closest = now.memory;
             }
@@ -334,7 +334,7 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
         }
         if (!is_new()) break;  // there are no others
     }
-    if (least < largest_violation) {
+    if (smallest < max_violation) {
         key = closest;
         now.memory = of_closest;
         return Found::yes;
@@ -380,10 +380,10 @@ double SwitchedTrain<Sizes>::violation(const R& r, const Now& now, const Event& 
         const auto& guard = r.guards[g];
         if (ignored[g] || guard.is_edge() || guard.kind == Guard::outside) continue;
         const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);
-        const auto [rate, rate_size] = motion.derivative(guard.form, 1);
+        const auto [rate, rate_magnitude] = motion.derivative(guard.form, 1);
         const bool zero = std::fabs(value) <= motion.noise(size, rate);
         if (zero && rate < 0.0 && !event.by_value_alone(guard))
-            worst = std::fmax(worst, -rate / rate_size);
+            worst = std::fmax(worst, -rate / rate_magnitude);
         else if (!zero && value < 0.0)
             worst = std::fmax(worst, -value / size);
     }

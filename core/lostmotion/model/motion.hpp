@@ -15,7 +15,7 @@ struct Instant {
     std::array<double, max_states> x{};
     std::array<double, max_memory> memory{};
     std::array<std::array<double, max_inputs>, n_derivatives> input{};  // [k]: k-th derivatives
-    std::array<double, max_inputs> input_size{};
+    std::array<double, max_inputs> input_magnitudes{};
 };
 
 // Added up as the kernel does: the constants, the inputs, the coupled states in fours, the angles.
@@ -38,7 +38,7 @@ double magnitude(const Sizes& n, const F& f, const Now& now) {
     double sum = std::fabs(f.c[n.one]);
     for (int k = 0; k < n.memory; ++k) sum += std::fabs(f.c[n.first_memory + k] * now.memory[k]);
     for (int k = 0; k < n.inputs; ++k)
-        sum += std::fabs(f.c[n.first_input + k]) * std::fmax(std::fabs(now.input[0][k]), now.input_size[k]);
+        sum += std::fabs(f.c[n.first_input + k]) * std::fmax(std::fabs(now.input[0][k]), now.input_magnitudes[k]);
     for (int k = 0; k < n.states; ++k) sum += std::fabs(f.c[k] * now.x[k]);
     return sum;
 }
@@ -59,12 +59,12 @@ class Motion {
     Sign sign(const F& form, bool by_value_alone = false) {
         double value = evaluate(n_, form, now_), size = magnitude(n_, form, now_);
         for (int k = 0; k + 1 < n_derivatives; ++k) {
-            const auto [rate, rate_size] = derivative(form, k + 1);
+            const auto [rate, rate_magnitude] = derivative(form, k + 1);
             if (std::fabs(value) > noise(size, rate))
                 return {value > 0.0 ? +1 : -1, k, size > 0.0 ? value / size : 0.0};
             if (by_value_alone) return {};
             value = rate;
-            size = rate_size;
+            size = rate_magnitude;
         }
         return {};
     }

@@ -39,7 +39,7 @@ struct PackedGuard {
     PackedForm<D> form;
     Kind kind = outside;
     int contact = -1, branch = -1, neighbour = 0;
-    bool by_touch = false;
+    bool by_grazing = false;
     int memory = -1;
     double shift = 0.0;
     bool behind = false;
@@ -81,7 +81,7 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
     for (const Guard& g : r.guards) {
         if (out.n_guards == D::guards) break;
         out.guards[out.n_guards++] = {pack<D>(g.form, n), g.kind,   g.contact, g.branch, g.neighbour,
-                                      g.by_touch,         g.memory, g.shift,   g.behind};
+                                      g.by_grazing,       g.memory, g.shift,   g.behind};
     }
     std::copy_n(r.at_rest.begin(), n.contacts, out.at_rest.begin());
     const auto& shafts = a.places().shafts;

@@ -39,11 +39,11 @@ struct Guard {
     };
     Row form;
     Kind kind = outside;
-    int contact = -1;       // for speed and capacity; the contact that a law belongs to, if any
-    int branch = -1;        // for edges and limits: the law
-    int neighbour = 0;      // for edges and limits: the branch beyond; capacity: the sign of slip
-    bool by_touch = false;  // ends the regime also by touching zero without falling through it
-    int memory = -1;        // set if crossing shifts a memory (the turn of an angle) by `shift`
+    int contact = -1;         // for speed and capacity; the contact that a law belongs to, if any
+    int branch = -1;          // for edges and limits: the law
+    int neighbour = 0;        // for edges and limits: the branch beyond; capacity: the sign of slip
+    bool by_grazing = false;  // ends the regime also by touching zero without falling through it
+    int memory = -1;          // set if crossing shifts a memory (the turn of an angle) by `shift`
     double shift = 0.0;
     bool behind = false;  // an edge that the twist slips away from, so that it does not reach it
 

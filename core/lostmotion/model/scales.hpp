@@ -40,7 +40,7 @@ void rated_scale(const Assembly& a, State& s) {
     for (std::size_t g = 0; g < train.gears.size(); ++g) {
         const Gear& gear = train.gears[g];
         if (const int k = a.places().gears[g].twist; k != nowhere)
-            s[k] = gear.rigid() ? 1.0 : gear.law.rated_output_torque / gear.law.curve.largest_slope();
+            s[k] = gear.rigid() ? 1.0 : gear.law.rated_output_torque / gear.law.curve.max_slope();
     }
 }
 
@@ -73,7 +73,7 @@ void balanced_scale(const Assembly& a, State& s, int first_angle) {
             out = in / i;
             twist = out * J;
         } else {
-            const double k = gear.law.curve.largest_slope();
+            const double k = gear.law.curve.max_slope();
             twist = in / i / std::sqrt(k / (i * i * J));
             out = twist * std::sqrt(k / inertia(gear.output));
         }

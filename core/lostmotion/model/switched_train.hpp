@@ -206,8 +206,8 @@ class SwitchedTrain {
     template <class Cache, class Now, class Input>
     bool stays(Cache& cache, const Now& now, const Key& key, const Input& input) const;
 
-    static constexpr double largest_violation = 1e-6;  // that rounding may make
-    static constexpr double most = 729.0;              // combinations that are tried as a last resort
+    static constexpr double max_violation = 1e-6;  // that rounding may make
+    static constexpr double max_tried = 729.0;     // combinations that are tried as a last resort
     static constexpr std::size_t from_one_start = 300, longest_pivoting = 600;
 
     const Assembly& assembly_;

@@ -17,7 +17,7 @@ struct Shaft {
     // Torque [N m] against the motion over speed [rad/s]: odd, piecewise linear; present if it has a slope.
     TorsionCurve drag{{}, {0.0}};
 
-    bool has_drag() const { return drag.largest_slope() > 0.0; }
+    bool has_drag() const { return drag.max_slope() > 0.0; }
     // A quadratic drag c w |w| up to `top` [rad/s], by chords that depart from it by at most `error` [N m]; beyond, it
     // goes on in a straight line.
     static TorsionCurve quadratic_drag(double c, double top, double error) {

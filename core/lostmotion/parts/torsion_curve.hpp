@@ -53,7 +53,7 @@ class TorsionCurve {
         }
         return sum;
     }
-    double largest_slope() const {
+    double max_slope() const {
         double k = 0.0;
         for (double s : slopes_) k = std::fmax(k, s);
         return k;

@@ -88,7 +88,7 @@ inline RunReport run_exact(Workspace& workspace, const Signals& signals, const S
     report.contact = solver.stopped_at();
     report.x = solver.state();
     report.memory = solver.memory();
-    report.steps = solver.looks();
+    report.steps = solver.event_checks();
     report.switching_count = solver.switchings();
     return report;
 }

@@ -61,7 +61,7 @@ class SamplerOf {
     bool write() {
         // Every piece is a chain of steps that wait for one another, so it pays to have several at hand.
         const std::span pieces(pieces_.data(), std::exchange(n_pieces_, 0));
-        for (auto& p : pieces) p->cursor.nudge(p->rest);
+        for (auto& p : pieces) p->cursor.taylor_step(p->rest);
         for (auto& p : pieces)
             if (!write(*p)) return false;
         return true;
@@ -87,7 +87,8 @@ class SamplerOf {
         if (level < 0 && p.at_once) return write_at_once(p);
         const Reader reader(model_, p.entry->regime, p.memory);
         for (std::size_t next = p.first;;) {
-            const int n = static_cast<int>(std::min<std::size_t>(p.end - next, Instants::most - next % Instants::most));
+            const int n =
+                static_cast<int>(std::min<std::size_t>(p.end - next, Instants::max_count - next % Instants::max_count));
             if (level >= 0) {
                 stride_.place(propagator, level, p.constant, p.cursor);
                 stride_.run(n, instants_);
@@ -113,7 +114,7 @@ class SamplerOf {
         const Cursor<D> first = p.cursor;
         LongStep<D> step = p.cursor.long_step(whole_interval(p));
         for (std::size_t next = p.first;;) {
-            const int n = static_cast<int>(std::min<std::size_t>(p.end - next, Instants::most));
+            const int n = static_cast<int>(std::min<std::size_t>(p.end - next, Instants::max_count));
             for (int k = 0; k < n; ++k) {
                 if (k > 0) p.cursor.leap_to(instant(next + static_cast<std::size_t>(k)), step);
                 instants_.set(k, load(p.cursor.x()), p.cursor.input().values());
@@ -122,7 +123,7 @@ class SamplerOf {
             next += static_cast<std::size_t>(n);
             if (next == p.end) return true;
             if (interrupted != nullptr && interrupted(interrupted_context)) return false;
-            if ((next - p.first) % (1024 * Instants::most) == 0) {  // so that rounding does not add up
+            if ((next - p.first) % (1024 * Instants::max_count) == 0) {  // so that rounding does not add up
                 p.cursor = first;
                 p.cursor.leap_to(instant(next));
             } else {

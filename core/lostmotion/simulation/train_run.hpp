@@ -85,8 +85,8 @@ class TrainMeter {
     }
 
  private:
-    static constexpr int most = 96;
-    using Integral = PowerIntegral<D, most>;
+    static constexpr int max_flows = 96;
+    using Integral = PowerIntegral<D, max_flows>;
 
     // Its row, which it keeps from regime to regime.
     int place(const model::PowerFlow& f) {
@@ -231,7 +231,7 @@ TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std:
     report.status = solver.begin(0.0, x, m);
     if (report.status == Status::done) report.status = solver.advance(options.duration, recorder);
     recorder.end();
-    report.steps = solver.looks();
+    report.steps = solver.event_checks();
     finish(solver);
     return report;
 }

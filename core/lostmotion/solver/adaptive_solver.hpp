@@ -134,7 +134,7 @@ class AdaptiveSolver {
     Status advance(double t_end, Observer& observer) {
         t_end_ = t_end;
         while (time_ < t_end) {
-            double limit = std::fmin(t_end, next_knot(signals_, time_));
+            double limit = std::fmin(t_end, next_breakpoint(signals_, time_));
             if (const Regime& r = cache_.regime(key_); r.driving_input >= 0) {
                 input_.anchor(time_);
                 limit = input_.turning(r.driving_input, r.driving_way, limit);
@@ -187,7 +187,7 @@ class AdaptiveSolver {
         using DP = DormandPrince;
         DenseStep dense;
         std::array<double, D::guards> value, slope, end_value, end_slope;
-        const auto look = [&](double t, const State& x, const State& rate, auto& g, auto& g_rate) {
+        const auto evaluate = [&](double t, const State& x, const State& rate, auto& g, auto& g_rate) {
             input_.anchor(t);
             const auto u = input_.template jet<2>();
             entry.guards.evaluate(constant, x, u[0], g);
@@ -196,7 +196,7 @@ class AdaptiveSolver {
         double h = step_ > 0.0 ? step_ : 1e-6;
         off_zero_ = false;
         dense.k[0] = rates(linear, fixed, time_, now_.x);
-        look(time_, now_.x, dense.k[0], value, slope);
+        evaluate(time_, now_.x, dense.k[0], value, slope);
         while (time_ < limit) {
             if (++steps_ % 256 == 0 && interrupted != nullptr && interrupted(interrupted_context))
                 return Status::interrupted;
@@ -206,7 +206,7 @@ class AdaptiveSolver {
             dense.x = now_.x;
             dense.begin = time_;
             dense.length = h;
-            // At a knot the inputs of this regime are those before it.
+            // At a breakpoint the inputs of this regime are those before it.
             const double latest = std::nextafter(limit, time_);
             State x{};
             for (int stage = 1; stage < DP::stages; ++stage) {
@@ -228,14 +228,14 @@ class AdaptiveSolver {
                 continue;
             }
             const double end = last ? latest : time_ + h;
-            look(end, x, dense.k[DP::stages - 1], end_value, end_slope);
+            evaluate(end, x, dense.k[DP::stages - 1], end_value, end_slope);
             const Guard* crossed = nullptr;
             double t_event = end;
             for (int g = 0; g < r.n_guards; ++g) {
                 if ((entry.behind >> g & 1) != 0) continue;
                 const Cubic c(value[g], slope[g], end_value[g], end_slope[g], h);
-                if (c.least() <= 0.0) refine_crossing(r.guards[g], dense, end, t_event, crossed);
-                if (r.guards[g].by_touch) find_touch(r.guards[g], c, dense, t_event, crossed);
+                if (c.min() <= 0.0) refine_crossing(r.guards[g], dense, end, t_event, crossed);
+                if (r.guards[g].by_grazing) find_grazing(r.guards[g], c, dense, t_event, crossed);
             }
             if (crossed != nullptr) {
                 dense.end = t_event;
@@ -262,17 +262,17 @@ class AdaptiveSolver {
     // bisection on the dense output.
     void refine_crossing(const Guard& guard, const DenseStep& dense, double end, double& t_event,
                          const Guard*& crossed) {
-        constexpr int looks = 16;
+        constexpr int parts_checked = 16;
         const auto value = [&](double t) { return evaluate<D>(guard.form, dense(t), now_.memory, input_at(t)); };
         // A solution of finite accuracy may tremble about a guard that the exact one only approaches.
         double noise = rounding * magnitude<D>(guard.form, dense.x, now_.memory, input_at(dense.begin));
         for (int k = 0; k < D::states; ++k) noise += noise_factor * std::fabs(guard.form.c[k]) * scale_[k];
         // The speed of the twist is a small difference, and each of its zeros sets the hysteresis anew: one that the
         // error of the solution may make is none.
-        if (guard.by_touch) noise += solution_error(guard.form, dense.x);
+        if (guard.by_grazing) noise += solution_error(guard.form, dense.x);
         double low = dense.begin;
-        for (int k = 1; k <= looks; ++k) {
-            double high = k == looks ? end : dense.begin + dense.length * k / looks;
+        for (int k = 1; k <= parts_checked; ++k) {
+            double high = k == parts_checked ? end : dense.begin + dense.length * k / parts_checked;
             if (low >= t_event) return;
             if (value(high) >= -noise) {
                 low = high;
@@ -292,10 +292,10 @@ class AdaptiveSolver {
     }
 
     // Does the guard touch zero, as far as this solution can tell, and rise again?
-    void find_touch(const Guard& guard, const Cubic& c, const DenseStep& dense, double& t_event,
-                    const Guard*& crossed) {
+    void find_grazing(const Guard& guard, const Cubic& c, const DenseStep& dense, double& t_event,
+                      const Guard*& crossed) {
         const double t = dense.begin + dense.length * c.lowest_at();
-        const double near = touch_factor * solution_error(guard.form, dense.x);
+        const double near = grazing_factor * solution_error(guard.form, dense.x);
         off_zero_ |= c.c0 > near;
         if (!off_zero_ || c.c3 <= near || t >= t_event ||
             std::fabs(evaluate<D>(guard.form, dense(t), now_.memory, input_at(t))) > near)
@@ -312,7 +312,7 @@ class AdaptiveSolver {
     }
 
     static constexpr double noise_factor = 1e-14;
-    static constexpr double touch_factor = 10.0;
+    static constexpr double grazing_factor = 10.0;
 
     const System& system_;
     Signals signals_;

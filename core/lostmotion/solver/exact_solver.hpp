@@ -1,7 +1,7 @@
 // Exact solver: propagation by matrix exponentials; only switching instants are searched, and none is missed.
 //
-// A look tests an interval of length h for a guard that becomes negative. From value and slope of the guard at both
-// ends comes its cubic Hermite interpolant, which departs from the guard by at most h^4/384 max|g''''|, its slope
+// An event check covers an interval of length h for a guard that becomes negative. From value and slope of the guard at
+// both ends comes its cubic Hermite interpolant, which departs from the guard by at most h^4/384 max|g''''|, its slope
 // by at most sqrt(3)/216 h^3 max|g''''| (Birkhoff and Priver 1967). max|g''''| is bounded through the fourth
 // derivative of the state at the start and a bound on |exp(A s)|. The Bernstein coefficients of the cubic enclose
 // it. So a guard is certified positive, or certified to fall through zero once, or the interval is shortened. There
@@ -71,7 +71,7 @@ class ExactSolver {
           cache_(shared == nullptr ? *own_ : *shared),
           scale_(scale),
           unit_(elementary(unit)),
-          turns_(cache_.serve(unit_, input_basis(signals_))),
+          rotations_(cache_.serve(unit_, input_basis(signals_))),
           cursors_{start(), start(), start(), start()},
           input_bound_(begin_->input().fourth_derivative_bound()) {}
     ExactSolver(const ExactSolver&) = delete;
@@ -87,10 +87,10 @@ class ExactSolver {
     const Key& key() const { return key_; }
     const Regime& regime() { return cache_.regime(key_); }
     const Regime& regime(const Key& key) { return cache_.regime(key); }
-    const std::vector<InputBasis>& basis() const { return turns_.basis(); }
+    const std::vector<InputBasis>& basis() const { return rotations_.basis(); }
     double unit() const { return unit_; }
     Contact stopped_at() const { return stopped_at_; }
-    long looks() const { return looks_; }
+    long event_checks() const { return event_checks_; }
     std::size_t switchings() const { return switchings_; }
 
     // Sets the state and finds the regime it is in.
@@ -114,7 +114,7 @@ class ExactSolver {
     }
     const Course& course() const { return course_; }
     // From now on the input is value + slope * (t - now). Only for signals made with ramped_inputs().
-    void set_ramp(int input, double value, double slope) { signals_[input].knots[0] = {time_, value, slope}; }
+    void set_ramp(int input, double value, double slope) { signals_[input].breakpoints[0] = {time_, value, slope}; }
     // The inputs have changed at this instant: finds the regime anew.
     Status inputs_changed() {
         const Key before = key_;
@@ -136,7 +136,7 @@ class ExactSolver {
         }
         while (true) {
             Entry& entry = cache_.entry(key_);
-            if (!entry.propagator.ready()) entry.prepare(turns_, scale_);
+            if (!entry.propagator.ready()) entry.prepare(rotations_, scale_);
             Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
                                     now_.x};
             begin_->place(entry.propagator, segment.constant, now_.x, course_.rate_known ? &course_.rate : nullptr);
@@ -146,8 +146,8 @@ class ExactSolver {
                 segment.x_end = now_.x;
                 begin_->place(entry.propagator, segment.constant, now_.x);
             }
-            if (!(time_ < knot_)) knot_ = next_knot(signals_, time_);
-            double limit = std::min(t_end, knot_);
+            if (!(time_ < breakpoint_)) breakpoint_ = next_breakpoint(signals_, time_);
+            double limit = std::min(t_end, breakpoint_);
             if (const Regime& r = entry.regime; r.driving_input >= 0) [[unlikely]]
                 limit = begin_->input().turning(r.driving_input, r.driving_way, limit);
             const Guard* fired = nullptr;
@@ -158,7 +158,7 @@ class ExactSolver {
             segment.last = fired == nullptr && time_ >= t_end;
             if (!observer.segment(segment)) return Status::interrupted;
             if (segment.last) {
-                jump_pending_ = knot_ == t_end;  // it belongs to what comes after
+                jump_pending_ = breakpoint_ == t_end;  // it belongs to what comes after
                 return Status::done;
             }
             if (fired == nullptr && time_ < limit) continue;  // the motion has settled
@@ -169,12 +169,12 @@ class ExactSolver {
 
  private:
     static constexpr double converging = 1e-7;   // the next correction is less than the square of the last
-    static constexpr int first_level = 6;        // of the first look
+    static constexpr int first_level = 6;        // of the first event check
     static constexpr double settled = 0x1p-400;  // of a rate [1/s], in natural sizes: below it, squares would underflow
     // A third of the length times the error of the slope of a cubic, over the error of its value.
     static constexpr double slope_share = 0.00802 / 3.0 * 384.0;
 
-    Cursor start() const { return Cursor(InputState(signals_, turns_.basis())); }
+    Cursor start() const { return Cursor(InputState(signals_, rotations_.basis())); }
     static double elementary(double unit) {
         while (unit > 1e-2) unit *= 0.5;
         return unit;
@@ -183,7 +183,7 @@ class ExactSolver {
         time_ = time;
         accumulation_ = {};
         jump_pending_ = false;
-        knot_ = time;
+        breakpoint_ = time;
         last_level_ = first_level;  // so that what follows depends on the state alone
     }
     void anchor_inputs() {
@@ -191,7 +191,7 @@ class ExactSolver {
         see_inputs(begin_->input(), time_, now_);
     }
 
-    bool has_settled(const Regime& regime, const State& rate) const {
+    [[gnu::noinline]] bool has_settled(const Regime& regime, const State& rate) const {
         for (int k = 0; k < D::coupled; ++k) {
             if (regime.following[k]) continue;
             if (!(std::fabs(rate[k]) <= settled * scale_[k])) return false;
@@ -207,17 +207,15 @@ class ExactSolver {
         bool changed = false;
         for (typename Cache::States left = ~forced & Cache::all_states; left != 0; left &= left - 1) {
             const int k = std::countr_zero(left);
-            const double most = settled * scale_[k];
-            if (now_.x[k] == 0.0 || !(std::fabs(now_.x[k]) <= most && std::fabs(rate[k]) <= most)) continue;
+            const double limit = settled * scale_[k];
+            if (now_.x[k] == 0.0 || !(std::fabs(now_.x[k]) <= limit && std::fabs(rate[k]) <= limit)) continue;
             now_.x[k] = 0.0;
             changed = true;
         }
         return changed;
     }
     static bool moderate(const State& rate) {
-        double sum = 0.0;
-        for (int k = 0; k < D::coupled; ++k) sum += std::fabs(rate[k]);
-        return sum < 1e100;
+        return sum_in_fours<D::coupled>([&](auto k) { return std::fabs(rate[k]); }) < 1e100;
     }
     // After a change of the inputs: if the regime goes on, the rate jumps by no more than what they bring.
     [[gnu::cold]] void follow_inputs(const Key& before) {
@@ -235,19 +233,19 @@ class ExactSolver {
             const double was = before_jump[e.twists[t].state], is = after_jump[e.twists[t].state];
             twist.doubt = is > 0.0 ? std::fmin(1.0, twist.doubt * was / is) : 0.0;
             twist.off_zero = false;
-            twist.touch_size = 0.0;
+            twist.grazing_magnitude = 0.0;
         }
         rate.store(course_.rate.data());
     }
     // Bound on the coupled states over the first event check, from what they are.
     [[gnu::cold]] Coupled bound_ahead(Entry& e, const Coupled& x) const {
-        if (!e.propagator.ready()) e.prepare(turns_, scale_);
-        return e.propagator.level(first_level).growth * absolute(x);
+        if (!e.propagator.ready()) e.prepare(rotations_, scale_);
+        return e.propagator.level(first_level).exponential_bound * absolute(x);
     }
     // Rounding of a rate that is computed from the state, where a regime begins, as far as it acts on the twists. What
     // the search for the modes takes for zero must not be seen to fall at once.
     [[gnu::cold]] void begin_in_doubt(Entry& e, const Cursor& at, const Memory& memory) {
-        State size = e.rates.size(magnitudes(at.x()), magnitudes(memory), at.input().sizes());
+        State size = e.rates.size(magnitudes(at.x()), magnitudes(memory), at.input().magnitudes());
         for (int t = 0; t < e.n_twists; ++t)
             if (const int k = e.twists[t].state; at.rate()[k] == 0.0) size[k] = 0.0;  // it starts from rest
         const Coupled ahead = bound_ahead(e, coupled(at.rate())), rounding_ahead = bound_ahead(e, coupled(size));
@@ -279,13 +277,13 @@ class ExactSolver {
 
     enum class Verdict { clear, crossing, uncertain };
 
-    // Guards at one end of a look.
+    // Guards at one end of a event check.
     struct Ends {
         typename GuardTable::Values value, slope;
     };
     // Guards all through it: a lower bound of their cubics, and how far they may lie from these.
     struct Bounds {
-        typename GuardTable::Values least, error, fourth;
+        typename GuardTable::Values lower, error, fourth;
     };
 
     // Advances within the regime until a guard reaches zero (fired) or `limit`.
@@ -305,8 +303,8 @@ class ExactSolver {
         int level = std::min(last_level_, p.level_below(limit - time_));
         const double shortest = 1e-7 * p.length(0);
         for (long count = 1; time_ < limit; ++count) {
-            ++looks_;
-            if (looks_ % 1024 == 0 && interrupted != nullptr && interrupted(interrupted_context))
+            ++event_checks_;
+            if (event_checks_ % 1024 == 0 && interrupted != nullptr && interrupted(interrupted_context))
                 return Status::interrupted;
             if (count % 64 == 0) cursor->anchor(time_);
             const State& rate = cursor->rate();
@@ -326,7 +324,7 @@ class ExactSolver {
                     end->advance_from(*cursor, h);
                 }
                 evaluate(e, constant, *end, *there);
-                bound_fourth(e.guards, p.level(level).growth, fourth + h * forced);
+                bound_fourth(e.guards, p.level(level).exponential_bound, fourth + h * forced);
                 const Verdict verdict = judge(e, segment.memory, *cursor, *here, *there, h, h < shortest);
                 if (verdict == Verdict::uncertain) {  // below the shortest level, by plain halves
                     h = level > 0 ? std::min(p.length(level = std::max(0, level - halvings_)), left) : 0.5 * h;
@@ -380,12 +378,12 @@ class ExactSolver {
     }
 
     // All the way to `limit`, where there is no guard. False if the motion leaves the range of the arithmetic: then the
-    // looks find out when.
+    // event_checks find out when.
     [[gnu::noinline]] bool leap(const Entry& e, double limit) {
         *there_ = *begin_;
         there_->leap_to(limit);
         if (!moderate(there_->rate())) return false;
-        ++looks_;
+        ++event_checks_;
         time_ = limit;
         now_.x = there_->x();
         keep_course(e, *there_);
@@ -404,15 +402,16 @@ class ExactSolver {
         }
     }
 
-    // |g''''| over the look, from a bound on the fourth derivative of the state that the flow carries on.
-    [[gnu::always_inline]] void bound_fourth(const GuardTable& guards, const Matrix& growth, const Coupled& size) {
-        State most;
-        (growth * size).store(most.data());
-        guards.rate_sizes(most, input_bound_, bounds_.fourth);
+    // |g''''| over the event check, from a bound on the fourth derivative of the state that the flow carries on.
+    [[gnu::always_inline]] void bound_fourth(const GuardTable& guards, const Matrix& exponential_bound,
+                                             const Coupled& size) {
+        State bound;
+        (exponential_bound * size).store(bound.data());
+        guards.rate_magnitudes(bound, input_bound_, bounds_.fourth);
     }
 
-    // Encloses all guards over a look of length h. Returns, as bits, those that are not certain to be positive all
-    // through it.
+    // Encloses all guards over a event check of length h. Returns, as bits, those that are not certain to be positive
+    // all through it.
     Guards enclose(int rows, const Ends& here, const Ends& there, double h) {
         const double third = h / 3.0, share = h * h * h * h / 384.0;
         Guards doubtful = 0;
@@ -420,12 +419,12 @@ class ExactSolver {
         for (int g = 0; g < rows; g += vec_width) {
             const Vec begin = load(&here.value[g]), end = load(&there.value[g]);
             const Vec c1 = begin + third * load(&here.slope[g]), c2 = end - third * load(&there.slope[g]);
-            const Vec low = least(least(begin, end), least(c1, c2)), error = share * load(&bounds_.fourth[g]);
-            store(low, &bounds_.least[g]);
+            const Vec low = min_of(min_of(begin, end), min_of(c1, c2)), error = share * load(&bounds_.fourth[g]);
+            store(low, &bounds_.lower[g]);
             store(error, &bounds_.error[g]);
             const unsigned clear = above(low, error);
             // One that starts on zero or above and rises all through is certain, too.
-            const Vec rise = least(c1 - begin, least(c2 - c1, end - c2));
+            const Vec rise = min_of(c1 - begin, min_of(c2 - c1, end - c2));
             const unsigned rises = above(rise, slope_share * error) & ~above(Vec{}, begin);
             doubtful |= Guards{all_bits & ~(clear | rises)} << g;
             tight |= clear & ~above(low, 64.0 * error);
@@ -438,48 +437,50 @@ class ExactSolver {
                   bool shortest) {
         Guards doubtful = enclose(e.guards.rows(), here, there, h);
         n_crossing_ = 0;
-        // What counts as zero when the speed of a twist touches it.
-        std::array<double, D::twists> touch{};
+        // What counts as zero when the speed of a twist grazes it.
+        std::array<double, D::twists> grazing{};
         for (int t = 0; t < e.n_twists; ++t) {
-            const int g = e.twists[t].touch_guard;
+            const int g = e.twists[t].grazing_guard;
             if (g < 0) continue;
             auto& twist = course_.twist[t];
-            twist.touch_size = std::max(twist.touch_size, e.touch_size(e.twists[t], cursor.x()));
-            touch[t] = cursor.carries_rate() ? twist_speed_rounding(e, t, cursor) : rounding * twist.touch_size;
-            twist.off_zero |= here.value[g] > touch[t];
-            if (bounds_.least[g] <= touch[t]) doubtful |= Guards{1} << g;
+            twist.grazing_magnitude = std::max(twist.grazing_magnitude, e.grazing_magnitude(e.twists[t], cursor.x()));
+            grazing[t] =
+                cursor.carries_rate() ? twist_speed_rounding(e, t, cursor) : rounding * twist.grazing_magnitude;
+            twist.off_zero |= here.value[g] > grazing[t];
+            if (bounds_.lower[g] <= grazing[t]) doubtful |= Guards{1} << g;
         }
         doubtful &= ~e.behind;
         if (doubtful == 0) return Verdict::clear;
-        typename GuardTable::Values size;
-        e.guards.sizes(magnitudes(memory), magnitudes(cursor.x()), cursor.input(), size);
+        const Memory memory_magnitudes = magnitudes(memory);
+        const State state_magnitudes = magnitudes(cursor.x());
         for (; doubtful != 0; doubtful &= doubtful - 1) {
             const int g = std::countr_zero(doubtful);
-            const double low = bounds_.least[g], error = bounds_.error[g];
+            const double low = bounds_.lower[g], error = bounds_.error[g];
             const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
-            const int t = e.touching(g);
-            const double near = t >= 0 ? touch[t] : 0.0;
-            const bool touches = t >= 0 && course_.twist[t].off_zero && low - error <= near && c.c3 > near;
-            if (low > error && !touches) continue;
+            const int t = e.grazing_twist(g);
+            const double near = t >= 0 ? grazing[t] : 0.0;
+            const bool grazes = t >= 0 && course_.twist[t].off_zero && low - error <= near && c.c3 > near;
+            if (low > error && !grazes) continue;
+            const double magnitude = e.guards.magnitude(g, memory_magnitudes, state_magnitudes, cursor.input());
             const auto of_rate = rate_multiple(e, cursor, g);
             const double resolution = of_rate.factor != 0.0
                                           ? std::fabs(of_rate.factor) * twist_speed_rounding(e, of_rate.twist, cursor)
-                                          : rounding * size[g];
+                                          : rounding * magnitude;
             const double tolerance = resolution + time_rounding * std::fabs(time_) *
                                                       std::max(std::fabs(here.slope[g]), std::fabs(there.slope[g]));
-            if (low - error >= -tolerance && !touches) continue;
+            if (low - error >= -tolerance && !grazes) continue;
             const double d0 = c.c1 - c.c0, d1 = c.c2 - c.c1, d2 = c.c3 - c.c2;
             const bool rises = std::min(d0, std::min(d1, d2)) > slope_share * error;
             const bool falls = std::max(d0, std::max(d1, d2)) < -slope_share * error;
-            if (rises && c.c0 >= -tolerance && !(touches && c.c0 <= near)) continue;
+            if (rises && c.c0 >= -tolerance && !(grazes && c.c0 <= near)) continue;
             if (falls && c.c3 >= -tolerance) continue;
-            const bool starts_on_zero = c.c0 <= rounding * size[g];
+            const bool starts_on_zero = c.c0 <= rounding * magnitude;
             if (falls) {
                 crossing_[n_crossing_++] = {g, false, starts_on_zero};
                 continue;
             }
-            if (c.c0 <= tolerance && !touches && departs(e, memory, cursor, g, h)) continue;
-            const double resolved = touches ? near : tolerance;
+            if (c.c0 <= tolerance && !grazes && departs(e, memory, cursor, g, h)) continue;
+            const double resolved = grazes ? near : tolerance;
             if (error > resolved && !shortest) {
                 // Half the length has a sixteenth of the error, which ought to be small beside what the guard does.
                 const double course = std::max(std::max(std::fabs(c.c0), std::fabs(c.c3)),
@@ -488,11 +489,11 @@ class ExactSolver {
                 for (double left = error / 16.0; left > 0.25 * course && halvings_ < 10; left /= 16.0) ++halvings_;
                 return Verdict::uncertain;
             }
-            // The cubic is the guard to rounding, or as near as the shortest look comes; does it dip below zero?
+            // The cubic is the guard to rounding, or as near as the shortest event check comes; does it dip below zero?
             const double lowest = c(c.lowest_at());
             if (lowest < -std::max(tolerance, error))
                 crossing_[n_crossing_++] = {g, false, starts_on_zero};
-            else if (touches && lowest <= resolved)
+            else if (grazes && lowest <= resolved)
                 crossing_[n_crossing_++] = {g, true, starts_on_zero};
         }
         return n_crossing_ > 0 ? Verdict::crossing : Verdict::clear;
@@ -509,15 +510,16 @@ class ExactSolver {
         return at.carries_rate() ? e.twist_speed(g) : typename Entry::TwistSpeed{g, 0, 0.0};
     }
 
-    // A guard that starts on zero: does its first derivative that is not zero carry it away, all through the look?
+    // A guard that starts on zero: does its first derivative that is not zero carry it away, all through the event
+    // check?
     bool departs(const Entry& e, const Memory& memory, const Cursor& cursor, int g, double h) const {
         const auto [first, derivative] = departure(e, memory, cursor, g);
         if (first == 0) return false;
         // value = h^k (derivative_k / k! + what follows), bounded at the far end.
-        double least = derivative[first] * over_factorial[first], power = h;
+        double lower = derivative[first] * over_factorial[first], power = h;
         for (int k = first + 1; k < 4; ++k, power *= h)
-            least += power * std::min(0.0, derivative[k]) * over_factorial[k];
-        return least > power * bounds_.fourth[g] * over_factorial[4];
+            lower += power * std::min(0.0, derivative[k]) * over_factorial[k];
+        return lower > power * bounds_.fourth[g] * over_factorial[4];
     }
     // The order of the first derivative of a guard, up to the third, that is not zero; 0 if there is none or it is
     // negative.
@@ -526,14 +528,14 @@ class ExactSolver {
         std::array<double, 4> derivative{};
     };
     Departure departure(const Entry& e, const Memory& memory, const Cursor& cursor, int g) const {
-        const InstantOf<D> now{time_, cursor.x(), memory, cursor.input().jet(), cursor.input().sizes()};
+        const InstantOf<D> now{time_, cursor.x(), memory, cursor.input().jet(), cursor.input().magnitudes()};
         Flow<D> flow(e.rates, now);
         const LinearForm form = e.guards.form(g);
         Departure out;
         for (std::size_t k = 1; k < 4; ++k) {
             const double value = out.derivative[k] = flow.rate(form, static_cast<int>(k));
             if (out.order > 0) continue;
-            const double resolution = rounding * flow.rate_size(form, static_cast<int>(k));
+            const double resolution = rounding * flow.rate_magnitude(form, static_cast<int>(k));
             if (value < -resolution) return out;
             if (value > resolution) out.order = k;
         }
@@ -549,19 +551,19 @@ class ExactSolver {
         };
         std::array<double, D::guards> estimate;
         for (int k = 0; k < n_crossing_; ++k) {
-            const auto& [g, touch, starts_on_zero] = crossing_[k];
+            const auto& [g, grazing, starts_on_zero] = crossing_[k];
             const Cubic c = cubic(g);
-            estimate[g] = touch ? c.lowest_at() : c.zero(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
+            estimate[g] = grazing ? c.lowest_at() : c.zero(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
         }
         if (n_crossing_ > 1)
             std::sort(crossing_.begin(), crossing_.begin() + n_crossing_,
                       [&](const Crossing& a, const Crossing& b) { return estimate[a.guard] < estimate[b.guard]; });
         for (int k = 0; k < n_crossing_; ++k) {
-            const auto& [g, touch, starts_on_zero] = crossing_[k];
+            const auto& [g, grazing, starts_on_zero] = crossing_[k];
             // Still positive where another has crossed: later.
             if (k > 0 && cubic(g)(best / h) > bounds_.error[g]) continue;
             double s = estimate[g] * h;
-            if (touch) {
+            if (grazing) {
                 trial_->advance_from(cursor, s);
             } else {
                 s = find_zero(e, g, memory, cursor, starts_on_zero, s, h);
@@ -587,7 +589,7 @@ class ExactSolver {
                 (guard.value(middle) > 0.0 ? low : high) = middle;
             }
         *trial_ = cursor;
-        trial_->nudge(expansion_, high);
+        trial_->taylor_step(expansion_, high);
         return high;
     }
 
@@ -627,7 +629,7 @@ class ExactSolver {
             }
             if (found && std::fabs(z) <= reach && (from + z >= earliest || earliest == 0.0)) {
                 s = std::clamp(from + z, 0.0, h);
-                trial_->nudge(expansion_, s - from);
+                trial_->taylor_step(expansion_, s - from);
                 return s;
             }
             // The zero lies elsewhere: where the last step led, or in half of what is left.
@@ -647,15 +649,15 @@ class ExactSolver {
     double unit_;
 
     double time_ = 0.0;
-    double knot_ = 0.0;  // [s], the next of the inputs; it has been found if it lies ahead
+    double breakpoint_ = 0.0;  // [s], the next of the inputs; it has been found if it lies ahead
     InstantOf<D> now_;
     Key key_;
     int last_level_ = first_level;
-    long looks_ = 0;
+    long event_checks_ = 0;
     std::size_t switchings_ = 0;
-    InputTurns& turns_;
-    // Where the present segment begins, the two ends of a look, and one that is tried out. They change their roles, not
-    // their contents.
+    PhaseRotations& rotations_;
+    // Where the present segment begins, the two ends of a event check, and one that is tried out. They change their
+    // roles, not their contents.
     std::array<Cursor, 4> cursors_;
     Cursor *begin_ = &cursors_[0], *here_ = &cursors_[1], *there_ = &cursors_[2], *trial_ = &cursors_[3];
     InputsOf<D> input_bound_;  // on the fourth derivative of each, for all time
@@ -663,11 +665,11 @@ class ExactSolver {
     int crossings_ = 0;
     Ends ends_[2];
     Bounds bounds_;
-    int halvings_ = 1;    // how many times an uncertain look ought to be halved
-    bool roomy_ = false;  // in the last look the guards that were clear were so by far
+    int halvings_ = 1;    // how many times an uncertain event check ought to be halved
+    bool roomy_ = false;  // in the last event check the guards that were clear were so by far
     struct Crossing {
         int guard;
-        bool touch, starts_on_zero;
+        bool grazing, starts_on_zero;
     };
     std::array<Crossing, D::guards> crossing_{};
     int n_crossing_ = 0;

@@ -44,7 +44,7 @@ class RegimeCache {
         Guards behind = 0;                         // edges that a twist slips away from, so that it does not reach them
         // The twists that move: the state, and the guard of its rate that also ends the regime by touching zero.
         struct Twist {
-            int state, touch_guard;
+            int state, grazing_guard;
         };
         std::array<Twist, D::twists> twists;
         int n_twists = 0;
@@ -86,7 +86,7 @@ class RegimeCache {
             if constexpr (requires { system.near_event(guards, near_event); }) system.near_event(guards, near_event);
             propagator.reset();
         }
-        void prepare(InputTurns& turns, const State& scale) { propagator.prepare(rates, turns, scale); }
+        void prepare(PhaseRotations& rotations, const State& scale) { propagator.prepare(rates, rotations, scale); }
 
         // How many times the rate of a twist a guard is; factor 0 if of none.
         TwistSpeed twist_speed(int guard) const {
@@ -95,15 +95,15 @@ class RegimeCache {
             return {guard, 0, 0.0};
         }
         // The twist whose rate this guard is, if it also ends the regime by touching zero; else -1.
-        int touching(int guard) const {
+        int grazing_twist(int guard) const {
             for (int t = 0; t < n_twists; ++t)
-                if (twists[t].touch_guard == guard) return t;
+                if (twists[t].grazing_guard == guard) return t;
             return -1;
         }
         // Sum of the magnitudes of the terms of a guard that ends by touching, a speed.
-        double touch_size(const Twist& twist, const State& x) const {
+        double grazing_magnitude(const Twist& twist, const State& x) const {
             return sum_in_fours<D::coupled>(
-                [&](auto k) { return std::fabs(guards.coefficient(twist.touch_guard, k) * x[k]); });
+                [&](auto k) { return std::fabs(guards.coefficient(twist.grazing_guard, k) * x[k]); });
         }
 
      private:
@@ -134,7 +134,7 @@ class RegimeCache {
                     if (regime.guards[g].kind != Guard::speed) continue;
                     const double factor = times_rate(regime.guards[g].form, regime.rate[twist.state]);
                     if (factor != 0.0) twist_speeds[n_twist_speeds++] = {g, n_twists, factor};
-                    if (factor != 0.0 && regime.guards[g].by_touch) twist.touch_guard = g;
+                    if (factor != 0.0 && regime.guards[g].by_grazing) twist.grazing_guard = g;
                     moves = moves || factor != 0.0;
                 }
                 if (moves) ++n_twists;
@@ -191,13 +191,13 @@ class RegimeCache {
     }
 
     // Makes ready for runs with this unit of length and these inputs; propagators for others are forgotten.
-    InputTurns& serve(double unit, std::vector<InputBasis> basis) {
+    PhaseRotations& serve(double unit, std::vector<InputBasis> basis) {
         if (used_ > most_kept) forget();
-        if (!turns_ || unit != turns_->unit() || basis != turns_->basis()) {
+        if (!rotations_ || unit != rotations_->unit() || basis != rotations_->basis()) {
             for (std::size_t k = 0; k < used_; ++k) entries_[k]->propagator.reset();
-            turns_ = std::make_unique<InputTurns>(unit, std::move(basis));
+            rotations_ = std::make_unique<PhaseRotations>(unit, std::move(basis));
         }
-        return *turns_;
+        return *rotations_;
     }
 
  private:
@@ -231,7 +231,7 @@ class RegimeCache {
     }
 
     const System& system_;
-    std::unique_ptr<InputTurns> turns_;
+    std::unique_ptr<PhaseRotations> rotations_;
     Entry* last_ = nullptr;                        // the one asked for last
     std::vector<std::unique_ptr<Entry>> entries_;  // those in use, then such as only keep their memory
     std::size_t used_ = 0;

@@ -31,7 +31,7 @@ template <class D>
 void see_inputs(const InputState<D>& input, double time, InstantOf<D>& now) {
     now.time = time;
     input.jet(n_derivatives, now.input.data());
-    now.input_size = input.sizes();
+    now.input_magnitudes = input.magnitudes();
 }
 
 // Whether an observer of a run wants to see the next switching: if it has switching(), and wants_switching() does not
@@ -101,11 +101,11 @@ class Accumulation {
             count_ = 0;
             since_ = time;
         }
-        return ++count_ > most;
+        return ++count_ > max_count;
     }
 
  private:
-    static constexpr int most = 100;
+    static constexpr int max_count = 100;
     static constexpr double span = 1e4 * std::numeric_limits<double>::epsilon();
     int count_ = 0;
     double since_ = 0.0;
