@@ -510,3 +510,63 @@ def test_a_bias_above_half_the_torque_of_the_ring_keeps_the_backlash_closed() ->
     for name in ("first", "second"):
         assert float(loose[f"{name}_gear_twist"].min()) < -gap
         assert float(loose[f"{name}_gear_twist"].max()) > gap
+
+
+def braked(command: Any, **delays: float) -> lm.TrainScenario:
+    """A flywheel of 2 kg·m² at 10 rad/s and a brake of 4 N·m."""
+    return lm.TrainScenario(
+        shafts={"wheel": {"inertia": 2.0, "torque": 0.0}},
+        brakes={"b": {"shaft": "wheel", "torque": 4.0, **delays}},
+        command={"b": command},
+        initial={"speeds": {"wheel": 10.0}},
+        simulation={"duration": 2.0, "sample_interval": 0.001},
+    )
+
+
+def test_a_brake_acts_after_its_delays() -> None:
+    command = {"steps": [{"height": 1, "time": 0.5}, {"height": -1, "time": 1.0}]}
+    speed = lm.simulate(braked(command, engagement_delay=0.03, release_delay=0.1)).wheel_speed
+    # 2 rad/s^2 from 0.53 s to 1.1 s
+    assert float(speed.sel(time=0.53, method="nearest")) == 10.0
+    assert float(speed[-1]) == pytest.approx(10.0 - 2.0 * (1.1 - 0.53), abs=1e-12)
+    assert float(speed.sel(time=0.8, method="nearest")) == pytest.approx(10.0 - 2.0 * 0.27, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("command", "delays", "message"),
+    [
+        (
+            {"ramps": [{"rise": 1, "duration": 0.1}]},
+            {"engagement_delay": 0.03},
+            "key command.b: is not made of steps; with an engagement or release delay, give mean and steps alone",
+        ),
+        (
+            {"steps": [{"height": 1, "time": 0.5}, {"height": -1, "time": 0.51}]},
+            {"engagement_delay": 0.03},
+            "key command.b: steps at 0.5 s and at 0.51 s, which after the delays would act in reverse order; leave more time "
+            "between them",
+        ),
+    ],
+)
+def test_a_command_that_delays_cannot_shift_is_refused(command: Any, delays: dict[str, float], message: str) -> None:
+    with pytest.raises(lm.InputError) as refused:
+        braked(command, **delays)
+    assert message in str(refused.value)
+
+
+def test_a_safety_clutch_has_no_delays() -> None:
+    clutch = {"kind": "safety", "input": "a", "output": "b", "torque": 1.0, "release_delay": 0.1}
+    with pytest.raises(lm.InputError, match="is a safety clutch, which has no command; remove engagement_delay"):
+        lm.DriveTrain(
+            shafts={"a": {"inertia": 1.0}, "b": {"inertia": 1.0}},
+            motors={
+                "m": {
+                    "shaft": "a",
+                    "kind": "torque_source",
+                    "rotor_inertia": 0.1,
+                    "rated_speed": 100.0,
+                    "rated_torque": 1.0,
+                }
+            },
+            clutches={"c": clutch},
+        )

@@ -168,6 +168,31 @@ class Signal(Part, Generic[V]):
         """The solver's signal; made once for equal signals."""
         return _core_signal(self)
 
+    def delayed(self, up: float, down: float) -> Self:
+        """The same signal whose steps up act later by `up` [s], those down by `down` [s].
+
+        Raises
+        ------
+        ValueError
+            It is not made of a mean and steps, or a step would act before the one that precedes it.
+        """
+        if up == 0.0 == down:
+            return self
+        if self.sine_list() or self.ramps or self.chirp or self.samples:
+            raise ValueError("is not made of steps; with an engagement or release delay, give mean and steps alone")
+        heights: dict[float, float] = {}
+        for step in sorted(self.steps, key=lambda step: step.time):
+            heights[step.time] = heights.get(step.time, 0.0) + float(step.height)  # type: ignore[arg-type]
+        steps = [Step[V](time=t, height=h) for t, h in heights.items()]  # type: ignore[arg-type]
+        later = [Step[V](time=t + (up if h > 0.0 else down), height=h) for t, h in heights.items()]  # type: ignore[arg-type]
+        for (a, b), (first, second) in zip(itertools.pairwise(steps), itertools.pairwise(later), strict=True):
+            if second.time < first.time:
+                raise ValueError(
+                    f"steps at {a.time:g} s and at {b.time:g} s, which after the delays would act in reverse order; leave more "
+                    "time between them"
+                )
+        return self.model_copy(update={"steps": tuple(later)})
+
     def mirrored(self) -> Self:
         """The same signal with the other sign."""
         return self.scaled(-1.0)

@@ -70,6 +70,11 @@ class TrainScenario(TrainElements):
         if idle:
             keys = f"key {idle[0]}: is" if len(idle) == 1 else f"keys {', '.join(idle)}: are"
             raise InputError(f"{keys} missing; add a number from 0 (open) to 1 (full torque), or a signal")
+        for name, element in (*self.brakes.items(), *self.clutches.items()):
+            try:
+                element.acting(self.command.get(name, CommandSignal()))
+            except ValueError as problem:
+                raise InputError(f"key command.{name}: {problem}") from None
         start_values(train, self.initial)
         return self
 
@@ -85,8 +90,11 @@ class TrainScenario(TrainElements):
         return [name for name, shaft in self.shafts.items() if shaft.torque is not None]
 
     def signals(self) -> dict[str, CommandSignal | TorqueSignal]:
-        """All that acts on the train, by the name of its result variable."""
+        """All that acts on the train, after delays of brakes and clutches, by the name of its result variable."""
         commands = {f"{name}_command": self.command.get(name, CommandSignal()) for name in self.commanded()}
+        for name, element in (*self.brakes.items(), *self.clutches.items()):
+            if name in self.command:
+                commands[f"{name}_command"] = element.acting(self.command[name])
         torques = {f"{name}_load_torque": s.torque for name, s in self.shafts.items() if s.torque is not None}
         return {**commands, **torques}
 
