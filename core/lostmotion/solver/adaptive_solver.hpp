@@ -176,86 +176,104 @@ class AdaptiveSolver {
         return out;
     }
 
+    // Guards at one end of a step.
+    struct Ends {
+        std::array<double, D::guards> value, slope;
+    };
+    // What a step is taken with: the regime and its parts that are constant in it.
+    struct Motion {
+        const typename Cache::Entry& entry;
+        ColumnOf<D> fixed;
+        typename GuardTable::Values constant;
+        double limit;
+    };
+
     template <class Observer>
     Status run_regime(double limit, const Guard*& fired, Observer& observer) {
         const auto& entry = cache_.entry(key_);
-        const Regime& r = entry.regime;
-        const LinearRatesOf<D>& linear = entry.rates;
-        const ColumnOf<D> fixed = linear.constant(now_.memory);
-        typename GuardTable::Values constant;
-        entry.guards.constants(now_.memory, constant);
-        using DP = DormandPrince;
+        Motion motion{entry, entry.rates.constant(now_.memory), {}, limit};
+        entry.guards.constants(now_.memory, motion.constant);
         DenseStep dense;
-        std::array<double, D::guards> value, slope, end_value, end_slope;
-        const auto evaluate = [&](double t, const State& x, const State& rate, auto& g, auto& g_rate) {
-            input_.anchor(t);
-            const auto u = input_.template jet<2>();
-            entry.guards.evaluate(constant, x, u[0], g);
-            entry.guards.rates(rate, u[1], g_rate);
-        };
+        Ends here, there;
         double h = step_ > 0.0 ? step_ : 1e-6;
         off_zero_ = false;
-        dense.k[0] = rates(linear, fixed, time_, now_.x);
-        evaluate(time_, now_.x, dense.k[0], value, slope);
+        dense.k[0] = rates(entry.rates, motion.fixed, time_, now_.x);
+        evaluate_guards(motion, time_, now_.x, dense.k[0], here);
         while (time_ < limit) {
             if (++steps_ % 256 == 0 && interrupted != nullptr && interrupted(interrupted_context))
                 return Status::interrupted;
             h = std::min(h, longest_step_);
             const bool last = h >= limit - time_;
             if (last) h = limit - time_;
-            dense.x = now_.x;
-            dense.begin = time_;
-            dense.length = h;
-            // At a breakpoint the inputs of this regime are those before it.
-            const double latest = std::nextafter(limit, time_);
-            State x{};
-            for (int stage = 1; stage < DP::stages; ++stage) {
-                x = now_.x;
-                for (int j = 0; j < stage; ++j) add_scaled(x, h * DP::a[stage][j], dense.k[j]);
-                dense.k[stage] = rates(linear, fixed, std::min(time_ + DP::c[stage] * h, latest), x);
-            }
-            double error = 0.0;
-            for (int n = 0; n < D::states; ++n) {
-                double e = 0.0;
-                for (int j = 0; j < DP::stages; ++j) e += DP::error[j] * dense.k[j][n];
-                const double size = tolerance_ * (scale_[n] + std::max(std::fabs(now_.x[n]), std::fabs(x[n])));
-                error += (h * e / size) * (h * e / size);
-            }
-            error = std::sqrt(error / D::states);
+            State x;
+            const double error = take_step(motion, h, dense, x);
             if (!(error < 1.0)) {
                 if (!(h > 1e-14 * std::max(1.0, time_))) return Status::outside;
                 h *= std::isfinite(error) ? std::clamp(0.9 * std::pow(error, -0.2), 0.2, 0.9) : 0.1;
                 continue;
             }
-            const double end = last ? latest : time_ + h;
-            evaluate(end, x, dense.k[DP::stages - 1], end_value, end_slope);
-            const Guard* crossed = nullptr;
+            const double end = last ? std::nextafter(limit, time_) : time_ + h;
+            evaluate_guards(motion, end, x, dense.k[DormandPrince::stages - 1], there);
             double t_event = end;
-            for (int g = 0; g < r.n_guards; ++g) {
-                if ((entry.behind >> g & 1) != 0) continue;
-                const Cubic c(value[g], slope[g], end_value[g], end_slope[g], h);
-                if (c.min() <= 0.0) refine_crossing(r.guards[g], dense, end, t_event, crossed);
-                if (r.guards[g].by_grazing) find_grazing(r.guards[g], c, dense, t_event, crossed);
-            }
-            if (crossed != nullptr) {
-                dense.end = t_event;
-                observer.step(r, now_.memory, dense, false);
-                now_.x = dense(t_event);
-                time_ = t_event;
-                fired = crossed;
-                step_ = h;
-                return Status::done;
-            }
-            dense.end = last ? limit : end;
-            observer.step(r, now_.memory, dense, last && limit >= t_end_);
-            now_.x = x;
+            fired = first_event(entry, here, there, dense, t_event);
+            dense.end = fired != nullptr ? t_event : last ? limit : end;
+            observer.step(entry.regime, now_.memory, dense, fired == nullptr && last && limit >= t_end_);
+            now_.x = fired != nullptr ? dense(t_event) : x;
             time_ = dense.end;
-            dense.k[0] = dense.k[DP::stages - 1];
-            std::swap(value, end_value);
-            std::swap(slope, end_slope);
+            step_ = h;
+            if (fired != nullptr) return Status::done;
+            dense.k[0] = dense.k[DormandPrince::stages - 1];
+            std::swap(here, there);
             step_ = h *= std::clamp(0.9 * std::pow(std::max(error, 1e-10), -0.2), 0.2, 5.0);
         }
         return Status::done;
+    }
+
+    void evaluate_guards(const Motion& motion, double t, const State& x, const State& rate, Ends& out) {
+        input_.anchor(t);
+        const auto u = input_.template jet<2>();
+        motion.entry.guards.evaluate(motion.constant, x, u[0], out.value);
+        motion.entry.guards.rates(rate, u[1], out.slope);
+    }
+
+    // One step of length h from where dense.k[0] is known, to x. Returns the estimate of its error over what is
+    // allowed.
+    double take_step(const Motion& motion, double h, DenseStep& dense, State& x) {
+        using DP = DormandPrince;
+        dense.x = now_.x;
+        dense.begin = time_;
+        dense.length = h;
+        // At a breakpoint the inputs of this regime are those before it.
+        const double latest = std::nextafter(motion.limit, time_);
+        x = {};
+        for (int stage = 1; stage < DP::stages; ++stage) {
+            x = now_.x;
+            for (int j = 0; j < stage; ++j) add_scaled(x, h * DP::a[stage][j], dense.k[j]);
+            dense.k[stage] = rates(motion.entry.rates, motion.fixed, std::min(time_ + DP::c[stage] * h, latest), x);
+        }
+        double error = 0.0;
+        for (int n = 0; n < D::states; ++n) {
+            double e = 0.0;
+            for (int j = 0; j < DP::stages; ++j) e += DP::error[j] * dense.k[j][n];
+            const double allowed = tolerance_ * (scale_[n] + std::max(std::fabs(now_.x[n]), std::fabs(x[n])));
+            error += (h * e / allowed) * (h * e / allowed);
+        }
+        return std::sqrt(error / D::states);
+    }
+
+    // The guard that ends the regime within the step, and when; nullptr if none does.
+    const Guard* first_event(const typename Cache::Entry& entry, const Ends& here, const Ends& there,
+                             const DenseStep& dense, double& t_event) {
+        const double end = t_event;
+        const Guard* crossed = nullptr;
+        for (int g = 0; g < entry.regime.n_guards; ++g) {
+            if ((entry.behind >> g & 1) != 0) continue;
+            const Guard& guard = entry.regime.guards[g];
+            const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], dense.length);
+            if (c.min() <= 0.0) refine_crossing(guard, dense, end, t_event, crossed);
+            if (guard.by_grazing) find_grazing(guard, c, dense, t_event, crossed);
+        }
+        return crossed;
     }
 
     // Looks for the first fall of the guard below zero on a grid within the step, before t_event, and refines it by
