@@ -741,3 +741,17 @@ def test_a_reversed_range_is_told_as_such():
         assert sentence in str(done.exception or "").replace("'", '"')
     bare, united = (CliRunner().invoke(app, ["catalogue", "--torque", t]) for t in ("20..30", "20 Nm..3 kgf*m"))
     assert bare.exit_code == united.exit_code == 0
+
+
+def test_sheets_with_former_words_are_read() -> None:
+    """`maker`, `figures` and `figure` stood for `manufacturer`, `data` and `datum`."""
+    former = {
+        "name": "old",
+        "rated_voltage": 24.0,
+        "sources": [{"figures": ["rated_voltage"], "status": "maker", "text": "page 7"}],
+        "gaps": [{"figure": "inductance", "where": "page 8"}],
+    }
+    sheet = MotorSheet(**former)
+    assert sheet.sources[0].data == ("rated_voltage",)
+    assert sheet.sources[0].status == "manufacturer"
+    assert sheet.where("inductance") == "page 8"

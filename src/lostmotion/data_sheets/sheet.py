@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from ..inputs.part import Part
 from .loss_data import LossData
 
+# Sheets written before may have these words.
+FORMER_WORDS = {"maker": "manufacturer", "figures": "data", "figure": "datum"}
+
 
 def current_word(word: Any) -> Any:
-    """A key or a status as it is called now: sheets written before may say `maker` for the manufacturer."""
-    return "manufacturer" if word == "maker" else word
+    """A key or a status as it is called now."""
+    return FORMER_WORDS.get(word, word) if isinstance(word, str) else word
 
 
 def in_current_words(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -21,20 +24,29 @@ def in_current_words(table: Mapping[str, Any]) -> dict[str, Any]:
     return {key if current_word(key) in table else current_word(key): value for key, value in table.items()}
 
 
-class Source(Part):
+class Remark(Part):
+    """What is said of data."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_current_words(cls, table: Any) -> Any:
+        return in_current_words(table) if isinstance(table, Mapping) else table
+
+
+class Source(Remark):
     """Where data come from."""
 
-    figures: tuple[str, ...]
+    data: tuple[str, ...]
     """keys of the record that it covers"""
     status: Annotated[Literal["manufacturer", "transcription", "inferred"], BeforeValidator(current_word)]
     """read in the manufacturer's own text, in somebody's transcription of it, or concluded from other data"""
     text: str
 
 
-class Gap(Part):
+class Gap(Remark):
     """A datum that the record lacks."""
 
-    figure: str
+    datum: str
     where: str
     """where one would read it"""
 
@@ -67,10 +79,10 @@ class Record(Part):
     def source_of(self, datum: str) -> Source | None:
         """The source that covers a datum."""
         for source in self.sources:
-            if datum in source.figures or datum.split(".", maxsplit=1)[0] in source.figures:
+            if datum in source.data or datum.split(".", maxsplit=1)[0] in source.data:
                 return source
         return None
 
     def where(self, datum: str) -> str:
         """Where one would read a datum that is missing."""
-        return next((gap.where for gap in self.gaps if gap.figure == datum), "the manufacturer's data sheet")
+        return next((gap.where for gap in self.gaps if gap.datum == datum), "the manufacturer's data sheet")

@@ -128,10 +128,10 @@ def record_text(name: str) -> str:
             f"the sheet's {RPM * record.no_load_speed:.0f} rpm.",
         ]
     lines += ["", "Sources"]
-    lines += [f"  {s.status}: {s.text} [{', '.join(s.figures)}]" for s in record.sources]
+    lines += [f"  {s.status}: {s.text} [{', '.join(s.data)}]" for s in record.sources]
     if record.gaps:
         lines += ["", "Gaps"]
-        lines += [f"  {g.figure}: {g.where}" for g in record.gaps]
+        lines += [f"  {g.datum}: {g.where}" for g in record.gaps]
     missing = record.missing()
     lines += [
         "",
