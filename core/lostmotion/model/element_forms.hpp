@@ -1,0 +1,99 @@
+// Speeds and torques of the elements of a train in a regime, as linear forms: each law is stated here once.
+#pragma once
+
+#include <utility>
+
+#include "places.hpp"
+#include "regime.hpp"
+
+namespace lostmotion::model {
+
+class ElementForms {
+ public:
+    explicit ElementForms(Train train) : train_(std::move(train)), places_(train_), terms_(places_.layout) {}
+    ElementForms(const ElementForms&) = delete;
+    ElementForms& operator=(const ElementForms&) = delete;
+
+    const Train& train() const { return train_; }
+    const Places& places() const { return places_; }
+    const Layout& layout() const { return places_.layout; }
+    const Terms& terms() const { return terms_; }
+
+    // The ratio of the twist's rate to the speed of the input shaft: 1/i, less the slope of a transmission error.
+    double per_input(int gear, const Key& key) const {
+        const Gear& g = train_.gears[gear];
+        const int k = places_.gears[gear].error_piece;
+        return k == nowhere ? 1.0 / g.law.ratio : 1.0 / g.law.ratio - g.transmission_error.slope(key.branch[k]);
+    }
+    // The speed of a contact, as a form.
+    Row contact_speed(int contact) const {
+        const ContactPlace& c = places_.contacts[contact];
+        Row f = terms_.state(places_.shafts[c.a].speed, c.per_a);
+        if (c.b != nowhere) f += terms_.state(places_.shafts[c.b].speed, c.per_b);
+        return f;
+    }
+    Row twist_rate(int gear, const Key& key) const {
+        const Gear& g = train_.gears[gear];
+        return terms_.state(places_.shafts[g.input].speed, per_input(gear, key)) -
+               terms_.state(places_.shafts[g.output].speed);
+    }
+    // P(d) in its piece; 0 of a rigid gear.
+    Row spring_torque(int gear, const Key& key) const {
+        const Gear& g = train_.gears[gear];
+        if (g.rigid()) return Row{};
+        const int piece = key.branch[places_.gears[gear].piece];
+        return terms_.state(places_.gears[gear].twist, g.law.curve.slope(piece)) +
+               terms_.one(g.law.curve.offset(piece));
+    }
+    Row angle_torque(int k, const Key& key) const {
+        const PeriodicCurve& curve = train_.angle_torques[k].torque;
+        const AngleTorquePlace& p = places_.angle_torques[k];
+        const int piece = key.branch[p.piece];
+        return terms_.one(curve.at_zero(piece)) +
+               terms_.state(places_.shafts[train_.angle_torques[k].shaft].angle, curve.slope(piece)) -
+               terms_.memory(p.turn, curve.slope(piece));
+    }
+    // Torque against the motion of a shaft.
+    Row drag_torque(int shaft, const Key& key) const {
+        const ShaftPlace& p = places_.shafts[shaft];
+        const TorsionCurve& drag = train_.shafts[shaft].drag;
+        const int piece = p.drag_piece == nowhere ? 0 : key.branch[p.drag_piece];
+        return terms_.state(p.speed, drag.slope(piece)) + terms_.one(drag.offset(piece));
+    }
+    // Dry friction of a shaft that slips, without brakes and gears.
+    Row sliding_friction(int shaft, const Key& key) const {
+        const ShaftPlace& p = places_.shafts[shaft];
+        const DryFriction& friction = train_.shafts[shaft].friction;
+        const int piece = p.friction_piece == nowhere ? 0 : key.branch[p.friction_piece];
+        return terms_.one(mode(key, p.contact) * (p.motor_friction + friction.at_zero(piece))) +
+               terms_.state(p.speed, friction.per_speed(piece));
+    }
+    // What an engaged brake takes of a shaft that slips.
+    Row brake_torque(int k, const Key& key) const {
+        const BrakePlace& p = places_.brakes[k];
+        return static_cast<double>(mode(key, places_.shafts[train_.brakes[k].shaft].contact)) *
+               commanded(p.input, p.branch, train_.brakes[k].torque, key);
+    }
+    // Is the rate of the twist kept at zero?
+    bool twist_rests(int gear, const Regime& r) const {
+        const Gear& g = train_.gears[gear];
+        if (g.rigid()) return true;
+        if (r.ties.at_rest[g.input] && r.ties.at_rest[g.output]) return true;
+        return !g.transmission_error.present() &&
+               kept_at_rest({ContactPlace::gear, gear, g.input, g.output, 1.0 / g.law.ratio, -1.0}, r.ties);
+    }
+    // Capacity of a brake or clutch: linear in its input, 0 below 0 and 1 above 1.
+    Row commanded(int input, int branch, double torque, const Key& key) const {
+        const int b = key.branch[branch];
+        return b < 0 ? Row{} : b > 0 ? terms_.one(torque) : terms_.input(input, torque);
+    }
+
+ private:
+    static int mode(const Key& key, int contact) { return key.modes[contact]; }
+
+    Train train_;
+    Places places_;
+    Terms terms_;
+};
+
+}  // namespace lostmotion::model

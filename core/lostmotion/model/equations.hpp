@@ -1,0 +1,209 @@
+// Equations of a regime: torques, accelerations and rates from the forms of the elements.
+//
+// The torques of a shaft are added up in one order: motors, gears and couplings that turn it; viscous friction; the
+// load; its dry contact; gears and couplings that it turns. Losses act on the contact of the input shaft, whose
+// capacity is the sum over all that is dry there: one speed, one sign.
+#pragma once
+
+#include "element_forms.hpp"
+#include "statics.hpp"
+
+namespace lostmotion::model {
+
+class Equations {
+ public:
+    explicit Equations(const ElementForms& forms)
+        : forms_(forms),
+          train_(forms.train()),
+          places_(forms.places()),
+          layout_(forms.layout()),
+          terms_(forms.terms()) {}
+
+    // Torques and accelerations, in terms of the reactions of the stuck contacts as well.
+    void compose(const Key& key, Regime& r, std::vector<Row>& acceleration) const;
+    // Rates of the states, from accelerations without reactions.
+    void set_rates(const Key& key, const std::vector<Row>& acceleration, Regime& r) const;
+
+ private:
+    void compose_motors(const Key& key, Regime& r) const;
+    void compose_gear(int gear, const Key& key, Regime& r, std::vector<Row>& loss) const;
+    void compose_coupling(int coupling, const Key& key, Regime& r) const;
+    Row shaft_friction(int shaft, const Key& key, const Regime& r, const std::vector<Row>& loss) const;
+    Row acceleration(int shaft, const Key& key, const Regime& r) const;
+
+    int mode(const Key& key, int contact) const { return key.modes[contact]; }
+    // The speed of a shaft where it acts: 0 at rest, that of the leader where it is tied to one.
+    Row speed(int shaft, const Regime& r) const {
+        if (r.ties.at_rest[shaft]) return Row{};
+        return terms_.state(places_.shafts[r.ties.leader[shaft]].speed, r.ties.factor[shaft]);
+    }
+    // What a stuck contact takes: found from its rest, or, where the motion does not determine it, as it was.
+    Row held(int contact, const Regime& r) const {
+        return r.ties.redundant[contact] ? terms_.memory(places_.contacts[contact].locked) : terms_.reaction(contact);
+    }
+
+    const ElementForms& forms_;
+    const Train& train_;
+    const Places& places_;
+    const Layout& layout_;
+    const Terms& terms_;
+};
+
+inline void Equations::compose(const Key& key, Regime& r, std::vector<Row>& acceleration) const {
+    const std::size_t gears = train_.gears.size();
+    r.output_torque.resize(gears);
+    r.input_torque.resize(gears);
+    r.gear_hysteresis.resize(gears);
+    r.contact_torque.resize(places_.contacts.size());
+    std::vector<Row> loss(gears);
+    compose_motors(key, r);
+    for (std::size_t g = 0; g < gears; ++g) compose_gear(static_cast<int>(g), key, r, loss);
+    for (std::size_t k = 0; k < train_.couplings.size(); ++k) compose_coupling(static_cast<int>(k), key, r);
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
+        const int c = places_.shafts[s].contact;
+        if (c != nowhere) r.contact_torque[c] = shaft_friction(static_cast<int>(s), key, r, loss);
+    }
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s)
+        acceleration[s] = this->acceleration(static_cast<int>(s), key, r);
+    // From here on the torque at the input tells of the losses, too.
+    for (std::size_t g = 0; g < gears; ++g) r.input_torque[g] += loss[g];
+}
+
+inline void Equations::compose_motors(const Key& key, Regime& r) const {
+    for (std::size_t m = 0; m < train_.motors.size(); ++m) {
+        const ShaftMotor& motor = train_.motors[m];
+        const MotorPlace& p = places_.motors[m];
+        const int limit = p.branch == nowhere ? 0 : key.branch[p.branch];
+        if (motor.law.kind == Motor::dc)
+            r.motor_torque.push_back(terms_.state(p.torque));
+        else
+            r.motor_torque.push_back(limit == 0 ? terms_.input(p.command, motor.law.rated_torque)
+                                                : terms_.one(limit * motor.torque_limit));
+    }
+}
+
+// T_2 = P(d) + H, with damping while the flanks touch; T_1 without the losses that act on the contact of the input
+// shaft, which are `loss`: M_2B sign(w)/i with M_2B of one cell of the loss law (12).
+inline void Equations::compose_gear(int gear, const Key& key, Regime& r, std::vector<Row>& loss) const {
+    const Gear& g = train_.gears[gear];
+    const GearPlace& p = places_.gears[gear];
+    const double i = g.law.ratio;
+    const Row P = forms_.spring_torque(gear, key);
+    Row& H = r.gear_hysteresis[gear];
+    if (p.contact != nowhere) {
+        const int slip = mode(key, p.contact);
+        if (slip != 0)
+            H = terms_.memory(p.hysteresis, slip);
+        else if (r.ties.redundant[p.contact])
+            H = held(p.contact, r) - P;
+        else
+            H = held(p.contact, r);
+    }
+    Row& T_2 = r.output_torque[gear];
+    T_2 = P + H;
+    if (p.contact != nowhere) r.contact_torque[p.contact] = H;
+    const bool parted = p.parted != nowhere && key.branch[p.parted] != 0;
+    if (parted)
+        T_2 = Row{};
+    else if (g.mesh_damping > 0.0 && !(g.has_backlash() && key.branch[p.piece] == 0) && !forms_.twist_rests(gear, r))
+        T_2 += g.mesh_damping * forms_.twist_rate(gear, key);
+
+    Row& T_1 = r.input_torque[gear];
+    T_1 = T_2 / i;
+    if (p.error_piece != nowhere) T_1 -= g.transmission_error.slope(key.branch[p.error_piece]) * T_2;
+    if (!g.has_dry_losses()) {
+        if (g.law.losses == Gearbox::constant_efficiency) T_1 = T_1 / g.law.efficiency;
+        return;
+    }
+    const double s = mode(key, places_.shafts[g.input].contact);
+    if (s == 0.0) return;
+    const Plane m = g.loss_plane(key.branch[p.cell]);
+    const double T_2R = g.rated_torque();
+    const Row M_2B_signed = terms_.one(s * T_2R * m.at_zero) +
+                            terms_.state(places_.shafts[g.input].speed, T_2R * m.per_speed / g.law.rated_input_speed) +
+                            m.per_load * T_2;
+    loss[gear] = M_2B_signed / i;
+}
+
+inline void Equations::compose_coupling(int coupling, const Key& key, Regime& r) const {
+    const Coupling& c = train_.couplings[coupling];
+    const CouplingPlace& p = places_.couplings[coupling];
+    const int slip = mode(key, p.contact);
+    Row& torque = r.contact_torque[p.contact];
+    if (slip == 0)
+        torque = held(p.contact, r);
+    else if (c.kind == Coupling::clutch)
+        torque = static_cast<double>(slip) * forms_.commanded(p.input, p.branch, c.torque, key);
+    else if (c.kind == Coupling::safety_clutch)
+        torque = terms_.one(slip * c.torque);
+}
+
+// What the dry contact of a shaft takes.
+inline Row Equations::shaft_friction(int shaft, const Key& key, const Regime& r, const std::vector<Row>& loss) const {
+    const ShaftPlace& p = places_.shafts[shaft];
+    if (mode(key, p.contact) == 0) return held(p.contact, r);
+    Row F = forms_.sliding_friction(shaft, key);
+    for (std::size_t b = 0; b < train_.brakes.size(); ++b)
+        if (train_.brakes[b].shaft == shaft) F += forms_.brake_torque(static_cast<int>(b), key);
+    for (std::size_t g = 0; g < train_.gears.size(); ++g)
+        if (train_.gears[g].input == shaft && train_.gears[g].has_dry_losses()) F += loss[g];
+    return F;
+}
+
+inline Row Equations::acceleration(int shaft, const Key& key, const Regime& r) const {
+    const ShaftPlace& p = places_.shafts[shaft];
+    Row sum;
+    for (std::size_t m = 0; m < train_.motors.size(); ++m)
+        if (train_.motors[m].shaft == shaft) sum += r.motor_torque[m];
+    for (std::size_t g = 0; g < train_.gears.size(); ++g)
+        if (train_.gears[g].output == shaft) sum += r.output_torque[g];
+    for (std::size_t k = 0; k < train_.couplings.size(); ++k)
+        if (train_.couplings[k].output == shaft) sum += r.contact_torque[places_.couplings[k].contact];
+    for (std::size_t k = 0; k < train_.angle_torques.size(); ++k)
+        if (train_.angle_torques[k].shaft == shaft) sum += forms_.angle_torque(static_cast<int>(k), key);
+    sum -= p.viscous_friction * speed(shaft, r);
+    if (train_.shafts[shaft].has_drag() && !r.ties.at_rest[shaft]) sum -= forms_.drag_torque(shaft, key);
+    if (p.load != nowhere) sum -= terms_.input(p.load);
+    if (p.contact != nowhere) sum -= r.contact_torque[p.contact];
+    for (std::size_t g = 0; g < train_.gears.size(); ++g)
+        if (train_.gears[g].input == shaft) sum -= r.input_torque[g];
+    for (std::size_t k = 0; k < train_.couplings.size(); ++k)
+        if (train_.couplings[k].input == shaft) sum -= r.contact_torque[places_.couplings[k].contact];
+    return sum / p.inertia;
+}
+
+inline void Equations::set_rates(const Key& key, const std::vector<Row>& acceleration, Regime& r) const {
+    r.rate.resize(layout_.states);
+    for (std::size_t m = 0; m < train_.motors.size(); ++m) {
+        const Motor& motor = train_.motors[m].law;
+        const MotorPlace& p = places_.motors[m];
+        if (motor.kind != Motor::dc) continue;
+        // The motor states its law in terms of its own.
+        const auto law = motor.torque_rate<Form<n_terms>>(p.branch == nowhere ? 0 : key.branch[p.branch]);
+        Row& rate = r.rate[p.torque];
+        rate.c[p.torque] = law.c[lostmotion::motor_torque];
+        rate.c[places_.shafts[train_.motors[m].shaft].speed] = law.c[lostmotion::motor_speed];
+        rate.c[layout_.first_input + p.command] = law.c[lostmotion::command];
+        rate.c[layout_.one] = law.c[lostmotion::one];
+    }
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
+        const int leader = r.ties.leader[s];
+        if (r.ties.at_rest[s]) continue;
+        r.rate[places_.shafts[s].speed] =
+            leader == static_cast<int>(s) ? acceleration[s] : r.ties.factor[s] * acceleration[leader];
+    }
+    for (std::size_t g = 0; g < train_.gears.size(); ++g) {
+        const GearPlace& p = places_.gears[g];
+        if (p.twist != nowhere && !forms_.twist_rests(static_cast<int>(g), r))
+            r.rate[p.twist] = forms_.twist_rate(static_cast<int>(g), key);
+    }
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s)
+        if (places_.shafts[s].angle != nowhere && !r.ties.at_rest[s])
+            r.rate[places_.shafts[s].angle] = terms_.state(places_.shafts[s].speed);
+    for (int a = 0; a < layout_.angles; ++a) {
+        const int s = places_.last_shaft[a];
+        if (!r.ties.at_rest[s]) r.rate[layout_.coupled + a] = terms_.state(places_.shafts[s].speed);
+    }
+}
+
+}  // namespace lostmotion::model

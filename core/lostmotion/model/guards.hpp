@@ -1,0 +1,281 @@
+// Guards of a regime: what ends it, element by element.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "equations.hpp"
+
+namespace lostmotion::model {
+
+class RegimeGuards {
+ public:
+    // Of a regime whose torques and rates are known.
+    RegimeGuards(const Equations& equations, const ElementForms& forms, Regime& regime)
+        : equations_(equations),
+          forms_(forms),
+          train_(forms.train()),
+          places_(forms.places()),
+          layout_(forms.layout()),
+          terms_(forms.terms()),
+          regime_(regime) {}
+
+    void add_all();
+
+ private:
+    void add_speed_guards();
+    void add_gear_capacities();
+    void add_coupling_capacities();
+    void add_shaft_guards(int shaft);
+    void add_loss_cells(int gear, int s, Row& capacity);
+    void add_loss_edges(int gear);
+    void add_turning();
+    void add_twist_pieces(int gear);
+    void add_speed_pieces(int shaft);
+    void add_input_limits();
+    void add_angle_pieces(int branch, int turn, int shaft, const PeriodicCurve& curve);
+
+    Guard& add(const Row& form, Guard::Kind kind, int contact, int branch, int neighbour) {
+        regime_.guards.push_back(Guard{form, kind, contact, branch, neighbour});
+        return regime_.guards.back();
+    }
+
+    const Equations& equations_;
+    const ElementForms& forms_;
+    const Train& train_;
+    const Places& places_;
+    const Layout& layout_;
+    const Terms& terms_;
+    Regime& regime_;
+};
+
+inline void RegimeGuards::add_all() {
+    add_speed_guards();
+    add_gear_capacities();
+    add_coupling_capacities();
+    for (int s = static_cast<int>(train_.shafts.size()) - 1; s >= 0; --s) add_shaft_guards(s);
+    add_turning();
+    for (std::size_t g = 0; g < train_.gears.size(); ++g) add_twist_pieces(static_cast<int>(g));
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s) add_speed_pieces(static_cast<int>(s));
+    add_input_limits();
+    for (std::size_t g = 0; g < train_.gears.size(); ++g) {
+        const GearPlace& p = places_.gears[g];
+        if (p.error_piece != nowhere)
+            add_angle_pieces(p.error_piece, p.error_turn, train_.gears[g].input, train_.gears[g].transmission_error);
+    }
+    for (std::size_t k = 0; k < train_.angle_torques.size(); ++k)
+        add_angle_pieces(places_.angle_torques[k].piece, places_.angle_torques[k].turn, train_.angle_torques[k].shaft,
+                         train_.angle_torques[k].torque);
+}
+
+inline void RegimeGuards::add_speed_guards() {
+    for (int c = 0; c < layout_.contacts; ++c) {
+        const int mode = regime_.key.modes[c];
+        if (mode == 0) continue;
+        // (16) sets the hysteresis anew whenever the twist rate reaches zero, whether it then changes sign or not.
+        add(static_cast<double>(mode) * forms_.contact_speed(c), Guard::speed, c, nowhere, 0).by_grazing =
+            places_.contacts[c].kind == ContactPlace::gear;
+    }
+}
+
+inline void RegimeGuards::add_gear_capacities() {
+    for (std::size_t g = 0; g < train_.gears.size(); ++g) {
+        const GearPlace& p = places_.gears[g];
+        if (p.contact == nowhere || train_.gears[g].rigid() || regime_.key.modes[p.contact] != 0) continue;
+        const Row h = terms_.memory(p.hysteresis), &H = regime_.gear_hysteresis[g];
+        add(h - H, Guard::capacity, p.contact, nowhere, +1);
+        add(h + H, Guard::capacity, p.contact, nowhere, -1);
+    }
+}
+
+inline void RegimeGuards::add_coupling_capacities() {
+    for (std::size_t k = 0; k < train_.couplings.size(); ++k) {
+        const Coupling& c = train_.couplings[k];
+        const CouplingPlace& p = places_.couplings[k];
+        if (regime_.key.modes[p.contact] != 0) continue;
+        const Row& torque = regime_.contact_torque[p.contact];
+        Row capacity;
+        if (c.kind == Coupling::clutch) capacity = forms_.commanded(p.input, p.branch, c.torque, regime_.key);
+        if (c.kind == Coupling::safety_clutch) capacity = terms_.one(c.torque);
+        if (c.kind != Coupling::freewheel) add(capacity - torque, Guard::capacity, p.contact, nowhere, +1);
+        add(capacity + torque, Guard::capacity, p.contact, nowhere, -1);
+    }
+}
+
+// Capacity of the contact of a shaft while it is stuck, edges of the cells of its gears while it slips.
+inline void RegimeGuards::add_shaft_guards(int shaft) {
+    const ShaftPlace& p = places_.shafts[shaft];
+    if (p.contact == nowhere) return;
+    const auto each_gear = [&](auto&& use) {
+        for (std::size_t g = 0; g < train_.gears.size(); ++g)
+            if (train_.gears[g].input == shaft && train_.gears[g].has_dry_losses()) use(static_cast<int>(g));
+    };
+    if (regime_.key.modes[p.contact] != 0) {
+        each_gear([&](int g) { add_loss_edges(g); });
+        return;
+    }
+    for (const int s : {+1, -1}) {
+        Row F = terms_.one(p.motor_friction + train_.shafts[shaft].friction.holding());
+        for (std::size_t b = 0; b < train_.brakes.size(); ++b)
+            if (train_.brakes[b].shaft == shaft)
+                F += forms_.commanded(places_.brakes[b].input, places_.brakes[b].branch, train_.brakes[b].torque,
+                                      regime_.key);
+        each_gear([&](int g) { add_loss_cells(g, s, F); });
+        add(F - static_cast<double>(s) * regime_.contact_torque[p.contact], Guard::capacity, p.contact, nowhere, s);
+    }
+}
+
+inline void RegimeGuards::add_loss_cells(int gear, int s, Row& capacity) {
+    const Gear& g = train_.gears[gear];
+    const GearPlace& p = places_.gears[gear];
+    const int contact = places_.shafts[g.input].contact, branch = s > 0 ? p.cell : p.cell_back;
+    const int j = regime_.key.branch[branch];
+    const double T_2R = g.rated_torque();
+    const Plane m = g.loss_at_standstill(j);
+    const Row mu = s / T_2R * regime_.output_torque[gear];
+    capacity += T_2R / g.law.ratio * (terms_.one(m.at_zero) + m.per_load * mu);
+    const double low = g.load_lower(j), high = g.load_upper(j);
+    const bool bounded = std::isfinite(low) && std::isfinite(high);
+    const double scale = bounded ? 1.0 / (high - low) : 1.0;
+    const auto edge = [&](const Row& form, int neighbour) {
+        const bool end = neighbour < 0 || neighbour >= g.load_intervals();
+        add(scale * form, end ? Guard::outside : Guard::edge, contact, branch, neighbour);
+    };
+    if (std::isfinite(high)) edge(terms_.one(high) - mu, j + 1);
+    if (std::isfinite(low)) edge(mu - terms_.one(low), j - 1);
+    regime_.in_data = regime_.in_data && g.load_interval_in_data(j);
+}
+
+inline void RegimeGuards::add_loss_edges(int gear) {
+    const Gear& g = train_.gears[gear];
+    const GearPlace& p = places_.gears[gear];
+    const int contact = places_.shafts[g.input].contact;
+    const double s = regime_.key.modes[contact], T_2R = g.rated_torque();
+    Edge edges[3];
+    const int n = g.loss_edges(regime_.key.branch[p.cell], edges);
+    for (int k = 0; k < n; ++k) {
+        const Plane& inside = edges[k].inside;
+        add(terms_.one(inside.at_zero) +
+                terms_.state(places_.shafts[g.input].speed, s * inside.per_speed / g.law.rated_input_speed) +
+                s * inside.per_load / T_2R * regime_.output_torque[gear],
+            edges[k].neighbour < 0 ? Guard::outside : Guard::edge, contact, p.cell, edges[k].neighbour);
+    }
+    regime_.in_data = regime_.in_data && g.in_data(regime_.key.branch[p.cell]);
+}
+
+// A shaft that "slips" but is kept at rest by others is at its limit: the torques go along with what drives it there,
+// as long as that goes on. When it turns back the torques stay. What drives it is the torque that it would take if it
+// were stuck, in terms of the states and inputs.
+inline void RegimeGuards::add_turning() {
+    for (int c = 0; c < layout_.contacts; ++c) {
+        if (places_.contacts[c].kind != ContactPlace::shaft || regime_.key.modes[c] == 0 || !regime_.at_rest[c])
+            continue;
+        Regime stuck;
+        stuck.key = regime_.key;
+        stuck.key.modes[c] = 0;
+        stuck.ties = tie(places_.contacts, static_cast<int>(train_.shafts.size()), stuck.key.modes.data());
+        std::vector<Row> acceleration(train_.shafts.size());
+        equations_.compose(stuck.key, stuck, acceleration);
+        Row& torque = stuck.contact_torque[c];
+        if (!solve_reactions(places_.contacts, layout_, stuck.key, stuck.ties, acceleration, {&torque})) continue;
+        Row rate;
+        for (int k = 0; k < layout_.states; ++k) {
+            // Of what acts on the shaft itself, the whole: no rounding of the elimination.
+            double share = torque.c[k];
+            if (std::fabs(std::fabs(share) - 1.0) < 1e-14) share = share > 0.0 ? 1.0 : -1.0;
+            if (share != 0.0) rate += share * regime_.rate[k];
+        }
+        const double way = regime_.key.modes[c];
+        const bool by_states = std::any_of(rate.c.begin(), rate.c.end(), [](double v) { return v != 0.0; });
+        int inputs = 0, input = nowhere;
+        for (int i = 0; i < layout_.inputs; ++i)
+            if (std::fabs(torque.c[layout_.first_input + i]) > 1e-14) {
+                ++inputs;
+                input = i;
+            }
+        // Only a rate that is a form of the states, or that of one input, can be watched; with more of them the torques
+        // follow all the time.
+        if (by_states && inputs == 0) add(way * rate, Guard::turning, c, nowhere, 0);
+        if (by_states || inputs != 1) continue;
+        regime_.driving_input = input;
+        regime_.driving_way = way * (torque.c[layout_.first_input + input] > 0.0 ? 1.0 : -1.0);
+        regime_.driven_contact = c;
+    }
+}
+
+// Pieces of the torsion curve, and where the flanks part and touch again.
+inline void RegimeGuards::add_twist_pieces(int gear) {
+    const Gear& g = train_.gears[gear];
+    const GearPlace& p = places_.gears[gear];
+    if (forms_.twist_rests(gear, regime_)) return;
+    const TorsionCurve& curve = g.law.curve;
+    const int piece = regime_.key.branch[p.piece];
+    const int slip = p.contact == nowhere ? 0 : regime_.key.modes[p.contact];
+    if (piece < curve.outermost_piece())
+        add(terms_.one(curve.upper(piece)) - terms_.state(p.twist), Guard::edge, p.contact, p.piece, piece + 1).behind =
+            slip < 0;
+    if (piece > -curve.outermost_piece())
+        add(terms_.state(p.twist) - terms_.one(curve.lower(piece)), Guard::edge, p.contact, p.piece, piece - 1).behind =
+            slip > 0;
+    if (p.parted == nowhere || piece == 0) return;
+    const bool parted = regime_.key.branch[p.parted] != 0;
+    const Row pressed = terms_.state(p.twist, curve.slope(piece)) + terms_.one(curve.offset(piece)) +
+                        g.mesh_damping * forms_.twist_rate(gear, regime_.key);
+    add(((piece > 0) != parted ? 1.0 : -1.0) * pressed, Guard::edge, p.contact, p.parted, parted ? 0 : 1);
+}
+
+inline void RegimeGuards::add_speed_pieces(int shaft) {
+    const ShaftPlace& p = places_.shafts[shaft];
+    const Shaft& law = train_.shafts[shaft];
+    if (regime_.ties.at_rest[shaft]) return;
+    const Row w = terms_.state(p.speed);
+    if (p.friction_piece != nowhere && regime_.key.modes[p.contact] != 0) {
+        const double s = regime_.key.modes[p.contact];
+        const int k = regime_.key.branch[p.friction_piece];
+        if (k + 1 < law.friction.pieces())
+            add(terms_.one(law.friction.speeds[k + 1]) - s * w, Guard::edge, p.contact, p.friction_piece, k + 1);
+        if (k > 0) add(s * w - terms_.one(law.friction.speeds[k]), Guard::edge, p.contact, p.friction_piece, k - 1);
+    }
+    if (p.drag_piece != nowhere) {
+        const int k = regime_.key.branch[p.drag_piece], last = law.drag.outermost_piece();
+        if (k < last) add(terms_.one(law.drag.upper(k)) - w, Guard::edge, nowhere, p.drag_piece, k + 1);
+        if (k > -last) add(w - terms_.one(law.drag.lower(k)), Guard::edge, nowhere, p.drag_piece, k - 1);
+    }
+}
+
+inline void RegimeGuards::add_input_limits() {
+    const auto limits = [&](int input, int branch, double low, double high, int contact) {
+        const int at = regime_.key.branch[branch];
+        const Row u = terms_.input(input);
+        if (at <= 0) add(terms_.one(at == 0 ? high : low) - u, Guard::input_limit, contact, branch, at + 1);
+        if (at >= 0) add(u - terms_.one(at == 0 ? low : high), Guard::input_limit, contact, branch, at - 1);
+    };
+    for (std::size_t m = 0; m < train_.motors.size(); ++m)
+        if (places_.motors[m].branch != nowhere) {
+            const double most = train_.motors[m].command_limit();
+            limits(places_.motors[m].command, places_.motors[m].branch, -most, most,
+                   places_.shafts[train_.motors[m].shaft].contact);
+        }
+    for (std::size_t b = 0; b < train_.brakes.size(); ++b)
+        limits(places_.brakes[b].input, places_.brakes[b].branch, 0.0, 1.0,
+               places_.shafts[train_.brakes[b].shaft].contact);
+    for (const CouplingPlace& c : places_.couplings)
+        if (c.branch != nowhere) limits(c.input, c.branch, 0.0, 1.0, c.contact);
+}
+
+// Where the angle of a shaft leaves its piece. The last and the first piece are neighbours: then the angle at which the
+// present turn began, which is remembered, moves by a period.
+inline void RegimeGuards::add_angle_pieces(int branch, int turn, int shaft, const PeriodicCurve& curve) {
+    if (regime_.ties.at_rest[shaft]) return;
+    const int k = regime_.key.branch[branch], last = curve.pieces() - 1;
+    const Row within = terms_.state(places_.shafts[shaft].angle) - terms_.memory(turn);
+    const auto edge = [&](const Row& form, int neighbour, double shift) {
+        Guard& g = add(form, Guard::edge, nowhere, branch, neighbour);
+        g.memory = shift == 0.0 ? nowhere : turn;
+        g.shift = shift;
+    };
+    edge(terms_.one(curve.upper(k)) - within, k == last ? 0 : k + 1, k == last ? curve.period() : 0.0);
+    edge(within - terms_.one(curve.lower(k)), k == 0 ? last : k - 1, k == 0 ? -curve.period() : 0.0);
+}
+
+}  // namespace lostmotion::model
