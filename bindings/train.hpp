@@ -10,6 +10,7 @@
 
 #include "drives.hpp"
 #include "interruption.hpp"
+#include "lostmotion/analysis/steady_regime.hpp"
 #include "lostmotion/simulation/train_run.hpp"
 
 namespace lostmotion::binding {
@@ -64,6 +65,7 @@ class TrainDescription {
     }
 
     std::string check() const { return TrainRun(train).error(); }
+    std::string check_start(const std::vector<double>& speeds) const { return model::check_start(train, speeds); }
     // The train must have passed the check.
     std::vector<std::tuple<std::string, std::string, std::string>> channels() const {
         std::vector<std::tuple<std::string, std::string, std::string>> out;
@@ -77,6 +79,27 @@ class TrainDescription {
         std::vector<std::string> names;
         for (int c = 0; c < a.layout().contacts; ++c) names.push_back(model::contact_name(a, c));
         return names;
+    }
+    // (J [kg m2], holding friction [N m]) of each shaft, with what is on it; brakes are open.
+    std::vector<std::pair<double, double>> shafts() const {
+        const model::Assembly a(train);
+        std::vector<std::pair<double, double>> out;
+        for (std::size_t s = 0; s < train.shafts.size(); ++s) {
+            const model::ShaftPlace& p = a.places().shafts[s];
+            out.emplace_back(p.inertia, p.motor_friction + train.shafts[s].friction.holding());
+        }
+        return out;
+    }
+    std::pair<double, double> mesh_loss(std::size_t gear, double driven, double speed) const {
+        const model::MeshLoss loss = train.gears.at(gear).loss(driven, speed);
+        return {loss.torque, loss.per_torque};
+    }
+    nb::tuple steady_regime(const std::vector<double>& speeds, const std::vector<double>& torques) const {
+        const SteadyRegime r = lostmotion::steady_regime(train, {speeds, torques});
+        const std::size_t n = r.states.size();
+        auto rate = std::make_unique_for_overwrite<double[]>(n * n);
+        std::copy(r.rate.begin(), r.rate.end(), rate.get());
+        return nb::make_tuple(r.states, as_array(std::move(rate), {n, n}), r.determined);
     }
 
  private:
@@ -121,6 +144,7 @@ inline Named train_ledger(const TrainReport& report) {
 }
 
 inline void check_train_run(const TrainReport& report, const model::Assembly& a) {
+    if (!report.message.empty()) throw nb::value_error(report.message.c_str());
     if (report.status == Status::interrupted) throw nb::python_error();
     if (report.too_many_guards)
         throw SolverError("the train has a regime with more conditions than the solver has room for, at t = " +
@@ -218,9 +242,16 @@ inline void bind_train(nb::module_& m) {
             "name"_a, "input"_a, "output"_a)
         .def("add_angle_torque", &TrainDescription::add_angle_torque, "name"_a, "shaft"_a, "torque"_a)
         .def("check", &TrainDescription::check)
+        .def("check_start", &TrainDescription::check_start, "speeds"_a)
         .def("channels", &TrainDescription::channels, nb::sig("def channels(self) -> list[tuple[str, str, str]]"),
              "Name, unit, meaning.")
         .def("input_names", &TrainDescription::input_names)
+        .def("shafts", &TrainDescription::shafts,
+             "Inertia [kg m2] and friction that holds at rest [N m] of each shaft.")
+        .def("mesh_loss", &TrainDescription::mesh_loss, "gear"_a, "driven"_a, "speed"_a)
+        .def("steady_regime", &TrainDescription::steady_regime, "speeds"_a, "torques"_a,
+             nb::sig("def steady_regime(self, speeds: collections.abc.Sequence[float], torques: "
+                     "collections.abc.Sequence[float]) -> tuple[list[str], numpy.typing.NDArray[numpy.float64], bool]"))
         .def("contact_names", &TrainDescription::contact_names);
     m.def("run_train", &run_train, "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a, "duration"_a,
           "interval"_a, "samples"_a, "energy"_a, "tolerance"_a, "max_switchings"_a,

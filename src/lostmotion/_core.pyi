@@ -123,10 +123,19 @@ class Train:
 
     def check(self) -> str: ...
 
+    def check_start(self, speeds: Sequence[float]) -> str: ...
+
     def channels(self) -> list[tuple[str, str, str]]:
         """Name, unit, meaning."""
 
     def input_names(self) -> list[str]: ...
+
+    def shafts(self) -> list[tuple[float, float]]:
+        """Inertia [kg m2] and friction that holds at rest [N m] of each shaft."""
+
+    def mesh_loss(self, gear: int, driven: float, speed: float) -> tuple[float, float]: ...
+
+    def steady_regime(self, speeds: Sequence[float], torques: Sequence[float]) -> tuple[list[str], numpy.typing.NDArray[numpy.float64], bool]: ...
 
     def contact_names(self) -> list[str]: ...
 

@@ -2,8 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "places.hpp"
 
@@ -158,6 +161,37 @@ class TrainCheck {
 
     const Train& train_;
 };
+
+// Empty, or which rigid gear or freewheel the speeds contradict that the shafts begin with.
+inline std::string check_start(const Train& train, const std::vector<double>& speed) {
+    const auto number = [](double v) {
+        char text[32];
+        std::snprintf(text, sizeof text, "%.10g", v);
+        return std::string(text);
+    };
+    const auto both = [&](int a, int b) {
+        const auto one = [&](int s) {
+            return train.shafts[static_cast<std::size_t>(s)].name + " = " + number(speed[static_cast<std::size_t>(s)]) +
+                   " rad/s";
+        };
+        return one(a) + " and " + one(b);
+    };
+    constexpr double rounding = 1e-12;  // of speeds that were converted from other units
+    for (const Gear& g : train.gears) {
+        const double in = speed[static_cast<std::size_t>(g.input)] / g.law.ratio,
+                     out = speed[static_cast<std::size_t>(g.output)];
+        if (g.rigid() && std::fabs(in - out) > rounding * std::fmax(std::fabs(in), std::fabs(out)))
+            return both(g.input, g.output) + " do not fit the rigid gear " + g.name +
+                   "; their quotient must be its ratio, " + number(g.law.ratio);
+    }
+    for (const Coupling& c : train.couplings) {
+        const double in = speed[static_cast<std::size_t>(c.input)], out = speed[static_cast<std::size_t>(c.output)];
+        if (c.kind == Coupling::freewheel && in - out > rounding * std::fmax(std::fabs(in), std::fabs(out)))
+            return both(c.input, c.output) + " do not fit the freewheel " + c.name +
+                   ", whose input cannot be faster than its output; give both the same speed";
+    }
+    return {};
+}
 
 // Empty, or what is wrong with it. A train is checked before it is assembled.
 inline std::string check(const Train& train) { return TrainCheck(train)(); }

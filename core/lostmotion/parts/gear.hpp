@@ -11,6 +11,11 @@
 
 namespace lostmotion::model {
 
+// What a gear takes at its output [N m], and how that changes with the torque in its mesh.
+struct MeshLoss {
+    double torque = 0.0, per_torque = 0.0;
+};
+
 struct Gear {
     std::string name;
     int input = 0, output = 0;  // shafts
@@ -54,6 +59,17 @@ struct Gear {
     }
     bool load_interval_in_data(int j) const {
         return with_losses([&](const auto& m) { return m.load_interval_in_data(j); });
+    }
+    // M_2B of the mesh torque T_2 [N m] in the direction of the motion (> 0: the input drives) at a speed of the input
+    // shaft; at rest, what the gear can hold.
+    MeshLoss loss(double driven, double speed) const {
+        if (!has_dry_losses()) {  // (5b): T_1 = T_2/(i eta), whichever side drives
+            const double share = 1.0 / law.efficiency - 1.0;
+            return {share * driven, share};
+        }
+        const double T_2R = rated_torque(), mu = driven / T_2R, v = std::fabs(speed) / law.rated_input_speed;
+        const Plane m = v == 0.0 ? loss_at_standstill(load_interval(mu)) : loss_plane(loss_cell(mu, v));
+        return {T_2R * (m.at_zero + m.per_speed * v + m.per_load * mu), m.per_load};
     }
     // Bounds of an interval of the load axis, infinite where there is none.
     double load_lower(int j) const {

@@ -85,13 +85,35 @@ class TrainReader {
             }
             case TrainChannel::motor_torque: return evaluate(row(regime_.rows.motor_torque[index]), at, k);
             case TrainChannel::output_torque: return evaluate(regime_.output_torque[index], at, k);
-            case TrainChannel::input_torque: return evaluate(row(regime_.rows.input_torque[index]), at, k);
+            case TrainChannel::input_torque: return input_torque(index, at, k);
             case TrainChannel::contact_torque: return evaluate(regime_.contact_torque[index], at, k);
             default: return Vec{} + (regime_.at_rest[index] ? 0.0 : static_cast<double>(regime_.key.modes[index]));
         }
     }
 
  private:
+    // Of an input shaft at rest, the torque that its contact holds is shared by what is dry there as the capacities
+    // are.
+    Vec input_torque(std::size_t index, const Instants& at, int k) const {
+        const model::Gear& gear = model_.assembly.train().gears[index];
+        const int contact = model_.assembly.places().shafts[static_cast<std::size_t>(gear.input)].contact;
+        Vec T_1 = evaluate(row(regime_.rows.input_torque[index]), at, k);
+        if (!gear.has_dry_losses() || regime_.key.modes[static_cast<std::size_t>(contact)] != 0) return T_1;
+        const Vec T_2 = evaluate(regime_.output_torque[index], at, k),
+                  F = evaluate(regime_.contact_torque[static_cast<std::size_t>(contact)], at, k);
+        Vec margin[2];  // until it slips backward, forward
+        for (int g = 0; g < regime_.n_guards; ++g)
+            if (const auto& guard = regime_.guards[static_cast<std::size_t>(g)];
+                guard.kind == model::Guard::capacity && guard.contact == contact)
+                margin[guard.neighbour > 0] = evaluate(guard.form, at, k);
+        for (int lane = 0; lane < vec_width; ++lane) {
+            const int s = F[lane] >= 0.0 ? 1 : -1;
+            const double capacity = margin[s > 0][lane] + s * F[lane];
+            if (capacity > 0.0) T_1[lane] += F[lane] * gear.loss(s * T_2[lane], 0.0).torque / gear.law.ratio / capacity;
+        }
+        return T_1;
+    }
+
     LinearFormOf<D> row(const model::Row& r) const { return model::pack<D>(r, model_.assembly.layout()); }
 
     // None of the forms depends on an angle that follows.

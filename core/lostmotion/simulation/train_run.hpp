@@ -41,7 +41,7 @@ struct TrainEnergy {
 
 struct TrainReport {
     Status status = Status::done;
-    std::string message;  // what is wrong with the train; then nothing has run
+    std::string message;  // what is wrong with the start; then nothing has run
     double time = 0.0;    // [s] reached
     int contact = -1;     // at the last switching
     std::vector<double> x, memory;
@@ -181,6 +181,11 @@ TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std:
     const model::Assembly& a = model.assembly;
     const model::Layout& n = a.layout();
     TrainReport report;
+    std::vector<double> speeds;
+    for (const model::ShaftPlace& s : a.places().shafts)
+        speeds.push_back(start.empty() ? 0.0 : start[static_cast<std::size_t>(s.speed)]);
+    report.message = model::check_start(a.train(), speeds);
+    if (!report.message.empty()) return report;
     const System system(a);
     SignalsOf<D> signals;
     std::copy_n(inputs.begin(), std::min<std::size_t>(inputs.size(), static_cast<std::size_t>(n.inputs)),

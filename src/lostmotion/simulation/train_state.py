@@ -31,9 +31,8 @@ def start_values(train: DriveTrain, initial: Any) -> dict[str, float]:
     _check("twists", initial.twists, stiff, "gear with a stiffness")
     _check("motor_torques", initial.motor_torques, electric, 'motor of kind "dc"')
     _check("hysteresis_capacities", initial.hysteresis_capacities, lossy, "gear with hysteresis")
-    for name, gear in train.gears.items():
-        if isinstance(gear.stiffness, Rigid):
-            _check_rigid(name, gear, initial.speeds)
+    if problem := train.core(()).check_start([initial.speeds.get(name, 0.0) for name in train.shafts]):
+        raise InputError(f"key initial.speeds: {problem}")
     angles = angles_at_start(train, initial.angles, initial.twists)
     values = {
         f"{name}_{what}": v for what, of in (("speed", initial.speeds), ("angle", angles)) for name, v in of.items()
@@ -49,15 +48,6 @@ def _check(key: str, given: Iterable[str], known: Iterable[str], what: str) -> N
         if name not in known:
             meant = did_you_mean(name, known, f"there are {', '.join(known)}" if known else "there is none")
             raise InputError(f"key initial.{key}.{name}: is no {what} of this train; {meant}")
-
-
-def _check_rigid(name: str, gear: Gear, speeds: Mapping[str, float]) -> None:
-    fast, slow = speeds.get(gear.input, 0.0), speeds.get(gear.output, 0.0)
-    if abs(fast / gear.ratio - slow) > ROUNDING * abs(slow):
-        raise InputError(
-            f"key initial.speeds: {gear.input} = {fast} rad/s and {gear.output} = {slow} rad/s do not fit the rigid gear "
-            f"{name}; their quotient must be its ratio, {gear.ratio:g}"
-        )
 
 
 def angles_at_start(train: DriveTrain, given: Mapping[str, float], twists: Mapping[str, float]) -> dict[str, float]:
