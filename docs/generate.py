@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import self_locking_figures
 from typer.main import get_command
 
 import lostmotion as lm
@@ -295,6 +296,7 @@ def generate(out: Path = OUT) -> None:
         "commands": commands(),
         "gallery": gallery(out),
     }
+    self_locking_figures.write(out)
     for name, text in pages.items():
         (out / f"{name}.md").write_text(text, encoding="utf-8")
 

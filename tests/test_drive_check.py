@@ -10,8 +10,9 @@ import lostmotion as lm
 from conftest import ROOT, SCENARIOS
 from lostmotion.cli import app
 from lostmotion.simulation.scenario import from_tables
-from lostmotion.sizing.drive_check import RULES, Finding, check_drive
+from lostmotion.sizing.drive_check import check_drive
 from lostmotion.sizing.duty_cycle import DutyCycle, duty_cycle
+from lostmotion.sizing.finding import RULES, Finding
 from lostmotion.sizing.holding import holding
 
 RPM = math.pi / 30.0

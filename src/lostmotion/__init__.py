@@ -43,6 +43,10 @@ if TYPE_CHECKING:
     from .model.motor import Motor as Motor
     from .model.motor import MotorLimits as MotorLimits
     from .model.motor import ShaftMotor as ShaftMotor
+    from .model.self_locking import Overrunning as Overrunning
+    from .model.self_locking import SelfLocking as SelfLocking
+    from .model.self_locking import overrunning as overrunning
+    from .model.self_locking import self_locking as self_locking
     from .model.shaft import DragCurve as DragCurve
     from .model.shaft import FrictionCurve as FrictionCurve
     from .model.shaft import QuadraticDrag as QuadraticDrag
@@ -85,8 +89,8 @@ if TYPE_CHECKING:
     from .simulation.train_scenario import TrainScenario as TrainScenario
     from .simulation.variables import VARIABLES as VARIABLES
     from .simulation.variables import Variable as Variable
-    from .sizing.drive_check import Finding as Finding
     from .sizing.drive_check import check_drive as check_drive
+    from .sizing.finding import Finding as Finding
     from .studies.engine import study as study
     from .studies.file import load_study as load_study
     from .studies.study import Study as Study
@@ -114,6 +118,7 @@ _HOMES = {
     "model.load": ("Load",),
     "model.losses": ("ConstantEfficiency", "LossMap", "MeshEfficiency", "WormMesh"),
     "model.motor": ("Motor", "MotorLimits", "ShaftMotor"),
+    "model.self_locking": ("Overrunning", "SelfLocking", "overrunning", "self_locking"),
     "model.shaft": ("DragCurve", "FrictionCurve", "QuadraticDrag", "Shaft"),
     "model.signals": ("CommandSignal", "TorqueSignal"),
     "model.torsion": ("Hysteresis", "LinearStiffness", "Rigid", "TorsionCurve"),
@@ -134,7 +139,8 @@ _HOMES = {
     "simulation.switchings": ("switchings_of",),
     "simulation.train_scenario": ("ShaftTable", "TrainInitial", "TrainScenario"),
     "simulation.variables": ("VARIABLES", "Variable"),
-    "sizing.drive_check": ("Finding", "check_drive"),
+    "sizing.drive_check": ("check_drive",),
+    "sizing.finding": ("Finding",),
     "studies.engine": ("study",),
     "studies.file": ("load_study",),
     "studies.study": ("Study",),

@@ -10,18 +10,18 @@ def check(
     scenario: SourceArgument,
     overrides: Overrides = None,
 ) -> None:
-    """Torques, speeds, voltage, current, heat, inertia ratio, resonance, dead zone, lost motion and holding.
+    """Torques, speeds, voltage, current, heat, inertia ratio, resonance, dead zone, lost motion, holding and self-locking.
 
-    Each point names its rule and the source of the rule. The table [task] of the scenario gives the duty cycle and requirements.
+    Of a drive train: torques, speeds, voltage, current, heat and self-locking, of each gear and motor. Each point names its rule and the source of the rule. The table [task] of the scenario gives the duty cycle and requirements.
 
     \b
     lostmotion drive check drive.toml --set task.cycle="2 s"
     """
     from ..errors import InputError
-    from ..simulation.sources import load_drive
+    from ..simulation.sources import load
     from ..sizing.drive_check import check_drive
 
-    loaded = load_drive(scenario, overrides or ())
+    loaded = load(scenario, overrides or ())
     try:
         with busy("Checking"):
             findings = check_drive(loaded)

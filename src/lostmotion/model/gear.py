@@ -6,10 +6,11 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from ..errors import InputError
 from ..inputs.quantities import NotNegative, ViscousFriction
 from .angle_torques import TransmissionError
 from .gearbox import Gearbox, Transmission
-from .losses import ConstantEfficiency, LossMap, MeshEfficiency, WormMesh
+from .losses import ConstantEfficiency, LossMap, MeshEfficiency, WormMesh, efficiency_map
 from .torsion import LinearStiffness, Rigid, TorsionCurve
 
 
@@ -42,6 +43,24 @@ class Gear(Transmission):
                 if getattr(self, key) is None:
                     raise ValueError(f"lacks {key}, by which the loss map is scaled; add it")
         return self
+
+    def gearbox(self) -> Gearbox:
+        """The same gear alone, as the test rig takes it: without mesh damping and transmission error, its losses as a map.
+
+        Raises
+        ------
+        InputError
+            It has no rated speed or torque.
+        """
+        lacking = [key for key in ("rated_input_speed", "rated_output_torque") if getattr(self, key) is None]
+        if lacking:
+            raise InputError(
+                f"the gear lacks {' and '.join(lacking)}, by which the test rig chooses what it measures; add it"
+            )
+        losses = self.losses
+        if isinstance(losses, MeshEfficiency | WormMesh):
+            losses = efficiency_map(*losses.efficiencies())
+        return Gearbox(**{name: getattr(self, name) for name in Gearbox.model_fields} | {"losses": losses})
 
     @classmethod
     def of(cls, gearbox: Gearbox, *, input: str, output: str) -> Self:

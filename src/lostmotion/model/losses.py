@@ -84,6 +84,13 @@ class LossMap(Part):
         return _core.LossMap(speeds, loads, [x for row in values for x in row])
 
 
+def efficiency_map(eta_f: float, eta_b: float) -> LossMap:
+    """An efficiency for each direction of power flow as a loss map: the same losses at all loads and speeds."""
+    overrunning, driving = 1.0 - eta_b, 1.0 / eta_f - 1.0
+    values = ((overrunning, overrunning), (0.0, 0.0), (driving, driving))
+    return LossMap(speeds=(0.0, 1.0), loads=(-1.0, 0.0, 1.0), values=values)
+
+
 class MeshEfficiency(Part):
     """An efficiency for each direction of power flow, as printed for worm gears. Only in drive trains."""
 

@@ -123,7 +123,7 @@ class DriveTrain(TrainElements):
             limit = math.inf if m.torque_limit is None else m.torque_limit
             train.add_motor(name, m.shaft, numbers(m, "motor"), m.kind == "torque_source", limit)
         for name, g in self.gears.items():
-            _add_gear(train, name, g)
+            add_gear(train, name, g)
         for name, b in self.brakes.items():
             train.add_brake(name, b.shaft, b.torque)
         for name, c in self.clutches.items():
@@ -137,7 +137,8 @@ class DriveTrain(TrainElements):
         return train
 
 
-def _add_gear(train: _core.Train, name: str, gear: Gear) -> None:
+def add_gear(train: _core.Train, name: str, gear: Gear) -> None:
+    """Adds a gear to the solver's train."""
     stiffness, losses, error = gear.stiffness, gear.losses, gear.transmission_error
     train.add_gear(
         name,

@@ -104,10 +104,25 @@ def summary_rows(report: RigReport) -> list[tuple[str, str]]:
             "back-driving torque at the output",
             f"{back:.4g} N·m" if back is not None else "none up to three times rated torque: self-locking",
         ),
+        *_overrunning_rows(report),
         (f"lost motion at ±{100 * LOST_MOTION_LOAD:.0f} % of rated torque", practical(report.lost_motion, "rad")),
         ("width of the loop at zero torque, rated torque in both directions", width),
         ("energy lost in that loop", f"{loop.area:.4g} J" if hysteresis else "none: no hysteresis is given"),
     ]
+
+
+def _overrunning_rows(report: RigReport) -> list[tuple[str, str]]:
+    """Whether the gearbox locks, and what lowering its rated load takes."""
+    at, ratio = report.overrunning, report.overrunning.critical_inertia_ratio
+    rows = [("self-locking at rated load and speed", str(at))]
+    if at.holds:
+        rows.append(("input torque that breaks the rated load loose downward", f"more than {at.input_torque:.4g} N·m"))
+    if at.slope < 0.0:
+        motion = (
+            f"unstable without damping where the load's inertia exceeds {ratio:.3g} i² times that on the input shaft"
+        )
+        rows.append(("lowering of the rated load at rated speed", motion))
+    return rows
 
 
 def write_sheet(

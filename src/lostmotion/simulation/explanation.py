@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Time
 from ..model.drive import Drive
+from ..model.self_locking import SelfLocking, self_locking
 from .run import core_inputs
 from .scenario import Scenario
 from .stepping import Simulation
@@ -61,6 +62,7 @@ class Explanation:
     command_forward: float  # E_C above which the load moves forward
     command_backward: float  # E_C below which it moves backward
     command_limit: float  # |E_C| that the amplifier can follow
+    self_locking: SelfLocking  # of the gearbox under the present load torque, or where there is none, the rated one
 
     def __str__(self) -> str:
         v = self.values
@@ -74,6 +76,8 @@ class Explanation:
         beyond = [c for c in (self.command_forward, self.command_backward) if abs(c) > self.command_limit]
         if beyond:
             lines.append(f"  but the amplifier ends at {self.command_limit:.4g}: it cannot reach {beyond[0]:.4g}")
+        if self.self_locking.notable:
+            lines.append(f"  {self.self_locking}")
         return "\n".join(lines)
 
 
@@ -119,4 +123,5 @@ def _explanation(drive: Drive, time: float, values: list[float], contacts: list[
     )
     limit = drive.motor.command_limit
     states = tuple(ContactState(*contact) for contact in contacts)
-    return Explanation(time, named, states, forward, backward, math.inf if limit is None else limit)
+    verdict = self_locking(drive.train(), "gearbox", named["load_torque"] or drive.gearbox.rated_output_torque)
+    return Explanation(time, named, states, forward, backward, math.inf if limit is None else limit, verdict)

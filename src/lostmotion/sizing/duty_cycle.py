@@ -57,6 +57,11 @@ class DutyCycle:
     def _integral(self, values: np.ndarray) -> float:
         return float(np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(self.time)))
 
+    @property
+    def peak_input_speed(self) -> float:
+        """Largest magnitude [rad/s]."""
+        return float(self.input_speed.max())
+
     def mean_input_speed(self) -> float:
         """Mean of the magnitude over the cycle, pause included [rad/s]."""
         return self._integral(self.input_speed) / (self.period or self.duration)
@@ -80,7 +85,14 @@ class DutyCycle:
         return float(np.sqrt(max(square / self.duration, held)))
 
 
-def duty_cycle(result: xarray.Dataset, period: float | None) -> DutyCycle:
+def duty_cycle(
+    result: xarray.Dataset,
+    period: float | None,
+    *,
+    speed: str = "motor_speed",
+    motor_torque: str = "motor_torque",
+    output_torque: str = "output_torque",
+) -> DutyCycle:
     """The duty cycle of a run.
 
     A standstill at its beginning or end is rest if it is no mere reversal of the motion: if it is not too short, and the torque
@@ -92,26 +104,28 @@ def duty_cycle(result: xarray.Dataset, period: float | None) -> DutyCycle:
         Of `simulate`.
     period
         `task.cycle` [s].
+    speed, motor_torque, output_torque
+        Variables of the result: the input shaft, what turns it, what leaves at the output.
 
     Raises
     ------
     InputError
         The motion does not fit into the period, or is not at its end where a pause would begin.
     """
-    time, torque = result["time"].values, result["motor_torque"].values
-    speed = np.abs(result["motor_speed"].values)
-    turning = np.flatnonzero(speed > STANDSTILL * speed.max())
-    first, last = (turning[0], turning[-1]) if len(turning) else (0, len(speed) - 1)
+    time, torque = result["time"].values, result[motor_torque].values
+    fast = np.abs(result[speed].values)
+    turning = np.flatnonzero(fast > STANDSTILL * fast.max())
+    first, last = (turning[0], turning[-1]) if len(turning) else (0, len(fast) - 1)
     shortest = MIN_REST * (time[last] - time[first])
     steady = STEADY * np.abs(torque).max()
-    before, after = first // 2 + 1, (last + len(speed)) // 2  # halves of the standstills, those far from the motion
+    before, after = first // 2 + 1, (last + len(fast)) // 2  # halves of the standstills, those far from the motion
     waits = time[first] - time[0] > shortest and np.ptp(torque[:before]) <= steady
     rests = not len(turning) or (time[-1] - time[last] > shortest and np.ptp(torque[after:]) <= steady)
-    part = slice(max(first - 1, 0) if waits else 0, last + 2 if rests else len(speed))
+    part = slice(max(first - 1, 0) if waits else 0, last + 2 if rests else len(fast))
     found = DutyCycle(
         time[part],
-        speed[part],
-        result["output_torque"].values[part],
+        fast[part],
+        result[output_torque].values[part],
         torque[part],
         float(torque[-1]) if rests else None,
         period,

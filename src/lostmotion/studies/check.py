@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from ..simulation.scenario import Scenario
-from ..sizing.drive_check import RULES, check_drive
+from ..sizing.drive_check import check_drive
+from ..sizing.finding import RULES
 from .select import SHARES, USE
 
 TEXTS = ("violated", "why", "not judged")

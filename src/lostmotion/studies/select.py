@@ -7,7 +7,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from ..inputs.part import Part
-from ..sizing.drive_check import RULES
+from ..sizing.finding import RULES
 from .units import in_si
 
 Direction = Literal["least", "largest"]

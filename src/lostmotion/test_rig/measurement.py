@@ -10,7 +10,9 @@ import numpy as np
 
 from ..data_sheets.gearbox_sheet import GearboxSheet
 from ..inputs.arguments import checked
+from ..model.gear import Gear
 from ..model.gearbox import Gearbox
+from ..model.self_locking import Overrunning, overrunning
 from .comparison import Comparison, compare
 from .loop import Loop
 from .rig import TestRig
@@ -37,6 +39,8 @@ class RigReport:
     starting_torque: float
     backdriving_torque: float | None
     lost_motion: float
+    overrunning: Overrunning
+    """at rated load and speed: whether it locks, by its losses"""
     comparisons: tuple[Comparison, ...] = field(default=())
 
 
@@ -49,7 +53,7 @@ WORK = len(LOADS) + len(LOOPS) + 6  # how often `measure` reports progress
 
 @checked
 def measure(
-    gearbox: Gearbox,
+    gearbox: Gearbox | Gear,
     sheet: GearboxSheet | None = None,
     notes: Iterable[str] = (),
     progress: Callable[[], None] = lambda: None,
@@ -66,6 +70,7 @@ def measure(
         Called `WORK` times.
     """
     rig = TestRig(gearbox)
+    gearbox = rig.gearbox
     T_2R, n_1R = gearbox.rated_output_torque, gearbox.rated_input_speed
     speeds = n_1R * np.array(SPEEDS)
 
@@ -82,5 +87,6 @@ def measure(
         starting_torque=done(rig.starting_torque()),
         backdriving_torque=done(rig.backdriving_torque()),
         lost_motion=done(rig.lost_motion()),
+        overrunning=overrunning(rig.gearbox),
         comparisons=done(() if sheet is None else tuple(compare(rig, sheet, tuple(notes)))),
     )

@@ -17,6 +17,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Speed, Torque
 from ..inputs.validation import shown
 from ..model.drive import Drive
+from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.load import Load
 from ..model.motor import Motor
@@ -53,13 +54,15 @@ class TestRig:
     Parameters
     ----------
     gearbox
-        Any but a rigid one.
+        Any but a rigid one; a gear of a drive train is measured alone, as `Gear.gearbox` says.
     """
 
     __test__ = False  # no test case of pytest
 
     @checked
-    def __init__(self, gearbox: Gearbox) -> None:
+    def __init__(self, gearbox: Gearbox | Gear) -> None:
+        if isinstance(gearbox, Gear):
+            gearbox = gearbox.gearbox()
         if isinstance(gearbox.stiffness, Rigid):
             raise InputError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
         self.gearbox = gearbox

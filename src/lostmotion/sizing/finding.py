@@ -1,0 +1,75 @@
+"""Findings of a check, and the rules behind them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from .duty_cycle import DutyCycle
+
+Verdict = Literal["ok", "warning", "unknown"]
+
+# Each rule of the check and where it comes from.
+RULES = {
+    "average_output_torque": "cubic mean weighted with speed: Harmonic Drive, CSF & CSG catalogue, selection procedure",
+    "peak_output_torque": "repeated peak torque: Harmonic Drive, CSF & CSG catalogue, selection procedure",
+    "average_input_speed": "mean speed: Harmonic Drive, CSF & CSG catalogue, selection procedure",
+    "max_input_speed": "the gearbox's data sheet",
+    "max_motor_speed": "the motor's data sheet",
+    "motor_torque": "root mean square: maxon, Formulae Handbook, motor selection",
+    "winding_temperature": "maxon, Formulae Handbook, thermal behaviour; copper 0.39 %/K",
+    "voltage": "voltage equation of the motor, u = R i + k w, without inductance",
+    "current": "torque / torque constant",
+    "inertia_ratio": "rule of thumb of servo manufacturers: at most 10",
+    "resonance": "two-mass oscillator; a command within a factor of 1.5",
+    "dead_zone": "the run, and the commands that move the load from rest",
+    "lost_motion": "virtual test rig; the limit is that of the task",
+    "holding": "runs with command 0, from rest and from motion",
+    "self_locking": "linear regime of the steady motion under the load: docs/self-locking.md",
+    "loss_map": "the run, and the data of gearbox.losses",
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One point of the check."""
+
+    rule: str
+    """key of `RULES`"""
+    what: str
+    value: str
+    verdict: Verdict
+    remark: str = ""
+    use: float | None = None
+    """share of the limit that is used; above 1 it is exceeded"""
+
+    @property
+    def source(self) -> str:
+        """Where the rule comes from."""
+        return RULES[self.rule]
+
+    def __str__(self) -> str:
+        mark = {"ok": "ok     ", "warning": "WARNING", "unknown": "?      "}[self.verdict]
+        remark = f" ({self.remark})" if self.remark else ""
+        return f"{mark}  {self.what}: {self.value}{remark} [{self.source}]"
+
+
+def within(
+    rule: str,
+    what: str,
+    value: float,
+    limit: float | None,
+    unit: str,
+    name: str,
+    *,
+    key: str = "",
+    cycle: DutyCycle | None = None,
+) -> Finding:
+    """Compares a value with its limit; `key` of the scenario would give it."""
+    over = "" if cycle is None else f", {cycle}"
+    if limit is None:
+        return Finding(rule, what, f"{value:.4g} {unit}{over}", "unknown", f"no {name} is given: {key}")
+    use = value / limit
+    share = f"{value:.4g} of {limit:.4g} {unit}{over}"
+    remark = "" if use <= 1.0 else f"exceeds the {name} by {100.0 * (use - 1.0):.0f} %"
+    return Finding(rule, what, share, "ok" if use <= 1.0 else "warning", remark, use)

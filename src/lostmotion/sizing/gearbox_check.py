@@ -1,0 +1,122 @@
+"""The check of a gearbox: loads, speeds, lost motion, self-locking, range of the losses."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..model.gearbox import Gearbox, Transmission
+from ..model.self_locking import self_locking
+from ..model.torsion import Rigid
+from ..model.train import DriveTrain
+from ..test_rig.rig import LOST_MOTION_LOAD, TestRig
+from ..units.practical import ARCMIN, RPM
+from .duty_cycle import DutyCycle
+from .finding import Finding, within
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def loads(g: Transmission, peak: float, cycle: DutyCycle, where: str = "gearbox") -> list[Finding]:
+    """Mean and largest output torque, `peak` [N·m] being the latter. where: the table of the gearbox."""
+    average = g.limits.average_output_torque if g.limits else None
+    name = "rated output torque" if average is None else "average output torque"
+    return [
+        within(
+            "average_output_torque",
+            "output torque, cubic mean",
+            cycle.mean_output_torque(),
+            average or g.rated_output_torque,
+            "N·m",
+            name,
+            key=f"{where}.rated_output_torque",
+            cycle=cycle,
+        ),
+        _with_momentary(
+            within(
+                "peak_output_torque",
+                "output torque, largest",
+                peak,
+                g.limits.peak_output_torque if g.limits else None,
+                "N·m",
+                "repeated peak torque of the gearbox",
+                key=f"{where}.limits.peak_output_torque",
+            ),
+            peak,
+            g.limits.momentary_output_torque if g.limits else None,
+        ),
+    ]
+
+
+def _with_momentary(finding: Finding, torque: float, momentary: float | None) -> Finding:
+    """Beyond, or without, a repeated peak torque: what the limit for emergency stops says."""
+    if momentary is None or finding.verdict == "ok":
+        return finding
+    if torque > momentary:
+        remark = f"even the momentary torque of the gearbox, {momentary:.4g} N·m, is exceeded"
+        return replace(finding, verdict="warning", remark="; ".join(filter(None, [finding.remark, remark])))
+    remark = f"in an emergency stop the gearbox stands {momentary:.4g} N·m"
+    return replace(finding, remark="; ".join(filter(None, [finding.remark, remark])))
+
+
+def input_speeds(g: Transmission, cycle: DutyCycle, where: str = "gearbox") -> list[Finding]:
+    """Mean and largest speed of the input."""
+    limits = g.limits
+    average = (limits.average_input_speed if limits else None) or g.rated_input_speed
+    largest = limits.max_input_speed if limits else None
+    return [
+        within(
+            "average_input_speed",
+            "input speed, mean",
+            RPM * cycle.mean_input_speed(),
+            None if average is None else RPM * average,
+            "rpm",
+            "average input speed" if limits and limits.average_input_speed else "rated input speed",
+            key=f"{where}.rated_input_speed",
+            cycle=cycle,
+        ),
+        within(
+            "max_input_speed",
+            "input speed, largest, for the gearbox",
+            RPM * cycle.peak_input_speed,
+            None if largest is None else RPM * largest,
+            "rpm",
+            "largest speed of the gearbox",
+            key=f"{where}.limits.max_input_speed",
+        ),
+    ]
+
+
+def locks(train: DriveTrain, gear: str, torques: Collection[float]) -> list[Finding]:
+    """The verdict on a gear that locks or whose motion under its load is unstable, for each load torque [N·m] at its output."""
+    verdicts = [self_locking(train, gear, torque) for torque in torques]
+    return [
+        Finding(
+            "self_locking",
+            f"lowering {v.overrunning.load_torque:.4g} N·m on {v.gear}",
+            v.brief,
+            "ok" if v.lowering == "smooth" else "warning",
+            v.remedy,
+        )
+        for v in verdicts
+        if v.notable
+    ]
+
+
+def lost_motion(g: Gearbox, limit: float | None) -> Finding:
+    """limit: of the task [rad]."""
+    lost = 0.0 if isinstance(g.stiffness, Rigid) else TestRig(g).lost_motion()
+    what = f"lost motion at ±{100.0 * LOST_MOTION_LOAD:.0f} % of rated torque"
+    maximum = None if limit is None else ARCMIN * limit
+    return within(
+        "lost_motion", what, ARCMIN * lost, maximum, "arcmin", "limit of the task", key="task.max_lost_motion"
+    )
+
+
+def loss_map(result: xarray.Dataset) -> Finding:
+    """Whether the run left the data of a loss map."""
+    if "warning" in result.attrs:
+        return Finding("loss_map", "loss map", "used outside its data", "warning", result.attrs["warning"])
+    return Finding("loss_map", "loss map", "used within its data", "ok")

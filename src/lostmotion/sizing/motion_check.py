@@ -1,0 +1,132 @@
+"""The check of the motion of a drive: inertia ratio, resonance, dead zone, holding."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from .. import _core
+from ..model.gearbox import Gearbox
+from ..model.torsion import Rigid
+from ..simulation.scenario import Scenario
+from ..test_rig.rig import TestRig
+from .finding import Finding, Verdict
+from .holding import holding
+
+if TYPE_CHECKING:
+    import xarray
+
+INERTIA_RATIO = 10.0  # beyond it a load is usually called hard to control
+NEAR_RESONANCE = 1.5  # a command within this factor of a resonance excites it
+
+
+def load_torques(result: xarray.Dataset) -> list[float]:
+    """The largest and the least load torque of a run, but not 0 [N·m]."""
+    torque = result["load_torque"]
+    return sorted({float(torque.max()), float(torque.min())} - {0.0})
+
+
+def inertia(scenario: Scenario) -> Finding:
+    """That of the load with that of the motor side."""
+    g = scenario.gearbox
+    ratio = scenario.load.inertia / (g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia))
+    far = ratio > INERTIA_RATIO
+    remark = f"above {INERTIA_RATIO:g} the load is hard to control from the motor side" if far else ""
+    return Finding(
+        "inertia_ratio",
+        "inertia of the load / of the motor side",
+        f"{ratio:.3g}",
+        "warning" if far else "ok",
+        remark,
+        ratio / INERTIA_RATIO,
+    )
+
+
+def resonances(scenario: Scenario) -> list[tuple[str, float, float]]:
+    """(segment, resonance, anti-resonance) [Hz] of the softest and the stiffest segment of the torsion curve."""
+    g = scenario.gearbox
+    J_1 = g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia)
+    slopes = [] if isinstance(g.stiffness, Rigid) else [k for k in g.stiffness.pieces()[1] if k > 0.0]
+    pieces = {"softest": min(slopes, default=0.0), "stiffest": max(slopes, default=0.0)}
+    return [
+        (
+            name,
+            math.sqrt(k / J_1 + k / scenario.load.inertia) / (2.0 * math.pi),
+            math.sqrt(k / scenario.load.inertia) / (2.0 * math.pi),
+        )
+        for name, k in pieces.items()
+        if k > 0.0 and not (name == "stiffest" and len(slopes) == 1)
+    ]
+
+
+def resonance(scenario: Scenario) -> list[Finding]:
+    """Whether a sine of the command excites one."""
+    excited = {s.frequency for s in scenario.command.sines}
+    if scenario.command.frequency is not None:
+        excited.add(scenario.command.frequency)
+    out = []
+    for name, f_r, f_a in resonances(scenario):
+        near = [f for f in excited if f_a / NEAR_RESONANCE < f < f_r * NEAR_RESONANCE]
+        value = f"{f_r:.4g} Hz, anti-resonance {f_a:.4g} Hz"
+        remark = f"the command has {near[0]:g} Hz" if near else ""
+        verdict: Verdict = "warning" if near else "ok"
+        out.append(Finding("resonance", f"resonance on the {name} segment", value, verdict, remark))
+    return out
+
+
+def dead_zone(scenario: Scenario, result: xarray.Dataset) -> Finding:
+    """The commands that move the load from rest."""
+    against = float(result["load_torque"][0])
+    forward, backward = (scenario.drive().core().smallest_command(0.0, against, s) for s in (+1, -1))
+    peak = float(abs(result["command"]).max())
+    value = f"the load moves above a command of {forward:.4g} and below {backward:.4g}"
+    moves = bool((result["motor_speed"] != 0.0).any())
+    if peak == 0.0:
+        return Finding("dead_zone", "dead zone", value, "ok", "the command is 0 throughout")
+    if peak <= min(forward, -backward) and not moves:
+        remark = f"the command never exceeds {peak:.4g}: the load does not move"
+        return Finding("dead_zone", "dead zone", value, "warning", remark)
+    small = peak < 3.0 * max(forward, -backward)
+    remark = f"a large part of the command, which reaches {peak:.4g}" if small else ""
+    return Finding("dead_zone", "dead zone", value, "warning" if small else "ok", remark)
+
+
+def holdings(scenario: Scenario, result: xarray.Dataset) -> list[Finding]:
+    """Whether the drive bears the load torques of the run with command 0."""
+    loads = load_torques(result)
+    if not loads:
+        return [
+            Finding("holding", "holding with command 0", "no load torque acts", "ok", _static_holding(scenario.gearbox))
+        ]
+    return [_held(scenario, load, float(abs(result["load_speed"]).max())) for load in loads]
+
+
+def _held(scenario: Scenario, load_torque: float, speed: float) -> Finding:
+    what = f"holding {load_torque:.4g} N·m with command 0"
+    try:
+        found = holding(scenario, load_torque, speed)
+    except _core.SolverError as error:
+        return Finding("holding", what, "cannot be determined", "unknown", str(error))
+    if found.holds:
+        value = f"the load stays at rest, and comes to rest if the power fails at {abs(found.begin):.3g} rad/s"
+        return Finding("holding", what, value, "ok")
+    if found.from_rest != 0.0:
+        value = f"the load torque drives the load {_at(found.from_rest)}"
+    else:
+        value = f"at rest only: if the power fails at {abs(found.begin):.3g} rad/s, the load goes on {_at(found.from_motion)}"
+    if not scenario.task.hold_without_power:
+        return Finding("holding", what, value, "ok", "not required by the task")
+    remedy = "it needs a brake or a motor under control; then set task.hold_without_power = false"
+    return Finding("holding", what, value, "warning", f"{remedy}; {_static_holding(scenario.gearbox)}")
+
+
+def _at(speed: float) -> str:
+    return f"at {speed:.3g} rad/s" if math.isfinite(speed) else "ever faster"
+
+
+def _static_holding(g: Gearbox) -> str:
+    """What the gearbox alone holds at rest."""
+    back = TestRig(g).backdriving_torque() if g.losses.kind == "map" and not isinstance(g.stiffness, Rigid) else 0.0
+    if back is None:
+        return "the gearbox alone holds more than three times rated torque at rest"
+    return f"the gearbox alone holds {back:.4g} N·m at rest"

@@ -1,0 +1,95 @@
+"""The check of a drive train: loads and speeds of its gears, heat and current of its motors, self-locking."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..model.losses import ConstantEfficiency, LossMap
+from ..model.task import Task
+from ..simulation.run import simulate
+from ..simulation.train_scenario import TrainScenario
+from .duty_cycle import duty_cycle
+from .finding import Finding
+from .gearbox_check import input_speeds, loads, locks, loss_map
+from .motor_check import current, heat, largest_speed, voltage
+
+if TYPE_CHECKING:
+    import xarray
+
+SAMPLES = 20_000  # the fewest of a run
+
+NOT_JUDGED = ("inertia_ratio", "resonance", "dead_zone", "lost_motion", "holding")
+
+
+def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
+    """As `check_drive`. The motion of each gear and motor is taken to repeat without a pause, at the ambient temperature of `Task`.
+
+    Raises
+    ------
+    SolverError
+        As `simulate`.
+    """
+    table = scenario.simulation
+    interval = min(table.sample_interval, table.duration / SAMPLES)
+    result = simulate(scenario, sample_interval=interval, energy=False)
+    findings = [f for name in scenario.gears for f in _gear(scenario, name, result)]
+    findings += [f for name in scenario.motors for f in _motor(scenario, name, result)]
+    if any(isinstance(g.losses, LossMap) for g in scenario.gears.values()):
+        findings.append(loss_map(result))
+    what = "in the short form, [motor], [gearbox] and [load], of a drive that can be written so"
+    findings += [
+        Finding(rule, rule.replace("_", " "), "not judged of a drive train", "unknown", what) for rule in NOT_JUDGED
+    ]
+    return tuple(findings)
+
+
+def _named(name: str, findings: list[Finding]) -> list[Finding]:
+    return [replace(f, what=f"{name}: {f.what}") for f in findings]
+
+
+def _gear(scenario: TrainScenario, name: str, result: xarray.Dataset) -> list[Finding]:
+    gear, where = scenario.gears[name], f"gears.{name}"
+    torque = f"{name}_output_torque"
+    cycle = duty_cycle(
+        result, None, speed=f"{gear.input}_speed", motor_torque=f"{name}_input_torque", output_torque=torque
+    )
+    findings = loads(gear, float(abs(result[torque]).max()), cycle, where)
+    if gear.rated_input_speed is not None or gear.limits is not None:
+        findings += input_speeds(gear, cycle, where)
+    findings = _named(name, findings)
+    if not isinstance(gear.losses, ConstantEfficiency) and (torques := _load_torques(scenario, name, result)):
+        findings += locks(scenario.train(), name, torques)
+    return findings
+
+
+def _load_torques(scenario: TrainScenario, name: str, result: xarray.Dataset) -> list[float]:
+    """The largest and the least load torque at the output of a gear, from the shafts behind it through their ratios [N·m]; its
+    rated torque where there are none."""
+    gear, share = scenario.gears[name], 1.0
+    shaft, found = gear.output, list[float]()
+    while not found:
+        if scenario.shafts[shaft].torque is not None:
+            torque = result[f"{shaft}_load_torque"]
+            found = [share * t for t in sorted({float(torque.max()), float(torque.min())} - {0.0})]
+        behind = next((g for g in scenario.gears.values() if g.input == shaft), None)
+        if behind is None:
+            break
+        shaft, share = behind.output, share / behind.ratio
+    if found or gear.rated_output_torque is None:
+        return found
+    return [gear.rated_output_torque]
+
+
+def _motor(scenario: TrainScenario, name: str, result: xarray.Dataset) -> list[Finding]:
+    motor, where = scenario.motors[name], f"motors.{name}"
+    torque, speed = f"{name}_torque", f"{motor.shaft}_speed"
+    cycle = duty_cycle(result, None, speed=speed, motor_torque=torque, output_torque=torque)
+    command, T, w = (result[key].values for key in (f"{name}_command", torque, speed))
+    findings = [
+        largest_speed(motor, float(abs(w).max()), where),
+        *heat(motor, cycle, Task().ambient_temperature, where),
+        voltage(motor, command, T, w, where),
+        current(motor, T, where),
+    ]
+    return _named(name, findings)
