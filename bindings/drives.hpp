@@ -11,18 +11,62 @@
 
 namespace lostmotion::binding {
 
+// Workspaces of drives that are gone, for the sake of their memory.
+class SpareWorkspaces {
+ public:
+    std::unique_ptr<Workspace> take(const Drive& drive) {
+        std::unique_ptr<Workspace> w;
+        {
+            const std::lock_guard<std::mutex> hold(mutex_);
+            if (!idle_.empty()) {
+                w = std::move(idle_.back());
+                idle_.pop_back();
+            }
+        }
+        if (w == nullptr) return std::make_unique<Workspace>(drive);
+        w->set(drive);
+        return w;
+    }
+    void give_back(std::unique_ptr<Workspace> w) {
+        w->cache.forget(max_regimes);
+        const std::lock_guard<std::mutex> hold(mutex_);
+        if (idle_.size() < max_idle) idle_.push_back(std::move(w));
+    }
+
+ private:
+    static constexpr std::size_t max_idle = 8, max_regimes = 1000;  // about 100 megabytes in all
+
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<Workspace>> idle_;
+};
+
+// The one store that the drives of this module share.
+inline const std::shared_ptr<SpareWorkspaces>& spare_workspaces() {
+    static const auto spare = std::make_shared<SpareWorkspaces>();
+    return spare;
+}
+
 // A drive and what runs of it have left for the next ones. Each run takes a workspace for itself.
 class SharedDrive : public WorkspacePool {
  public:
     const Drive drive;
     explicit SharedDrive(const Drive& d) : drive(d) {}
+    ~SharedDrive() override {
+        for (std::unique_ptr<Workspace>& w : idle_) spare_->give_back(std::move(w));
+    }
+    SharedDrive(const SharedDrive&) = delete;
+    SharedDrive& operator=(const SharedDrive&) = delete;
 
     std::unique_ptr<Workspace> take() override {
-        const std::lock_guard<std::mutex> hold(mutex_);
-        if (idle_.empty()) return std::make_unique<Workspace>(drive);
-        std::unique_ptr<Workspace> w = std::move(idle_.back());
-        idle_.pop_back();
-        return w;
+        {
+            const std::lock_guard<std::mutex> hold(mutex_);
+            if (!idle_.empty()) {
+                std::unique_ptr<Workspace> w = std::move(idle_.back());
+                idle_.pop_back();
+                return w;
+            }
+        }
+        return spare_->take(drive);
     }
     void give_back(std::unique_ptr<Workspace> w) override {
         const std::lock_guard<std::mutex> hold(mutex_);
@@ -30,6 +74,7 @@ class SharedDrive : public WorkspacePool {
     }
 
  private:
+    std::shared_ptr<SpareWorkspaces> spare_ = spare_workspaces();
     std::mutex mutex_;
     std::vector<std::unique_ptr<Workspace>> idle_;
 };

@@ -95,7 +95,7 @@ inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in
     bool drive_varies = false;
     for (const int f : in.fields) drive_varies = drive_varies || batch_fields()[static_cast<std::size_t>(f)].of_drive;
     distribute(in.runs, threads, waiting, [&](auto next, std::atomic<bool>& stop) {
-        std::unique_ptr<Workspace> workspace = drive_varies ? std::make_unique<Workspace>(in.base.drive) : pool.take();
+        std::unique_ptr<Workspace> workspace = pool.take();
         RunOptions options = in.options;
         options.max_switchings = 0;
         options.interrupted = [](void* flag) { return static_cast<std::atomic<bool>*>(flag)->load(); };
@@ -118,7 +118,8 @@ inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in
             rows[k] = {report.status,       report.contact, report.time, static_cast<double>(report.switching_count),
                        report.left_data_at, report.energy};
         }
-        if (!drive_varies) pool.give_back(std::move(workspace));
+        if (drive_varies) workspace->set(in.base.drive);
+        pool.give_back(std::move(workspace));
     });
     return rows;
 }

@@ -154,10 +154,6 @@ class RegimeCache {
     };
 
     explicit RegimeCache(const System& system) : system_(system) {}
-    ~RegimeCache() {
-        for (std::unique_ptr<Entry>& entry : entries_)
-            if (spare().size() < most_spare) spare().push_back(std::move(entry));
-    }
     RegimeCache(const RegimeCache&) = delete;
     RegimeCache& operator=(const RegimeCache&) = delete;
 
@@ -168,7 +164,7 @@ class RegimeCache {
         std::size_t k = slot(key);
         if (slots_[k] == nullptr) {
             if (2 * (used_ + 1) > slots_.size()) k = grow(key);
-            if (used_ == entries_.size()) entries_.push_back(memory());
+            if (used_ == entries_.size()) entries_.push_back(std::make_unique<Entry>());
             slots_[k] = entries_[used_++].get();
             slots_[k]->set(system_, key);
         }
@@ -182,9 +178,9 @@ class RegimeCache {
         return *(last_ = neighbour);
     }
 
-    // Forgets all regimes, since the system has changed. Their memory is kept for others.
-    void forget() {
-        if (entries_.size() > most_kept) entries_.resize(most_kept);
+    // Forgets all regimes, since the system has changed. The memory of so many is kept for others.
+    void forget(std::size_t kept = max_kept) {
+        if (entries_.size() > kept) entries_.resize(kept);
         std::ranges::fill(slots_, nullptr);
         used_ = 0;
         last_ = nullptr;
@@ -192,7 +188,7 @@ class RegimeCache {
 
     // Makes ready for runs with this unit of length and these inputs; propagators for others are forgotten.
     PhaseRotations& serve(double unit, std::vector<InputBasis> basis) {
-        if (used_ > most_kept) forget();
+        if (used_ > max_kept) forget();
         if (!rotations_ || unit != rotations_->unit() || basis != rotations_->basis()) {
             for (std::size_t k = 0; k < used_; ++k) entries_[k]->propagator.reset();
             rotations_ = std::make_unique<PhaseRotations>(unit, std::move(basis));
@@ -201,20 +197,7 @@ class RegimeCache {
     }
 
  private:
-    static constexpr std::size_t most_kept = 4000;   // from run to run; each takes about 12 kilobytes
-    static constexpr std::size_t most_spare = 1000;  // from drive to drive, in each thread
-
-    // Entries of caches that are gone, for the sake of their memory.
-    static std::vector<std::unique_ptr<Entry>>& spare() {
-        thread_local std::vector<std::unique_ptr<Entry>> entries;
-        return entries;
-    }
-    static std::unique_ptr<Entry> memory() {
-        if (spare().empty()) return std::make_unique<Entry>();
-        std::unique_ptr<Entry> entry = std::move(spare().back());
-        spare().pop_back();
-        return entry;
-    }
+    static constexpr std::size_t max_kept = 4000;  // from run to run; each takes about 12 kilobytes
 
     // Where the regime is, or where it has to go.
     std::size_t slot(Key key) const {
