@@ -11,7 +11,7 @@
 #include "drives.hpp"
 #include "interruption.hpp"
 #include "lostmotion/analysis/steady_regime.hpp"
-#include "lostmotion/simulation/train_run.hpp"
+#include "lostmotion/analysis/train_batch.hpp"
 
 namespace lostmotion::binding {
 
@@ -73,6 +73,7 @@ class TrainDescription {
             out.emplace_back(c.name, c.unit, c.meaning);
         return out;
     }
+    std::vector<std::string> ledger_names() const { return lostmotion::ledger_names(model::Assembly(train)); }
     std::vector<std::string> input_names() const { return model::input_names(model::Assembly(train)); }
     std::vector<std::string> contact_names() const {
         const model::Assembly a(train);
@@ -121,8 +122,6 @@ inline std::vector<std::pair<int, std::string>> train_causes() {
             {model::Guard::turning, "driving torque turned"}};
 }
 
-using Named = std::map<std::string, double>;
-
 // Time, cause, the modes of all contacts before and after.
 inline Array train_switching_table(const TrainReport& report, int contacts) {
     return column(report.switchings, {2 + 2 * static_cast<std::size_t>(contacts)},
@@ -134,20 +133,21 @@ inline Array train_switching_table(const TrainReport& report, int contacts) {
                   });
 }
 
-inline Named train_ledger(const TrainReport& report) {
-    Named ledger;
-    for (const TrainEnergy& e : report.energy) ledger[e.name] = e.energy;
-    ledger["stored_change"] = report.stored_end - report.stored_begin;
-    ledger["residual"] = report.residual();
-    ledger["turned_over"] = report.turned_over;
-    return ledger;
-}
-
 inline void check_train_run(const TrainReport& report, const model::Assembly& a) {
     if (!report.message.empty()) throw nb::value_error(report.message.c_str());
     if (report.status == Status::interrupted) throw nb::python_error();
-    const std::string error = train_status_text(a, report.status, report.time, report.contact, report.too_many_guards);
-    if (!error.empty()) throw SolverError(error);
+    if (const std::string error = error_text(report, a); !error.empty()) throw SolverError(error);
+}
+
+inline TrainOptions train_options(double duration, double interval, std::size_t samples, bool energy,
+                                  std::size_t max_switchings) {
+    TrainOptions options;
+    options.duration = duration;
+    options.sample_interval = interval;
+    options.samples = samples;
+    options.energy = energy;
+    options.max_switchings = max_switchings;
+    return options;
 }
 
 // start: states by name; capacities: of the hysteresis of gears by name. What is left out is 0.
@@ -158,17 +158,14 @@ inline nb::dict run_train(const TrainDescription& description, const std::vector
     const model::Assembly& a = run.assembly();
     const model::Layout& n = a.layout();
     const std::vector<std::string> states = model::state_names(a);
-    std::vector<double> x, memory(static_cast<std::size_t>(n.memory));
-    for (const std::string& name : states) x.push_back(start.contains(name) ? start.at(name) : 0.0);
-    for (std::size_t g = 0; g < description.train.gears.size(); ++g)
-        if (const auto h = capacities.find(description.train.gears[g].name); h != capacities.end())
-            memory[static_cast<std::size_t>(a.places().gears[g].hysteresis)] = h->second;
-    const TrainOptions options{duration, interval, samples, energy, max_switchings, tolerance, poll_signals, nullptr};
+    TrainOptions options = train_options(duration, interval, samples, energy, max_switchings);
+    options.tolerance = tolerance;
+    options.interrupted = poll_signals;
     auto data = std::make_unique_for_overwrite<double[]>(run.channels().size() * samples);
     TrainReport report;
     {
         nb::gil_scoped_release release;
-        report = run.run(inputs, x, memory, options, data.get());
+        report = run.run(inputs, {start, capacities}, options, data.get());
     }
     check_train_run(report, a);
     Named end;
@@ -180,11 +177,40 @@ inline nb::dict run_train(const TrainDescription& description, const std::vector
     out["values"] = as_array(std::move(data), {run.channels().size(), samples});
     out["switchings"] = train_switching_table(report, n.contacts);
     out["switching_count"] = report.switching_count;
-    out["energy"] = train_ledger(report);
+    out["energy"] = named_ledger(report, a);
     out["end_state"] = end;
     out["left_data_at"] = report.left_data_at;
     out["steps"] = report.steps;
     return out;
+}
+
+// Each case: train, inputs, start, hysteresis capacities. Of each run the text of its error, empty if it has none;
+// switchings; the energies; and the samples, or what is kept of them.
+using CaseOfTrain = std::tuple<TrainDescription, std::vector<Signal>, Named, Named>;
+inline nb::tuple run_train_batch(const std::vector<CaseOfTrain>& cases, double duration, double interval,
+                                 std::size_t samples, const std::vector<std::string>& energies,
+                                 const std::vector<std::string>& channels,
+                                 const std::vector<std::pair<std::size_t, int>>& kept, unsigned threads) {
+    TrainBatch batch{{}, train_options(duration, interval, samples, !energies.empty(), 0), channels, {}, energies};
+    for (const auto& [train, inputs, start, capacities] : cases)
+        batch.cases.push_back({train.train, inputs, {start, capacities}});
+    for (const auto& [channel, how] : kept) batch.kept.push_back({channel, static_cast<Reduction>(how)});
+    std::vector<std::size_t> shape{cases.size(), kept.size()};
+    if (kept.empty()) shape = {cases.size(), channels.size(), samples};
+    auto data = std::make_unique_for_overwrite<double[]>(cases.size() * batch.width());
+    std::vector<TrainRow> rows;
+    const nb::object nobody = nb::none();
+    Watch watch(nobody);
+    {
+        nb::gil_scoped_release release;
+        rows = run_trains(batch, data.get(), threads, std::ref(watch));
+    }
+    watch.check();
+    std::vector<std::string> errors;
+    for (const TrainRow& r : rows) errors.push_back(r.error);
+    return nb::make_tuple(
+        as_array(std::move(data), shape), errors, numbers(rows, [](const TrainRow& r) { return r.switchings; }),
+        column(rows, {energies.size()}, [](const TrainRow& r, double* to) { std::ranges::copy(r.energies, to); }));
 }
 
 inline void bind_train(nb::module_& m) {
@@ -241,6 +267,7 @@ inline void bind_train(nb::module_& m) {
         .def("check_start", &TrainDescription::check_start, "speeds"_a)
         .def("channels", &TrainDescription::channels, nb::sig("def channels(self) -> list[tuple[str, str, str]]"),
              "Name, unit, meaning.")
+        .def("ledger_names", &TrainDescription::ledger_names)
         .def("input_names", &TrainDescription::input_names)
         .def("shafts", &TrainDescription::shafts,
              "Inertia [kg m2] and friction that holds at rest [N m] of each shaft.")
@@ -255,6 +282,14 @@ inline void bind_train(nb::module_& m) {
                   "collections.abc.Mapping[str, float], hysteresis_capacities: collections.abc.Mapping[str, float], "
                   "duration: float, interval: float, samples: int, energy: bool, tolerance: float, max_switchings: int)"
                   " -> dict[str, typing.Any]"));
+    m.def("run_trains", &run_train_batch, "cases"_a, "duration"_a, "interval"_a, "samples"_a, "energies"_a,
+          "channels"_a, "kept"_a, "threads"_a,
+          nb::sig("def run_trains(cases: collections.abc.Sequence[tuple[Train, collections.abc.Sequence[Signal], "
+                  "collections.abc.Mapping[str, float], collections.abc.Mapping[str, float]]], duration: float, "
+                  "interval: float, samples: int, energies: collections.abc.Sequence[str], channels: "
+                  "collections.abc.Sequence[str], kept: collections.abc.Sequence[tuple[int, int]], threads: int) -> "
+                  "tuple[numpy.typing.NDArray[numpy.float64], list[str], numpy.typing.NDArray[numpy.float64], "
+                  "numpy.typing.NDArray[numpy.float64]]"));
 }
 
 }  // namespace lostmotion::binding

@@ -12,7 +12,7 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion import _core
 from lostmotion.model.drive import Drive
-from lostmotion.studies.chunk import _core_can
+from lostmotion.studies.in_core import core_can
 from lostmotion.studies.table import read_table
 from lostmotion.units.conversion import Unit
 
@@ -73,7 +73,7 @@ def test_a_constant_efficiency_varies_in_the_core_as_in_single_runs(tmp_path: Pa
         vary=[{"key": "gearbox.losses.efficiency", "values": [0.6, 0.7]}],
         keep={"end": "final(load_angle)"},
     )
-    assert _core_can(study)
+    assert core_can(study)
     rows = read_table(lm.study(study, tmp_path / "s")).to_pydict()
     for value, end in zip((0.6, 0.7), rows["end"], strict=True):
         single = lm.simulate(base.replace(**{"gearbox.losses.efficiency": value}))

@@ -26,9 +26,10 @@ from lostmotion.paper import paper_scenario
 from lostmotion.reports.study import best_runs, influence, read_table, sobol_indices
 from lostmotion.simulation.variables import CHANNEL_NAMES
 from lostmotion.studies import chunk as study_chunk
-from lostmotion.studies.chunk import _core_can, pieces, run_piece, scenario_of_run
+from lostmotion.studies.chunk import pieces, run_piece, scenario_of_run
 from lostmotion.studies.design import CHUNK
 from lostmotion.studies.expressions import FUNCTIONS, REDUCTIONS
+from lostmotion.studies.in_core import core_can
 from lostmotion.studies.study import Study
 from lostmotion.studies.vary import Vary
 
@@ -76,7 +77,7 @@ def test_a_row_equals_the_single_run_bit_for_bit(tmp_path: Path, engine: str):
     if engine == "one by one":  # a key that the core does not know
         vary.append({"key": "gearbox.stiffness.breaks", "relative": True, "values": [1.0, 1.1]})
     study = make(vary=vary, trajectories={"variables": ["load_speed"], "every": 10})
-    assert _core_can(study) is (engine == "core")
+    assert core_can(study) is (engine == "core")
     rows = rows_of(lm.study(study, tmp_path / "s"))
     assert rows["run"] == list(range(32))
     for run in (0, 7, 31):

@@ -62,12 +62,6 @@ inline const std::vector<BatchField>& batch_fields() {
     return all;
 }
 
-// One number to keep of each run: a reduction of the samples of a channel, by its place among those of the run.
-struct Kept {
-    std::size_t channel = 0;
-    Reduction how = Reduction::peak;
-};
-
 struct BatchInput {
     Case base;
     RunOptions options;
@@ -112,8 +106,7 @@ inline std::vector<BatchRow> run_batch(WorkspacePool& pool, const BatchInput& in
             if (report.status != Status::done) {
                 std::ranges::fill(row, std::numeric_limits<double>::quiet_NaN());
             } else {
-                for (std::size_t j = 0; j < in.kept.size(); ++j)
-                    row[j] = reduce(in.kept[j].how, samples + in.kept[j].channel * options.samples, options.samples);
+                reduce_all(in.kept, samples, options.samples, row.data());
             }
             rows[k] = {report.status,       report.contact, report.time, static_cast<double>(report.switching_count),
                        report.left_data_at, report.energy};

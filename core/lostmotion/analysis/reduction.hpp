@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
 
 #include "../kernel/vec.hpp"
 #include "../simulation/enum_table.hpp"
@@ -69,6 +70,17 @@ inline double reduce(Reduction r, const double* v, std::size_t n) {
         case Reduction::min: return -best_of(v, n, larger, [](auto x) { return -1.0 * x; });
         default: return best_of(v, n, larger, itself);
     }
+}
+
+// One number to keep of each run: a reduction of the samples of a channel, by its place among those of the run.
+struct Kept {
+    std::size_t channel = 0;
+    Reduction how = Reduction::peak;
+};
+
+// samples: channels x n.
+inline void reduce_all(std::span<const Kept> kept, const double* samples, std::size_t n, double* out) {
+    for (std::size_t k = 0; k < kept.size(); ++k) out[k] = reduce(kept[k].how, samples + kept[k].channel * n, n);
 }
 
 }  // namespace lostmotion

@@ -90,4 +90,13 @@ inline std::string flow_name(const Assembly& a, const PowerFlow& f) {
     return element + ": " + f.what;
 }
 
+// Of all flows that there can be: those of a regime in which every contact slips.
+inline std::vector<std::string> flow_names(const Assembly& a) {
+    Key key;
+    key.modes.fill(1);
+    std::vector<std::string> names;
+    for (const PowerFlow& f : power_flows(a, a.build(key))) names.push_back(flow_name(a, f));
+    return names;
+}
+
 }  // namespace lostmotion::model

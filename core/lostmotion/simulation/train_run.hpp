@@ -1,7 +1,10 @@
 // A whole run of a train, recorded: samples, switchings and energy ledger.
 #pragma once
 
+#include <map>
 #include <memory>
+#include <numeric>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,16 +13,31 @@
 #include "../model/power.hpp"
 #include "../solver/adaptive_solver.hpp"
 #include "power_integral.hpp"
+#include "result_names.hpp"
 #include "sampler.hpp"
 #include "train_reader.hpp"
 #include "train_status.hpp"
 
 namespace lostmotion {
 
+// By name; what is left out is 0.
+using Named = std::map<std::string, double>;
+
+inline double value_of(const Named& values, const std::string& name) {
+    const auto found = values.find(name);
+    return found == values.end() ? 0.0 : found->second;
+}
+
+struct TrainStart {
+    Named states;
+    Named hysteresis_capacities;  // of gears [N m]
+};
+
 struct TrainOptions {
-    double duration = 1.0;          // [s]
-    double sample_interval = 1e-3;  // [s]
-    std::size_t samples = 0;        // instants k * sample_interval to record, from k = 0
+    double duration = 1.0;                     // [s]
+    double sample_interval = 1e-3;             // [s]
+    std::size_t samples = 0;                   // instants k * sample_interval to record, from k = 0
+    std::optional<std::vector<int>> channels;  // to record, by their place among TrainRun::channels(); left out, all
     bool energy = true;
     std::size_t max_switchings = 100000;  // kept; all are counted
     double tolerance = 0.0;               // relative, of the adaptive solver; 0: the exact one
@@ -117,8 +135,8 @@ class TrainRecorder {
           options_(options),
           out_(out),
           report_(report),
-          channels_(m.channels.size()),
-          sampler_(m, 0.0, options.sample_interval, options.samples, out, numbers()),
+          channels_(options.channels ? *options.channels : all(m)),
+          sampler_(m, 0.0, options.sample_interval, options.samples, out, channels_),
           meter_(m.assembly) {
         sampler_.interrupted = options.interrupted;
         sampler_.interrupted_context = options.interrupted_context;
@@ -149,7 +167,7 @@ class TrainRecorder {
             at.set(0, load(dense(t)), t < dense.end ? solver.input_at(t) : solver.input_before(t));
             const TrainReader<D> reader(model_, r, m);
             for (std::size_t c = 0; c < channels_.size(); ++c)
-                out_[c * options_.samples + next_] = reader.read(static_cast<int>(c), at, 0)[0];
+                out_[c * options_.samples + next_] = reader.read(channels_[c], at, 0)[0];
         }
     }
     void end() {
@@ -159,9 +177,10 @@ class TrainRecorder {
     }
 
  private:
-    std::span<const int> numbers() {
-        for (std::size_t c = 0; c < channels_.size(); ++c) channels_[c] = static_cast<int>(c);
-        return channels_;
+    static std::vector<int> all(const Model& m) {
+        std::vector<int> numbers(m.channels.size());
+        std::iota(numbers.begin(), numbers.end(), 0);
+        return numbers;
     }
 
     const Model& model_;
@@ -173,6 +192,28 @@ class TrainRecorder {
     TrainMeter<D> meter_;
     std::size_t next_ = 0;
 };
+
+// Why a run has not ended well, or empty.
+inline std::string error_text(const TrainReport& report, const model::Assembly& a) {
+    if (!report.message.empty()) return report.message;
+    return train_status_text(a, report.status, report.time, report.contact, report.too_many_guards);
+}
+
+// The energy ledger by name [J], also of flows that there have not been.
+inline std::vector<std::string> ledger_names(const model::Assembly& a) {
+    std::vector<std::string> names = model::flow_names(a);
+    for (const char* name : {"stored_change", "residual", "turned_over"}) names.emplace_back(name);
+    return names;
+}
+inline Named named_ledger(const TrainReport& report, const model::Assembly& a) {
+    Named ledger;
+    for (const std::string& name : ledger_names(a)) ledger[name] = 0.0;
+    for (const TrainEnergy& e : report.energy) ledger.at(e.name) = e.energy;
+    ledger["stored_change"] = report.stored_end - report.stored_begin;
+    ledger["residual"] = report.residual();
+    ledger["turned_over"] = report.turned_over;
+    return ledger;
+}
 
 // start: the states by the layout of the assembly, or nothing for rest.
 template <class D>
@@ -270,6 +311,16 @@ class TrainRun {
     }
 
     // inputs: one signal each, as model::input_names. out: channels x samples, channel by channel.
+    TrainReport run(const std::vector<Signal>& inputs, const TrainStart& start, const TrainOptions& options,
+                    double* out) const {
+        std::vector<double> x, memory(static_cast<std::size_t>(assembly_->layout().memory));
+        for (const std::string& name : model::state_names(*assembly_)) x.push_back(value_of(start.states, name));
+        const std::vector<model::Gear>& gears = assembly_->train().gears;
+        for (std::size_t g = 0; g < gears.size(); ++g)
+            if (const int h = assembly_->places().gears[g].hysteresis; h != model::nowhere)
+                memory[static_cast<std::size_t>(h)] = value_of(start.hysteresis_capacities, gears[g].name);
+        return run(inputs, x, memory, options, out);
+    }
     TrainReport run(const std::vector<Signal>& inputs, std::span<const double> start, std::span<const double> memory,
                     const TrainOptions& options, double* out) const {
         return in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {

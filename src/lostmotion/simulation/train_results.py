@@ -26,17 +26,25 @@ def run_train(scenario: TrainScenario, options: tuple[Any, ...], how: str, *, le
         Duration [s], sample interval [s], samples, whether to keep the energy ledger, relative tolerance (0: exact), and how
         many switchings are kept.
     """
+    core, inputs, start, capacities = core_case(scenario)
+    result = _core.run_train(core, inputs, start, capacities, *options)
+    time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
+    data = dict(zip((name for name, _, _ in core.channels()), result["values"], strict=True))
+    add_derived_of_train(scenario.train(), data, time)
+    attributes = _attributes(scenario, result, how, ledger=ledger)
+    return RawResult(time, data, attributes | {CONTACTS_OF_TRAIN: " ".join(core.contact_names())})
+
+
+def core_case(
+    scenario: TrainScenario,
+) -> tuple[_core.Train, list[_core.Signal], dict[str, float], dict[str, float]]:
+    """What every run of the core begins with: train, inputs, state and hysteresis capacities by name."""
     train = scenario.train()
     core = train.core(scenario.loaded())
     signals = scenario.signals()
     inputs = [signals[name].core() for name in core.input_names()]
     capacities = {name: h for name, h in scenario.initial.hysteresis_capacities.items() if h}
-    result = _core.run_train(core, inputs, start_values(train, scenario.initial), capacities, *options)
-    time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
-    data = dict(zip((name for name, _, _ in core.channels()), result["values"], strict=True))
-    add_derived_of_train(train, data, time)
-    attributes = _attributes(scenario, result, how, ledger=ledger)
-    return RawResult(time, data, attributes | {CONTACTS_OF_TRAIN: " ".join(core.contact_names())})
+    return core, inputs, start_values(train, scenario.initial), capacities
 
 
 def _attributes(scenario: TrainScenario, result: dict[str, Any], how: str, *, ledger: bool) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from ..atomic_writer import write_bytes
 from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
-from .chunk import as_parquet, compute_chunk, parsed, pieces, run_piece, tabulate
+from .chunk import as_parquet, as_table, compute_chunk, parsed, pieces, run_piece
 from .design import CHUNK
 from .file import from_json, to_json
 from .study import Study
@@ -159,7 +159,7 @@ def _compute_here(
                     runs = run_piece(study, a, b, threads)
                     if tables:
                         tables[-1].result()
-                    tables.append(beside.submit(tabulate, study, text, a, b, runs, threads))
+                    tables.append(beside.submit(as_table, text, a, b, runs, threads))
                     done += b - a
                     if b < last:
                         report(done)

@@ -7,6 +7,7 @@ the listed ones is refused. Nothing of it is ever run as Python.
 from __future__ import annotations
 
 import ast
+import difflib
 import operator
 import warnings
 from collections.abc import Callable, Mapping
@@ -15,17 +16,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..simulation.results import ENERGY
-from ..simulation.variables import CHANNEL_NAMES, VARIABLES
+from ..simulation.variables import VARIABLES
 from .functions import BANDWIDTH, FUNCTIONS, METHODS, REDUCTIONS, Function, Parameter
 from .measures import Measure, measure, plain, power, product, text_of, total
+from .vocabulary import OF_DRIVES, OF_THE_RUN, Vocabulary
 
 Names = Mapping[str, Any]
 """values by name: variables (run, time), `energy` (entry -> runs), `bandwidth` (a function of the amplitude)"""
-
-OF_THE_RUN = ("energy", "time", "ideal_speed", "bandwidth")
-"""further names: the ledger; the instants; the load speed of a rigid drive without inertia, friction and load under the same
-command; the bandwidth [Hz] of the load speed, a function of the command's amplitude (left out: the run's own)"""
 
 MAX_LENGTH = 2000  # characters
 MAX_DEPTH = 100  # parts inside of parts
@@ -74,22 +71,28 @@ LEFT_OUT = Term(Measure(), lambda _: None)
 class Expression:
     """An expression of the result variables, as `keep` has it.
 
+    Parameters
+    ----------
+    text
+        As written.
+    vocabulary
+        What it may name.
+
     Raises
     ------
     ValueError
         It cannot be read, uses what the grammar does not have, or leaves a value for each instant.
     """
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, vocabulary: Vocabulary = OF_DRIVES) -> None:
         self.text = text
         tree = _parse(text)
         self.names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
         """all that it names"""
-        known = {v.name for v in VARIABLES}
-        for name in sorted(self.names - FUNCTIONS.keys() - set(OF_THE_RUN) - known):
-            choice = ", ".join((*FUNCTIONS, *OF_THE_RUN))
-            raise ValueError(f"{name!r} in {text!r} is neither a result variable nor one of {choice}")
-        reader = _Reader(text)
+        known = {name for name, _ in vocabulary.variables}
+        for name in sorted(self.names - FUNCTIONS.keys() - set(vocabulary.of_the_run) - known):
+            raise _unknown(name, text, vocabulary)
+        reader = _Reader(text, vocabulary)
         self._term = reader.read(tree)
         if self._term.measure.over_time:
             raise ValueError(f"{text!r} leaves a value for each instant; reduce it, as in peak({text})")
@@ -105,7 +108,7 @@ class Expression:
         """reduction and variable, if it is nothing else, so that the core can do it"""
         match tree:
             case ast.Call(ast.Name(reduction), [ast.Name(variable)], []):
-                if reduction in REDUCTIONS and variable in CHANNEL_NAMES:
+                if reduction in REDUCTIONS and variable in vocabulary.channels:
                     self.reduction = reduction, variable
 
     def values(self, names: Names, runs: int) -> np.ndarray:
@@ -116,9 +119,18 @@ class Expression:
 
 
 @lru_cache(maxsize=1000)
-def read_expression(text: str) -> Expression:
+def read_expression(text: str, vocabulary: Vocabulary = OF_DRIVES) -> Expression:
     """The expression of a text; each is read once."""
-    return Expression(text)
+    return Expression(text, vocabulary)
+
+
+def _unknown(name: str, text: str, vocabulary: Vocabulary) -> ValueError:
+    if name in OF_THE_RUN:
+        return ValueError(f"{name} in {text!r} is of a drive of one motor, gearbox and load, not of a drive train")
+    choice = ", ".join((*FUNCTIONS, *vocabulary.of_the_run))
+    near = difflib.get_close_matches(name, [v for v, _ in vocabulary.variables], n=1)
+    hint = f"; did you mean {near[0]}?" if near else ""
+    return ValueError(f"{name!r} in {text!r} is neither a result variable nor one of {choice}{hint}")
 
 
 def _parse(text: str) -> ast.expr:
@@ -145,8 +157,10 @@ def _parse(text: str) -> ast.expr:
 class _Reader:
     """Turns a syntax tree into terms: the whole grammar."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, vocabulary: Vocabulary) -> None:
         self.text = text
+        self.units = dict(vocabulary.variables) | {"time": "s", "ideal_speed": "rad/s"}
+        self.energies = [name for name, _ in vocabulary.energies]
         self.instants: list[float] = []
         self.indices: list[int] = []
 
@@ -162,8 +176,8 @@ class _Reader:
             case ast.Name(name):
                 return self.name(name)
             case ast.Attribute(ast.Name("energy"), entry):
-                if entry not in ENERGY:
-                    raise ValueError(f"energy.{entry} is none of {', '.join(ENERGY)}")
+                if entry not in self.energies:
+                    raise ValueError(f"energy.{entry} is none of {', '.join(self.energies)}")
                 return Term(measure("J"), lambda names: names["energy"][entry])
             case ast.UnaryOp():
                 return self.unary(node)
@@ -190,9 +204,8 @@ class _Reader:
         if name in FUNCTIONS or name == "bandwidth":
             raise self.refuse(f"{name} without its brackets; write {name}(...)")
         if name == "energy":
-            raise self.refuse(f"energy alone; name an entry, such as energy.{ENERGY[0]}")
-        units = {v.name: v.unit for v in VARIABLES} | {"time": "s", "ideal_speed": "rad/s"}
-        return Term(measure(units[name], over_time=True), lambda names: names[name])
+            raise self.refuse(f"energy alone; name an entry, such as energy.{self.energies[0]}")
+        return Term(measure(self.units[name], over_time=True), lambda names: names[name])
 
     def unary(self, node: ast.UnaryOp) -> Term:
         if isinstance(node.op, ast.Not):

@@ -12,8 +12,9 @@ from ..inputs.toml_files import read_toml
 from ..simulation.result_files import FORMATS
 from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import find_scenario, read_tables
-from ..simulation.sources import load_drive
-from .records import TABLE_OF
+from ..simulation.sources import load
+from ..simulation.train_scenario import TrainScenario, is_train
+from .records import kind_of_record
 from .study import Study
 
 
@@ -35,7 +36,7 @@ def load_study(path: str | Path) -> Study:
     if not isinstance(changes, dict):
         raise InputError(f'{path}: key set: must be a table, such as set = {{ "load.inertia" = 2 }}')
     where = find_scenario(base, path.parent)
-    scenario = load_drive(where, changes)
+    scenario = load(where, changes)
     written = {} if where.suffix in FORMATS else read_tables(where, changes)  # a result has all values written out
     for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:
         _find_sheets(entry, path.parent)
@@ -47,7 +48,9 @@ def load_study(path: str | Path) -> Study:
 
 def _find_sheets(entry: Any, directory: Path) -> None:
     """Files of data sheets (.toml) among the values are relative to the study file."""
-    if isinstance(entry, dict) and entry.get("key") in TABLE_OF and isinstance(entry.get("values"), list):
+    if not isinstance(entry, dict) or not isinstance(entry.get("key"), str):
+        return
+    if kind_of_record(entry["key"]) and isinstance(entry.get("values"), list):
         entry["values"] = [
             str((directory / name).resolve()) if isinstance(name, str) and name.endswith(".toml") else name
             for name in entry["values"]
@@ -57,7 +60,8 @@ def _find_sheets(entry: Any, directory: Path) -> None:
 def from_json(text: str) -> Study:
     """The study that `to_json` wrote."""
     data = json.loads(text)
-    data["scenario"] = Scenario(**data["scenario"])
+    base = data["scenario"]
+    data["scenario"] = TrainScenario(**base) if is_train(base) else Scenario(**base)
     return Study(**data)
 
 

@@ -2,23 +2,69 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
 from typing import Any
 
 from ..data_sheets.components import Conditions
 from ..data_sheets.records import KINDS, catalogue, find
 from ..data_sheets.sheet import in_current_words
+from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import unit_in_schema
 from ..inputs.validation import shown
 from ..simulation.scenario import Scenario, from_tables
+from ..simulation.train_scenario import TrainScenario, is_train, train_from_tables
 from .units import in_si
 
-TABLE_OF = {key: table for table in KINDS for key in (table, f"{table}.from")}
-"""keys that take the name of a record, and its kind"""
-CONDITIONS = tuple(f"gearbox.{name}" for name in Conditions.model_fields)
-"""keys that hold beside the name of a record only"""
+# Of keys that take the name of a record: the part that the record describes, and what kind of record it is.
+_RECORD_KEYS = {
+    "gearbox": re.compile(r"(gearbox)(\.from)?|(gears\.[^.]+)\.gearbox"),
+    "motor": re.compile(r"(motor)(\.from)?|(motors\.[^.]+)\.from"),
+}
+_CONDITION = re.compile(rf"(gearbox|gears\.[^.]+)\.({'|'.join(Conditions.model_fields)})")
+
+
+def kind_of_record(key: str) -> str | None:
+    """``"gearbox"`` or ``"motor"`` for a key that takes the name of such a record, else None."""
+    return next((kind for kind, pattern in _RECORD_KEYS.items() if pattern.fullmatch(key)), None)
+
+
+def is_condition(key: str) -> bool:
+    """Whether it is a key that holds beside the name of a record only."""
+    return _CONDITION.fullmatch(key) is not None
+
+
+def owner_of(key: str) -> str:
+    """The part that such a key belongs to, such as ``gearbox`` or ``gears.worm``."""
+    found = next((m for p in (*_RECORD_KEYS.values(), _CONDITION) if (m := p.fullmatch(key))), None)
+    assert found is not None, key
+    return found[1] or found[3]
+
+
+def record_keys(scenario: Scenario | TrainScenario) -> Iterator[str]:
+    """The keys of a scenario that take names of records, and the conditions of their use."""
+    if isinstance(scenario, Scenario):
+        yield from (*KINDS, *(f"gearbox.{name}" for name in Conditions.model_fields))
+        return
+    for name in scenario.gears:
+        yield from (f"gears.{name}.{key}" for key in (RECORDS["gears"][0], *Conditions.model_fields))
+    yield from (f"motors.{name}.{RECORDS['motors'][0]}" for name in scenario.motors)
+
+
+def name_key(part: str) -> str:
+    """The key of a part of a scenario that names its record: ``from``, or ``gearbox`` of the gear of a train."""
+    table, _, name = part.partition(".")
+    return RECORDS[table][0] if name else "from"
+
+
+def names_a_record(tables: Mapping[str, Any], part: str) -> bool:
+    """Whether a part of a scenario, as its file has it, names a record."""
+    table, _, name = part.partition(".")
+    element = tables.get(table, {})
+    element = element.get(name, {}) if name else element
+    return isinstance(element, str) or name_key(part) in element
 
 
 def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
@@ -93,10 +139,11 @@ def check_names(table: str, names: Any) -> None:
         find(name, table)
 
 
-def with_records(written: Mapping[str, Any], changes: Mapping[str, Any]) -> Scenario:
+def with_records(written: Mapping[str, Any], changes: Mapping[str, Any]) -> Scenario | TrainScenario:
     """The scenario of tables in which records, and the conditions of their use, are others.
 
-    What the tables give beside `from` holds for every record; of a table without `from` the record takes the place.
+    What the tables give beside the name of a record holds for every record; of a part without such a name the record takes
+    the place.
 
     Raises
     ------
@@ -104,11 +151,23 @@ def with_records(written: Mapping[str, Any], changes: Mapping[str, Any]) -> Scen
         A record lacks what a run needs, or a value cannot be used.
     """
     tables = dict(written)
-    for key, value in changes.items():
-        table, _, name = key.partition(".")
-        own = tables.get(table)
-        beside = {"from": own} if isinstance(own, str) else dict(own) if isinstance(own, dict) and "from" in own else {}
-        if key not in TABLE_OF and not beside:
-            raise InputError(f"{key} belongs beside `from`, but the {table} of the base is written out")
-        tables[table] = beside | {"from" if key in TABLE_OF else name: value}
-    return from_tables(tables)
+    # The names first, so that the conditions find them.
+    for key in sorted(changes, key=lambda key: kind_of_record(key) is None):
+        table, _, name = owner_of(key).partition(".")
+        if name:
+            tables[table] = {**tables[table], name: _changed(tables, f"{table}.{name}", key, changes[key])}
+        else:
+            tables[table] = _changed(tables, table, key, changes[key])
+    return train_from_tables(tables) if is_train(tables) else from_tables(tables)
+
+
+def _changed(tables: Mapping[str, Any], part: str, key: str, value: Any) -> dict[str, Any]:
+    table, _, name = part.partition(".")
+    element: Any = tables[table][name] if name else tables.get(table)
+    if names_a_record(tables, part):
+        beside = {"from": element} if isinstance(element, str) else dict(element)
+    elif kind_of_record(key):
+        beside = without_record(table, element) if name else {}
+    else:
+        raise InputError(f"{key} belongs beside `{name_key(part)}`, but the {part} of the base is written out")
+    return beside | {name_key(part) if kind_of_record(key) else key.rpartition(".")[2]: value}

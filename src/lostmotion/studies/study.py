@@ -11,12 +11,14 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from ..inputs.part import Part
 from ..simulation.scenario import Scenario
-from ..simulation.variables import VARIABLES
+from ..simulation.train_scenario import TrainScenario, is_train
 from .design import unit_cube
 from .expressions import Expression, read_expression
-from .records import CONDITIONS, TABLE_OF, with_records
+from .records import is_condition, kind_of_record, name_key, names_a_record, owner_of, with_records
 from .select import SHARES, USE, Selection, check_bounds
+from .units import unit_in, unit_of_key
 from .vary import Vary, base_value, check_key, scaled
+from .vocabulary import Vocabulary, vocabulary_of
 
 MAX_RUNS = 100_000_000
 
@@ -34,23 +36,15 @@ class Trajectories(Part):
     every: Annotated[int, Field(ge=1)] = 1
     """one of so many samples"""
 
-    @model_validator(mode="after")
-    def _known(self) -> Self:
-        names = {v.name for v in VARIABLES}
-        for v in self.variables:
-            if v not in names:
-                raise ValueError(f"has the variable {v!r}, which is none; they are {', '.join(sorted(names))}")
-        return self
-
 
 class Study(Part):
-    """Many runs of one scenario."""
+    """Many runs of one scenario, of a drive or of a drive train."""
 
     title: str = ""
-    scenario: Scenario
+    scenario: Scenario | TrainScenario
     """the base, with all values"""
     written: dict[str, Any] = Field(default={})
-    """the base as its file has it, with `from` where it names a record; empty if made in Python"""
+    """the base as its file has it, with the names of records; empty if made in Python"""
     design: Literal["grid", "list", "latin_hypercube", "sobol", "random", "saltelli"] = "grid"
     """grid: every combination; list: the first value of each, then the second, ...; saltelli: for Sobol indices"""
     runs: Annotated[int, Field(ge=1, le=MAX_RUNS)] | None = None
@@ -63,7 +57,16 @@ class Study(Part):
     select: Selection | None = None
     """which runs fit the task, and which of these are best"""
 
-    _bases: dict[tuple[Any, ...], Scenario] = PrivateAttr(default_factory=dict)
+    _bases: dict[tuple[Any, ...], Scenario | TrainScenario] = PrivateAttr(default_factory=dict)
+    _vocabulary: Vocabulary | None = PrivateAttr(default=None)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_scenario(cls, data: Any) -> Any:
+        base = data.get("scenario") if isinstance(data, dict) else None
+        if not isinstance(base, dict):
+            return data
+        return data | {"scenario": TrainScenario(**base) if is_train(base) else Scenario(**base)}
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -72,9 +75,10 @@ class Study(Part):
         self._check_design()
         for name, text in self.keep.items():
             try:
-                self._check_kept(read_expression(text))
+                self._check_kept(read_expression(text, self.vocabulary))
             except ValueError as error:
                 raise ValueError(f"keep.{name}: {error}") from None
+        self._check_trajectories()
         if self.select is not None:
             self._check_selection(self.select)
         return self
@@ -86,9 +90,9 @@ class Study(Part):
             twice = [x for x in values if values.count(x) > 1]
             if twice:
                 raise ValueError(f"has the {name} {twice[0]} twice in vary")
-        for table in ("gearbox", "motor"):
-            if table in keys and f"{table}.from" in keys:
-                raise ValueError(f"has {table} and {table}.from in vary, which are the same; keep one")
+        for kind in ("gearbox", "motor"):
+            if kind in keys and f"{kind}.from" in keys:
+                raise ValueError(f"has {kind} and {kind}.from in vary, which are the same; keep one")
         for key in keys:
             if key.split(".", maxsplit=1)[0] == "simulation":
                 raise ValueError(f"varies {key}; all runs must have the same samples")
@@ -120,37 +124,57 @@ class Study(Part):
             raise ValueError(f"{expression.text!r} reads a sample that a run of {table.samples} does not have")
         if any(not 0.0 <= t <= table.duration for t in expression.instants):
             raise ValueError(f"{expression.text!r} reads an instant outside the {table.duration} s of a run")
-        motor_varies = any(TABLE_OF.get(key) == "motor" for v in self.vary for key in v.all_keys)
-        if "ideal_speed" in expression.names and self.scenario.motor.kind != "dc" and not motor_varies:
+        if "ideal_speed" not in expression.names or not isinstance(self.scenario, Scenario):
+            return
+        motor_varies = any(kind_of_record(key) == "motor" for v in self.vary for key in v.all_keys)
+        if self.scenario.motor.kind != "dc" and not motor_varies:
             raise ValueError("ideal_speed needs a motor of kind dc; a torque source has no speed of its own")
+
+    def _check_trajectories(self) -> None:
+        known = [name for name, _ in self.vocabulary.variables]
+        for name in self.trajectories.variables if self.trajectories else ():
+            if name not in known:
+                raise ValueError(
+                    f"trajectories: has the variable {name!r}, which is none; they are {', '.join(sorted(known))}"
+                )
 
     def _check_keys(self) -> None:
         """Sees that the keys are there to be varied: in the base, or where records vary, with one that can be run."""
-        scenario = self.scenario
-        named = [v for v in self.vary if v.names is not None]
-        if named:
-            for names in itertools.islice(itertools.product(*(v.names or () for v in named)), 1000):
-                try:
-                    changes = {v.all_keys[0]: name for v, name in zip(named, names, strict=True)}
-                    scenario = with_records(self.tables, changes)
-                    break
-                except ValueError:
-                    continue
-        from_record = isinstance(self.tables.get("gearbox"), str) or "from" in self.tables.get("gearbox", {})
-        for v in self.vary:
-            for key in v.all_keys:
-                if key in TABLE_OF:
-                    continue
-                if key in CONDITIONS and not (
-                    from_record or any(TABLE_OF.get(n.all_keys[0]) == "gearbox" for n in named)
-                ):
+        keys = [(key, v.relative) for v in self.vary for key in v.all_keys]
+        owners = {owner_of(key) for key, _ in keys if kind_of_record(key)}
+        for key, _ in keys:
+            if kind_of_record(key) or is_condition(key):
+                base_value(self.scenario, owner_of(key))  # so that it is there
+        scenario = self._with_first_records() if owners else self.scenario
+        for key, relative in keys:
+            if kind_of_record(key):
+                continue
+            if is_condition(key):
+                owner = owner_of(key)
+                if owner not in owners and not names_a_record(self.tables, owner):
                     raise ValueError(
-                        f"varies {key}, which belongs beside `from`, but the gearbox of the base scenario is written out; "
-                        "name a record there, or vary gearbox too"
+                        f"varies {key}, which belongs beside `{name_key(owner)}`, but the {owner} of the base scenario is written "
+                        "out; name a record there, or vary that too"
                     )
-                check_key(scenario, key, relative=v.relative)
+            check_key(scenario, key, relative=relative)
+            if isinstance(scenario, TrainScenario) and unit_in(TrainScenario, key) != unit_of_key(key):
+                raise ValueError(f"varies {key}, which is a key of the short form, too; rename that element")
+
+    def _with_first_records(self) -> Scenario | TrainScenario:
+        """The base with the first of the varied records that can be run."""
+        named = {v.all_keys[0]: v.names for v in self.vary if v.names is not None}
+        for names in itertools.islice(itertools.product(*named.values()), 1000):
+            try:
+                return with_records(self.tables, dict(zip(named, names, strict=True)))
+            except ValueError:
+                continue
+        return self.scenario
 
     def _check_selection(self, select: Selection) -> None:
+        if select.drive_check and not isinstance(self.scenario, Scenario):
+            raise ValueError(
+                "select: the drive check is of a drive of one motor, gearbox and load; of a drive train set drive_check = false"
+            )
         numbers = {v.title: v.unit for v in self.vary if v.names is None}
         units = numbers | {name: e.unit for name, e in self.expressions.items()}
         if select.drive_check:
@@ -165,7 +189,14 @@ class Study(Part):
         """The base as tables of a scenario file."""
         return self.written or self.scenario.model_dump()
 
-    def scenario_at(self, row: np.ndarray) -> Scenario:
+    @property
+    def vocabulary(self) -> Vocabulary:
+        """What its expressions may name."""
+        if self._vocabulary is None:
+            self._vocabulary = vocabulary_of(self.scenario)
+        return self._vocabulary
+
+    def scenario_at(self, row: np.ndarray) -> Scenario | TrainScenario:
         """The scenario of one run, by its row of `parameters`.
 
         Raises
@@ -174,7 +205,7 @@ class Study(Part):
             There is no such scenario.
         """
         values = {key: (v, v.value(number)) for v, number in zip(self.vary, row, strict=True) for key in v.all_keys}
-        records = {key: value for key, (_, value) in values.items() if key in TABLE_OF or key in CONDITIONS}
+        records = {key: value for key, (_, value) in values.items() if kind_of_record(key) or is_condition(key)}
         base = self._with_records(records) if records else self.scenario
         changes = {
             key: scaled(base_value(base, key), float(value)) if v.relative else value
@@ -183,14 +214,24 @@ class Study(Part):
         }
         return base.replace(**changes) if changes else base
 
-    def _with_records(self, records: dict[str, Any]) -> Scenario:
+    def drive_at(self, row: np.ndarray) -> Scenario:
+        """The same, of a study of a drive."""
+        found = self.scenario_at(row)
+        assert isinstance(found, Scenario)
+        return found
+
+    def train_at(self, row: np.ndarray) -> TrainScenario:
+        """The same, of a study of a drive train."""
+        found = self.scenario_at(row)
+        assert isinstance(found, TrainScenario)
+        return found
+
+    def _with_records(self, records: dict[str, Any]) -> Scenario | TrainScenario:
         """The base with other records; the last ones are kept, since other parameters may vary beside them."""
         key = tuple(sorted(records.items()))
         found = self._bases.get(key)
         if found is None:
-            # The names first, so that the conditions find them.
-            order = sorted(records, key=lambda k: k not in TABLE_OF)
-            found = with_records(self.tables, {k: records[k] for k in order})
+            found = with_records(self.tables, records)
             if len(self._bases) >= MAX_BASES:
                 self._bases.clear()
             self._bases[key] = found
@@ -199,7 +240,7 @@ class Study(Part):
     @property
     def expressions(self) -> dict[str, Expression]:
         """What to keep, read."""
-        return {name: read_expression(text) for name, text in self.keep.items()}
+        return {name: read_expression(text, self.vocabulary) for name, text in self.keep.items()}
 
     @property
     def total(self) -> int:

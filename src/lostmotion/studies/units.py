@@ -1,31 +1,46 @@
-"""Units of what a study varies: those of the keys of a scenario."""
+"""Units of what a study varies: those of the keys of a scenario, in the short or the long form."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
-from ..simulation.scenario import json_schema
+from ..simulation.scenario import Scenario, json_schema
+from ..simulation.train_scenario import TrainScenario, train_schema
 from ..units.conversion import to_si
 
 
-@cache
 def unit_of_key(key: str) -> str | None:
-    """SI unit of a dotted key of the scenario; empty for a plain number, None if it is no quantity or not known."""
+    """SI unit of a dotted key of a scenario; empty for a plain number, None if it is no quantity or not known.
+
+    A key of both forms (`command.frequency`, where a motor has that name) is taken as that of the short one.
+    """
+    of_drive = unit_in(Scenario, key)
+    return unit_in(TrainScenario, key) if of_drive is None else of_drive
+
+
+def unit_in(form: type[Scenario | TrainScenario], key: str) -> str | None:
+    """The same, of a key of the short or of the long form."""
+    return _unit(key, train_schema if form is TrainScenario else json_schema)
+
+
+@cache
+def _unit(key: str, schema: Callable[[], dict[str, Any]]) -> str | None:
     place = tuple(int(part) if part.isdecimal() else part for part in key.split("."))
-    found, nodes = follow(_schema(), place)
+    found, nodes = follow(_made(schema), place)
     if found != place:
         return None
     if any({"mean", "sines"} <= node.get("properties", {}).keys() for node in nodes):
-        return unit_of_key(f"{key}.mean")  # a signal, which one value makes constant
+        return _unit(f"{key}.mean", schema)  # a signal, which one value makes constant
     return next((unit for node in nodes if (unit := unit_in_schema(node)) is not None), None)
 
 
 @cache
-def _schema() -> dict[str, Any]:
-    return json_schema()
+def _made(schema: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    return schema()
 
 
 def in_si(value: Any, unit: str | None) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 from collections.abc import Iterator, Mapping
 from statistics import NormalDist
 from typing import Annotated, Any, Self
@@ -11,15 +12,19 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
+from ..errors import InputError
+from ..inputs.named import Named
 from ..inputs.part import Part
 from ..inputs.validation import shown
 from ..model.signals import Signal
 from ..simulation.keys import list_index
 from ..simulation.scenario import Scenario
-from .records import CONDITIONS, TABLE_OF, check_names, names_that_fit
-from .units import in_si, unit_of_key
+from ..simulation.train_scenario import TrainScenario
+from .records import check_names, is_condition, kind_of_record, names_that_fit, record_keys
+from .units import in_si, unit_in, unit_of_key
 
 MAX_LEVELS = 1_000_000  # of one parameter
+TAKING_NAMES = ("gearbox", "gearbox.from", "motor", "motor.from", "gears.NAME.gearbox", "motors.NAME.from")
 WAYS = ("values", "grid", "uniform", "log_uniform", "normal", "triangular")
 
 
@@ -34,7 +39,8 @@ class Normal(Part):
 class Vary(Part):
     """One parameter, or several that go together.
 
-    Values are SI, or strings with a unit of what the key measures; of the keys `gearbox` and `motor` names of records.
+    Values are SI, or strings with a unit of what the key measures; of the keys `gearbox` and `motor`, and of trains
+    `gears.NAME.gearbox` and `motors.NAME.from`, names of records.
     """
 
     key: str = ""
@@ -63,10 +69,10 @@ class Vary(Part):
         key = str(data.get("key") or next(iter(data.get("keys") or ()), ""))
         unit = "" if data.get("relative") else unit_of_key(key)
         try:
-            if key in TABLE_OF:
-                return _with_names(data, TABLE_OF[key])
+            if (kind := kind_of_record(key)) is not None:
+                return _with_names(data, kind)
             if "catalogue" in data:
-                raise ValueError(f"has a catalogue filter, which only {', '.join(TABLE_OF)} take")
+                raise ValueError(f"has a catalogue filter, which only {', '.join(TAKING_NAMES)} take")
             return data | {way: in_si(data[way], unit) for way in WAYS if way in data}
         except ValueError as error:
             raise ValueError(f"of {key}: {error}") from None
@@ -77,9 +83,9 @@ class Vary(Part):
         if bool(self.key) == bool(self.keys):
             raise ValueError("needs key or keys, one of the two")
         if len(ways) != 1:
-            more = ", catalogue" if self.all_keys[0] in TABLE_OF else ""
+            more = ", catalogue" if kind_of_record(self.all_keys[0]) else ""
             raise ValueError(f"of {self.title}: needs one of {', '.join(WAYS)}{more}")
-        if any(key in TABLE_OF for key in self.all_keys) and (self.names is None or self.keys or self.relative):
+        if any(kind_of_record(key) for key in self.all_keys) and (self.names is None or self.keys or self.relative):
             raise ValueError(f"of {self.title}: names of records need a key of their own, and values or catalogue")
         if self.names is None and any(isinstance(x, str) for x in self.values or ()):
             raise ValueError(f"of {self.title}: has values that are no numbers")
@@ -103,7 +109,7 @@ class Vary(Part):
     @property
     def names(self) -> tuple[str, ...] | None:
         """The names of records, where it varies these; else None."""
-        if not self.values or self.all_keys[0] not in TABLE_OF:
+        if not self.values or kind_of_record(self.all_keys[0]) is None:
             return None
         return tuple(str(name) for name in self.values)
 
@@ -163,7 +169,7 @@ def _with_names(data: Mapping[str, Any], table: str) -> dict[str, Any]:
     return out
 
 
-def base_value(scenario: Scenario, key: str) -> Any:
+def base_value(scenario: Scenario | TrainScenario, key: str) -> Any:
     """What a scenario has under a dotted key.
 
     Raises
@@ -178,6 +184,10 @@ def base_value(scenario: Scenario, key: str) -> Any:
                 node = node[list_index(node, part)]
             elif isinstance(node, BaseModel) and part in type(node).model_fields:
                 node = getattr(node, part)
+            elif isinstance(node, Named) and part in node:
+                node = node[part]
+            elif isinstance(node, Named) and _may_be_left_out(scenario, key):
+                return None
             else:
                 raise ValueError(f"there is no {part}")
         except ValueError as error:
@@ -186,9 +196,20 @@ def base_value(scenario: Scenario, key: str) -> Any:
     return node
 
 
-def near_key(scenario: Scenario, key: str) -> str:
+def _may_be_left_out(scenario: Scenario | TrainScenario, key: str) -> bool:
+    """Whether a value at the start, or a command, is 0 where a train does not give it, and may be given."""
+    if not re.fullmatch(r"initial\.[^.]+\.[^.]+|command\.[^.]+", key):
+        return False
+    try:
+        scenario.replace(**{key: 0.0})
+    except InputError as error:
+        raise ValueError(str(error)) from None
+    return True
+
+
+def near_key(scenario: Scenario | TrainScenario, key: str) -> str:
     """The key of a scenario that ends as this one, or is spelled most like it; empty if none is."""
-    known = [*_keys(scenario.model_dump(), ""), *CONDITIONS]
+    known = [*_keys(scenario.model_dump(), ""), *record_keys(scenario)]
     last = key.rpartition(".")[2]
     same = [k for k in known if k.rpartition(".")[2] == last]
     return next(iter(difflib.get_close_matches(key, same or known, n=1, cutoff=0.0 if same else 0.6)), "")
@@ -201,7 +222,7 @@ def _keys(table: Mapping[str, Any], before: str) -> Iterator[str]:
             yield from _keys(value, f"{before}{name}.")
 
 
-def check_key(scenario: Scenario, key: str, *, relative: bool) -> None:
+def check_key(scenario: Scenario | TrainScenario, key: str, *, relative: bool) -> None:
     """Sees that a number, or with `relative` a factor, can take the place of what a scenario has under a key.
 
     Raises
@@ -209,20 +230,21 @@ def check_key(scenario: Scenario, key: str, *, relative: bool) -> None:
     ValueError
         It cannot; the message says what to vary instead.
     """
-    if key in CONDITIONS:
+    if is_condition(key):
         if relative:
             raise ValueError(f"varies {key} with relative, but it is itself no datum of the record; give its values")
         return
     value = base_value(scenario, key)
-    if isinstance(value, BaseModel):
+    if isinstance(value, BaseModel | Named):
         if isinstance(value, Signal) and not relative:
             return  # a bare number is a constant
-        inner = ", ".join(f"{key}.{name}" for name in type(value).model_fields if name != "kind")
+        names = value if isinstance(value, Named) else type(value).model_fields
+        inner = ", ".join(f"{key}.{name}" for name in names if name != "kind") or "it has none"
         raise ValueError(f"varies {key}, which is a table; vary one of its keys: {inner}")
     if value is None:
         if relative:
             raise ValueError(f"varies {key} with relative, but the base scenario has no value there to multiply")
-        if unit_of_key(key) is None:
+        if unit_in(type(scenario), key) is None:
             raise ValueError(f"varies {key}, which the base scenario does not have; give it there first")
     elif isinstance(value, str | bool):
         raise ValueError(f"varies {key}, which is {shown(value)} and no number")

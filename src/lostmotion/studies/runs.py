@@ -1,0 +1,30 @@
+"""What comes of the runs of a piece of a study."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+
+class Runs(SimpleNamespace):
+    """Of a piece: parameters (runs x parameters), samples (variable -> runs x samples), what the core has made of them instead
+    (column -> runs), energy (entry -> runs), columns of the drive check, switchings, errors; of drives the ratio (runs)."""
+
+    parameters: np.ndarray
+    samples: dict[str, np.ndarray]
+    kept: dict[str, np.ndarray]
+    energy: dict[str, np.ndarray]
+    checks: dict[str, list[float | str]]
+    switchings: np.ndarray
+    errors: list[str]
+    ratio: np.ndarray
+
+
+def spread(values: np.ndarray, where: np.ndarray, runs: int) -> np.ndarray:
+    """Values of some of the runs in a row of all of them; NaN elsewhere."""
+    if len(where) == runs:
+        return values
+    out = np.full((runs, *values.shape[1:]), np.nan)
+    out[where] = values
+    return out

@@ -1,0 +1,54 @@
+"""What a study wants of its runs: result variables, reductions of them, energies, the drive check."""
+
+from __future__ import annotations
+
+from ..simulation.train_scenario import TrainScenario
+from ..simulation.variables import VARIABLES
+from .study import Study
+
+DERIVED = frozenset(v.name for v in VARIABLES if v.derived)
+SOURCES = {
+    "efficiency": ("output_torque", "input_torque", "motor_speed"),
+    "motor_power": ("motor_torque", "motor_speed"),
+}
+"""channels that the derived variables of a drive are made of"""
+
+
+def asks_for(study: Study, name: str) -> bool:
+    """Whether an expression uses a name that is no result variable."""
+    return any(name in e.names for e in study.expressions.values())
+
+
+def used(study: Study) -> set[str]:
+    """The result variables that its expressions use."""
+    return {name for e in study.expressions.values() for name in e.variables}
+
+
+def needed(study: Study) -> frozenset[str]:
+    """The result variables that the study uses."""
+    return frozenset(used(study) | set(study.trajectories.variables if study.trajectories else ()))
+
+
+def reductions(study: Study) -> dict[str, tuple[str, str]]:
+    """Reduction and variable of each column that needs samples, if they are all of that kind, so that the core can do them and
+    no samples need leave it; else empty."""
+    all_of_them = {name: e.reduction for name, e in study.expressions.items() if e.variables}
+    known = {name: r for name, r in all_of_them.items() if r is not None}
+    return known if study.trajectories is None and len(known) == len(all_of_them) else {}
+
+
+def channels(study: Study) -> list[str]:
+    """The channels of the core that the needed variables are made of."""
+    wanted = needed(study)
+    if not isinstance(study.scenario, TrainScenario):
+        return sorted({channel for name in wanted for channel in SOURCES.get(name, (name,))})
+    given = study.vocabulary.channels
+    if wanted <= set(given):
+        return sorted(wanted)
+    # Angles that follow do so through the gears, from angle to angle.
+    return [name for name in given if name in wanted or name.endswith(("_angle", "_twist"))]
+
+
+def checks_drives(study: Study) -> bool:
+    """Whether each run goes through the drive check."""
+    return study.select is not None and study.select.drive_check
