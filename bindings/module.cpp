@@ -3,7 +3,6 @@
 #include "responses.hpp"
 #include "runs.hpp"
 #include "stepping.hpp"
-#include "train.hpp"
 
 using namespace lostmotion::binding;
 
@@ -13,8 +12,8 @@ NB_MODULE(CORE_MODULE, m) {
     bind_names(m);
     bind_drives(m);
     bind_runs(m);
-    bind_analysis(m);
-    bind_stepping(m);
     bind_train(m);
+    bind_instants(m);
+    bind_stepping(m);
     bind_responses(m);
 }

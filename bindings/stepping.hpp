@@ -1,46 +1,10 @@
-// The drive step by step.
+// Drives and trains step by step.
 #pragma once
 
-#include "analysis.hpp"
-#include "lostmotion/simulation/stepping.hpp"
+#include "instants.hpp"
+#include "snapshots.hpp"
 
 namespace lostmotion::binding {
-
-// The course of a motion and whether the inputs are constant, as numbers.
-using CourseNumbers = std::array<double, n_states + n_inputs + 6>;
-inline CourseNumbers from_course(const CourseOf<DriveDims>& c, bool steady) {
-    CourseNumbers v{};
-    auto next = std::copy(c.input.begin(), c.input.end(), std::copy(c.rate.begin(), c.rate.end(), v.begin()));
-    const auto& twist = c.twist[0];
-    for (const double x : {double(c.rate_known), double(twist.off_zero), twist.grazing_magnitude, twist.doubt,
-                           twist.most_doubt, double(steady)})
-        *next++ = x;
-    return v;
-}
-inline CourseOf<DriveDims> to_course(const CourseNumbers& v) {
-    CourseOf<DriveDims> c;
-    std::copy_n(v.begin(), n_states, c.rate.begin());
-    std::copy_n(v.begin() + n_states, n_inputs, c.input.begin());
-    const double* rest = &v[n_states + n_inputs];
-    c.rate_known = rest[0] != 0.0;
-    c.twist[0] = {rest[1] != 0.0, rest[2], rest[3], rest[4]};
-    return c;
-}
-
-// The modes of the contacts, and which pieces of the laws hold.
-using KeyNumbers = std::array<int, n_contacts + 4>;
-inline KeyNumbers from_key(const RegimeKey& k) {
-    return {k.modes[0], k.modes[1], k.modes[2], k.amplifier, k.piece, k.cell, k.cell_back};
-}
-inline RegimeKey to_key(const KeyNumbers& k) {
-    RegimeKey key;
-    for (int c = 0; c < n_contacts; ++c) key.modes[c] = static_cast<std::int8_t>(k[c]);
-    key.amplifier = static_cast<std::int8_t>(k[3]);
-    key.piece = static_cast<std::int16_t>(k[4]);
-    key.cell = k[5];
-    key.cell_back = k[6];
-    return key;
-}
 
 inline void advance(Simulation& s, double interval, double c0, double c1, double m0, double m1) {
     s.set_interrupt(poll_signals, nullptr);
@@ -52,28 +16,12 @@ inline void advance(Simulation& s, double interval, double c0, double c1, double
     if (status != Status::done) check(status, s.time(), s.stopped_at());
 }
 
-inline nb::tuple explain_now(Simulation& s) {
-    const Reading r = s.reading();
-    const auto& now = s.snapshot();
-    return nb::make_tuple(values_of(r), explain_state(s.drive(), s.regime(), now.x, now.memory, now.input));
-}
-
-inline nb::tuple get_state(const Simulation& s) {
+// use(drive, regime, state, memory, inputs) at the present instant.
+template <class Use>
+nb::tuple now(Simulation& s, Use&& use) {
+    check(s.find_regime(), s.time(), s.stopped_at());
     const auto& n = s.snapshot();
-    return nb::make_tuple(n.time, from_state(n.x), n.memory.hysteresis_capacity, n.memory.locked_torque,
-                          from_key(n.key), n.input, n.started, from_course(n.course, n.steady));
-}
-
-inline void set_state(Simulation& s, double time, const StateNumbers& x, double capacity, double locked_torque,
-                      const KeyNumbers& key, const InputNumbers& input, bool started, const CourseNumbers& course) {
-    s.restore({time,
-               to_state(x),
-               {capacity, locked_torque},
-               to_key(key),
-               input,
-               started,
-               course.back() != 0.0,
-               to_course(course)});
+    return use(s.drive(), s.regime(), n.x, n.memory, n.input);
 }
 
 // To t = 0, with the contacts still to be found.
@@ -84,24 +32,129 @@ inline void reset(Simulation& s, const StateNumbers& x, double capacity) {
     s.restore(start);
 }
 
+inline void check_train(Status status, TrainSimulation& s) {
+    if (status == Status::done) return;
+    TrainReport report;
+    report.status = status;
+    report.time = s.time();
+    s.with([&](auto& in) {
+        report.contact = in.stopped_at();
+        report.too_many_guards = in.too_many_guards();
+    });
+    check_train_run(report, s.assembly());
+}
+
+inline void advance_train(TrainSimulation& s, double interval, const Numbers& begin, const Numbers& end) {
+    const auto n = static_cast<std::size_t>(s.assembly().layout().inputs);
+    check_size(begin, n);
+    check_size(end, n);
+    s.with([](auto& in) { in.set_interrupt(poll_signals, nullptr); });
+    Status status;
+    {
+        nb::gil_scoped_release release;
+        status = s.advance(interval, begin, end);
+    }
+    check_train(status, s);
+}
+
+inline TrainPoint point_now(TrainSimulation& s) {
+    return s.with([&](auto& in) {
+        check_train(in.find_regime(), s);
+        return in.point();
+    });
+}
+
+inline Numbers read_train(TrainSimulation& s) {
+    return s.with([&](auto& in) {
+        check_train(in.find_regime(), s);
+        return in.values();
+    });
+}
+
+// use(simulation) with the one of its kernel.
+template <class Use>
+auto with_kernel(const Simulation& s, Use&& use) {
+    return use(s);
+}
+template <class Use>
+auto with_kernel(Simulation& s, Use&& use) {
+    return use(s);
+}
+template <class Use>
+auto with_kernel(const TrainSimulation& s, Use&& use) {
+    return s.with(use);
+}
+template <class Use>
+auto with_kernel(TrainSimulation& s, Use&& use) {
+    return s.with(use);
+}
+
+// What both have.
+template <class S, class Class>
+void bind_state(Class& c) {
+    c.def(
+         "get_state", [](const S& s) { return with_kernel(s, [](const auto& in) { return get_state(in); }); },
+         nb::sig("def get_state(self) -> tuple[float, list[float], list[float], list[int], list[float], bool, "
+                 "list[float]]"))
+        .def(
+            "set_state",
+            [](S& s, double time, const Numbers& x, const Numbers& memory, const std::vector<int>& regime,
+               const Numbers& input, bool started, const Numbers& course) {
+                with_kernel(s, [&](auto& in) { set_state(in, time, x, memory, regime, input, started, course); });
+            },
+            "time"_a, "state"_a, "memory"_a, "regime"_a, "input"_a, "started"_a, "course"_a)
+        .def("time", [](const S& s) { return s.time(); });
+}
+
 inline void bind_stepping(nb::module_& m) {
-    nb::class_<Simulation>(m, "Simulation")
+    nb::class_<Simulation> of_drive(m, "Simulation");
+    of_drive
         .def(
             "__init__",
             [](Simulation* self, const SharedDrive& d, double step) { new (self) Simulation(d.drive, step); },
             "drive"_a, "step"_a)
         .def("advance", &advance, "interval"_a, "command_begin"_a, "command_end"_a, "load_begin"_a, "load_end"_a)
-        .def("time", &Simulation::time)
-        .def("read", [](Simulation& s) { return values_of(s.reading()); })
-        .def("explain", &explain_now,
-             nb::sig("def explain(self) -> "
-                     "tuple[list[float], list[tuple[str, int, float, float, float, float]]]"))
-        .def("reset", &reset, "state"_a, "hysteresis_capacity"_a)
-        .def("get_state", &get_state,
-             nb::sig("def get_state(self) -> tuple[float, list[float], float, float, list[int], list[float], bool, "
-                     "list[float]]"))
-        .def("set_state", &set_state, "time"_a, "state"_a, "hysteresis_capacity"_a, "locked_torque"_a, "regime"_a,
-             "input"_a, "started"_a, "course"_a);
+        .def("read",
+             [](Simulation& s) {
+                 check(s.find_regime(), s.time(), s.stopped_at());
+                 return values_of(s.reading());
+             })
+        .def(
+            "explain", [](Simulation& s) { return now(s, explain_state); },
+            nb::sig("def explain(self) -> "
+                    "tuple[list[float], list[tuple[str, int, float, float, float, float]]]"))
+        .def(
+            "linearize", [](Simulation& s) { return now(s, linearize_state); },
+            nb::sig("def linearize(self) -> tuple[list[float], float, list[float], "
+                    "numpy.typing.NDArray[numpy.float64], dict[str, numpy.typing.NDArray[numpy.float64]], list[int]]"))
+        .def("reset", &reset, "state"_a, "hysteresis_capacity"_a);
+    bind_state<Simulation>(of_drive);
+
+    nb::class_<TrainSimulation> of_train(m, "TrainSimulation");
+    of_train
+        .def(
+            "__init__",
+            [](TrainSimulation* self, const TrainDescription& t, double step) {
+                new (self) TrainSimulation(t.train, step);
+            },
+            "train"_a, "step"_a)
+        .def("advance", &advance_train, "interval"_a, "begin"_a, "end"_a)
+        .def("read", &read_train)
+        .def(
+            "explain", [](TrainSimulation& s) { return explain_point(s.assembly(), point_now(s)); },
+            nb::sig("def explain(self) -> "
+                    "tuple[list[float], list[tuple[typing.Any, ...]], list[tuple[str, float, float]]]"))
+        .def(
+            "linearize", [](TrainSimulation& s) { return linearize_point(s.assembly(), s.channels(), point_now(s)); },
+            nb::sig("def linearize(self) -> tuple[typing.Any, ...]"))
+        .def(
+            "reset",
+            [](TrainSimulation& s, const Named& start, const Named& capacities) {
+                const std::string error = s.reset({start, capacities});
+                if (!error.empty()) throw nb::value_error(error.c_str());
+            },
+            "start"_a, "hysteresis_capacities"_a);
+    bind_state<TrainSimulation>(of_train);
 }
 
 }  // namespace lostmotion::binding

@@ -18,7 +18,7 @@ def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
     page = (ROOT / "docs" / "tutorial.md").read_text()
     sheet, drive = re.findall(r"```toml\n(.*?)```", page, re.S)
     commands = re.findall(r"^lostmotion (.*)$", "\n".join(re.findall(r"```sh\n(.*?)```", page, re.S)), re.M)
-    assert len(commands) == 6
+    assert len(commands) == 7
 
     def run(command: str) -> str:
         words = [sys.executable, "-m", "lostmotion", *shlex.split(command)]
@@ -35,6 +35,7 @@ def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
     assert (tmp_path / "sheet" / "rig.html").exists()
     assert (tmp_path / "my-drive.png").exists()
     assert "input shaft: stuck" in printed[4]
+    assert "motor first_motor: its shaft turns forward with a constant command above" in printed[5]
     result = lm.simulate(lm.load(tmp_path / "my-drive.toml"))
     assert float(abs(result["load_speed"]).max()) > 0.1
     (tmp_path / "my-drive.toml").write_text(drive.replace("friction_torque =", "friction_torqe ="))

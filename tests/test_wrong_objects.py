@@ -35,6 +35,7 @@ WRONG: list[Any] = [
 WRONG += [-1, 0, float("nan"), 10**30, Path("none"), lambda: None, lm.Load(inertia=1)]
 
 SCENARIO = lm.load("paper-2dof-nl-small", {"simulation.duration": 0.02, "command.frequency": "50 Hz"})
+TRAIN = lm.load("worm-lowering")
 RESULT = lm.simulate(SCENARIO)
 RESPONSE = lm.frequency_response(SCENARIO, [1.0, 2.0, 4.0], [0.5, 1.0], threads=1)
 LINEAR = lm.linearize(SCENARIO, lm.Initial())
@@ -58,7 +59,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "explain": (lm.explain, {"what": SCENARIO, "time": 0.01}),
     "frequency_response": (lm.frequency_response, {"drive": SCENARIO, "frequencies": [10.0], "amplitudes": [1.0], "source": "command", "mean_command": 0.0, "mean_load_torque": 0.0, "harmonics": 1, "refine": None, "threads": 1, "max_periods": 5, "progress": dangle}),
     "gearbox": (lm.gearbox, {"name": "paper-gearbox", "temperature": None, "added_backlash": 0.0, "loss_factor": 1.0}),
-    "linearize": (lm.linearize, {"drive": SCENARIO, "state": lm.Initial(), "command": 0.0, "load_torque": 0.0, "command_rate": 0.0, "load_torque_rate": 0.0}),
+    "linearize": (lm.linearize, {"drive": SCENARIO, "state": lm.Initial(), "command": 0.0, "load_torque": 0.0, "command_rate": 0.0, "load_torque_rate": 0.0, "time": None, "inputs": None, "input_rates": None}),
+    "linearize of a train": (lm.linearize, {"drive": TRAIN, "state": lm.TrainInitial(), "inputs": {}, "input_rates": {}}),
     "load": (lm.load, {"source": "paper-2dof-nl-small", "overrides": {}}),
     "load_study": (lm.load_study, {"path": "none.toml"}),
     "measure": (lm.measure, {"gearbox": None, "sheet": None, "notes": (), "progress": dangle}),
@@ -74,12 +76,16 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "study": (lm.study, {"what": STUDY, "directory": "study", "threads": 1, "executor": None, "progress": None}),
     "switchings_of": (lm.switchings_of, {"result": RESULT}),
     "to_control": (lm.to_control, {"response": RESPONSE, "amplitude": 1.0, "output": "load_speed"}),
-    "Simulation": (lm.Simulation, {"drive": SCENARIO, "step": 1e-3, "initial": None}),
+    "Simulation": (lm.Simulation, {"drive": SCENARIO, "step": 1e-3, "initial": None, "loaded": None}),
+    "Simulation of a train": (lm.Simulation, {"drive": TRAIN, "step": 1e-3, "initial": None, "loaded": ["worm"]}),
     "TestRig": (lm.TestRig, {"gearbox": SCENARIO.gearbox}),
     "ResultAccessor": (lm.ResultAccessor, {"dataset": RESULT}),
     "InputError": (lm.InputError, {"text": "x"}),
     "Simulation.reset": (lambda **a: lm.Simulation(SCENARIO).reset(**a), {"initial": lm.Initial()}),
     "Simulation.advance": (lambda **a: lm.Simulation(SCENARIO).advance(**a), {"interval": 1e-3, "command": 0.0, "load_torque": 0.0}),
+    "Simulation.advance of a train": (lambda **a: lm.Simulation(TRAIN).advance(**a), {"interval": 1e-3, "motor_command": 0.0, "drum_load_torque": 0.0}),
+    "Simulation[...] of a train": (lambda name: lm.Simulation(TRAIN)[name], {"name": "worm_speed"}),
+    "Simulation.state of a train": (lambda state: setattr(lm.Simulation(TRAIN), "state", state), {"state": lm.Simulation(TRAIN).state}),
     "Simulation[...]": (lambda name: lm.Simulation(SCENARIO)[name], {"name": "twist"}),
     "Simulation.state": (lambda state: setattr(lm.Simulation(SCENARIO), "state", state), {"state": lm.Simulation(SCENARIO).state}),
     "TestRig.steady": (RIG.steady, {"input_speed": 10.0, "load": 0.5}),

@@ -71,11 +71,11 @@ double next_breakpoint(const std::array<Signal, n>& signals, double t) {
     return next;
 }
 
-// Inputs that will be set to ramps from outside, step by step.
+// Inputs of which the first will be set to ramps from outside, step by step.
 template <class D>
-SignalsOf<D> ramped_inputs() {
+SignalsOf<D> ramped_inputs(int count = D::inputs) {
     SignalsOf<D> signals;
-    for (Signal& s : signals) s.breakpoints[0].slope = 1.0;
+    for (int i = 0; i < count; ++i) signals[i].breakpoints[0].slope = 1.0;
     return signals;
 }
 

@@ -33,6 +33,12 @@ F pack(const Row& f, const Layout& n) {
     return out;
 }
 
+// A state of the kernel, by the layout.
+template <class D, class To>
+void unpack_state(const StateOf<D>& x, const Layout& n, To to) {
+    std::copy_n(x.begin() + D::coupled, n.angles, std::copy_n(x.begin(), n.coupled, to));
+}
+
 template <class D>
 struct PackedGuard {
     using Kind = Guard::Kind;

@@ -1,6 +1,7 @@
 // A holding brake: a dry contact of a shaft with the frame, whose capacity is commanded.
 #pragma once
 
+#include <algorithm>
 #include <string>
 
 namespace lostmotion::model {
@@ -11,6 +12,8 @@ struct Brake {
     std::string name;
     int shaft = 0;
     double torque = 0.0;  // [N m] at u = 1
+
+    double capacity(double u) const { return torque * std::clamp(u, 0.0, 1.0); }
 };
 
 }  // namespace lostmotion::model

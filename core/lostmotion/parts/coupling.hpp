@@ -1,6 +1,8 @@
 // Contacts of two shafts at equal speed: a commanded friction clutch, a safety clutch, a freewheel.
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <string>
 
 namespace lostmotion::model {
@@ -17,6 +19,11 @@ struct Coupling {
     double torque = 0.0;        // [N m]
 
     bool commanded() const { return kind == clutch; }
+    // Torque [N m] that it passes on at most before it slips in direction s. u: the command, if it has one.
+    double capacity(int s, double u) const {
+        if (kind == freewheel) return s > 0 ? std::numeric_limits<double>::infinity() : 0.0;
+        return kind == clutch ? torque * std::clamp(u, 0.0, 1.0) : torque;
+    }
 };
 
 }  // namespace lostmotion::model

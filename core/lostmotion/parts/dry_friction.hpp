@@ -33,6 +33,7 @@ struct DryFriction {
     }
     // What it holds at rest.
     double holding() const { return std::max(breakaway_torque, at_zero(0)); }
+    double capacity(double speed) const { return speed == 0.0 ? holding() : sliding(speed); }
 
     // Stribeck's curve T_C + (T_S - T_C) exp(-(w/w_S)^2), by chords that depart from it by at most `error` [N m].
     static DryFriction stribeck(double coulomb, double breakaway, double stribeck_speed, double error) {

@@ -1,6 +1,7 @@
 // A gear between two shafts of a train: ratio, compliance and loss law of a gearbox, and what a train adds to it.
 #pragma once
 
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <string>

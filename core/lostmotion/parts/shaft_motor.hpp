@@ -1,6 +1,7 @@
 // A motor on a shaft of a train.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <string>
 
@@ -17,6 +18,11 @@ struct ShaftMotor {
     // A limit of the input: of the voltage, or of the torque that is asked for.
     bool limited() const {
         return law.kind == Motor::dc ? law.limits_voltage() : torque_limit < std::numeric_limits<double>::infinity();
+    }
+    // Torque [N m] at standstill under a constant command.
+    double torque_at_rest(double u) const {
+        const double most = limited() ? command_limit() : std::numeric_limits<double>::infinity();
+        return law.stall_torque() * std::clamp(u, -most, most);
     }
     double command_limit() const { return law.kind == Motor::dc ? law.voltage_limit : torque_limit / law.rated_torque; }
 };

@@ -90,6 +90,14 @@ class TrainReader {
             default: return Vec{} + (regime_.at_rest[index] ? 0.0 : static_cast<double>(regime_.key.modes[index]));
         }
     }
+    // All channels of one instant.
+    std::vector<double> operator()(const StateOf<D>& x, const InputsOf<D>& u) const {
+        Instants at;
+        at.set(0, load(x), u);
+        std::vector<double> out;
+        for (std::size_t c = 0; c < model_.channels.size(); ++c) out.push_back(read(static_cast<int>(c), at, 0)[0]);
+        return out;
+    }
 
  private:
     // Of an input shaft at rest, the torque that its contact holds is shared by what is dry there as the capacities

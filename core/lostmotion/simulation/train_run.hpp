@@ -15,7 +15,8 @@
 #include "power_integral.hpp"
 #include "result_names.hpp"
 #include "sampler.hpp"
-#include "train_reader.hpp"
+#include "stepping.hpp"
+#include "train_point.hpp"
 #include "train_status.hpp"
 
 namespace lostmotion {
@@ -73,6 +74,17 @@ struct TrainReport {
     long steps = 0;
     bool too_many_guards = false;  // a regime has more conditions than the kernel has room for
 
+    template <class System, class Solver>
+    void ended(const System& system, const Solver& solver) {
+        const model::Layout& n = system.assembly().layout();
+        time = solver.time();
+        contact = solver.stopped_at();
+        switching_count = solver.switchings();
+        too_many_guards = system.overflowed();
+        x.resize(static_cast<std::size_t>(n.states));
+        model::unpack_state<typename System::Dims>(solver.state(), n, x.begin());
+        memory.assign(solver.memory().begin(), solver.memory().begin() + n.memory);
+    }
     // What the balance fails by [J].
     double residual() const {
         double sum = stored_begin - stored_end;
@@ -215,6 +227,14 @@ inline Named named_ledger(const TrainReport& report, const model::Assembly& a) {
     return ledger;
 }
 
+// What is wrong with states by the layout of the assembly, or empty.
+inline std::string check_start(const model::Assembly& a, std::span<const double> start) {
+    std::vector<double> speeds;
+    for (const model::ShaftPlace& s : a.places().shafts)
+        speeds.push_back(start.empty() ? 0.0 : start[static_cast<std::size_t>(s.speed)]);
+    return model::check_start(a.train(), speeds);
+}
+
 // start: the states by the layout of the assembly, or nothing for rest.
 template <class D>
 TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
@@ -224,26 +244,16 @@ TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std:
     const model::Assembly& a = model.assembly;
     const model::Layout& n = a.layout();
     TrainReport report;
-    std::vector<double> speeds;
-    for (const model::ShaftPlace& s : a.places().shafts)
-        speeds.push_back(start.empty() ? 0.0 : start[static_cast<std::size_t>(s.speed)]);
-    report.message = model::check_start(a.train(), speeds);
+    report.message = check_start(a, start);
     if (!report.message.empty()) return report;
     const System system(a);
     const SignalsOf<D> signals = model::packed_signals<D>(inputs);
     const auto [x, m] = model::packed_start<D>(n, start, memory);
     TrainRecorder<D> recorder(model, options, out, report);
     const auto finish = [&](auto& solver) {
-        report.time = solver.time();
-        report.contact = solver.stopped_at();
-        report.switching_count = solver.switchings();
-        const StateOf<D>& end = solver.state();
-        report.x.assign(end.begin(), end.begin() + n.coupled);
-        report.x.insert(report.x.end(), end.begin() + D::coupled, end.begin() + D::coupled + n.angles);
-        report.memory.assign(solver.memory().begin(), solver.memory().begin() + n.memory);
+        report.ended(system, solver);
         report.stored_begin = model::stored_energy(a, x);
-        report.stored_end = model::stored_energy(a, end);
-        report.too_many_guards = system.overflowed();
+        report.stored_end = model::stored_energy(a, solver.state());
     };
     if (options.tolerance > 0.0) {
         AdaptiveSolver<System> solver(system, signals, options.tolerance, system.rated_scale());
@@ -310,15 +320,21 @@ class TrainRun {
         return in(model::Wide{});
     }
 
-    // inputs: one signal each, as model::input_names. out: channels x samples, channel by channel.
-    TrainReport run(const std::vector<Signal>& inputs, const TrainStart& start, const TrainOptions& options,
-                    double* out) const {
+    // States and memory by the layout of the assembly.
+    std::pair<std::vector<double>, std::vector<double>> in_layout(const TrainStart& start) const {
         std::vector<double> x, memory(static_cast<std::size_t>(assembly_->layout().memory));
         for (const std::string& name : model::state_names(*assembly_)) x.push_back(value_of(start.states, name));
         const std::vector<model::Gear>& gears = assembly_->train().gears;
         for (std::size_t g = 0; g < gears.size(); ++g)
             if (const int h = assembly_->places().gears[g].hysteresis; h != model::nowhere)
                 memory[static_cast<std::size_t>(h)] = value_of(start.hysteresis_capacities, gears[g].name);
+        return {x, memory};
+    }
+
+    // inputs: one signal each, as model::input_names. out: channels x samples, channel by channel.
+    TrainReport run(const std::vector<Signal>& inputs, const TrainStart& start, const TrainOptions& options,
+                    double* out) const {
+        const auto [x, memory] = in_layout(start);
         return run(inputs, x, memory, options, out);
     }
     TrainReport run(const std::vector<Signal>& inputs, std::span<const double> start, std::span<const double> memory,
@@ -328,7 +344,41 @@ class TrainRun {
         });
     }
 
+    // By the exact solver to options.duration, without a record: what is there.
+    TrainReport reach(const std::vector<Signal>& inputs, const TrainStart& start, const TrainOptions& options,
+                      TrainPoint& point) const {
+        const auto [x, memory] = in_layout(start);
+        return in_kernel([&, &x = x, &memory = memory]<class D>(const typename TrainReader<D>::Model& model) {
+            return reach_in<D>(model, inputs, x, memory, options, point);
+        });
+    }
+
  private:
+    template <class D>
+    static TrainReport reach_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
+                                std::span<const double> start, std::span<const double> memory,
+                                const TrainOptions& options, TrainPoint& point) {
+        TrainReport report;
+        report.message = check_start(model.assembly, start);
+        if (!report.message.empty()) return report;
+        const model::TrainSystem<D> system(model.assembly);
+        const SignalsOf<D> signals = model::packed_signals<D>(inputs);
+        const auto [x, m] = model::packed_start<D>(model.assembly.layout(), start, memory);
+        ExactSolver<model::TrainSystem<D>> solver(system, signals, options.sample_interval, system.balanced_scale());
+        solver.interrupted = options.interrupted;
+        solver.interrupted_context = options.interrupted_context;
+        NoObserver nothing;
+        report.status = solver.begin(0.0, x, m);
+        if (report.status == Status::done && options.duration > 0.0)
+            report.status = solver.advance(options.duration, nothing);
+        report.ended(system, solver);
+        if (report.status != Status::done) return report;
+        InputState<D> input(signals, solver.basis());
+        input.anchor(solver.time());
+        point = point_of<D>(model, solver.regime(), solver.time(), solver.state(), solver.memory(), input.values());
+        return report;
+    }
+
     std::string error_;
     std::unique_ptr<model::Assembly> assembly_;
     std::vector<TrainChannel> channels_;

@@ -26,7 +26,10 @@ def run(
     explain: Annotated[
         float | None,
         typer.Option(
-            "--explain", metavar="TIME", parser=number("s"), help="Say what each contact holds at this instant [s]."
+            "--explain",
+            metavar="TIME",
+            parser=number("s"),
+            help="Say what each contact holds at this instant [s], and what would free it.",
         ),
     ] = None,
     solver: Annotated[
@@ -51,7 +54,6 @@ def run(
     lostmotion run result.csv --explain 0.25
     """
     from ..errors import InputError
-    from ..simulation.scenario import Scenario
     from ..simulation.sources import load
     from ..simulation.train_scenario import TrainScenario
 
@@ -62,10 +64,6 @@ def run(
             f"--explain {explain}: must lie between 0 and simulation.duration, {loaded.simulation.duration} s"
         )
     _check_solver(solver, tolerance)
-    if explain is not None and isinstance(loaded, TrainScenario):
-        raise InputError(
-            "--explain: is for a drive of [motor], [gearbox] and [load]; leave it out, or see the contacts in the result"
-        )
     from ..simulation.run import run as work
 
     try:
@@ -76,7 +74,7 @@ def run(
     from ..reports.run import summary
 
     print(summary(result))
-    if explain is not None and isinstance(loaded, Scenario):
+    if explain is not None:
         from ..simulation.explanation import explain as explain_instant
 
         print(explain_instant(loaded, explain))

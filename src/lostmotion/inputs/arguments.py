@@ -31,6 +31,7 @@ WANTED = {
     "Mapping": "a mapping of names to values",
     "xarray.Dataset": "a dataset, such as simulate returns",
     "Drive": "a Drive",
+    "DriveTrain": "a DriveTrain",
     "Gearbox": 'a Gearbox, such as gearbox("schaeffler-rt1-h-20-100") returns',
     "GearboxSheet": "a GearboxSheet, such as catalogue() lists",
     "Initial": "a state, such as Initial(motor_speed=100)",

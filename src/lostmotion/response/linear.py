@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +13,19 @@ from .. import _core
 from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number, Time, Torque, argument, arguments
-from ..inputs.validation import shown
+from ..inputs.validation import did_you_mean, shown
 from ..model.drive import Drive
 from ..model.losses import ConstantEfficiency
 from ..model.torsion import Rigid
-from ..simulation.run import start_state
+from ..model.train import DriveTrain
+from ..simulation.run import core_inputs, start_state
 from ..simulation.scenario import Initial, Scenario, drive_of
-from ..simulation.variables import CONTACTS, STATES
+from ..simulation.stepping import Simulation
+from ..simulation.train_results import core_case
+from ..simulation.train_scenario import TrainInitial, TrainScenario, loaded_train
+from ..simulation.train_state import start_capacities, start_values
+from ..simulation.train_variables import angle_through, angles_through_gears, train_variables
+from ..simulation.variables import CONTACTS, STATES, VARIABLES
 
 if TYPE_CHECKING:
     import control
@@ -30,28 +37,26 @@ OUTPUTS = (*STATES, "output_torque", "input_torque")
 
 @dataclass(frozen=True)
 class LinearModel:
-    """One regime of a drive, dx/dt = A x + B u + a, y = C x + D u + c. Exact as long as the regime lasts."""
+    """One regime of a drive or a train, dx/dt = A x + B u + a, y = C x + D u + c. Exact as long as the regime lasts."""
 
     A: np.ndarray
-    """5 x 5, over `states` (SI)"""
+    """over `states` (SI)"""
     B: np.ndarray
-    """5 x 2, over `inputs`"""
+    """over `inputs`"""
     C: np.ndarray
-    """7 x 5, `outputs` over `states`"""
+    """`outputs` over `states`"""
     D: np.ndarray
-    """7 x 2"""
+    """`outputs` over `inputs`"""
     rate: np.ndarray
     """a, constant part of the rates"""
     offset: np.ndarray
     """c, constant part of the outputs"""
     contacts: dict[str, int]
-    """modes of the contacts: -1, 0 stuck, +1; 2: the drive has none"""
-    state: Initial
-    """operating point (SI)"""
-    command: float
-    """at the operating point [-]"""
-    load_torque: float
-    """at the operating point [N·m]"""
+    """modes of the contacts: -1, 0 stuck, +1; 2: a drive has none"""
+    point: dict[str, float]
+    """operating point (SI): states, inputs and, of a drive, the hysteresis capacity, by name"""
+    units: dict[str, str]
+    """of states, inputs and outputs, by name"""
     states: tuple[str, ...] = STATES
     inputs: tuple[str, ...] = INPUTS
     outputs: tuple[str, ...] = OUTPUTS
@@ -60,9 +65,7 @@ class LinearModel:
         """Which operating point and regime it is."""
         words = {-1: "slips in reverse", 0: "is stuck", 1: "slips forward"}
         modes = [f"{c.replace('_', ' ')} {words[m]}" for c, m in self.contacts.items() if m in words]
-        point = {name: getattr(self.state, name) for name in (*STATES, "hysteresis_capacity")}
-        point |= {"command": self.command, "load_torque": self.load_torque}
-        moved = ", ".join(f"{name} {value:.6g}" for name, value in point.items() if value != 0.0)
+        moved = ", ".join(f"{name} {value:.6g}" for name, value in self.point.items() if value != 0.0)
         return f"linear model at {moved or 'rest, command 0'}: {', '.join(modes) or 'no contact'}"
 
     @checked
@@ -150,13 +153,16 @@ def _pairs(values: np.ndarray) -> list[tuple[float, float]]:
 
 @checked
 def linearize(
-    drive: Drive | Scenario,
-    state: Initial | None = None,
+    drive: Drive | Scenario | DriveTrain | TrainScenario | Simulation,
+    state: Initial | TrainInitial | None = None,
     *,
+    time: Time | None = None,
     command: Number = 0.0,
     load_torque: Torque = 0.0,
     command_rate: float = 0.0,
     load_torque_rate: float = 0.0,
+    inputs: Mapping[str, float] | None = None,
+    input_rates: Mapping[str, float] | None = None,
 ) -> LinearModel:
     """The linear model of the regime that a state is in, sticking included.
 
@@ -165,35 +171,129 @@ def linearize(
 
     Parameters
     ----------
+    drive
+        A drive or a train, of a scenario too; or a simulation, which is linearised as it stands.
     state
         The operating point in SI, such as ``Initial(motor_speed=100.0, load_speed=1.1, twist=2e-3)``, ``Initial()`` for rest, or
-        the end of a run, ``Initial(**json.loads(result.attrs["end_state"]))``. May be left out only for a drive that has one
-        regime, which is the same everywhere.
+        the end of a run, ``Initial(**json.loads(result.attrs["end_state"]))``; of a train a `TrainInitial`. May be left out only for a
+        drive that has one regime, which is the same everywhere.
+    time
+        [s]: takes the place of a state, of a scenario, which is run until then with its own inputs.
     command, load_torque
-        Inputs [-], [N·m] at this instant, and their rates [1/s], [N·m/s].
+        Inputs of a drive [-], [N·m] at this instant, and their rates [1/s], [N·m/s].
+    inputs, input_rates
+        The same of a train, by name, such as ``{"servo_command": 0.2, "table_load_torque": 5.0}``; what is left out is 0.
 
     Raises
     ------
     InputError
-        The state is missing, and the drive has several regimes.
+        The state is missing, and the drive has several regimes; or what is given does not go together.
     SolverError
         The state has no continuation.
     """
+    rates = {
+        "command_rate": argument("command_rate", command_rate, "1/s"),
+        "load_torque_rate": argument("load_torque_rate", load_torque_rate, "N*m/s"),
+    }
+    given = {"state": state is not None, "command": command != 0.0, "load_torque": load_torque != 0.0}
+    given |= {name: value != 0.0 for name, value in rates.items()}
+    given |= {"inputs": inputs is not None, "input_rates": input_rates is not None}
+    if isinstance(drive, Simulation):
+        _refuse(given | {"time": time is not None}, "a simulation is linearised as it stands")
+        return _model_now(drive)
+    if time is not None:
+        _refuse(given, "at a time of a run, state and inputs are its own")
+        return _model_of_run(drive, time)
+    if isinstance(drive, DriveTrain | TrainScenario):
+        names = ("command", "load_torque", *rates)
+        _refuse({name: given[name] for name in names}, "a train takes its inputs by name, in inputs and input_rates")
+        return _model_of_train(drive, state, inputs or {}, input_rates or {})
+    _refuse({name: given[name] for name in ("inputs", "input_rates")}, "a drive has command and load_torque")
     drive = drive_of(drive)
+    if not isinstance(state, Initial | None):
+        raise InputError("state: is that of a train; give an Initial")
     if state is None:
-        if regimes := _why_several_regimes(drive):
-            raise InputError(
-                f"linearize: the linear model of this drive depends on the operating point ({regimes}); give one, such as "
-                "Initial(motor_speed=100, load_speed=1, twist=2e-3) [SI], or Initial() for the drive at rest"
-            )
+        _need_one_regime(
+            _why_several_regimes(drive), "Initial(motor_speed=100, load_speed=1, twist=2e-3) [SI], or Initial()"
+        )
         state = Initial()
-    rates, torques, modes = _core.linearization(
-        drive.core(),
-        start_state(state),
-        state.hysteresis_capacity,
-        [command, load_torque],
-        [argument("command_rate", command_rate, "1/s"), argument("load_torque_rate", load_torque_rate, "N*m/s")],
-    )
+    signals = _ramp(command, rates["command_rate"]), _ramp(load_torque, rates["load_torque_rate"])
+    return _drive_model(*_core.linearize_at(drive.core(), *signals, start_state(state), state.hysteresis_capacity, 0.0))
+
+
+def _refuse(given: dict[str, bool], why: str) -> None:
+    if names := [name for name, is_given in given.items() if is_given]:
+        raise InputError(f"{', '.join(names)}: {why}; leave {'it' if len(names) == 1 else 'them'} out")
+
+
+def _need_one_regime(regimes: str, such_as: str) -> None:
+    if regimes:
+        raise InputError(
+            f"linearize: the linear model of this drive depends on the operating point ({regimes}); give one, such as "
+            f"{such_as} for the drive at rest"
+        )
+
+
+def _ramp(value: float, rate: float) -> _core.Signal:
+    return _core.Signal([(0.0, value, rate)], [])
+
+
+def _model_now(simulation: Simulation) -> LinearModel:
+    rows = simulation._core.linearize()
+    if isinstance(simulation.drive, DriveTrain):
+        return _train_model(simulation.drive, list(simulation.loaded), *rows)
+    return _drive_model(*rows)
+
+
+def _model_of_run(what: Any, time: float) -> LinearModel:
+    if not isinstance(what, Scenario | TrainScenario):
+        raise InputError("time: a drive alone has no run; give a scenario, or a state")
+    if not 0.0 <= time <= what.simulation.duration:
+        raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
+    if isinstance(what, Scenario):
+        return _drive_model(*_core.linearize_at(*core_inputs(what), time))
+    return _train_model(what.train(), what.loaded(), *_core.linearize_train_at(*core_case(what), time))
+
+
+def _model_of_train(
+    what: DriveTrain | TrainScenario,
+    state: Initial | TrainInitial | None,
+    inputs: Mapping[str, float],
+    rates: Mapping[str, float],
+) -> LinearModel:
+    train, loaded = loaded_train(what)
+    core = train.core(loaded)
+    if not isinstance(state, TrainInitial | None):
+        raise InputError("state: is that of a drive; give a TrainInitial")
+    if state is None:
+        _need_one_regime(_why_several_regimes_of(train, core), "TrainInitial()")
+        state = TrainInitial()
+    names = core.input_names()
+    for which, values in (("inputs", inputs), ("input_rates", rates)):
+        for name in values:
+            if name not in names:
+                meant = did_you_mean(name, names, f"the inputs are {', '.join(names)}")
+                raise InputError(f"{which}: {shown(name)} is no input of this train; {meant}")
+    unit = {v.name: v.unit.replace("1", "") for v in train_variables(train, loaded)}
+    ramps = [
+        _ramp(
+            argument(f"inputs.{name}", inputs.get(name, 0.0), unit[name]),
+            argument(f"input_rates.{name}", rates.get(name, 0.0), f"{unit[name] or '1'}/s"),
+        )
+        for name in names
+    ]
+    rows = _core.linearize_train_at(core, ramps, start_values(train, state), start_capacities(state), 0.0)
+    return _train_model(train, loaded, *rows)
+
+
+def _drive_model(
+    x: list[float],
+    capacity: float,
+    u: list[float],
+    rates: np.ndarray,
+    torques: dict[str, np.ndarray],
+    modes: list[int],
+) -> LinearModel:
     n = len(STATES)
     A, B = rates[:, :n], rates[:, n : n + 2]
     C, D, offset = np.eye(len(OUTPUTS), n), np.zeros((len(OUTPUTS), 2)), np.zeros(len(OUTPUTS))
@@ -201,7 +301,45 @@ def linearize(
         row = OUTPUTS.index(name)
         C[row], D[row], offset[row] = values[:n], values[n : n + 2], values[-1]
     contacts = dict(zip(CONTACTS, modes, strict=True))
-    return LinearModel(A, B, C, D, rates[:, -1], offset, contacts, state, command, load_torque)
+    point = dict(zip(STATES, x, strict=True)) | {"hysteresis_capacity": capacity} | dict(zip(INPUTS, u, strict=True))
+    units = {v.name: v.unit for v in VARIABLES if v.name in (*INPUTS, *OUTPUTS)}
+    return LinearModel(A, B, C, D, rates[:, -1], offset, contacts, point, units)
+
+
+def _train_model(
+    train: DriveTrain,
+    loaded: Sequence[str],
+    states: dict[str, float],
+    inputs: dict[str, float],
+    rates: np.ndarray,
+    outputs: list[str],
+    rows: np.ndarray,
+    contacts: dict[str, int],
+) -> LinearModel:
+    n, m = len(states), len(inputs)
+    of = dict(zip(outputs, rows, strict=True))
+    nothing = np.zeros(n + m + 1)
+    if all(gear.transmission_error is None for gear in train.gears.values()):  # else the angles are not linear
+        known = [name for name in train.shafts if f"{name}_angle" in of]
+        for shaft, source, name, forward in angles_through_gears(train, known):
+            twist = of.get(f"{name}_twist", nothing)
+            of[f"{shaft}_angle"] = angle_through(train.gears[name], of[f"{source}_angle"], twist, forward=forward)
+    whole = np.array(list(of.values()))
+    units = {v.name: v.unit for v in train_variables(train, loaded) if v.name in {*states, *inputs, *of}}
+    return LinearModel(
+        A=rates[:, :n],
+        B=rates[:, n : n + m],
+        C=whole[:, :n],
+        D=whole[:, n : n + m],
+        rate=rates[:, -1],
+        offset=whole[:, -1],
+        contacts=contacts,
+        point=states | inputs,
+        units=units,
+        states=tuple(states),
+        inputs=tuple(inputs),
+        outputs=tuple(of),
+    )
 
 
 def _why_several_regimes(drive: Drive) -> str:
@@ -213,6 +351,24 @@ def _why_several_regimes(drive: Drive) -> str:
         "hysteresis": g.hysteresis is not None and g.hysteresis.efficiency < 1.0,
         "a torsion curve of several pieces": not isinstance(g.stiffness, Rigid) and len(g.stiffness.pieces()[1]) > 1,
         "a voltage limit": m.voltage_limit is not None,
+    }
+    return ", ".join(reason for reason, holds in reasons.items() if holds)
+
+
+def _why_several_regimes_of(train: DriveTrain, core: _core.Train) -> str:
+    """What gives a train more than one regime; empty if it has one."""
+    gears, motors, shafts = train.gears.values(), train.motors.values(), train.shafts.values()
+    rigid = {f"{name}_twist_contact" for name, g in train.gears.items() if isinstance(g.stiffness, Rigid)}
+    dry = [name for name in core.contact_names() if name not in rigid]
+    limits = any(m.voltage_limit is not None or m.torque_limit is not None for m in motors)
+    curves = any(not isinstance(g.stiffness, Rigid) and len(g.stiffness.pieces()[1]) > 1 for g in gears)
+    reasons = {
+        f"dry contacts: {', '.join(dry)}": bool(dry),
+        "a torsion curve of several pieces": curves,
+        "a limit of a motor": limits,
+        "drag over speed": any(s.drag is not None for s in shafts),
+        "a torque over an angle": bool(train.gravity or train.angle_torques),
+        "a transmission error": any(g.transmission_error is not None for g in gears),
     }
     return ", ".join(reason for reason, holds in reasons.items() if holds)
 

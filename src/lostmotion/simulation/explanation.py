@@ -1,9 +1,10 @@
-"""Why a drive is stuck: what holds each contact, and what would free it."""
+"""Why a drive or a train is stuck: what holds each contact, and what would free it."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
 from .. import _core
@@ -12,9 +13,12 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Time
 from ..model.drive import Drive
 from ..model.self_locking import SelfLocking, self_locking
+from ..model.train import DriveTrain
 from .run import core_inputs
 from .scenario import Scenario
 from .stepping import Simulation
+from .train_results import core_case
+from .train_scenario import TrainScenario
 from .variables import CHANNEL_NAMES
 
 
@@ -28,6 +32,7 @@ class ContactState:
     torque: float  # held, or while slipping taken
     capacity_forward: float  # it holds torques up to this before it slips forward
     capacity_backward: float  # and down to minus this before it slips in reverse
+    shares: dict[str, tuple[float, float]] = field(default_factory=dict)  # of a train: of the capacities, by element
 
     @property
     def to_free_forward(self) -> float:
@@ -45,9 +50,11 @@ class ContactState:
             return f"{self.name}: slips {way} at {self.speed:.4g} rad/s, taking {abs(self.torque):.4g} N·m"
         if math.isinf(self.capacity_forward):
             return f"{self.name}: rigid, holds {self.torque:.4g} N·m"
+        parts = [f"{name} +{forward:.4g} / -{backward:.4g}" for name, (forward, backward) in self.shares.items()]
+        of = f" ({', '.join(parts)})" if len(parts) > 1 else ""
         return (
             f"{self.name}: stuck, holds {self.torque:.4g} N·m of +{self.capacity_forward:.4g} / "
-            f"-{self.capacity_backward:.4g} N·m; {self.to_free_forward:.4g} N·m more frees it forward, "
+            f"-{self.capacity_backward:.4g} N·m{of}; {self.to_free_forward:.4g} N·m more frees it forward, "
             f"{self.to_free_backward:.4g} N·m in reverse"
         )
 
@@ -81,9 +88,66 @@ class Explanation:
         return "\n".join(lines)
 
 
+@dataclass(frozen=True)
+class MotorState:
+    """One motor of a train at one instant, and the constant commands from which on its shaft goes on turning.
+
+    The motor is thought to wind up slowly all that it has to turn, from the present torques of the gears: each shaft that
+    gears and clutches join to its own, against its load, its friction and the other motors, whose commands stay; clutches slip
+    at their capacity. Inertia is left out, torques over angles are those of the present angles. Exact in trains without branches,
+    and with them unless a self-locking gear overruns beside another (then an upper bound); docs/drive-trains.md says more.
+    """
+
+    name: str
+    command: float
+    torque: float  # [N·m]
+    command_forward: float  # above it the shaft turns forward; infinite: never; NaN: not determined by statics
+    command_backward: float  # below it, backward
+    command_limit: float  # that the motor can follow
+
+    def __str__(self) -> str:
+        ways = (("forward", "above", self.command_forward), ("backward", "below", self.command_backward))
+        turns = []
+        for way, beyond, command in ways:
+            if math.isnan(command):
+                turns.append(f"{way} at a command that statics do not determine (gears in a loop)")
+            elif math.isinf(command):
+                turns.append(f"{way} at no command (a gear locks itself, or something holds without limit)")
+            else:
+                limit = f", but it ends at {self.command_limit:.4g}" if abs(command) > self.command_limit else ""
+                turns.append(f"{way} with a constant command {beyond} {command:.4g}{limit}")
+        return f"motor {self.name}: its shaft turns {', '.join(turns)}"
+
+
+@dataclass(frozen=True)
+class TrainExplanation:
+    """The contacts of a train at one instant, and the commands that would turn its motors."""
+
+    time: float  # [s]
+    values: dict[str, float]  # channels at this instant
+    contacts: tuple[ContactState, ...]
+    motors: tuple[MotorState, ...]
+    shafts: tuple[str, ...]
+    self_locking: tuple[
+        SelfLocking, ...
+    ]  # of the gears that lock or chatter under their present torque, or the rated one
+
+    def __str__(self) -> str:
+        motors = [f"{m.name} {m.torque:.4g} N·m at command {m.command:.4g}" for m in self.motors]
+        speeds = [f"{name} {self.values[f'{name}_speed']:.4g} rad/s" for name in self.shafts]
+        lines = [
+            f"t = {self.time:.6g} s: {', '.join([*motors, *speeds])}",
+            *(f"  {contact}" for contact in self.contacts),
+        ]
+        if self.motors:
+            lines.append("  from rest, all else as it is:")
+        lines += [f"    {motor}" for motor in self.motors]
+        return "\n".join([*lines, *(f"  {verdict}" for verdict in self.self_locking)])
+
+
 @checked
-def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanation:
-    """The state of the contacts of a drive at one instant.
+def explain(what: Scenario | Simulation | TrainScenario, time: Time | None = None) -> Explanation | TrainExplanation:
+    """The state of the contacts of a drive or a train at one instant.
 
     Parameters
     ----------
@@ -94,9 +158,9 @@ def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanatio
 
     Returns
     -------
-    Explanation
+    Explanation or, of a train, TrainExplanation
         Print it, or read its numbers. The commands that would move the load leave inertia out: the motor is thought
-        to wind up the gear slowly from its present output torque until the load is free.
+        to wind up the gear slowly from its present output torque until the load is free; of a train see `MotorState`.
 
     Raises
     ------
@@ -106,14 +170,17 @@ def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanatio
     if isinstance(what, Simulation):
         if time is not None:
             raise InputError("a simulation is explained at its present time; leave time out")
-        values, contacts = what._core.explain()
-        return _explanation(what.drive, what.time, values, contacts)
+        if isinstance(what.drive, DriveTrain):
+            return _of_train(what.drive, what.drive.core(what.loaded), what.time, *what._core.explain())
+        return _explanation(what.drive, what.time, *what._core.explain())
     if time is None:
         raise InputError(f"time is missing; give one between 0 and the duration, {what.simulation.duration} s")
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
-    values, contacts = _core.explain_at(*core_inputs(what), time)
-    return _explanation(what.drive(), time, values, contacts)
+    if isinstance(what, TrainScenario):
+        core, *case = core_case(what)
+        return _of_train(what.train(), core, time, *_core.explain_train_at(core, *case, time))
+    return _explanation(what.drive(), time, *_core.explain_at(*core_inputs(what), time))
 
 
 def _explanation(drive: Drive, time: float, values: list[float], contacts: list[tuple[Any, ...]]) -> Explanation:
@@ -125,3 +192,33 @@ def _explanation(drive: Drive, time: float, values: list[float], contacts: list[
     states = tuple(ContactState(*contact) for contact in contacts)
     verdict = self_locking(drive.train(), "gearbox", named["load_torque"] or drive.gearbox.rated_output_torque)
     return Explanation(time, named, states, forward, backward, math.inf if limit is None else limit, verdict)
+
+
+def _of_train(
+    train: DriveTrain,
+    core: _core.Train,
+    time: float,
+    values: list[float],
+    contacts: list[tuple[Any, ...]],
+    motors: list[tuple[str, float, float]],
+) -> TrainExplanation:
+    named = dict(zip((name for name, _, _ in core.channels()), values, strict=True))
+    states = []
+    for name, mode, speed, torque, forward, backward, elements in contacts:
+        shares = {element: (one, other) for element, one, other in elements}
+        states.append(ContactState(name, mode, speed, torque, forward, backward, shares))
+    turned = []
+    for name, forward, backward in motors:
+        motor = train.motors[name]
+        limits = (motor.command_limit, None if motor.torque_limit is None else motor.torque_limit / motor.rated_torque)
+        limit = min(limit for limit in (*limits, math.inf) if limit is not None)
+        turned.append(MotorState(name, named[f"{name}_command"], named[f"{name}_torque"], forward, backward, limit))
+    verdicts = tuple(_verdicts(train, named))
+    return TrainExplanation(time, named, tuple(states), tuple(turned), tuple(train.shafts), verdicts)
+
+
+def _verdicts(train: DriveTrain, named: dict[str, float]) -> Iterator[SelfLocking]:
+    for name, gear in train.gears.items():
+        torque = abs(named[f"{name}_output_torque"]) or gear.rated_output_torque
+        if torque and (verdict := self_locking(train, name, torque)).notable:
+            yield verdict

@@ -1,9 +1,9 @@
-"""A drive advanced step by step: for control loops, co-simulation and learning."""
+"""A drive or a train advanced step by step: for control loops, co-simulation and learning."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, overload
 
@@ -13,16 +13,24 @@ from .. import _core
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Time
-from ..inputs.validation import shown
+from ..inputs.validation import did_you_mean, shown
 from ..model.drive import Drive
+from ..model.train import DriveTrain
 from .run import start_state
 from .scenario import Initial, Scenario, drive_of
-from .variables import CHANNEL_NAMES, VARIABLES
+from .train_scenario import TrainInitial, TrainScenario, loaded_train
+from .train_state import start_capacities, start_values
+from .train_variables import angle_through, angles_through_gears, train_variables
+from .variables import CHANNEL_NAMES, VARIABLES, Variable
 
 MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 """Of a step [s]: below, it is lost in the rounding of the time; above, in that of a motion's phase."""
 
+_GIVE: Any = object()  # in the place of what has no default
 _CHANNEL = {name: k for k, name in enumerate(CHANNEL_NAMES)}
+
+Ramp = float | tuple[float, float]
+Derived = Callable[[list[float]], float]
 
 
 @dataclass(frozen=True)
@@ -32,19 +40,23 @@ class SimulationState:
     time: float
     """[s]"""
     values: tuple[Any, ...] = field(repr=False)
+    drive: Drive | DriveTrain = field(repr=False)
+    """whose state it is"""
 
 
 class Simulation:
-    """A drive that is advanced interval by interval.
+    """A drive or a train that is advanced interval by interval.
 
     Parameters
     ----------
     drive
-        A drive, or a scenario, which also gives the state at t = 0; its command and load torque are not used.
+        A drive or a train, or a scenario, which also gives the state at t = 0; its commands and load torques are not used.
     step
         The usual interval [s]; any other is possible, this one is fastest.
     initial
         State at t = 0; default that of the scenario, or rest.
+    loaded
+        Names of the shafts of a train that a load torque may act on; default those of the scenario, of a train alone all.
 
     Examples
     --------
@@ -52,70 +64,126 @@ class Simulation:
     >>> sim.advance(1e-3, command=0.1)                                # doctest: +SKIP
     >>> sim["load_speed"]                                             # doctest: +SKIP
     >>> sim["load_speed", "twist"]                                    # doctest: +SKIP
+    >>> ring = Simulation(train)                                      # doctest: +SKIP
+    >>> ring.advance(1e-3, m1_command=0.4, m2_command=-0.4)           # doctest: +SKIP
     """
 
     @checked
-    def __init__(self, drive: Drive | Scenario, *, step: Time = 1e-3, initial: Initial | None = None) -> None:
+    def __init__(
+        self,
+        drive: Drive | Scenario | DriveTrain | TrainScenario,
+        *,
+        step: Time = 1e-3,
+        initial: Initial | TrainInitial | None = None,
+        loaded: Sequence[str] | None = None,
+    ) -> None:
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
             raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
-        if initial is None:
-            initial = drive.initial if isinstance(drive, Scenario) else Initial()
-        self._drive = drive_of(drive)
-        self._core = _core.Simulation(self._drive.core(), step)
-        self._initial = initial
-        self._derived: dict[str, Callable[[list[float]], float]] = {
-            "efficiency": self._efficiency,
-            "motor_power": self._motor_power,
-        }
-        self.reset()
+        self._drive: Drive | DriveTrain
+        self._core: _core.Simulation | _core.TrainSimulation
+        self._input_places: dict[str, int] | None = None  # of a train
+        self._loaded: tuple[str, ...] = ()
+        self._variables: tuple[Variable, ...] = VARIABLES
+        self._channel = _CHANNEL
+        self._derived: dict[str, Derived]
+        self._initial: Initial | TrainInitial
+        if isinstance(drive, DriveTrain | TrainScenario):
+            self._of_train(drive, step, loaded)
+        elif loaded is not None:
+            raise InputError("loaded: is for trains; a drive has one load torque, on its load")
+        else:
+            self._drive = drive_of(drive)
+            self._core = _core.Simulation(self._drive.core(), step)
+            self._derived = {"efficiency": self._efficiency, "motor_power": self._motor_power}
+            self._initial = drive.initial if isinstance(drive, Scenario) else Initial()
+        self.reset(initial)
+
+    def _of_train(self, what: DriveTrain | TrainScenario, step: float, loaded: Sequence[str] | None) -> None:
+        train, shafts = loaded_train(what, loaded)
+        core = train.core(shafts)
+        self._drive = train
+        self._core = _core.TrainSimulation(core, step)
+        self._input_places = {name: k for k, name in enumerate(core.input_names())}
+        self._loaded = tuple(shafts)
+        self._required = {f"{name}_command" for name in train.commanded()}
+        self._variables = train_variables(train, shafts)
+        self._channel = {name: k for k, (name, _, _) in enumerate(core.channels())}
+        self._derived = self._derived_of(train)
+        self._initial = what.initial if isinstance(what, TrainScenario) else TrainInitial()
 
     def __repr__(self) -> str:
         return f"Simulation({self._drive!r}, at {self.time:.6g} s)"
 
     @checked
-    def reset(self, initial: Initial | None = None) -> None:
+    def reset(self, initial: Initial | TrainInitial | None = None) -> None:
         """Go back to t = 0.
 
         Parameters
         ----------
         initial
             A new state at t = 0; left out, that of the last start.
+
+        Raises
+        ------
+        InputError
+            A train is given the state of a drive or the other way round, or a state that it cannot have.
         """
-        if initial is not None:
-            self._initial = initial
-        start = self._initial
-        self._core.reset(start_state(start), start.hysteresis_capacity)
+        start = self._initial if initial is None else initial
+        if isinstance(self._core, _core.TrainSimulation):
+            if not isinstance(start, TrainInitial) or not isinstance(self._drive, DriveTrain):
+                raise InputError("initial: is the state of a drive; that of a train is a TrainInitial")
+            self._core.reset(start_values(self._drive, start), start_capacities(start))
+        else:
+            if not isinstance(start, Initial):
+                raise InputError("initial: is the state of a train; that of a drive is an Initial")
+            self._core.reset(start_state(start), start.hysteresis_capacity)
+        self._initial = start
 
     @property
-    def drive(self) -> Drive:
-        """The drive that is simulated."""
+    def drive(self) -> Drive | DriveTrain:
+        """The drive or train that is simulated."""
         return self._drive
+
+    @property
+    def loaded(self) -> tuple[str, ...]:
+        """Names of the shafts of a train that a load torque may act on."""
+        return self._loaded
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of what is given to `advance`."""
+        return ("command", "load_torque") if self._input_places is None else tuple(self._input_places)
 
     @property
     def time(self) -> float:
         """[s]"""
         return self._core.time()
 
-    def advance(
-        self,
-        interval: float,
-        command: float | tuple[float, float],
-        load_torque: float | tuple[float, float] = 0.0,
-    ) -> None:
+    def advance(self, interval: float, command: Ramp = _GIVE, load_torque: Ramp = 0.0, **inputs: Ramp) -> None:
         """Advance by an interval [s].
 
         Parameters
         ----------
         command, load_torque
-            E_C [-] and M_Z [N·m]: one value, held over the interval, or two, between which it runs in a straight line.
+            Of a drive E_C [-] and M_Z [N·m]: one value, held over the interval, or two, between which it runs in a
+            straight line.
+        inputs
+            Of a train the same by the names in `inputs`, such as ``servo_command=0.2`` and ``table_load_torque=(0.0, 5.0)``. All
+            commands are to be given; a load torque that is left out is 0.
 
         Raises
         ------
         InputError
-            The interval is shorter than 1e-12 s or longer than 1e12 s, or a value is not finite.
+            The interval is shorter than 1e-12 s or longer than 1e12 s, a value is not finite, or a name is unknown.
         SolverError
-            The motion has no continuation. The state stays as it was.
+            The motion has no continuation; the message names the contact. The state stays as it was.
         """
+        if self._input_places is not None:
+            self._advance_train(interval, command, load_torque, inputs)
+            return
+        if inputs or command is _GIVE:
+            wrong = f"an unexpected keyword argument '{next(iter(inputs))}'" if inputs else None
+            raise TypeError(f"advance() got {wrong}" if wrong else "advance() missing a required argument: 'command'")
         try:
             c0, c1 = command if isinstance(command, tuple) else (command, command)
             m0, m1 = load_torque if isinstance(load_torque, tuple) else (load_torque, load_torque)
@@ -126,17 +194,55 @@ class Simulation:
                 f"interval {shown(interval)}, command {shown(command)} and load_torque {shown(load_torque)} must be numbers (SI), the last two "
                 "also pairs of numbers"
             ) from None
-        if not within:
-            raise InputError(f"interval {shown(interval)} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
+        if not within or self.time + interval == self.time:
+            raise self._no_interval(interval)
         if not finite:
             raise InputError(
                 f"command {shown(command)} and load_torque {shown(load_torque)} must be finite numbers (SI)"
             )
-        if self.time + interval == self.time:
-            raise InputError(
-                f"interval {interval} s is below the resolution of the time, {self.time} s; take a longer one, or reset"
+        self._core.advance(interval, c0, c1, m0, m1)  # type: ignore[call-arg, arg-type]
+
+    def _advance_train(self, interval: float, command: Any, load_torque: Any, inputs: dict[str, Ramp]) -> None:
+        places = self._input_places or {}
+        if command is not _GIVE or load_torque != 0.0:
+            raise InputError(f"a train takes its inputs by name: {', '.join(places)}")
+        begin, end = [0.0] * len(places), [0.0] * len(places)
+        for name, value in inputs.items():
+            try:
+                first, last = value if isinstance(value, tuple) else (value, value)
+                finite = first - first == 0.0 and last - last == 0.0
+                begin[places[name]], end[places[name]] = float(first), float(last)
+            except KeyError:
+                raise self._no_input(name) from None
+            except (TypeError, ValueError):
+                raise InputError(f"{name} {shown(value)} must be a number (SI), or a pair of numbers") from None
+            if not finite:
+                raise InputError(f"{name} {shown(value)} must be finite (SI)")
+        if missing := self._required - inputs.keys():
+            raise InputError(f"{', '.join(sorted(missing))}: missing; all commands are to be given")
+        try:
+            within = MIN_INTERVAL <= interval <= MAX_INTERVAL
+        except (TypeError, ValueError):
+            raise InputError(f"interval {shown(interval)} must be a number (SI)") from None
+        if not within or self.time + interval == self.time:
+            raise self._no_interval(interval)
+        self._core.advance(interval, begin, end)  # type: ignore[call-arg, arg-type]
+
+    def _no_interval(self, interval: float) -> InputError:
+        if not MIN_INTERVAL <= interval <= MAX_INTERVAL:
+            return InputError(
+                f"interval {shown(interval)} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s"
             )
-        self._core.advance(interval, c0, c1, m0, m1)
+        return InputError(
+            f"interval {interval} s is below the resolution of the time, {self.time} s; take a longer one, or reset"
+        )
+
+    def _no_input(self, name: str) -> InputError:
+        shaft = name.removesuffix("_load_torque")
+        if shaft != name and isinstance(self._drive, DriveTrain) and shaft in self._drive.shafts:
+            return InputError(f'{name}: no load torque acts on this shaft; make the simulation with loaded=["{shaft}"]')
+        meant = did_you_mean(name, self.inputs, f"the inputs are {', '.join(self.inputs)}")
+        return InputError(f"{name}: is no input of this train; {meant}")
 
     @overload
     def __getitem__(self, name: str) -> float: ...
@@ -157,16 +263,16 @@ class Simulation:
 
     def _value(self, name: str, values: list[float]) -> float:
         try:
-            channel = _CHANNEL.get(name)
+            channel = self._channel.get(name)
             return values[channel] if channel is not None else self._derived[name](values)
         except (KeyError, TypeError):  # unknown, or nothing that could be a name
-            known = ", ".join(v.name for v in VARIABLES)
+            known = ", ".join(v.name for v in self._variables)
             raise InputError(f"{shown(name)} is no variable; the variables are {known}") from None
 
     def read(self) -> dict[str, float]:
         """All result variables (SI), by name."""
         values = self._core.read()
-        return {v.name: self._value(v.name, values) for v in VARIABLES}
+        return {v.name: self._value(v.name, values) for v in self._variables}
 
     # The array functions of `results` take ten times as long for a single number.
 
@@ -175,7 +281,7 @@ class Simulation:
 
     def _efficiency(self, values: list[float]) -> float:
         speed = values[_CHANNEL["motor_speed"]]
-        if speed == 0.0:
+        if speed == 0.0 or not isinstance(self._drive, Drive):
             return math.nan
         driving = math.copysign(1.0, speed) * values[_CHANNEL["output_torque"]]
         fed_in = math.copysign(1.0, speed) * values[_CHANNEL["input_torque"]] * self._drive.gearbox.ratio
@@ -183,15 +289,36 @@ class Simulation:
             return driving / fed_in if fed_in != 0.0 else math.nan if driving == 0.0 else math.inf
         return fed_in / driving if fed_in < 0.0 else 0.0
 
+    def _derived_of(self, train: DriveTrain) -> dict[str, Derived]:
+        """What the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
+
+        def angle_of(source: str, name: str, forward: bool) -> Derived:
+            gear, twist = train.gears[name], f"{name}_twist"
+            return lambda values: float(
+                angle_through(gear, self._value(f"{source}_angle", values), self._value(twist, values), forward=forward)
+            )
+
+        known = [name for name in train.shafts if f"{name}_angle" in self._channel]
+        derived: dict[str, Derived] = {
+            f"{name}_twist": lambda _: 0.0 for name in train.gears if f"{name}_twist" not in self._channel
+        }
+        for shaft, source, gear, forward in angles_through_gears(train, known):
+            derived[f"{shaft}_angle"] = angle_of(source, gear, forward)
+        return derived
+
     @property
     def state(self) -> SimulationState:
         """The whole state; set it to return to it, or to continue it in another simulation of the same drive."""
         time, *rest = self._core.get_state()
-        return SimulationState(time, tuple(rest))
+        return SimulationState(time, tuple(rest), self._drive)
 
     @state.setter
     def state(self, state: SimulationState) -> None:
         try:
-            self._core.set_state(state.time, *state.values)
+            same = state.drive is self._drive or state.drive == self._drive
+            if same:
+                self._core.set_state(state.time, *state.values)
         except (AttributeError, TypeError):
             raise InputError(f"{shown(state)} is no state of a simulation; give what `state` returned") from None
+        if not same:
+            raise InputError(f"{shown(state)} is the state of another drive, with other parameters")

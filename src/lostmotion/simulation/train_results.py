@@ -14,7 +14,8 @@ from .results import RawResult, installed_version
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import CONTACTS_OF_TRAIN, packed
 from .train_scenario import TrainScenario
-from .train_state import start_values
+from .train_state import start_capacities, start_values
+from .train_variables import angle_through, angles_through_gears
 
 
 def run_train(scenario: TrainScenario, options: tuple[Any, ...], how: str, *, ledger: bool) -> RawResult:
@@ -43,8 +44,7 @@ def core_case(
     core = train.core(scenario.loaded())
     signals = scenario.signals()
     inputs = [signals[name].core() for name in core.input_names()]
-    capacities = {name: h for name, h in scenario.initial.hysteresis_capacities.items() if h}
-    return core, inputs, start_values(train, scenario.initial), capacities
+    return core, inputs, start_values(train, scenario.initial), start_capacities(scenario.initial)
 
 
 def _attributes(scenario: TrainScenario, result: dict[str, Any], how: str, *, ledger: bool) -> dict[str, Any]:
@@ -76,19 +76,6 @@ def add_derived_of_train(train: DriveTrain, data: dict[str, np.ndarray], time: n
         if isinstance(gear.stiffness, Rigid):
             data.setdefault(f"{name}_twist", np.zeros_like(time))
     known = [name for name in train.shafts if f"{name}_angle" in data]
-    while known:
-        shaft = known.pop()
-        for name, gear in train.gears.items():
-            if shaft not in (gear.input, gear.output):
-                continue
-            other = gear.output if shaft == gear.input else gear.input
-            if f"{other}_angle" in data:
-                continue
-            angle, twist = data[f"{shaft}_angle"], data[f"{name}_twist"]
-            if other == gear.input:  # without a transmission error, which needs that angle in the solver
-                data[f"{other}_angle"] = gear.ratio * (angle + twist)
-            else:
-                error = gear.transmission_error
-                e = 0.0 if error is None else np.vectorize(error.core())(angle)
-                data[f"{other}_angle"] = angle / gear.ratio - twist - e
-            known.append(other)
+    for shaft, source, name, forward in angles_through_gears(train, known):
+        angle, twist = data[f"{source}_angle"], data[f"{name}_twist"]
+        data[f"{shaft}_angle"] = angle_through(train.gears[name], angle, twist, forward=forward)

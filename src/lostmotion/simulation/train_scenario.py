@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..inputs.named import nothing
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Speed, Torque
-from ..inputs.validation import did_you_mean
+from ..inputs.validation import did_you_mean, shown
 from ..model.shaft import Shaft
 from ..model.signals import CommandSignal, TorqueSignal
 from ..model.train import DriveTrain, Elements, TrainElements
@@ -121,6 +121,33 @@ class TrainScenario(TrainElements):
     @classmethod
     def _described_by(cls) -> dict[str, Any]:
         return train_schema()
+
+
+def loaded_train(what: DriveTrain | TrainScenario, loaded: Sequence[str] | None = None) -> tuple[DriveTrain, list[str]]:
+    """A train, and the names of the shafts that a load torque may act on.
+
+    Parameters
+    ----------
+    loaded
+        These; left out, those of the scenario, of a train alone all.
+
+    Raises
+    ------
+    InputError
+        One of them is no shaft, or names of variables coincide.
+    """
+    train = what if isinstance(what, DriveTrain) else what.train()
+    if loaded is None:
+        shafts = list(train.shafts) if isinstance(what, DriveTrain) else what.loaded()
+    else:
+        shafts = list(loaded)
+        for name in shafts:
+            if name not in train.shafts:
+                meant = did_you_mean(name, train.shafts, f"the shafts are {', '.join(train.shafts)}")
+                raise InputError(f"loaded: {shown(name)} is no shaft of this train; {meant}")
+        train.check(shafts)
+    check_names(train, shafts)
+    return train, shafts
 
 
 def is_train(tables: Mapping[str, Any]) -> bool:

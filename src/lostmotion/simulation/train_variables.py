@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from typing import Any
+
+import numpy as np
 
 from ..errors import InputError
+from ..model.gear import Gear
 from ..model.train import DriveTrain, TrainElements
 from .variables import Variable
 
@@ -27,6 +31,42 @@ def _derived(train: DriveTrain) -> Iterator[Variable]:
         yield Variable(f"{name}_angle", "", "rad", "angle of the shaft", derived=True)
     for name in train.gears:
         yield Variable(f"{name}_twist", "", "rad", "angle of input/ratio less that of output", derived=True)
+
+
+def angles_through_gears(train: DriveTrain, known: Collection[str]) -> Iterator[tuple[str, str, str, bool]]:
+    """How the angles that the solver does not integrate follow from those that it does.
+
+    Parameters
+    ----------
+    known
+        Names of the shafts whose angles are known.
+
+    Yields
+    ------
+    tuple
+        Shaft, the shaft from which its angle follows, the gear between them, and whether that leads to the gear's output.
+    """
+    reached = set(known)
+    waiting = [name for name in train.shafts if name in reached]
+    while waiting:
+        shaft = waiting.pop()
+        for name, gear in train.gears.items():
+            if shaft not in (gear.input, gear.output):
+                continue
+            other = gear.output if shaft == gear.input else gear.input
+            if other not in reached:
+                yield other, shaft, name, other == gear.output
+                reached.add(other)
+                waiting.append(other)
+
+
+def angle_through(gear: Gear, angle: Any, twist: Any, *, forward: bool) -> Any:
+    """The angle at the other side of a gear, forward at its output, of numbers or arrays."""
+    if not forward:  # without a transmission error, which needs that angle in the solver
+        return gear.ratio * (angle + twist)
+    error = gear.transmission_error
+    e = 0.0 if error is None else np.vectorize(error.core())(angle)
+    return angle / gear.ratio - twist - e
 
 
 def check_names(train: DriveTrain, loaded: Collection[str]) -> None:

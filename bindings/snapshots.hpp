@@ -1,0 +1,104 @@
+// Snapshots of simulations as numbers, so that they can be kept and pickled.
+#pragma once
+
+#include "arrays.hpp"
+#include "lostmotion/simulation/train_stepping.hpp"
+
+namespace lostmotion::binding {
+
+using Numbers = std::vector<double>;
+
+// Of what was given, `count` numbers.
+template <class T>
+void check_size(const std::vector<T>& given, std::size_t count) {
+    if (given.size() != count) throw nb::type_error("a state of another simulation");
+}
+
+inline Numbers from_memory(const Memory& m) { return {m.hysteresis_capacity, m.locked_torque}; }
+inline void to_memory(const Numbers& v, Memory& m) {
+    check_size(v, 2);
+    m = {v[0], v[1]};
+}
+template <std::size_t n>
+Numbers from_memory(const std::array<double, n>& m) {
+    return {m.begin(), m.end()};
+}
+template <std::size_t n>
+void to_memory(const Numbers& v, std::array<double, n>& m) {
+    check_size(v, n);
+    std::copy(v.begin(), v.end(), m.begin());
+}
+
+// The modes of the contacts, and which pieces of the laws hold.
+inline std::vector<int> from_key(const RegimeKey& k) {
+    return {k.modes[0], k.modes[1], k.modes[2], k.amplifier, k.piece, k.cell, k.cell_back};
+}
+inline void to_key(const std::vector<int>& v, RegimeKey& key) {
+    check_size(v, n_contacts + 4);
+    for (std::size_t c = 0; c < n_contacts; ++c) key.modes[c] = static_cast<std::int8_t>(v[c]);
+    key.amplifier = static_cast<std::int8_t>(v[3]);
+    key.piece = static_cast<std::int16_t>(v[4]);
+    key.cell = v[5];
+    key.cell_back = v[6];
+}
+inline std::vector<int> from_key(const model::Key& k) {
+    std::vector<int> v(k.modes.begin(), k.modes.end());
+    v.insert(v.end(), k.branch.begin(), k.branch.end());
+    return v;
+}
+inline void to_key(const std::vector<int>& v, model::Key& key) {
+    check_size(v, key.modes.size() + key.branch.size());
+    for (std::size_t c = 0; c < key.modes.size(); ++c) key.modes[c] = static_cast<std::int8_t>(v[c]);
+    for (std::size_t b = 0; b < key.branch.size(); ++b)
+        key.branch[b] = static_cast<std::int16_t>(v[key.modes.size() + b]);
+}
+
+// The course of a motion and whether the inputs are constant.
+template <class D>
+Numbers from_course(const CourseOf<D>& c, bool steady) {
+    Numbers v(c.rate.begin(), c.rate.end());
+    v.insert(v.end(), c.input.begin(), c.input.end());
+    v.push_back(c.rate_known);
+    for (const auto& t : c.twist)
+        for (const double x : {double(t.off_zero), t.grazing_magnitude, t.doubt, t.most_doubt}) v.push_back(x);
+    v.push_back(steady);
+    return v;
+}
+template <class D>
+void to_course(const Numbers& v, CourseOf<D>& c, bool& steady) {
+    check_size(v, c.rate.size() + c.input.size() + 4 * c.twist.size() + 2);
+    const double* next = v.data();
+    for (double& x : c.rate) x = *next++;
+    for (double& x : c.input) x = *next++;
+    c.rate_known = *next++ != 0.0;
+    for (auto& t : c.twist) {
+        t = {next[0] != 0.0, next[1], next[2], next[3]};
+        next += 4;
+    }
+    steady = *next != 0.0;
+}
+
+template <class System>
+nb::tuple get_state(const SimulationOf<System>& s) {
+    const auto& n = s.snapshot();
+    return nb::make_tuple(n.time, Numbers(n.x.begin(), n.x.end()), from_memory(n.memory), from_key(n.key),
+                          Numbers(n.input.begin(), n.input.end()), n.started, from_course(n.course, n.steady));
+}
+
+template <class System>
+void set_state(SimulationOf<System>& s, double time, const Numbers& x, const Numbers& memory,
+               const std::vector<int>& key, const Numbers& input, bool started, const Numbers& course) {
+    typename SimulationOf<System>::Snapshot to;
+    to.time = time;
+    check_size(x, to.x.size());
+    std::copy(x.begin(), x.end(), to.x.begin());
+    to_memory(memory, to.memory);
+    to_key(key, to.key);
+    check_size(input, to.input.size());
+    std::copy(input.begin(), input.end(), to.input.begin());
+    to.started = started;
+    to_course(course, to.course, to.steady);
+    s.restore(to);
+}
+
+}  // namespace lostmotion::binding

@@ -1,0 +1,158 @@
+// From which command on a motor keeps its shaft turning: statics of a train, the inertia forces left out.
+//
+// The motor is thought to wind up slowly, from the torques that the gears pass on at present, all that it has to turn:
+// everything that gears and clutches join to its shaft, each shaft against its load, its dry friction and the other
+// motors, whose commands stay. The hardest point on the way of each gear counts. A gear driven from its output turns
+// the motor behind it, unless it locks itself; a clutch slips where its capacity is less than what is behind it needs.
+// Torques over angles are those of the present angles. Without a branch that is exact, of any length; where shafts turn
+// several gears, it is too as long as each gear needs more torque on its input the more it is loaded (a self-locking
+// one that overruns needs less), else it is an upper bound.
+#pragma once
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "../model/capacity.hpp"
+
+namespace lostmotion {
+
+class Breakaway {
+ public:
+    // now: a point of a motion in the regime r.
+    Breakaway(const model::Assembly& a, const model::Regime& r, const model::Instant& now)
+        : assembly_(a), train_(a.train()), key_(r.key), now_(now) {
+        for (const model::Row& T : r.output_torque) T_2_.push_back(model::evaluate(a.layout(), T, now));
+    }
+    // Forward s = +1, backward s = -1. Infinite if no command turns it; NaN if it turns a loop, whose torques depend on
+    // more than statics.
+    double command(int motor, int s) {
+        const model::ShaftMotor& m = train_.motors[static_cast<std::size_t>(motor)];
+        left_out_ = motor;
+        loop_ = false;
+        visited_.assign(train_.shafts.size(), false);
+        const double needed = to_turn(m.shaft, s, nullptr);
+        return loop_ ? std::numeric_limits<double>::quiet_NaN() : needed / m.law.stall_torque();
+    }
+
+ private:
+    static constexpr double never = std::numeric_limits<double>::infinity();
+
+    // Torque that has to act on a shaft, beside what acts on it anyway and not through the element `from`, so that it
+    // turns in direction s and takes along all that is behind it.
+    double to_turn(int shaft, int s, const void* from) {
+        visited_[static_cast<std::size_t>(shaft)] = true;
+        double needed = -acting(shaft);
+        for (const model::CapacityShare& c : model::shaft_capacity(assembly_, shaft, 0.0, now_, nullptr))
+            needed += s * c.forward;
+        for (std::size_t g = 0; g < train_.gears.size(); ++g) {
+            const model::Gear& gear = train_.gears[g];
+            if (&gear == from || (gear.input != shaft && gear.output != shaft)) continue;
+            needed += gear.input == shaft ? to_drive(static_cast<int>(g), s) : to_drive_back(static_cast<int>(g), s);
+        }
+        for (std::size_t k = 0; k < train_.couplings.size(); ++k) {
+            const model::Coupling& c = train_.couplings[k];
+            if (&c != from && (c.input == shaft || c.output == shaft))
+                needed += to_carry(static_cast<int>(k), c.input == shaft, s);
+        }
+        return needed;
+    }
+    bool reaches_a_loop(int shaft) {
+        if (!visited_[static_cast<std::size_t>(shaft)]) return false;
+        loop_ = true;
+        return true;
+    }
+
+    // Torques on a shaft that do not depend on whether it turns.
+    double acting(int shaft) const {
+        double sum = 0.0;
+        for (std::size_t m = 0; m < train_.motors.size(); ++m)
+            if (train_.motors[m].shaft == shaft && static_cast<int>(m) != left_out_)
+                sum += train_.motors[m].torque_at_rest(input(assembly_.places().motors[m].command));
+        for (std::size_t k = 0; k < train_.angle_torques.size(); ++k)
+            if (train_.angle_torques[k].shaft == shaft)
+                sum += model::evaluate(assembly_.layout(), assembly_.angle_torque(static_cast<int>(k), key_), now_);
+        const int load = assembly_.places().shafts[static_cast<std::size_t>(shaft)].load;
+        return load == model::nowhere ? sum : sum - input(load);
+    }
+    double input(int k) const { return now_.input[0][static_cast<std::size_t>(k)]; }
+
+    // What a gear that passes T on takes from its input shaft, which turns in direction s.
+    double input_torque(int g, double T, int s) const {
+        const model::Gear& gear = train_.gears[static_cast<std::size_t>(g)];
+        const double T_1 = assembly_.per_input(g, key_) * T;
+        if (!gear.has_dry_losses())
+            return gear.law.losses == Gearbox::constant_efficiency ? T_1 / gear.law.efficiency : T_1;
+        return T_1 + s * gear.loss(s * T, 0.0).torque / gear.law.ratio;
+    }
+    // Where that is not straight: loads s T, rising.
+    std::vector<double> edges(int g) const {
+        const model::Gear& gear = train_.gears[static_cast<std::size_t>(g)];
+        std::vector<double> out;
+        if (gear.has_dry_losses())
+            for (int j = 0; j + 1 < gear.load_intervals(); ++j) out.push_back(gear.load_upper(j) * gear.rated_torque());
+        return out;
+    }
+
+    double to_drive(int g, int s) {
+        const model::Gear& gear = train_.gears[static_cast<std::size_t>(g)];
+        if (reaches_a_loop(gear.output)) return 0.0;
+        const double T_0 = T_2_[static_cast<std::size_t>(g)], T = to_turn(gear.output, s, &gear);
+        if (std::isinf(T)) return s * never;
+        double hardest = s * input_torque(g, T, s);
+        if (s * (T - T_0) <= 0.0) return s * hardest;
+        hardest = std::fmax(hardest, s * input_torque(g, T_0, s));
+        for (const double load : edges(g))
+            if (load > s * T_0 && load < s * T) hardest = std::fmax(hardest, s * input_torque(g, s * load, s));
+        return s * hardest;
+    }
+
+    // The output turns the input: T_2 falls from what it is until what the gear takes from its input shaft, there a
+    // drive, turns that.
+    double to_drive_back(int g, int s) {
+        const model::Gear& gear = train_.gears[static_cast<std::size_t>(g)];
+        if (reaches_a_loop(gear.input)) return 0.0;
+        const double wanted = -s * to_turn(gear.input, s, &gear);
+        if (std::isinf(wanted)) return s * never;
+        const auto taken = [&](double load) { return s * input_torque(g, s * load, s); };
+        double load = s * T_2_[static_cast<std::size_t>(g)];
+        const bool falls = taken(load) > wanted;  // else it has been wound up too far, and is relieved
+        std::vector<double> stops = edges(g);
+        if (falls) std::reverse(stops.begin(), stops.end());
+        for (const double stop : stops) {
+            if (falls ? stop >= load : stop <= load) continue;
+            if (falls == (taken(stop) <= wanted)) return -s * between(load, stop, taken, wanted);
+            load = stop;
+        }
+        const double far = load + (falls ? -1.0 : 1.0) * gear.rated_torque();
+        if ((taken(far) < taken(load)) != falls) return s * never;  // self-locking
+        return -s * between(load, far, taken, wanted);
+    }
+    // Where a straight line through two points has a value.
+    template <class F>
+    static double between(double a, double b, const F& f, double value) {
+        const double f_a = f(a), f_b = f(b);
+        return f_a == f_b ? b : a + (value - f_a) / (f_b - f_a) * (b - a);
+    }
+
+    double to_carry(int k, bool from_input, int s) {
+        const model::Coupling& c = train_.couplings[static_cast<std::size_t>(k)];
+        const int other = from_input ? c.output : c.input;
+        if (reaches_a_loop(other)) return 0.0;
+        const int place = assembly_.places().couplings[static_cast<std::size_t>(k)].input;
+        const double u = place == model::nowhere ? 0.0 : input(place), way = from_input ? 1.0 : -1.0;
+        const double torque = way * to_turn(other, s, &c);  // that it has to pass on
+        return way * std::clamp(torque, -c.capacity(-1, u), c.capacity(+1, u));
+    }
+
+    const model::Assembly& assembly_;
+    const model::Train& train_;
+    model::Key key_;
+    model::Instant now_;
+    std::vector<double> T_2_;
+    std::vector<bool> visited_;
+    int left_out_ = -1;
+    bool loop_ = false;
+};
+
+}  // namespace lostmotion

@@ -1,0 +1,66 @@
+// The regime of a train at a point as matrices: its rates and outputs over states and inputs.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "../model/names.hpp"
+#include "../simulation/train_point.hpp"
+
+namespace lostmotion {
+
+struct LinearRegime {
+    std::vector<std::string> states;  // those that the train moves
+    std::vector<double> state;        // their values
+    std::vector<std::string> outputs;
+    // A row each: over the states, over the inputs, constant.
+    std::vector<std::vector<double>> rate, output;
+};
+
+inline LinearRegime linearize(const model::Assembly& a, const std::vector<TrainChannel>& channels,
+                              const TrainPoint& p) {
+    using Channel = TrainChannel;
+    const model::Layout& n = a.layout();
+    const model::Regime r = a.build(p.key);
+    // A torque source and a rigid gear may have a place in the kernel; they have no state.
+    std::vector<bool> moves(static_cast<std::size_t>(n.states), true);
+    for (std::size_t m = 0; m < a.train().motors.size(); ++m)
+        if (const int k = a.places().motors[m].torque; k != model::nowhere)
+            moves[static_cast<std::size_t>(k)] = a.train().motors[m].law.kind == Motor::dc;
+    for (std::size_t g = 0; g < a.train().gears.size(); ++g)
+        if (const int k = a.places().gears[g].twist; k != model::nowhere)
+            moves[static_cast<std::size_t>(k)] = !a.train().gears[g].rigid();
+    const auto row = [&](const model::Row& f) {
+        std::vector<double> out;
+        for (int k = 0; k < n.states; ++k)
+            if (moves[static_cast<std::size_t>(k)]) out.push_back(f.c[k]);
+        for (int i = 0; i < n.inputs; ++i) out.push_back(f.c[n.first_input + i]);
+        double constant = f.c[n.one];
+        for (int m = 0; m < n.memory; ++m) constant += f.c[n.first_memory + m] * p.now.memory[m];
+        out.push_back(constant);
+        return out;
+    };
+    LinearRegime out;
+    const std::vector<std::string> names = model::state_names(a);
+    for (std::size_t k = 0; k < names.size(); ++k) {
+        if (!moves[k]) continue;
+        out.states.push_back(names[k]);
+        out.state.push_back(p.now.x[k]);
+        out.rate.push_back(row(r.rate[k]));
+    }
+    const auto add = [&](const Channel& c, const model::Row& f) {
+        out.outputs.push_back(c.name);
+        out.output.push_back(row(f));
+    };
+    for (const Channel& c : channels) {
+        const auto k = static_cast<std::size_t>(c.index);
+        if (c.kind == Channel::state) add(c, model::Row::unit(c.index));
+        if (c.kind == Channel::motor_torque) add(c, r.motor_torque[k]);
+        if (c.kind == Channel::output_torque) add(c, r.output_torque[k]);
+        if (c.kind == Channel::input_torque) add(c, r.input_torque[k]);
+        if (c.kind == Channel::contact_torque) add(c, r.contact_torque[k]);
+    }
+    return out;
+}
+
+}  // namespace lostmotion

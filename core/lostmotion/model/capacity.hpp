@@ -1,0 +1,59 @@
+// What the dry contacts of a train hold at one instant. As forms that end a regime the same are guards of the assembly.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "assembly.hpp"
+#include "motion.hpp"
+
+namespace lostmotion::model {
+
+// One element's share of what a contact holds before it slips forward and backward, or takes while it does, as
+// magnitudes [N m].
+struct CapacityShare {
+    std::string element;
+    double forward, backward;
+};
+
+// Of a shaft at speed w; without the losses of its gears, T_2 = nullptr. T_2: output torques of the gears [N m].
+inline std::vector<CapacityShare> shaft_capacity(const Assembly& a, int shaft, double w, const Instant& now,
+                                                 const double* T_2) {
+    const Train& train = a.train();
+    std::vector<CapacityShare> shares;
+    if (const double T_f = train.shafts[shaft].friction.capacity(w); T_f > 0.0)
+        shares.push_back({train.shafts[shaft].name, T_f, T_f});
+    for (const ShaftMotor& m : train.motors)
+        if (m.shaft == shaft && m.law.friction_torque > 0.0)
+            shares.push_back({m.name, m.law.friction_torque, m.law.friction_torque});
+    for (std::size_t b = 0; b < train.brakes.size(); ++b)
+        if (const Brake& brake = train.brakes[b]; brake.shaft == shaft) {
+            const double T = brake.capacity(now.input[0][a.places().brakes[b].input]);
+            shares.push_back({brake.name, T, T});
+        }
+    for (std::size_t g = 0; g < train.gears.size() && T_2 != nullptr; ++g)
+        if (const Gear& gear = train.gears[g]; gear.input == shaft && gear.has_dry_losses())
+            shares.push_back({gear.name, gear.loss(T_2[g], w).torque / gear.law.ratio,
+                              gear.loss(-T_2[g], w).torque / gear.law.ratio});
+    return shares;
+}
+
+inline std::vector<CapacityShare> contact_capacity(const Assembly& a, int contact, const Regime& r, const Instant& now,
+                                                   const double* T_2) {
+    const ContactPlace& c = a.places().contacts[contact];
+    const auto k = static_cast<std::size_t>(c.element);
+    if (c.kind == ContactPlace::shaft)
+        return shaft_capacity(a, c.a, r.at_rest[contact] ? 0.0 : now.x[a.places().shafts[k].speed], now, T_2);
+    if (c.kind == ContactPlace::gear) {
+        const double h =
+            c.bilateral ? std::numeric_limits<double>::infinity() : now.memory[a.places().gears[k].hysteresis];
+        return {{a.train().gears[k].name, h, h}};
+    }
+    const Coupling& law = a.train().couplings[k];
+    const int input = a.places().couplings[k].input;
+    const double u = input == nowhere ? 0.0 : now.input[0][input];
+    return {{law.name, law.capacity(+1, u), law.capacity(-1, u)}};
+}
+
+}  // namespace lostmotion::model

@@ -1,0 +1,98 @@
+// A train step by step, in the narrowest kernel that holds it.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "train_run.hpp"
+
+namespace lostmotion {
+
+template <class D>
+struct OwnTrain {
+    explicit OwnTrain(const TrainRun& run) : model{run.assembly(), run.channels()}, own_system(model.assembly) {}
+    const typename TrainReader<D>::Model model;
+    const model::TrainSystem<D> own_system;
+};
+
+// In one kernel.
+template <class D>
+class TrainSimulationIn : private OwnTrain<D>, public SimulationOf<model::TrainSystem<D>> {
+    using Own = OwnTrain<D>;
+    using Base = SimulationOf<model::TrainSystem<D>>;
+
+ public:
+    TrainSimulationIn(const TrainRun& run, double step)
+        : Own(run), Base(Own::own_system, Own::own_system.balanced_scale(), step, run.assembly().layout().inputs) {}
+
+    bool too_many_guards() const { return Own::own_system.overflowed(); }
+    TrainPoint point() {
+        const auto& now = Base::snapshot();
+        const auto& r = Base::regime();
+        return point_of<D>(Own::model, r, now.time, now.x, now.memory, now.input);
+    }
+    std::vector<double> values() {
+        const auto& r = Base::regime();
+        return TrainReader<D>(Own::model, r, Base::snapshot().memory)(Base::snapshot().x, Base::snapshot().input);
+    }
+};
+
+class TrainSimulation {
+ public:
+    // The train must have passed the check.
+    TrainSimulation(const model::Train& train, double step) : run_(train) {
+        run_.in_kernel([&]<class D>(const typename TrainReader<D>::Model&) {
+            in_ = std::make_unique<TrainSimulationIn<D>>(run_, step);
+        });
+    }
+    const model::Assembly& assembly() const { return run_.assembly(); }
+    const std::vector<TrainChannel>& channels() const { return run_.channels(); }
+
+    // use(simulation) with the one of its kernel.
+    template <class Use>
+    decltype(auto) with(Use&& use) {
+        return std::visit([&](auto& s) -> decltype(auto) { return use(*s); }, in_);
+    }
+    template <class Use>
+    decltype(auto) with(Use&& use) const {
+        return std::visit([&](const auto& s) -> decltype(auto) { return use(std::as_const(*s)); }, in_);
+    }
+
+    double time() const {
+        return with([](const auto& s) { return s.time(); });
+    }
+    // Each input runs in a straight line from its first to its second value.
+    Status advance(double interval, std::span<const double> begin, std::span<const double> end) {
+        return with([&]<class D>(TrainSimulationIn<D>& s) {
+            InputsOf<D> first{}, last{};
+            std::copy(begin.begin(), begin.end(), first.begin());
+            std::copy(end.begin(), end.end(), last.begin());
+            return s.advance(interval, first, last);
+        });
+    }
+    // To t = 0, with the contacts still to be found. Returns what is wrong with the start, or nothing.
+    std::string reset(const TrainStart& start) {
+        const auto [x, memory] = run_.in_layout(start);
+        if (std::string error = check_start(assembly(), x); !error.empty()) return error;
+        with([&, &x = x, &memory = memory]<class D>(TrainSimulationIn<D>& s) {
+            const auto begin = model::packed_start<D>(assembly().layout(), x, memory);
+            typename TrainSimulationIn<D>::Snapshot to;
+            to.x = begin.x;
+            to.memory = begin.memory;
+            s.restore(to);
+        });
+        return "";
+    }
+
+ private:
+    TrainRun run_;
+    std::variant<std::unique_ptr<TrainSimulationIn<model::Narrow>>, std::unique_ptr<TrainSimulationIn<model::Middle>>,
+                 std::unique_ptr<TrainSimulationIn<model::Wide>>>
+        in_;
+};
+
+}  // namespace lostmotion

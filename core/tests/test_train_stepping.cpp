@@ -1,0 +1,277 @@
+// Trains step by step and at one instant: against the drive's, whole runs, guards and closed forms.
+#include <doctest/doctest.h>
+
+#include <cstring>
+
+#include "lostmotion/analysis/train_explain.hpp"
+#include "lostmotion/simulation/train_stepping.hpp"
+#include "random_trains.hpp"
+
+TEST_SUITE_BEGIN("train_stepping");
+
+namespace lostmotion::model {
+namespace {
+
+using Values = std::vector<double>;
+
+// Inputs at instants 0, h, 2h, ...: between them they run in straight lines.
+std::vector<Values> random_levels(RandomTrains& random, std::size_t instants, int inputs) {
+    std::vector<Values> levels(instants, Values(static_cast<std::size_t>(inputs)));
+    for (Values& level : levels)
+        for (double& u : level) u = random.uniform(-2.0, 2.0);
+    return levels;
+}
+std::vector<Signal> straight_lines(const std::vector<Values>& levels, double h) {
+    std::vector<Signal> signals(levels[0].size());
+    for (std::size_t i = 0; i < signals.size(); ++i) {
+        signals[i].breakpoints.clear();
+        for (std::size_t k = 0; k + 1 < levels.size(); ++k)
+            signals[i].breakpoints.push_back(
+                {h * static_cast<double>(k), levels[k][i], (levels[k + 1][i] - levels[k][i]) / h});
+    }
+    return signals;
+}
+Values between(const Values& a, const Values& b, double share) {
+    Values u(a.size());
+    for (std::size_t i = 0; i < u.size(); ++i) u[i] = a[i] + (b[i] - a[i]) * share;
+    return u;
+}
+TrainPoint point(TrainSimulation& s) {
+    return s.with([](auto& in) { return in.point(); });
+}
+
+}  // namespace
+
+TEST_CASE("the classic drive as a train steps with the same bits") {
+    RandomDrives random(51);
+    int compared = 0;
+    for (int n = 0; n < 60; ++n) {
+        const Drive d = random.drive();
+        if (d.rigid() && d.min_rigid_inertia() <= 0.0) continue;
+        Simulation classic(d, 1e-3);
+        TrainSimulation train(train_of(d), 1e-3);
+        const Places& p = train.assembly().places();
+        ++compared;
+        CAPTURE(n);
+        double c = 0.0, m = 0.0;
+        for (int k = 0; k < 200; ++k) {
+            const double interval = random.uniform(1e-4, 3e-3), c_next = k % 7 < 4 ? c : random.uniform(-0.5, 0.5),
+                         m_next = k % 11 < 8 ? m : random.uniform(-1.0, 1.0) * d.gearbox.rated_output_torque;
+            const Status a = classic.advance(interval, c, c_next, m, m_next);
+            const Status b = train.advance(interval, Values{c, m}, Values{c_next, m_next});
+            REQUIRE(a == b);
+            if (a != Status::done) break;
+            c = c_next;
+            m = m_next;
+            const State& x = classic.snapshot().x;
+            const TrainPoint at = point(train);
+            REQUIRE(at.now.time == classic.time());
+            REQUIRE(at.now.x[p.shafts[0].speed] == x[motor_speed]);
+            REQUIRE(at.now.x[p.shafts[1].speed] == x[load_speed]);
+            REQUIRE(at.now.x[train.assembly().layout().coupled] == x[load_angle]);
+            if (d.motor.kind == Motor::dc) REQUIRE(at.now.x[p.motors[0].torque] == x[motor_torque]);
+            if (!d.rigid()) REQUIRE(at.now.x[p.gears[0].twist] == x[twist]);
+        }
+    }
+    CHECK(compared > 40);
+}
+
+// How far rounding alone may move a motion, the same run tells whose inputs are changed by what the search for the
+// modes takes for zero.
+TEST_CASE("random trains stepped with intervals split at random follow the run in one go") {
+    RandomTrains random(52);
+    constexpr double h = 0.02;
+    constexpr std::size_t steps = 60;
+    int compared = 0, sensitive = 0;
+    for (int n = 0; n < 150; ++n) {
+        const lostmotion::TrainRun run(random.train(random.pick(2, 6), true));
+        REQUIRE(run.error() == "");
+        const Assembly& a = run.assembly();
+        const auto levels = random_levels(random, steps + 1, a.layout().inputs);
+        TrainOptions options;
+        options.duration = h * steps;
+        options.energy = false;
+        std::vector<double> none;
+        const TrainReport whole = run.run(straight_lines(levels, h), {}, {}, options, none.data());
+        auto rounded = levels;
+        for (Values& level : rounded)
+            for (double& u : level) u *= 1.0 + (random.coin() ? 1.0 : -1.0) * rounding;
+        const TrainReport again = run.run(straight_lines(rounded, h), {}, {}, options, none.data());
+        TrainSimulation stepped(a.train(), h);
+        Status status = Status::done;
+        for (std::size_t k = 0; k < steps && status == Status::done; ++k) {
+            double at = 0.0;
+            while (at < 1.0 && status == Status::done) {
+                const double to = random.coin(0.4) ? 1.0 : std::min(1.0, at + random.uniform(0.05, 0.9));
+                status = stepped.advance(h * (to - at), between(levels[k], levels[k + 1], at),
+                                         between(levels[k], levels[k + 1], to));
+                at = to;
+            }
+        }
+        CAPTURE(n);
+        REQUIRE(status == whole.status);
+        if (status != Status::done) continue;
+        ++compared;
+        const TrainPoint end = point(stepped);
+        double off = 0.0, own = 0.0;
+        for (std::size_t k = 0; k < whole.x.size(); ++k) {
+            const double size = 1.0 + std::fabs(whole.x[k]);
+            off = std::max(off, std::fabs(end.now.x[k] - whole.x[k]) / size);
+            own = std::max(own, std::fabs(again.x[k] - whole.x[k]) / size);
+        }
+        if (off > 1e-9) MESSAGE("train " << n << " is off by " << off << ", with itself by " << own);
+        sensitive += own > 1e-10;
+        CHECK(off <= std::max(1e-9, 100.0 * own));
+    }
+    MESSAGE(compared << " trains compared, of them " << sensitive << " sensitive to rounding");
+    CHECK(compared > 140);
+    CHECK(sensitive < 10);
+}
+
+TEST_CASE("a restored simulation of a train continues bit for bit") {
+    RandomTrains random(53);
+    for (int n = 0; n < 60; ++n) {
+        const Train train = random.train(random.pick(2, 6), true);
+        TrainSimulation a(train, 1e-2), b(train, 1e-2);
+        const auto levels = random_levels(random, 121, a.assembly().layout().inputs);
+        CAPTURE(n);
+        Status status = Status::done;
+        for (std::size_t k = 0; k < 120 && status == Status::done; ++k) {
+            if (k == 47)
+                a.with([&]<class D>(TrainSimulationIn<D>& from) {
+                    b.with([&]<class E>(TrainSimulationIn<E>& to) {
+                        if constexpr (std::is_same_v<D, E>) to.restore(from.snapshot());
+                    });
+                });
+            const Values& begin = levels[k % 5 == 0 ? k + 1 : k];  // held now and then
+            status = a.advance(1e-2, begin, levels[k + 1]);
+            if (k < 47) continue;
+            REQUIRE(b.advance(1e-2, begin, levels[k + 1]) == status);
+            if (status != Status::done) break;
+            const TrainPoint p = point(a), q = point(b);
+            REQUIRE(p.now.x == q.now.x);
+            REQUIRE(p.now.memory == q.now.memory);
+            REQUIRE(p.key == q.key);
+            REQUIRE(std::memcmp(p.values.data(), q.values.data(), p.values.size() * sizeof(double)) == 0);
+        }
+    }
+}
+
+TEST_CASE("what a contact at rest can hold is its guard's margin and what it holds; sliding it takes its capacity") {
+    RandomTrains random(54);
+    int stuck = 0, sliding = 0;
+    for (int n = 0; n < 200; ++n) {
+        TrainSimulation s(random.train(random.pick(2, 6), true), 1e-2);
+        const Assembly& a = s.assembly();
+        const auto levels = random_levels(random, 40, a.layout().inputs);
+        for (const Values& level : levels) {
+            if (s.advance(1e-2, level, level) != Status::done) break;
+            const TrainPoint p = point(s);
+            const Regime r = a.build(p.key);
+            const auto contacts = explain_contacts(a, p);
+            CAPTURE(n);
+            for (const Guard& g : r.guards) {
+                if (g.kind != Guard::capacity) continue;
+                const TrainContactReport& c = contacts[static_cast<std::size_t>(g.contact)];
+                const double capacity = g.neighbour > 0 ? c.capacity_forward : c.capacity_backward;
+                const double margin = evaluate(a.layout(), g.form, p.now), size = magnitude(a.layout(), g.form, p.now);
+                CHECK(std::fabs(capacity - g.neighbour * c.torque - margin) <= 1e-13 * size);
+                ++stuck;
+            }
+            for (std::size_t k = 0; k < contacts.size(); ++k) {
+                const TrainContactReport& c = contacts[k];
+                if (r.at_rest[k] || c.mode == 0) continue;
+                const double size = magnitude(a.layout(), r.contact_torque[k], p.now);
+                const double capacity = c.mode > 0 ? c.capacity_forward : c.capacity_backward;
+                CHECK(std::fabs(capacity - c.mode * c.torque) <= 1e-11 * size);
+                ++sliding;
+            }
+        }
+    }
+    MESSAGE(stuck << " margins, " << sliding << " sliding contacts");
+    CHECK(stuck > 1000);
+    CHECK(sliding > 1000);
+}
+
+TEST_CASE("the smallest command of a classic drive is that of the train") {
+    RandomDrives random(55);
+    int compared = 0;
+    for (int n = 0; n < 100; ++n) {
+        const Drive d = random.drive();
+        if (d.rigid() && d.min_rigid_inertia() <= 0.0) continue;
+        TrainSimulation s(train_of(d), 1e-3);
+        for (int k = 0; k < 10; ++k) {
+            const double u = random.uniform(-0.5, 0.5), M_Z = random.uniform(-1.0, 1.0) * d.gearbox.rated_output_torque;
+            if (s.advance(5e-3, Values{u, M_Z}, Values{u, M_Z}) != Status::done) break;
+            const TrainPoint p = point(s);
+            const double T_2 = evaluate(s.assembly().layout(), s.assembly().build(p.key).output_torque[0], p.now);
+            const auto motors = explain_motors(s.assembly(), p);
+            const double forward = smallest_command(d, T_2, M_Z, +1), backward = smallest_command(d, T_2, M_Z, -1);
+            const double size = std::fabs(forward) + std::fabs(backward);
+            CAPTURE(n);
+            CHECK(std::fabs(motors[0].command_forward - forward) <= 1e-13 * size);
+            CHECK(std::fabs(motors[0].command_backward - backward) <= 1e-13 * size);
+            ++compared;
+        }
+    }
+    CHECK(compared > 500);
+}
+
+// A motor of ratio 1 on a shaft, and what it has to turn.
+TEST_CASE("the command that turns a motor: what is behind a clutch, a freewheel, a locking gear or a loop") {
+    Train t;
+    t.shafts = {shaft(1.0), shaft(1.0), shaft(1.0)};
+    t.shafts[0].friction.torque = 0.5;
+    t.shafts[1].friction.torque = 1.0;
+    t.shafts[1].friction.breakaway_torque = 1.25;
+    t.shafts[2].friction.torque = 2.0;
+    t.shafts[2].loaded = true;
+    t.motors = {torque_motor(0)};
+    const auto commands = [](const Train& train, const Values& u) {
+        TrainSimulation s(train, 1e-3);
+        REQUIRE(model::check(train) == "");
+        REQUIRE(s.advance(1e-6, u, u) == Status::done);
+        return explain_motors(s.assembly(), point(s));
+    };
+    Gear slow = spring(0, 1, 2.0, TorsionCurve({}, {100.0}));
+    slow.efficiencies.emplace(0.8, 0.5);
+    Train chain = t;
+    chain.gears = {slow, spring(1, 2, 4.0, TorsionCurve({}, {100.0}))};
+    // Load 6 on the last: forward (6 + 2)/4 + 1.25 = 3.25, /(2 * 0.8) + 0.5; backward (6 - 2)/4 - 1.25 = -0.25, which
+    // is driving in that direction.
+    auto of = commands(chain, {0.0, 6.0});
+    CHECK(of[0].command_forward == doctest::Approx(3.25 / 1.6 + 0.5).epsilon(1e-14));
+    CHECK(of[0].command_backward == doctest::Approx(-0.25 / 1.6 - 0.5).epsilon(1e-14));
+    // A load of 16 overruns: (16 - 2)/4 - 1.25 = 2.25, of which 0.5/2 reaches the motor.
+    of = commands(chain, {0.0, 16.0});
+    CHECK(of[0].command_backward == doctest::Approx(2.25 * 0.25 - 0.5).epsilon(1e-14));
+    // A safety clutch passes on no more than it can; a freewheel drives one way only.
+    Train clutched = t;
+    clutched.gears = {slow};
+    clutched.couplings = {{"clutch", Coupling::safety_clutch, 1, 2, 3.0}};
+    of = commands(clutched, {0.0, 6.0});
+    CHECK(of[0].command_forward == doctest::Approx((3.0 + 1.25) / 1.6 + 0.5).epsilon(1e-14));
+    clutched.couplings[0].kind = Coupling::freewheel;
+    of = commands(clutched, {0.0, 6.0});
+    CHECK(of[0].command_forward == doctest::Approx((8.0 + 1.25) / 1.6 + 0.5).epsilon(1e-14));
+    of = commands(clutched, {0.0, 0.0});
+    CHECK(of[0].command_backward == doctest::Approx(-1.25 / 1.6 - 0.5).epsilon(1e-14));
+    // A motor on the output has to turn the input from behind: friction 0.5 at 0.5/2 a unit. One that locks holds.
+    Train behind = t;
+    behind.motors = {torque_motor(1)};
+    behind.gears = {slow, spring(1, 2, 4.0, TorsionCurve({}, {100.0}))};
+    of = commands(behind, {0.0, 0.0});
+    CHECK(of[0].command_forward == doctest::Approx(0.5 / 0.25 + 1.25 + 0.5).epsilon(1e-14));
+    CHECK(of[0].command_backward == doctest::Approx(-0.5 / 0.25 - 1.25 - 0.5).epsilon(1e-14));
+    behind.gears[0].efficiencies.emplace(0.4, -0.1);
+    of = commands(behind, {0.0, 0.0});
+    CHECK(of[0].command_forward == std::numeric_limits<double>::infinity());
+    CHECK(of[0].command_backward == -std::numeric_limits<double>::infinity());
+    Train loop = chain;
+    loop.gears.push_back(spring(0, 2, 8.0, TorsionCurve({}, {100.0})));
+    CHECK(std::isnan(commands(loop, {0.0, 0.0})[0].command_forward));
+}
+
+}  // namespace lostmotion::model
+
+TEST_SUITE_END();
