@@ -1,6 +1,7 @@
 // A holding brake: a dry contact of a shaft with the frame, whose capacity is commanded.
 #pragma once
 
+#include <algorithm>
 #include <string>
 
 namespace lostmotion::model {
@@ -10,7 +11,10 @@ namespace lostmotion::model {
 struct Brake {
     std::string name;
     int shaft = 0;
-    double torque = 0.0;  // [N m] at u = 1
+    double torque = 0.0;            // [N m] while it slips, at u = 1
+    double breakaway_torque = 0.0;  // [N m] at rest, at u = 1; what lies below `torque` means that torque
+
+    double holding() const { return std::max(torque, breakaway_torque); }
 };
 
 }  // namespace lostmotion::model
