@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-FORMATTED := $(wildcard core/lostmotion/*/*.hpp core/tests/*.[ch]pp bindings/*.[ch]pp benchmarks/*.[ch]pp)
+FORMATTED := $(wildcard core/lostmotion/*/*.hpp core/tests/*.[ch]pp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.cpp examples/*.c benchmarks/*.[ch]pp)
 SOURCES := $(wildcard core/lostmotion/*/*.hpp bindings/*.cpp bindings/*.hpp scenarios/*.toml) CMakeLists.txt pyproject.toml
 
 .PHONY: demo test bench docs lint format clean
@@ -11,7 +11,7 @@ SOURCES := $(wildcard core/lostmotion/*/*.hpp bindings/*.cpp bindings/*.hpp scen
 demo: $(VENV)/built
 	$(BIN)/lostmotion reproduce -o out
 
-test: lint test-core $(VENV)/built
+test: lint test-core c-library $(VENV)/built
 	$(BIN)/pytest
 
 .PHONY: test-core
@@ -20,6 +20,13 @@ test-core: $(VENV)/tools
 	$(BIN)/cmake -S . -B build/core -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_TESTS=ON -DLOSTMOTION_WERROR=ON >build/core.log
 	$(BIN)/cmake --build build/core
 	$(BIN)/ctest --test-dir build/core --output-on-failure --parallel 2
+
+# The library of the C interface, bindings/c/lostmotion.h.
+.PHONY: c-library
+c-library: $(VENV)/tools
+	$(BIN)/cmake -S . -B build/c -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_C=ON -DLOSTMOTION_WERROR=ON >build/c.log
+	$(BIN)/cmake --build build/c
+	@echo 'cc -I$(abspath bindings/c) PROGRAM.c -L$(abspath build/c) -llostmotion -lm'
 
 # 100,000 random drives of each kind; CASES and SEED choose others.
 CASES ?= 100000

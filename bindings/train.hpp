@@ -53,12 +53,12 @@ class TrainDescription {
         if (transmission_error != nullptr) g.transmission_error = *transmission_error;
         train.gears.push_back(std::move(g));
     }
-    void add_brake(const std::string& name, const std::string& shaft, double torque) {
-        train.brakes.push_back({name, place_of(shaft), torque});
+    void add_brake(const std::string& name, const std::string& shaft, double torque, double breakaway_torque) {
+        train.brakes.push_back({name, place_of(shaft), torque, breakaway_torque});
     }
     void add_coupling(const std::string& name, const std::string& input, const std::string& output, double torque,
-                      model::Coupling::Kind kind) {
-        train.couplings.push_back({name, kind, place_of(input), place_of(output), torque});
+                      double breakaway_torque, model::Coupling::Kind kind) {
+        train.couplings.push_back({name, kind, place_of(input), place_of(output), torque, breakaway_torque});
     }
     void add_angle_torque(const std::string& name, const std::string& shaft, const model::PeriodicCurve& torque) {
         train.angle_torques.push_back({name, place_of(shaft), torque});
@@ -242,7 +242,8 @@ inline void bind_train(nb::module_& m) {
 
     const auto add_coupling = [](Coupling::Kind kind) {
         return [kind](TrainDescription& t, const std::string& name, const std::string& input, const std::string& output,
-                      double torque) { t.add_coupling(name, input, output, torque, kind); };
+                      double torque,
+                      double breakaway_torque) { t.add_coupling(name, input, output, torque, breakaway_torque, kind); };
     };
     nb::class_<TrainDescription>(m, "Train")
         .def(nb::init<>())
@@ -253,13 +254,15 @@ inline void bind_train(nb::module_& m) {
         .def("add_gear", &TrainDescription::add_gear, "name"_a, "input"_a, "output"_a, "parameters"_a,
              "torsion_curve"_a.none(), "loss_map"_a.none(), "efficiencies"_a.none(), "mesh_damping"_a,
              "transmission_error"_a.none())
-        .def("add_brake", &TrainDescription::add_brake, "name"_a, "shaft"_a, "torque"_a)
-        .def("add_clutch", add_coupling(Coupling::clutch), "name"_a, "input"_a, "output"_a, "torque"_a)
-        .def("add_safety_clutch", add_coupling(Coupling::safety_clutch), "name"_a, "input"_a, "output"_a, "torque"_a)
+        .def("add_brake", &TrainDescription::add_brake, "name"_a, "shaft"_a, "torque"_a, "breakaway_torque"_a)
+        .def("add_clutch", add_coupling(Coupling::clutch), "name"_a, "input"_a, "output"_a, "torque"_a,
+             "breakaway_torque"_a)
+        .def("add_safety_clutch", add_coupling(Coupling::safety_clutch), "name"_a, "input"_a, "output"_a, "torque"_a,
+             "breakaway_torque"_a)
         .def(
             "add_freewheel",
             [](TrainDescription& t, const std::string& name, const std::string& input, const std::string& output) {
-                t.add_coupling(name, input, output, 0.0, Coupling::freewheel);
+                t.add_coupling(name, input, output, 0.0, 0.0, Coupling::freewheel);
             },
             "name"_a, "input"_a, "output"_a)
         .def("add_angle_torque", &TrainDescription::add_angle_torque, "name"_a, "shaft"_a, "torque"_a)

@@ -440,8 +440,16 @@ ELEMENTS = {
 }
 
 
+def chords(scenario: lm.TrainScenario) -> float:
+    """By how much chords in place of sines move a speed [rad/s] at most: their error over the smallest inertia."""
+    smooth: dict[str, Any] = {**scenario.gravity, **scenario.angle_torques}
+    error = sum(element.error or 1e-3 * 9.80665 * element.mass * element.radius for element in smooth.values())
+    return error * scenario.simulation.duration / min(shaft.inertia for shaft in scenario.shafts.values())
+
+
 @pytest.mark.parametrize("scenario", ELEMENTS.values(), ids=ELEMENTS)
 def test_both_solvers_agree_on_every_element(scenario: lm.TrainScenario) -> None:
+    """The adaptive solver takes sines as they are, the exact one by chords."""
     exact = lm.simulate(scenario)
     coarse, fine = (
         lm.simulate(scenario, solver="dormand-prince", relative_tolerance=tolerance) for tolerance in (1e-8, 1e-10)
@@ -450,7 +458,8 @@ def test_both_solvers_agree_on_every_element(scenario: lm.TrainScenario) -> None
         if str(name).endswith(("_speed", "_angle", "_twist")):
             size = float(abs(exact[name]).max()) or 1.0
             open_by = float(abs(coarse[name] - fine[name]).max()) / size  # what the tolerance leaves open
-            assert float(abs(exact[name] - fine[name]).max()) / size <= 2.0 * open_by + 1e-9, name
+            sines = chords(scenario) * (1.0 if str(name).endswith("_speed") else scenario.simulation.duration)
+            assert float(abs(exact[name] - fine[name]).max()) <= (2.0 * open_by + 1e-9) * size + sines, name
     ledger = lm.energy_of(exact)
     assert abs(ledger["residual"]) <= 1e-9 * ledger["turned_over"]
 

@@ -75,6 +75,102 @@ class RandomTrains {
         return g;
     }
 
+    // Any elements anywhere: gears in either direction and in loops, several brakes, laws over speed and angle, limits.
+    Train any(int shafts) {
+        Train t;
+        std::vector<double> turns(static_cast<std::size_t>(shafts), 1.0);  // speed of each shaft for that of the first
+        for (int s = 0; s < shafts; ++s) t.shafts.push_back(any_shaft());
+        for (int m = pick(1, std::min(3, shafts)); m > 0; --m) t.motors.push_back(any_motor(pick(0, shafts - 1)));
+        for (int s = 1; s < shafts; ++s) {
+            const int to = pick(0, s - 1);
+            const bool forward = coin(0.7);
+            const int input = forward ? to : s, output = forward ? s : to;
+            if (coin(0.2)) {
+                const auto kind = static_cast<Coupling::Kind>(pick(0, 2));
+                const double torque = spread(0.2, 2.0);
+                t.couplings.push_back({"coupling", kind, input, output, torque, coin(0.3) ? 1.3 * torque : 0.0});
+                turns[s] = turns[to];
+            } else {
+                t.gears.push_back(any_gear(input, output));
+                turns[s] = forward ? turns[to] / t.gears.back().law.ratio : turns[to] * t.gears.back().law.ratio;
+            }
+        }
+        if (shafts > 2 && coin(0.2)) {  // a loop, closed by a gear that yields
+            const int a = pick(0, shafts - 2), b = pick(a + 1, shafts - 1);
+            Gear g = any_gear(a, b);
+            if (!g.rigid()) {
+                g.law.ratio = turns[a] / turns[b];
+                t.gears.push_back(g);
+            }
+        }
+        for (int b = pick(0, 3) - 1; b > 0; --b) {
+            const double torque = spread(0.2, 2.0);
+            t.brakes.push_back({"brake", pick(0, shafts - 1), torque, coin(0.3) ? 1.2 * torque : 0.0});
+        }
+        if (coin(0.2))
+            t.angle_torques.push_back(
+                {"gravity", pick(0, shafts - 1), chords(spread(0.2, 2.0), 1, uniform(0.0, 6.0), 0.05)});
+        if (coin(0.1)) t.angle_torques.push_back({"cogging", pick(0, shafts - 1), chords(0.1, 6, 0.0, 0.02)});
+        return t;
+    }
+
+    // As they are: the adaptive solver would take the sine.
+    static PeriodicCurve chords(double amplitude, int n, double phase, double error) {
+        const PeriodicCurve f = PeriodicCurve::sine(amplitude, n, phase, error);
+        std::vector<double> angles, values;
+        for (int k = 0; k < f.pieces(); ++k) {
+            angles.push_back(f.lower(k));
+            values.push_back(f(f.lower(k)));
+        }
+        return PeriodicCurve(f.period(), std::move(angles), std::move(values));
+    }
+
+    Shaft any_shaft() {
+        Shaft s;
+        s.inertia = spread(0.3, 3.0);
+        s.loaded = coin(0.6);
+        if (coin()) s.viscous_friction = spread(0.05, 0.5);
+        if (coin(0.1)) s.drag = Shaft::quadratic_drag(spread(0.01, 0.1), 8.0, 0.1);
+        const double T_C = spread(0.05, 1.0);
+        if (coin(0.2)) {
+            s.friction = DryFriction::stribeck(T_C, T_C * uniform(1.05, 1.6), spread(0.3, 3.0), 0.05 * T_C);
+        } else if (coin(0.6)) {
+            s.friction.torque = T_C;
+            if (coin(0.3)) s.friction.breakaway_torque = T_C * uniform(1.0, 1.5);
+        }
+        return s;
+    }
+
+    ShaftMotor any_motor(int shaft) {
+        ShaftMotor m;
+        m.shaft = shaft;
+        m.law.kind = coin() ? Motor::dc : Motor::torque_source;
+        m.law.rated_torque = 1.0;
+        m.law.rated_speed = 5.0;
+        m.law.electrical_time_constant = 0.05;
+        if (coin(0.3)) m.law.friction_torque = spread(0.05, 0.5);
+        if (coin(0.3)) m.law.rotor_inertia = spread(0.1, 0.5);
+        if (m.law.kind == Motor::dc && coin(0.3)) m.law.voltage_limit = uniform(0.5, 1.5);
+        if (m.law.kind == Motor::torque_source && coin(0.3)) m.torque_limit = uniform(0.5, 1.5);
+        return m;
+    }
+
+    Gear any_gear(int input, int output) {
+        Gear g = gear(input, output, true);
+        if (coin(0.2)) g.law.inertia = spread(0.1, 0.5);
+        if (coin(0.2)) g.law.viscous_friction = spread(0.05, 0.2);
+        if (g.rigid()) return g;
+        if (coin(0.25)) {
+            g.mesh_damping = spread(0.1, 2.0);
+            if (g.has_backlash()) g.law.hysteresis_efficiency = 1.0;
+        }
+        if (coin(0.15)) {
+            g.law.hysteresis_efficiency = 1.0;
+            g.transmission_error = PeriodicCurve::sine(spread(1e-3, 1e-2), pick(1, 5), uniform(0.0, 6.0), 5e-4);
+        }
+        return g;
+    }
+
     // For each input a sine and a step or a ramp.
     std::vector<Signal> signals(const Assembly& a, double duration) {
         std::vector<Signal> out(static_cast<std::size_t>(a.layout().inputs));

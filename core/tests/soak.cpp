@@ -5,6 +5,7 @@
 #include <string>
 
 #include "properties.hpp"
+#include "random_train_runs.hpp"
 #include "referee_compare.hpp"
 #include "round_drives.hpp"
 
@@ -121,6 +122,21 @@ Tally round_numbers(long count, unsigned seed) {
     return t;
 }
 
+// Trains: exact against adaptive solver, the laws of every run, time stepping.
+template <class Sum, class Check>
+Tally trains(const char* what, long count, unsigned seed, Check check) {
+    Tally t{what};
+    model::RandomTrains random(seed);
+    Sum sum;
+    for (long n = 0; n < count; ++n)
+        check(random, sum, ("seed " + std::to_string(seed) + " train " + std::to_string(n)).c_str());
+    t.cases = count;
+    t.wrong = sum.failed();
+    t.ambiguous = sum.open;
+    t.ill_conditioned = sum.undecided;
+    return t;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -138,5 +154,15 @@ int main(int argc, char** argv) {
     done(self_locking(count, seed, true));
     done(solvers(count / 10, seed));
     done(round_numbers(count / 100, seed));
+    done(trains<model::SolverTally>(
+        "exact and adaptive solver on random trains", count / 20, seed,
+        [](auto& random, auto& sum, const char* which) { model::compare_solvers(random, 6, 1.0, sum, which); }));
+    done(trains<model::LawTally>(
+        "laws of runs of random trains", count / 20, seed,
+        [](auto& random, auto& sum, const char* which) { model::check_laws(random, 6, 0.4, sum, which); }));
+    done(trains<model::SteppingTally>("random trains against time stepping", count / 100, seed,
+                                      [](auto& random, auto& sum, const char* which) {
+                                          model::compare_with_steps(random, 4, 0.5, 2000, sum, which);
+                                      }));
     return wrong > 0;
 }

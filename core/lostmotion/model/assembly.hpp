@@ -7,7 +7,8 @@ namespace lostmotion::model {
 
 class Assembly : public ElementForms {
  public:
-    explicit Assembly(Train train) : ElementForms(std::move(train)), equations_(*this) {}
+    explicit Assembly(Train train, bool with_remainders = false)
+        : ElementForms(std::move(train), with_remainders), equations_(*this) {}
 
     Regime build(const Key& key) const;
 

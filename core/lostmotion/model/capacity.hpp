@@ -29,7 +29,7 @@ inline std::vector<CapacityShare> shaft_capacity(const Assembly& a, int shaft, d
             shares.push_back({m.name, m.law.friction_torque, m.law.friction_torque});
     for (std::size_t b = 0; b < train.brakes.size(); ++b)
         if (const Brake& brake = train.brakes[b]; brake.shaft == shaft) {
-            const double T = brake.capacity(now.input[0][a.places().brakes[b].input]);
+            const double T = brake.capacity(now.input[0][a.places().brakes[b].input], w == 0.0);
             shares.push_back({brake.name, T, T});
         }
     for (std::size_t g = 0; g < train.gears.size() && T_2 != nullptr; ++g)
@@ -53,7 +53,7 @@ inline std::vector<CapacityShare> contact_capacity(const Assembly& a, int contac
     const Coupling& law = a.train().couplings[k];
     const int input = a.places().couplings[k].input;
     const double u = input == nowhere ? 0.0 : now.input[0][input];
-    return {{law.name, law.capacity(+1, u), law.capacity(-1, u)}};
+    return {{law.name, law.capacity(+1, u, r.at_rest[contact]), law.capacity(-1, u, r.at_rest[contact])}};
 }
 
 }  // namespace lostmotion::model

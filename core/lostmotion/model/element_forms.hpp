@@ -10,7 +10,8 @@ namespace lostmotion::model {
 
 class ElementForms {
  public:
-    explicit ElementForms(Train train) : train_(std::move(train)), places_(train_), terms_(places_.layout) {}
+    explicit ElementForms(Train train, bool with_remainders)
+        : train_(std::move(train)), places_(train_, with_remainders), terms_(places_.layout) {}
     ElementForms(const ElementForms&) = delete;
     ElementForms& operator=(const ElementForms&) = delete;
 
@@ -49,9 +50,11 @@ class ElementForms {
         const PeriodicCurve& curve = train_.angle_torques[k].torque;
         const AngleTorquePlace& p = places_.angle_torques[k];
         const int piece = key.branch[p.piece];
-        return terms_.one(curve.at_zero(piece)) +
-               terms_.state(places_.shafts[train_.angle_torques[k].shaft].angle, curve.slope(piece)) -
-               terms_.memory(p.turn, curve.slope(piece));
+        Row torque = terms_.one(curve.at_zero(piece)) +
+                     terms_.state(places_.shafts[train_.angle_torques[k].shaft].angle, curve.slope(piece)) -
+                     terms_.memory(p.turn, curve.slope(piece));
+        if (p.remainder != nowhere) torque += terms_.input(p.remainder);
+        return torque;
     }
     // Torque against the motion of a shaft.
     Row drag_torque(int shaft, const Key& key) const {

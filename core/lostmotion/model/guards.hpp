@@ -95,8 +95,8 @@ inline void RegimeGuards::add_coupling_capacities() {
         if (regime_.key.modes[p.contact] != 0) continue;
         const Row& torque = regime_.contact_torque[p.contact];
         Row capacity;
-        if (c.kind == Coupling::clutch) capacity = forms_.commanded(p.input, p.branch, c.torque, regime_.key);
-        if (c.kind == Coupling::safety_clutch) capacity = terms_.one(c.torque);
+        if (c.kind == Coupling::clutch) capacity = forms_.commanded(p.input, p.branch, c.holding(), regime_.key);
+        if (c.kind == Coupling::safety_clutch) capacity = terms_.one(c.holding());
         if (c.kind != Coupling::freewheel) add(capacity - torque, Guard::capacity, p.contact, nowhere, +1);
         add(capacity + torque, Guard::capacity, p.contact, nowhere, -1);
     }
@@ -118,7 +118,7 @@ inline void RegimeGuards::add_shaft_guards(int shaft) {
         Row F = terms_.one(p.motor_friction + train_.shafts[shaft].friction.holding());
         for (std::size_t b = 0; b < train_.brakes.size(); ++b)
             if (train_.brakes[b].shaft == shaft)
-                F += forms_.commanded(places_.brakes[b].input, places_.brakes[b].branch, train_.brakes[b].torque,
+                F += forms_.commanded(places_.brakes[b].input, places_.brakes[b].branch, train_.brakes[b].holding(),
                                       regime_.key);
         each_gear([&](int g) { add_loss_cells(g, s, F); });
         add(F - static_cast<double>(s) * regime_.contact_torque[p.contact], Guard::capacity, p.contact, nowhere, s);

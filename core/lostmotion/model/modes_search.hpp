@@ -35,16 +35,22 @@ void SwitchedTrain<Sizes>::stop(X& x, AtRest& at_rest) const {
 template <class Sizes>
 template <class Cache, class Now>
 Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
+    constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
     key = Key{};
     Event event;
+    bool snap = false;
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
         const double a = p.per_a * now.x[places().shafts[p.a].speed],
                      b = p.b == nowhere ? 0.0 : p.per_b * now.x[places().shafts[p.b].speed];
-        if (p.one_way && a + b > 0.0) return Found::inconsistent;
+        // Speeds that differ by rounding are the same: a state that a run has ended with may be that of the next.
+        const bool same = std::fabs(a + b) <= few_roundings * (std::fabs(a) + std::fabs(b));
+        if (p.one_way && a + b > 0.0 && !same) return Found::inconsistent;
         key.modes[c] = p.one_way || a + b < 0.0 ? -1 : +1;
-        event.at_rest[c] = p.bilateral || a == -b;
+        event.at_rest[c] = p.bilateral || same;
+        snap = snap || (same && !p.bilateral && a != -b);
     }
+    if (snap) stop(now.x, event.at_rest);
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const Gear& gear = train().gears[g];
         const GearPlace& p = places().gears[g];
@@ -344,17 +350,24 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
     return worst;
 }
 
-// Where a shaft holds more than it takes while it slips, both rest and slip may be consistent: it does not break away
+// Where a contact holds more than it takes while it slips, both rest and slip may be consistent: it does not break away
 // by itself.
 template <class Sizes>
 template <class Cache, class Now, class Memory>
 void SwitchedTrain<Sizes>::hold_where_possible(Cache& cache, Now& now, const Memory& before, Key modes,
                                                const Event& event, Key& key) const {
-    for (std::size_t s = 0; s < train().shafts.size(); ++s) {
-        const DryFriction& friction = train().shafts[s].friction;
-        const int c = places().shafts[s].contact;
-        if (c == nowhere || modes.modes[c] == 0 || !event.at_rest[c] || !(friction.holding() > friction.at_zero(0)))
-            continue;
+    const auto holds_more = [&](const ContactPlace& c) {
+        if (c.kind == ContactPlace::gear) return false;
+        const auto element = static_cast<std::size_t>(c.element);
+        if (c.kind == ContactPlace::coupling)
+            return train().couplings[element].holding() > train().couplings[element].torque;
+        const DryFriction& friction = train().shafts[element].friction;
+        return friction.holding() > friction.at_zero(0) ||
+               std::any_of(train().brakes.begin(), train().brakes.end(),
+                           [&](const Brake& b) { return b.shaft == c.element && b.holding() > b.torque; });
+    };
+    for (int c = 0; c < contacts(); ++c) {
+        if (modes.modes[c] == 0 || !event.at_rest[c] || !holds_more(places().contacts[c])) continue;
         Key held = modes, found;
         held.modes[c] = 0;
         const auto memory = now.memory;

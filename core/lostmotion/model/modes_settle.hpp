@@ -105,7 +105,7 @@ void SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
         } else if (!is_gear) {
             const Coupling& law = train().couplings[c.element];
             const int input = places().couplings[c.element].input;
-            high = law.commanded() ? law.torque * std::clamp(now.input[0][input], 0.0, 1.0) : law.torque;
+            high = law.commanded() ? law.holding() * std::clamp(now.input[0][input], 0.0, 1.0) : law.holding();
             low = -high;
         }
         double& torque = is_gear ? T_2[c.element] : coupling[c.element];
@@ -128,12 +128,16 @@ void SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
                     needed -= coupling[n];
                 if (train().couplings[n].input == out) needed += coupling[n];
             }
-            for (const AngleTorque& t : train().angle_torques)
-                if (t.shaft == out) needed -= t.torque(now.x[p.angle]);
+            for (std::size_t k = 0; k < train().angle_torques.size(); ++k) {
+                const AngleTorque& t = train().angle_torques[k];
+                if (t.shaft != out) continue;
+                needed -= t.torque(now.x[p.angle]);
+                if (const int rest = places().angle_torques[k].remainder; rest != nowhere) needed -= now.input[0][rest];
+            }
             double T_f = p.motor_friction + train().shafts[out].friction.holding();
             for (std::size_t b = 0; b < train().brakes.size(); ++b)
                 if (train().brakes[b].shaft == out)
-                    T_f += train().brakes[b].torque * std::clamp(now.input[0][places().brakes[b].input], 0.0, 1.0);
+                    T_f += train().brakes[b].holding() * std::clamp(now.input[0][places().brakes[b].input], 0.0, 1.0);
             low = std::max(low, needed - T_f);
             high = std::min(high, needed + T_f);
         }

@@ -38,6 +38,7 @@ struct CouplingPlace {
 };
 struct AngleTorquePlace {
     int piece = nowhere, turn = nowhere;  // branch, memory
+    int remainder = nowhere;              // input: what the chords leave of a sine
 };
 
 struct Places {
@@ -51,7 +52,8 @@ struct Places {
     std::vector<ContactPlace> contacts;
     std::vector<int> last_shaft;  // of each part of the train, whose angle is kept
 
-    explicit Places(const Train& train);
+    // with_remainders: what piecewise-linear laws leave of smooth ones enters as further inputs.
+    explicit Places(const Train& train, bool with_remainders = false);
 
  private:
     // The narrowest kernel. A train that fits into it has a place for the torque of each motor and the twist of each
@@ -64,7 +66,7 @@ struct Places {
     void place_memory_and_branches(const Train& train);
 };
 
-inline Places::Places(const Train& train)
+inline Places::Places(const Train& train, bool with_remainders)
     : motors(train.motors.size()),
       shafts(train.shafts.size()),
       gears(train.gears.size()),
@@ -86,6 +88,8 @@ inline Places::Places(const Train& train)
     place_states(train);
     place_contacts(train);
     place_inputs(train);
+    for (std::size_t k = 0; with_remainders && k < angle_torques.size(); ++k)
+        if (train.angle_torques[k].torque.of_sine()) angle_torques[k].remainder = layout.inputs++;
     place_memory_and_branches(train);
     layout.arrange();
 }

@@ -11,9 +11,12 @@ namespace lostmotion::model {
 struct Brake {
     std::string name;
     int shaft = 0;
-    double torque = 0.0;  // [N m] at u = 1
+    double torque = 0.0;            // [N m] while it slips, at u = 1
+    double breakaway_torque = 0.0;  // [N m] at rest, at u = 1; what lies below `torque` means that torque
 
-    double capacity(double u) const { return torque * std::clamp(u, 0.0, 1.0); }
+    double holding() const { return std::max(torque, breakaway_torque); }
+    // Torque [N m] that it holds at rest, or takes while it slips, at command u.
+    double capacity(double u, bool at_rest) const { return (at_rest ? holding() : torque) * std::clamp(u, 0.0, 1.0); }
 };
 
 }  // namespace lostmotion::model

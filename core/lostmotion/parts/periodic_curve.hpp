@@ -34,10 +34,18 @@ class PeriodicCurve {
             angles.push_back(width / n * k);
             values.push_back(amplitude * outwards * std::sin(width * k + phase));
         }
-        return PeriodicCurve(2.0 * std::numbers::pi / n, std::move(angles), std::move(values));
+        PeriodicCurve chords(2.0 * std::numbers::pi / n, std::move(angles), std::move(values));
+        chords.sine_ = {amplitude, n, phase};
+        return chords;
     }
 
     bool present() const { return !values_.empty(); }
+    // Whether it stands for a sine, of which the adaptive solver takes the remainder.
+    bool of_sine() const { return sine_.amplitude != 0.0; }
+    double smooth(double phi) const { return sine_.amplitude * std::sin(sine_.order * phi + sine_.phase); }
+    double smooth_slope(double phi) const {
+        return sine_.amplitude * sine_.order * std::cos(sine_.order * phi + sine_.phase);
+    }
     double period() const { return period_; }
     int pieces() const { return static_cast<int>(values_.size()) - 1; }
     double lower(int k) const { return angles_[k]; }
@@ -73,6 +81,11 @@ class PeriodicCurve {
  private:
     double period_ = 0.0;
     std::vector<double> angles_, values_;
+    struct {
+        double amplitude = 0.0;
+        int order = 1;
+        double phase = 0.0;
+    } sine_;  // that it stands for, if any
 };
 
 }  // namespace lostmotion::model

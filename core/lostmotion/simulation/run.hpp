@@ -109,8 +109,9 @@ class AdaptiveRecorder {
         for (; next_ < options_.samples; ++next_) {
             const double t = static_cast<double>(next_) * options_.sample_interval;
             if (!(t < dense.end || (last && t <= dense.end * (1.0 + 1e-15)))) return;
-            const auto input = t < dense.end ? solver_.input_at(t) : solver_.input_before(t);
-            const Reading reading = Reader(drive_, r, m)(dense(t), input);
+            const State x = dense(t);
+            const auto input = t < dense.end ? solver_.input_at(t, x) : solver_.input_before(t, x);
+            const Reading reading = Reader(drive_, r, m)(x, input);
             for (int c = 0; c < n_channels; ++c) out_[c * options_.samples + next_] = reading.value[c];
         }
     }

@@ -176,7 +176,8 @@ class TrainRecorder {
         for (; next_ < options_.samples; ++next_) {
             const double t = static_cast<double>(next_) * options_.sample_interval;
             if (!(t < dense.end || (last && t <= dense.end * (1.0 + 1e-15)))) return;
-            at.set(0, load(dense(t)), t < dense.end ? solver.input_at(t) : solver.input_before(t));
+            const StateOf<D> x = dense(t);
+            at.set(0, load(x), t < dense.end ? solver.input_at(t, x) : solver.input_before(t, x));
             const TrainReader<D> reader(model_, r, m);
             for (std::size_t c = 0; c < channels_.size(); ++c)
                 out_[c * options_.samples + next_] = reader.read(channels_[c], at, 0)[0];
@@ -294,9 +295,8 @@ class TrainRun {
         if (!error_.empty()) return;
         assembly_ = std::make_unique<model::Assembly>(train);
         channels_ = train_channels(*assembly_);
-        const model::Layout& n = assembly_->layout();
-        if (!model::fits<model::Narrow>(train, n) && !model::fits<model::Middle>(train, n) &&
-            !model::fits<model::Wide>(train, n))
+        const model::Layout n = model::Places(train, true).layout;
+        if (!model::fits<model::Wide>(train, n))
             error_ = "the train has " + std::to_string(n.coupled) + " coupled states, " + std::to_string(n.inputs) +
                      " inputs and " + std::to_string(n.contacts) + " dry contacts; at most " +
                      std::to_string(model::Wide::coupled) + ", " + std::to_string(model::Wide::inputs) + " and " +
@@ -309,10 +309,14 @@ class TrainRun {
     // What `use` gives in the narrowest kernel that holds the train.
     template <class Use>
     auto in_kernel(const Use& use) const {
-        const model::Train& train = assembly_->train();
-        const model::Layout& n = assembly_->layout();
+        return in_kernel(*assembly_, use);
+    }
+    template <class Use>
+    auto in_kernel(const model::Assembly& assembly, const Use& use) const {
+        const model::Train& train = assembly.train();
+        const model::Layout& n = assembly.layout();
         const auto in = [&]<class D>(D) {
-            const typename TrainReader<D>::Model model{*assembly_, channels_};
+            const typename TrainReader<D>::Model model{assembly, channels_};
             return use.template operator()<D>(model);
         };
         if (model::fits<model::Narrow>(train, n)) return in(model::Narrow{});
@@ -339,9 +343,11 @@ class TrainRun {
     }
     TrainReport run(const std::vector<Signal>& inputs, std::span<const double> start, std::span<const double> memory,
                     const TrainOptions& options, double* out) const {
-        return in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
+        const auto in = [&]<class D>(const typename TrainReader<D>::Model& model) {
             return run_train_in<D>(model, inputs, start, memory, options, out);
-        });
+        };
+        // The adaptive solver takes smooth laws as they are.
+        return options.tolerance > 0.0 ? in_kernel(model::Assembly(assembly_->train(), true), in) : in_kernel(in);
     }
 
     // By the exact solver to options.duration, without a record: what is there.

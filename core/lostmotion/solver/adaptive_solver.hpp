@@ -1,6 +1,6 @@
 // Adaptive solver: Dormand and Prince's embedded Runge-Kutta pair 5(4) with Shampine's dense output, over the same
-// regimes, plus an optional nonlinear remainder. A second opinion on the exact solver, and room for physics that is
-// not piecewise linear.
+// regimes, plus what is not piecewise linear: a second opinion on the exact solver. Of a train, what the chords of a
+// law leave of it enters as further inputs, so that modes, reactions, guards and energies see it.
 //
 // J. R. Dormand, P. J. Prince: A family of embedded Runge-Kutta formulae, J. Comput. Appl. Math. 6 (1980) 19-26.
 // L. F. Shampine: Some practical Runge-Kutta formulas, Math. Comput. 46 (1986) 135-150.
@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <type_traits>
 
 #include "exact_solver.hpp"
@@ -122,7 +123,7 @@ class AdaptiveSolver {
         now_.x = x;
         now_.memory = memory;
         input_.anchor(time_);
-        see_inputs(input_, time_, now_);
+        see_inputs(system_, input_, time_, now_);
         step_ = 0.0;
         switchings_ = 0;
         return status_of(system_.start(cache_, now_, key_));
@@ -149,17 +150,24 @@ class AdaptiveSolver {
         return Status::done;
     }
 
-    Inputs input_at(double t) {
+    Inputs input_at(double t, const State& x) {
         input_.anchor(t);
-        return input_.values();
+        return with_remainders(x);
     }
     // The left limit, for the end of the last step.
-    Inputs input_before(double t) {
+    Inputs input_before(double t, const State& x) {
         input_.anchor_left(t);
-        return input_.values();
+        return with_remainders(x);
     }
 
  private:
+    Inputs with_remainders(const State& x) const {
+        Inputs u = input_.values();
+        if constexpr (requires { system_.set_remainders(key_, x, now_.memory, u); })
+            system_.set_remainders(key_, x, now_.memory, u);
+        return u;
+    }
+
     template <class Observer>
     Status change_regime(const Guard* fired, Observer& observer) {
         if (fired != nullptr) input_.anchor(time_);
@@ -171,7 +179,7 @@ class AdaptiveSolver {
     }
 
     State rates(const LinearRatesOf<D>& linear, const ColumnOf<D>& constant, double t, const State& x) {
-        State out = linear(x, constant, input_at(t));
+        State out = linear(x, constant, input_at(t, x));
         remainder_(t, x, out);
         return out;
     }
@@ -196,7 +204,7 @@ class AdaptiveSolver {
         DenseStep dense;
         Ends here, there;
         double h = step_ > 0.0 ? step_ : 1e-6;
-        off_zero_ = false;
+        off_zero_ = 0;
         dense.k[0] = rates(entry.rates, motion.fixed, time_, now_.x);
         evaluate_guards(motion, time_, now_.x, dense.k[0], here);
         while (time_ < limit) {
@@ -231,7 +239,9 @@ class AdaptiveSolver {
 
     void evaluate_guards(const Motion& motion, double t, const State& x, const State& rate, Ends& out) {
         input_.anchor(t);
-        const auto u = input_.template jet<2>();
+        auto u = input_.template jet<2>();
+        if constexpr (requires { system_.set_remainders(key_, x, now_.memory, u[0], &u[1]); })
+            system_.set_remainders(key_, x, now_.memory, u[0], &u[1]);
         motion.entry.guards.evaluate(motion.constant, x, u[0], out.value);
         motion.entry.guards.rates(rate, u[1], out.slope);
     }
@@ -271,7 +281,7 @@ class AdaptiveSolver {
             const Guard& guard = entry.regime.guards[g];
             const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], dense.length);
             if (c.min() <= 0.0) refine_crossing(guard, dense, end, t_event, crossed);
-            if (guard.by_grazing) find_grazing(guard, c, dense, t_event, crossed);
+            if (guard.by_grazing) find_grazing(g, guard, c, dense, t_event, crossed);
         }
         return crossed;
     }
@@ -281,9 +291,12 @@ class AdaptiveSolver {
     void refine_crossing(const Guard& guard, const DenseStep& dense, double end, double& t_event,
                          const Guard*& crossed) {
         constexpr int parts_checked = 16;
-        const auto value = [&](double t) { return evaluate<D>(guard.form, dense(t), now_.memory, input_at(t)); };
+        const auto value = [&](double t) {
+            const State x = dense(t);
+            return evaluate<D>(guard.form, x, now_.memory, input_at(t, x));
+        };
         // A solution of finite accuracy may tremble about a guard that the exact one only approaches.
-        double noise = rounding * magnitude<D>(guard.form, dense.x, now_.memory, input_at(dense.begin));
+        double noise = rounding * magnitude<D>(guard.form, dense.x, now_.memory, input_at(dense.begin, dense.x));
         for (int k = 0; k < D::states; ++k) noise += noise_factor * std::fabs(guard.form.c[k]) * scale_[k];
         // The speed of the twist is a small difference, and each of its zeros sets the hysteresis anew: one that the
         // error of the solution may make is none.
@@ -310,13 +323,13 @@ class AdaptiveSolver {
     }
 
     // Does the guard touch zero, as far as this solution can tell, and rise again?
-    void find_grazing(const Guard& guard, const Cubic& c, const DenseStep& dense, double& t_event,
+    void find_grazing(int number, const Guard& guard, const Cubic& c, const DenseStep& dense, double& t_event,
                       const Guard*& crossed) {
         const double t = dense.begin + dense.length * c.lowest_at();
         const double near = grazing_factor * solution_error(guard.form, dense.x);
-        off_zero_ |= c.c0 > near;
-        if (!off_zero_ || c.c3 <= near || t >= t_event ||
-            std::fabs(evaluate<D>(guard.form, dense(t), now_.memory, input_at(t))) > near)
+        if (c.c0 > near) off_zero_ |= std::uint64_t{1} << number;
+        if ((off_zero_ >> number & 1) == 0 || c.c3 <= near || t >= t_event ||
+            std::fabs(evaluate<D>(guard.form, dense(t), now_.memory, input_at(t, dense(t)))) > near)
             return;
         t_event = t;
         crossed = &guard;
@@ -348,7 +361,7 @@ class AdaptiveSolver {
     long steps_ = 0;
     std::size_t switchings_ = 0;
     Accumulation accumulation_;
-    bool off_zero_ = false;  // whether the guard that may touch has been off zero in this regime
+    std::uint64_t off_zero_ = 0;  // bit g: guard g, which may touch zero, has been off it in this regime
     Contact stopped_at_{};
 };
 

@@ -34,6 +34,13 @@ void see_inputs(const InputState<D>& input, double time, InstantOf<D>& now) {
     now.input_magnitudes = input.magnitudes();
 }
 
+// The same, with those inputs that depend on the state, if the system has any.
+template <class System, class D>
+void see_inputs(const System& system, const InputState<D>& input, double time, InstantOf<D>& now) {
+    see_inputs(input, time, now);
+    if constexpr (requires { system.set_remainders(now); }) system.set_remainders(now);
+}
+
 // Whether an observer of a run wants to see the next switching: if it has switching(), and wants_switching() does not
 // say otherwise.
 template <class System, class Observer>
@@ -78,7 +85,14 @@ Status switch_regime(const System& system, Cache& cache, InputState<D>& input, d
         }
         input.anchor(time);
     }
-    see_inputs(input, time, now);
+    see_inputs(system, input, time, now);
+    if constexpr (requires { system.set_remainders(now); })
+        if (before) {
+            InstantOf<D> left = now;
+            left.input[0] = *before;
+            system.set_remainders(left);
+            before = left.input[0];
+        }
     const Found found = system.next(cache, now, fired, key, before.value_or(now.input[0]));
     if (found != Found::yes) return status_of(found);
     if constexpr (requires { observer.switching(s); }) {

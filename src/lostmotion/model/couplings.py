@@ -12,7 +12,12 @@ from .signals import CommandSignal
 
 
 class Commanded(Part):
-    """What its command engages, with the delays of a data sheet."""
+    """Dry friction with a capacity that its command applies, with the delays of a data sheet."""
+
+    torque: Annotated[Torque, Positive]
+    """capacity while it slips, at command 1; between 0 (open) and 1 in proportion"""
+    breakaway_torque: Annotated[Torque, Positive] | None = None
+    """capacity at rest, at command 1; left out, the same"""
 
     engagement_delay: Annotated[Time, NotNegative] = 0.0
     """from a step up of the command until it acts"""
@@ -29,14 +34,25 @@ class Commanded(Part):
         """
         return command.delayed(self.engagement_delay, self.release_delay)
 
+    @model_validator(mode="after")
+    def _holds_at_least_its_torque(self) -> Self:
+        if self.breakaway_torque is not None and self.breakaway_torque < self.torque:
+            raise ValueError(
+                f"has breakaway_torque = {self.breakaway_torque} N*m, less than its torque in motion, {self.torque} N*m; "
+                "give at least that, or leave it out"
+            )
+        return self
+
+    def holding(self) -> float:
+        """Capacity at rest [N·m]."""
+        return self.torque if self.breakaway_torque is None else self.breakaway_torque
+
 
 class Brake(Commanded):
-    """A holding brake: dry friction between a shaft and the frame, with a capacity that its command applies."""
+    """A holding brake: dry friction between a shaft and the frame."""
 
     shaft: str
     """that it holds"""
-    torque: Annotated[Torque, Positive]
-    """capacity at command 1; between 0 (open) and 1 in proportion"""
 
 
 class Clutch(Commanded):
@@ -48,8 +64,6 @@ class Clutch(Commanded):
     """shaft"""
     output: str
     """shaft"""
-    torque: Annotated[Torque, Positive]
-    """capacity; of a friction clutch at command 1, between 0 (open) and 1 in proportion"""
 
     @model_validator(mode="after")
     def _only_commanded_clutches_have_delays(self) -> Self:

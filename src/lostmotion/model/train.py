@@ -125,10 +125,10 @@ class DriveTrain(TrainElements):
         for name, g in self.gears.items():
             add_gear(train, name, g)
         for name, b in self.brakes.items():
-            train.add_brake(name, b.shaft, b.torque)
+            train.add_brake(name, b.shaft, b.torque, b.holding())
         for name, c in self.clutches.items():
             add = train.add_clutch if c.kind == "friction" else train.add_safety_clutch
-            add(name, c.input, c.output, c.torque)
+            add(name, c.input, c.output, c.torque, c.holding())
         for name, f in self.freewheels.items():
             train.add_freewheel(name, f.input, f.output)
         turning: dict[str, Any] = {**self.gravity, **self.angle_torques}

@@ -1,0 +1,302 @@
+// Runs of random trains, each by several ways: the exact solver, the adaptive one, time stepping, and the laws that
+// every run obeys. The tests and `make soak` share them.
+#pragma once
+
+#include <cstdio>
+#include <string>
+
+#include "lostmotion/simulation/train_run.hpp"
+#include "random_trains.hpp"
+#include "train_steps.hpp"
+
+namespace lostmotion::model {
+
+// With names of their own for all elements.
+inline Train named(Train t) {
+    const auto name = [](auto& elements, const std::string& kind) {
+        for (std::size_t k = 0; k < elements.size(); ++k)
+            if (elements[k].name.empty() || elements.size() > 1) elements[k].name = kind + std::to_string(k);
+    };
+    name(t.motors, "motor");
+    name(t.gears, "gear");
+    name(t.brakes, "brake");
+    name(t.couplings, "coupling");
+    name(t.angle_torques, "angle_torque");
+    if (t.shafts[0].name.empty()) name(t.shafts, "shaft");
+    return t;
+}
+
+struct Recorded {
+    lostmotion::TrainRun run;
+    TrainReport report;
+    std::vector<double> out;
+    std::size_t samples;
+
+    Recorded(const Train& train, const std::vector<Signal>& inputs, double duration, double interval,
+             double tolerance = 0.0, std::span<const double> start = {}, std::span<const double> memory = {})
+        : run(named(train)) {
+        TrainOptions options;
+        options.duration = duration;
+        options.sample_interval = interval;
+        samples = options.samples = static_cast<std::size_t>(duration / interval + 1.5);
+        options.tolerance = tolerance;
+        out.resize(run.channels().size() * samples);
+        report = run.run(inputs, start, memory, options, out.data());
+    }
+    bool done() const { return report.status == Status::done && !report.too_many_guards; }
+    const double* channel(const std::string& name) const {
+        for (std::size_t c = 0; c < run.channels().size(); ++c)
+            if (run.channels()[c].name == name) return &out[c * samples];
+        return nullptr;
+    }
+};
+
+// The largest difference of a state, in units of its largest value.
+inline double difference(const Recorded& p, const Recorded& q, double sign = 1.0) {
+    double worst = 0.0;
+    for (std::size_t c = 0; c < p.run.channels().size(); ++c) {
+        if (p.run.channels()[c].kind != TrainChannel::state) continue;
+        double size = 1e-6, most = 0.0;
+        for (std::size_t k = 0; k < p.samples; ++k) {
+            size = std::max(size, std::fabs(p.out[c * p.samples + k]));
+            most = std::max(most, std::fabs(p.out[c * p.samples + k] - sign * q.out[c * p.samples + k]));
+        }
+        worst = std::max(worst, most / size);
+    }
+    return worst;
+}
+
+// A random train that the kernel has room for, with its inputs.
+struct RandomRun {
+    Train train;
+    std::vector<Signal> inputs;
+
+    RandomRun(RandomTrains& random, int shafts, double duration) {
+        do train = named(random.any(random.pick(2, shafts)));
+        while (lostmotion::TrainRun(train).error() != "");
+        inputs = random.signals(Assembly(train), duration);
+    }
+};
+
+// Where contacts are redundant, their torques depend on what they were, or are shared by another rule. If one of them
+// holds more than it takes while it slips, or a loss depends on such a torque, so does the instant at which one of them
+// breaks away: rigid bodies leave it open.
+inline bool leaves_break_away_open(const Train& t) {
+    const Assembly a(t);
+    const auto more = [](const auto& e) { return e.holding() > e.torque; };
+    return std::any_of(a.places().contacts.begin(), a.places().contacts.end(),
+                       [](const ContactPlace& c) { return c.locked != nowhere; }) &&
+           (std::any_of(t.brakes.begin(), t.brakes.end(), more) ||
+            std::any_of(t.couplings.begin(), t.couplings.end(), more) ||
+            std::any_of(t.gears.begin(), t.gears.end(), [](const Gear& g) { return g.has_dry_losses(); }) ||
+            std::any_of(t.shafts.begin(), t.shafts.end(),
+                        [](const Shaft& s) { return s.friction.holding() > s.friction.at_zero(0); }));
+}
+
+// What time stepping converges to. A run is undecided if it does not agree with itself.
+struct SteppingTally {
+    int compared = 0, undecided = 0, open = 0, wrong = 0;
+    double worst = 0.0;
+
+    int failed() const { return wrong; }
+};
+
+// The largest difference of a speed or twist between the exact run and stepping `coarse` and four times as often, and
+// between the two.
+struct Stepped {
+    double exact = 0.0, own = 0.0;
+
+    Stepped(const Recorded& r, const Train& train, const std::vector<Signal>& inputs, double duration, long coarse) {
+        TrainSteps a(train, inputs), b(train, inputs);
+        const long parts = static_cast<long>(r.samples) - 1;
+        const double h = duration / static_cast<double>(coarse);
+        std::vector<double> size(train.shafts.size() + train.gears.size(), 1e-3), own_gap(size.size()),
+            gap(size.size());
+        for (long k = 0; k < coarse && !a.stopped && !b.stopped; ++k) {
+            const double t = h * static_cast<double>(k);
+            a.step(t, h);
+            for (int n = 0; n < 4; ++n) b.step(t + 0.25 * h * n, 0.25 * h);
+            if ((k + 1) % (coarse / parts) != 0) continue;
+            const auto sample = static_cast<std::size_t>((k + 1) / (coarse / parts));
+            const auto note = [&](std::size_t at, const double* exact, double one, double other) {
+                size[at] = std::max(size[at], std::fabs(exact[sample]));
+                gap[at] = std::max(gap[at], std::fabs(exact[sample] - other));
+                own_gap[at] = std::max(own_gap[at], std::fabs(one - other));
+            };
+            for (std::size_t s = 0; s < train.shafts.size(); ++s)
+                note(s, r.channel(train.shafts[s].name + "_speed"), a.speed[s], b.speed[s]);
+            for (std::size_t g = 0; g < train.gears.size(); ++g)
+                if (const double* d = r.channel(train.gears[g].name + "_twist"); d != nullptr)
+                    note(train.shafts.size() + g, d, a.twist[g], b.twist[g]);
+        }
+        for (std::size_t k = 0; k < size.size(); ++k) {
+            exact = std::max(exact, gap[k] / size[k]);
+            own = std::max(own, own_gap[k] / size[k]);
+        }
+        if (a.stopped || b.stopped) own = 1.0;
+    }
+    // Of a method of first order, the finer run is off by a third of what the two differ by.
+    bool agrees() const { return exact <= own + 1e-6; }
+    bool decided() const { return own < 0.02; }
+};
+
+inline void compare_with_steps(RandomTrains& random, int shafts, double duration, long steps, SteppingTally& tally,
+                               const char* tell = nullptr) {
+    const RandomRun r(random, shafts, duration);
+    const Recorded exact(r.train, r.inputs, duration, duration / 20.0);
+    if (!exact.done()) {
+        ++tally.undecided;
+        return;
+    }
+    Stepped s(exact, r.train, r.inputs, duration, steps);
+    for (int finer = 0; finer < 2 && !(s.decided() && s.agrees()); ++finer)
+        s = Stepped(exact, r.train, r.inputs, duration, steps *= 8);
+    if (!s.decided()) {
+        ++tally.undecided;
+        return;
+    }
+    if (!s.agrees() && leaves_break_away_open(r.train)) {
+        ++tally.open;
+        return;
+    }
+    ++tally.compared;
+    tally.worst = std::max(tally.worst, s.exact);
+    if (s.agrees()) return;
+    ++tally.wrong;
+    if (tell != nullptr)
+        std::printf("  %s: exact run and time stepping differ by %.2g, stepping with itself by %.2g\n", tell, s.exact,
+                    s.own);
+}
+
+// Exact against adaptive solver. Two tolerances of the adaptive one tell how well it knows the motion: a run counts if
+// it agrees with itself.
+struct SolverTally {
+    int compared = 0, undecided = 0, open = 0, jammed = 0, wrong = 0;
+    double worst = 0.0;
+
+    int failed() const { return wrong + jammed; }
+};
+
+inline void compare_solvers(RandomTrains& random, int shafts, double duration, SolverTally& tally,
+                            const char* tell = nullptr) {
+    const RandomRun r(random, shafts, duration);
+    const Recorded exact(r.train, r.inputs, duration, duration / 50.0),
+        fine(r.train, r.inputs, duration, duration / 50.0, 1e-10);
+    if (!exact.done()) {
+        ++tally.jammed;
+        return;
+    }
+    const double gap = fine.done() ? difference(exact, fine) : 1.0;
+    double own = 0.0;
+    if (gap > 1e-7) {
+        const Recorded coarse(r.train, r.inputs, duration, duration / 50.0, 1e-8);
+        own = fine.done() && coarse.done() ? difference(coarse, fine) : 1.0;
+    }
+    if (own > 1e-5) {
+        ++tally.undecided;
+        return;
+    }
+    ++tally.compared;
+    tally.worst = std::max(tally.worst, gap);
+    if (gap <= std::max(1e-6, 2.0 * own)) return;
+    ++tally.wrong;
+    if (tell != nullptr)
+        std::printf("  %s: exact and adaptive run differ by %.2g, the adaptive one with itself by %.2g\n", tell, gap,
+                    own);
+}
+
+// Balance and sign of the energies, mirror image, sampling, a split at which all signals begin anew.
+struct LawTally {
+    int runs = 0, undecided = 0, open = 0, unbalanced = 0, gained = 0, mirrored = 0;
+    int unlike_mirror = 0, unlike_sampled = 0, unlike_split = 0;
+    double residual = 0.0;
+
+    int failed() const { return unbalanced + gained + unlike_mirror + unlike_sampled + unlike_split; }
+};
+
+// Nothing of it tells forward from backward.
+inline bool is_symmetric(const Train& t) {
+    return t.angle_torques.empty() &&
+           std::none_of(t.couplings.begin(), t.couplings.end(),
+                        [](const Coupling& c) { return c.kind == Coupling::freewheel; }) &&
+           std::none_of(t.gears.begin(), t.gears.end(), [](const Gear& g) { return g.transmission_error.present(); });
+}
+// What it turns into heat is nowhere negative: a constant efficiency gives energy where the load drives.
+inline bool loses_only(const Train& t) {
+    return std::none_of(t.gears.begin(), t.gears.end(),
+                        [](const Gear& g) { return !g.has_dry_losses() && g.law.efficiency < 1.0; });
+}
+inline Signal mirrored(Signal s) {
+    for (Breakpoint& b : s.breakpoints) b = {b.time, -b.value, -b.slope};
+    for (Sine& w : s.sines) w.amplitude = -w.amplitude;
+    return s;
+}
+// The same signal with its zero of time at t.
+inline Signal from(const Signal& s, double t) {
+    Signal out;
+    const std::size_t k = s.segment(t);
+    out.breakpoints[0] = {0.0, s.breakpoints[k].value + s.breakpoints[k].slope * (t - s.breakpoints[k].time),
+                          s.breakpoints[k].slope};
+    for (std::size_t n = k + 1; n < s.breakpoints.size(); ++n)
+        out.breakpoints.push_back({s.breakpoints[n].time - t, s.breakpoints[n].value, s.breakpoints[n].slope});
+    out.sines = s.sines;
+    for (Sine& w : out.sines) w.phase += 2.0 * pi * w.frequency * t;
+    return out;
+}
+// Of the states at the end, in units of their largest values in the course of a run.
+inline double difference_at_end(const Recorded& run, const std::vector<double>& x) {
+    double worst = 0.0;
+    for (std::size_t c = 0; c < run.run.channels().size(); ++c) {
+        if (run.run.channels()[c].kind != TrainChannel::state) continue;
+        double size = 1e-6;
+        for (std::size_t k = 0; k < run.samples; ++k) size = std::max(size, std::fabs(run.out[c * run.samples + k]));
+        const auto state = static_cast<std::size_t>(run.run.channels()[c].index);
+        worst = std::max(worst, std::fabs(run.report.x[state] - x[state]) / size);
+    }
+    return worst;
+}
+
+inline void check_laws(RandomTrains& random, int shafts, double duration, LawTally& tally, const char* tell = nullptr) {
+    const RandomRun r(random, shafts, duration);
+    const double at = random.uniform(0.1, 0.9) * duration;
+    const Recorded run(r.train, r.inputs, duration, duration / 40.0);
+    if (!run.done()) return;
+    ++tally.runs;
+    const auto count = [&](int& wrong, const char* what, double by) {
+        ++wrong;
+        if (tell != nullptr) std::printf("  %s: %s by %.2g\n", tell, what, by);
+    };
+    const double turned_over = std::max(1e-9, run.report.turned_over), residual = std::fabs(run.report.residual());
+    tally.residual = std::max(tally.residual, residual / turned_over);
+    if (residual > 1e-9 * turned_over) count(tally.unbalanced, "energies do not balance", residual / turned_over);
+    for (const TrainEnergy& e : run.report.energy)
+        if (e.kind == PowerFlow::loss && e.energy < -1e-10 * turned_over && loses_only(r.train))
+            count(tally.gained, e.name.c_str(), -e.energy / turned_over);
+
+    const Recorded sampled(r.train, r.inputs, duration, duration / 7.0);
+    // An error of rounding grows by up to a thousand from switching to switching of a run of this length.
+    constexpr double near = 1e-9;
+    if (const double d = sampled.done() ? difference_at_end(run, sampled.report.x) : 1.0; d > near)
+        count(tally.unlike_sampled, "sampling changes it", d);
+    if (is_symmetric(r.train)) {
+        ++tally.mirrored;
+        std::vector<Signal> inputs = r.inputs;
+        // Brakes and clutches have no mirror image.
+        const std::size_t motors_and_loads =
+            r.train.motors.size() + static_cast<std::size_t>(std::count_if(r.train.shafts.begin(), r.train.shafts.end(),
+                                                                           [](const Shaft& s) { return s.loaded; }));
+        for (std::size_t k = 0; k < motors_and_loads; ++k) inputs[k] = mirrored(inputs[k]);
+        const Recorded image(r.train, inputs, duration, duration / 40.0);
+        if (const double d = image.done() ? difference(run, image, -1.0) : 1.0; d > near)
+            count(tally.unlike_mirror, "its mirror image differs", d);
+    }
+    const Recorded first(r.train, r.inputs, at, at / 2.0);
+    std::vector<Signal> rest;
+    for (const Signal& s : r.inputs) rest.push_back(from(s, at));
+    const Recorded second(r.train, rest, duration - at, (duration - at) / 2.0, 0.0, first.report.x,
+                          first.report.memory);
+    if (const double d = second.done() ? difference_at_end(run, second.report.x) : 1.0; d > near)
+        count(tally.unlike_split, "split it differs", d);
+}
+
+}  // namespace lostmotion::model

@@ -1,0 +1,446 @@
+"""Examples of Modelica.Mechanics.Rotational, rebuilt as drive trains, against an integration of their equations by scipy.
+
+The equations stand here as the examples' pages give them, with event logic of their own: nothing of the core is used.
+Its Gear of ElasticBearing joins three flanges (input, output, housing), for which there is no element.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+import lostmotion as lm
+
+Vector = NDArray[np.float64]
+TIGHT: dict[str, float] = {"rtol": 1e-12, "atol": 1e-13}
+
+
+@dataclass
+class Contact:
+    """Dry friction between shafts a and b (None: the frame), which takes what is given of the time [N·m]."""
+
+    a: int
+    b: int | None
+    slipping: Callable[[float], float]
+    holding: Callable[[float], float]
+    forward: float = math.inf
+    """factor of what it holds while b is driven forward: math.inf of a one-way clutch"""
+    one_way: bool = False
+
+
+@dataclass
+class Hybrid:
+    """Shafts with inertias, a smooth torque on each, and contacts: integrated from event to event."""
+
+    inertias: Sequence[float]
+    torque: Callable[[float, Vector], Vector]
+    """of the time and the state (speeds, then twists), on each shaft"""
+    contacts: list[Contact]
+    twists: list[tuple[int, int]] = field(default_factory=list)
+
+    def speed(self, c: Contact, y: Vector) -> float:
+        return float(y[c.a] - (0.0 if c.b is None else y[c.b]))
+
+    def solve(self, t: float, y: Vector, modes: dict[int, int]) -> tuple[Vector, dict[int, float]]:
+        """Accelerations, and the torque of each contact."""
+        n = len(self.inertias)
+        f = self.torque(t, y)
+        stuck = [k for k, mode in modes.items() if mode == 0]
+        W = np.zeros((len(stuck), n))
+        for k, mode in modes.items():
+            c = self.contacts[k]
+            row = np.zeros(n)
+            row[c.a] = 1.0
+            if c.b is not None:
+                row[c.b] = -1.0
+            if mode == 0:
+                W[stuck.index(k)] = row
+            else:
+                f = f - mode * c.slipping(t) * row
+        M = np.diag(1.0 / np.asarray(self.inertias))
+        torques = {k: mode * self.contacts[k].slipping(t) for k, mode in modes.items()}
+        if stuck:
+            held = np.linalg.solve(W @ M @ W.T, W @ M @ f)
+            f = f - W.T @ held
+            torques.update(zip(stuck, map(float, held), strict=True))
+        return M @ f, torques
+
+    def margin(self, k: int, t: float, torque: float) -> float:
+        c = self.contacts[k]
+        return math.inf if torque >= 0.0 and c.one_way else c.holding(t) - abs(torque)
+
+    def choose(self, t: float, y: Vector, active: list[int], broken: dict[int, int]) -> dict[int, int]:
+        """Modes that are consistent, those with most contacts stuck first."""
+        choices = []
+        for k in active:
+            v = self.speed(self.contacts[k], y)
+            if k in broken:
+                choices.append([broken[k]])
+            elif abs(v) > 1e-9:
+                choices.append([1 if v > 0.0 else -1])
+            else:
+                choices.append([0, -1] if self.contacts[k].one_way else [0, 1, -1])
+        for combination in sorted(itertools.product(*choices), key=lambda m: sum(map(abs, m))):
+            modes = dict(zip(active, combination, strict=True))
+            rates, torques = self.solve(t, y, modes)
+            if all(
+                self.margin(k, t, torques[k]) >= -1e-9
+                if mode == 0
+                else abs(self.speed(self.contacts[k], y)) > 1e-9 or mode * self.speed(self.contacts[k], rates) > -1e-9
+                for k, mode in modes.items()
+            ):
+                return modes
+        raise AssertionError(f"no consistent modes at {t}")
+
+    def run(self, y: Vector, times: Vector, breaks: Sequence[float]) -> tuple[Vector, int]:
+        """States at the times, and how often a contact changed its mode."""
+        out, events = [np.array(y)], 0
+        stops = sorted({*breaks, float(times[-1])})
+        t = 0.0
+        for stop in stops:
+            broken: dict[int, int] = {}
+            while t < stop:
+                middle = 0.5 * (t + stop)
+                active = [k for k, c in enumerate(self.contacts) if c.one_way or c.holding(middle) > 0.0]
+                modes = self.choose(t, y, active, broken)
+                t, y, broken, part = self.advance(t, y, stop, times, modes)
+                events += t < stop
+                out.extend(part)
+        return np.array(out), events
+
+    def advance(
+        self, t: float, y: Vector, stop: float, times: Vector, modes: dict[int, int]
+    ) -> tuple[float, Vector, dict[int, int], list[Vector]]:
+        """One regime, to its end."""
+        n = len(self.inertias)
+
+        def rates(time: float, state: Vector) -> Vector:
+            return np.concatenate([self.solve(time, state, modes)[0], [state[a] - state[b] for a, b in self.twists]])
+
+        def guard(k: int) -> Callable[[float, Vector], float]:
+            c, mode = self.contacts[k], modes[k]
+            if mode == 0:
+                return lambda time, state: min(1e9, self.margin(k, time, self.solve(time, state, modes)[1][k]))
+            return lambda time, state: mode * self.speed(c, state)
+
+        guards = []
+        for k in modes:
+            g = guard(k)
+            g.terminal, g.direction = True, -1  # type: ignore[attr-defined]
+            guards.append(g)
+        wanted = times[(times > t) & (times <= stop)]
+        s = solve_ivp(rates, (t, stop), y, "DOP853", dense_output=True, events=guards, max_step=5e-3, **TIGHT)
+        end = float(s.t[-1])
+        state = s.y[:, -1].copy()
+        broken = {}
+        for k, fired in zip(modes, s.t_events, strict=True):
+            if len(fired) and modes[k] == 0:
+                broken[k] = 1 if self.solve(end, state, modes)[1][k] > 0.0 else -1
+            elif len(fired) and self.contacts[k].b is None:
+                state[self.contacts[k].a] = 0.0
+        assert np.all(np.isfinite(state[:n]))
+        return end, state, broken, [s.sol(time) for time in wanted if time <= end]
+
+
+def speeds(scenario: lm.TrainScenario, *names: str) -> Vector:
+    result = lm.simulate(scenario)
+    return np.array([result[f"{name}_speed"].values for name in names]).T
+
+
+def close(train: Vector, expected: Vector, tolerance: float = 1e-8) -> None:
+    size = np.abs(expected).max()
+    assert np.abs(train - expected).max() < tolerance * size
+
+
+def simulation(duration: float, interval: float = 0.01) -> dict[str, float]:
+    return {"duration": duration, "sample_interval": interval}
+
+
+def test_first() -> None:
+    scenario = lm.TrainScenario(
+        shafts={
+            "motor": {"inertia": 0.1, "torque": {"amplitude": 10.0, "frequency": 5.0, "phase": math.pi}},
+            "gear": {"inertia": 2.0, "viscous_friction": 10.0},
+            "load": {"inertia": 2.0},
+        },
+        gears={
+            "ideal": {"input": "motor", "output": "gear", "ratio": 10.0},
+            "spring": {
+                "input": "gear",
+                "output": "load",
+                "ratio": 1.0,
+                "stiffness": {"kind": "linear", "stiffness": 1e4},
+            },
+        },
+        simulation=simulation(1.0),
+    )
+    # The motor counts 100-fold at the output of the gear.
+    reduced = Hybrid(
+        [2.0 + 0.1 * 100.0, 2.0],
+        lambda t, y: np.array([100.0 * math.sin(10.0 * math.pi * t) - 10.0 * y[0] - 1e4 * y[2], 1e4 * y[2]]),
+        [],
+        [(0, 1)],
+    )
+    times = np.arange(101) * 0.01
+    expected, _ = reduced.run(np.zeros(3), times, [])
+    close(speeds(scenario, "gear", "load"), expected[:, :2])
+
+
+def coupled_clutches(peak: float) -> tuple[lm.TrainScenario, Hybrid]:
+    scenario = lm.TrainScenario(
+        shafts={
+            "j1": {"inertia": 1.0, "torque": {"amplitude": 10.0, "frequency": 5.0, "phase": math.pi}},
+            **{name: {"inertia": 1.0} for name in ("j2", "j3", "j4")},
+        },
+        clutches={
+            f"c{k}": {"input": f"j{k}", "output": f"j{k + 1}", "torque": 10.0, "breakaway_torque": 10.0 * peak}
+            for k in (1, 2, 3)
+        },
+        command={
+            "c1": {"amplitude": 1.0, "frequency": 0.2, "phase": 0.5 * math.pi},
+            "c2": {"steps": [{"height": 1.0, "time": 0.4}]},
+            "c3": {"steps": [{"height": 1.0, "time": 0.9}]},
+        },
+        initial={"speeds": {"j1": 10.0}},
+        simulation=simulation(1.5),
+    )
+    engaged = (
+        lambda t: max(0.0, math.cos(0.4 * math.pi * t)),
+        lambda t: float(t >= 0.4),
+        lambda t: float(t >= 0.9),
+    )
+
+    def torque(t: float, y: Vector) -> Vector:
+        return np.array([10.0 * math.sin(10.0 * math.pi * t), 0.0, 0.0, 0.0])
+
+    contacts = [
+        Contact(k, k + 1, lambda t, u=u: 10.0 * u(t), lambda t, u=u: 10.0 * peak * u(t))  # type: ignore[misc]
+        for k, u in enumerate(engaged)
+    ]
+    return scenario, Hybrid([1.0] * 4, torque, contacts)
+
+
+@pytest.mark.parametrize("peak", [1.0, 1.1])
+def test_coupled_clutches(peak: float) -> None:
+    scenario, reference = coupled_clutches(peak)
+    times = np.arange(151) * 0.01
+    expected, events = reference.run(np.array([10.0, 0.0, 0.0, 0.0]), times, [0.4, 0.9, 1.25])
+    assert events >= 4
+    close(speeds(scenario, "j1", "j2", "j3", "j4"), expected)
+
+
+def friction(**tables: Any) -> lm.TrainScenario:
+    return lm.TrainScenario(
+        gears={
+            "spring": {
+                "input": "inertia2",
+                "output": "inertia1",
+                "ratio": 1.0,
+                "stiffness": {"kind": "linear", "stiffness": 160.0},
+                "mesh_damping": 1.0,
+            }
+        },
+        clutches={"clutch": {"input": "inertia3", "output": "inertia2", "torque": 80.0}},
+        brakes={"brake": {"shaft": "inertia1", "torque": 800.0}},
+        **tables,
+    )
+
+
+def test_friction() -> None:
+    """A clutch and a brake, which closes at 0.5 s, when the torque ends."""
+    shafts = {"inertia3": {"inertia": 1.0}, "inertia2": {"inertia": 0.05}, "inertia1": {"inertia": 1.0}}
+    driven = {
+        **shafts,
+        "inertia3": {"inertia": 1.0, "torque": {"amplitude": 200.0, "frequency": 50.0 / math.pi, "phase": math.pi}},
+    }
+    idle = {**shafts, "inertia3": {"inertia": 1.0, "torque": 0.0}}
+    names = ("inertia3", "inertia2", "inertia1")
+    first = lm.simulate(
+        friction(
+            shafts=driven,
+            command={"clutch": {"mean": 1.0}, "brake": {"mean": 0.0}},
+            initial={"speeds": {"inertia3": 100.0, "inertia2": 90.0, "inertia1": 90.0}},
+            simulation=simulation(0.5),
+        )
+    )
+    end = {name: float(first[f"{name}_speed"][-1]) for name in names}
+    second = speeds(
+        friction(
+            shafts=idle,
+            command={"clutch": {"mean": 1.0}, "brake": {"mean": 1.0}},
+            initial={"speeds": end, "twists": {"spring": float(first["spring_twist"][-1])}},
+            simulation=simulation(2.5),
+        ),
+        *names,
+    )
+
+    def torque(t: float, y: Vector) -> Vector:
+        spring = 160.0 * y[3] + (y[1] - y[2])
+        return np.array([200.0 * math.sin(100.0 * t) if t < 0.5 else 0.0, -spring, spring])
+
+    contacts = [
+        Contact(0, 1, lambda t: 80.0, lambda t: 80.0),
+        Contact(2, None, lambda t: 800.0 * (t >= 0.5), lambda t: 800.0 * (t >= 0.5)),
+    ]
+    times = np.arange(301) * 0.01
+    expected, events = Hybrid([1.0, 0.05, 1.0], torque, contacts, [(1, 2)]).run(
+        np.array([100.0, 90.0, 90.0, 0.0]), times, [0.5]
+    )
+    assert events >= 4
+    close(np.concatenate([np.array([first[f"{n}_speed"].values for n in names]).T, second[1:]]), expected[:, :3])
+
+
+def test_one_way_clutch() -> None:
+    """A freewheel and a clutch between the same shafts: while both are stuck, one torque serves for two."""
+    scenario = lm.TrainScenario(
+        shafts={
+            "input": {"inertia": 1.0, "torque": {"amplitude": 10.0, "frequency": 3.0, "phase": math.pi}},
+            "output": {"inertia": 1.0},
+        },
+        clutches={"clutch": {"input": "input", "output": "output", "torque": 1.5, "breakaway_torque": 37.5}},
+        freewheels={"freewheel": {"input": "input", "output": "output"}},
+        command={
+            "clutch": {
+                "steps": [{"height": h, "time": t} for h, t in ((1.0, 0.3), (-1.0, 0.95), (1.0, 1.6))],
+            }
+        },
+        initial={"speeds": {"input": -0.5}},
+        simulation=simulation(2.0),
+    )
+
+    def engaged(t: float) -> float:
+        return float(0.3 <= t < 0.95 or t >= 1.6)
+
+    contact = Contact(0, 1, lambda t: 1.5 * engaged(t), lambda t: 37.5 * engaged(t), one_way=True)
+    reference = Hybrid([1.0, 1.0], lambda t, y: np.array([10.0 * math.sin(6.0 * math.pi * t), 0.0]), [contact])
+    times = np.arange(201) * 0.01
+    expected, events = reference.run(np.array([-0.5, 0.0]), times, [0.3, 0.95, 1.6])
+    assert events >= 3
+    close(speeds(scenario, "input", "output"), expected)
+
+
+def test_lossy_gear_with_bearing_friction() -> None:
+    """LossyGearDemo2: both may be stuck at once, so that their torques are not unique; the motion is."""
+    scenario = lm.TrainScenario(
+        shafts={
+            "a": {
+                "inertia": 1.0,
+                "friction_torque": 0.5,
+                "viscous_friction": 0.5,
+                "torque": {"amplitude": 10.0, "frequency": 1.0, "phase": math.pi},
+            },
+            "b": {"inertia": 1.5, "torque": {"mean": 10.0, "ramps": [{"rise": -5.0, "duration": 2.0}]}},
+        },
+        gears={
+            "gear": {
+                "input": "a",
+                "output": "b",
+                "ratio": 2.0,
+                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.5, "backdrive_efficiency": 0.5},
+            }
+        },
+        simulation=simulation(0.5, 1e-3),
+    )
+
+    def load(t: float) -> float:
+        return 10.0 - 2.5 * t
+
+    def loss(s: int, T_2: float) -> float:
+        return (1.0 / 0.5 - 1.0 if s * T_2 > 0.0 else 1.0 - 0.5) * abs(T_2) / 2.0
+
+    def rate(t: float, w: float, s: int) -> float:
+        """w' with 1.5 w'/2 = T_2 - load and w' = 10 sin - T_2/2 - s (0.5 + loss) - 0.5 w, for the sign of T_2 that fits."""
+        for sign in (1, -1):
+            per_T_2 = 0.5 + s * loss(s, sign) * sign
+            a = (10.0 * math.sin(2.0 * math.pi * t) - per_T_2 * load(t) - 0.5 * s - 0.5 * w) / (1.0 + 0.75 * per_T_2)
+            if sign * (load(t) + 0.75 * a) >= 0.0:
+                return a
+        raise AssertionError("no torque fits")
+
+    def margins(t: float) -> tuple[float, float]:
+        held = 10.0 * math.sin(2.0 * math.pi * t) - load(t) / 2.0
+        return 0.5 + loss(1, load(t)) - held, 0.5 + loss(-1, load(t)) + held
+
+    times = np.arange(501) * 1e-3
+    expected, t, w, s, events = np.zeros(501), 0.0, 0.0, 0, 0
+    s = 0 if min(margins(0.0)) >= 0.0 else 1 if margins(0.0)[0] < 0.0 else -1
+    while t < 0.5:
+        guards: list[Any] = (
+            [lambda t, y: margins(t)[0], lambda t, y: margins(t)[1]] if s == 0 else [lambda t, y, s=s: s * y[0] + 0.0]
+        )
+        for g in guards:
+            g.terminal, g.direction = True, -1
+        rates = (lambda t, y: [0.0]) if s == 0 else (lambda t, y, s=s: [rate(t, y[0], s)])
+        part = solve_ivp(rates, (t, 0.5), [w], "DOP853", dense_output=True, events=guards, max_step=1e-3, **TIGHT)
+        inside = (times >= t) & (times <= part.t[-1])
+        expected[inside] = part.sol(times[inside])[0]
+        t, w = float(part.t[-1]), float(part.y[0, -1])
+        if t >= 0.5:
+            break
+        events += 1
+        if s == 0:
+            s = 1 if len(part.t_events[0]) else -1
+        else:
+            w = 0.0
+            s = 0 if min(margins(t)) >= 0.0 else 1 if margins(t)[0] < 0.0 else -1
+    assert events >= 4
+    close(speeds(scenario, "a", "b"), np.array([expected, expected / 2.0]).T)
+
+
+def test_elastic_backlash() -> None:
+    """Backlash with ElastoBacklash2: the flanks push as spring and damper, and part where these would pull."""
+    J, c, d, half = 5.0, 2e4, 50.0, math.pi / 8.0
+    scenario = lm.TrainScenario(
+        shafts={"inertia": {"inertia": J, "torque": 0.0}, "wall": {"inertia": 1.0}},
+        gears={
+            "mesh": {
+                "input": "inertia",
+                "output": "wall",
+                "ratio": 1.0,
+                "stiffness": {"kind": "curve", "backlash": 2.0 * half, "slopes": [c]},
+                "mesh_damping": d,
+            }
+        },
+        brakes={"ground": {"shaft": "wall", "torque": 1e6}},
+        command={"ground": {"mean": 1.0}},
+        initial={"twists": {"mesh": 0.5 * math.pi}},
+        simulation=simulation(1.0, 1e-3),
+    )
+    result = lm.simulate(scenario)
+    times = result["time"].values
+    expected = np.zeros((2, len(times)))
+    t, y, touching, events = 0.0, [0.5 * math.pi, 0.0], True, 0
+    while t < 1.0:
+        side = 1.0 if y[0] > 0.0 else -1.0
+
+        def force(y: Sequence[float], side: float = side) -> float:
+            return side * (c * (y[0] - side * half) + d * y[1])
+
+        def leaves(t: float, y: Sequence[float], force: Any = force) -> float:
+            return float(force(y))
+
+        leaves.terminal, leaves.direction = True, -1  # type: ignore[attr-defined]
+        rates = (
+            (lambda t, y, force=force, side=side: [y[1], -side * force(y) / J])
+            if touching
+            else (lambda t, y: [y[1], 0.0])
+        )
+        if not touching:  # to the other flank: the one that was left lies behind
+            crossing = (half + side * y[0]) / abs(y[1])
+            part = solve_ivp(rates, (t, min(1.0, t + crossing)), y, "DOP853", dense_output=True, **TIGHT)
+        else:
+            part = solve_ivp(rates, (t, 1.0), y, "DOP853", dense_output=True, events=[leaves], **TIGHT)
+        inside = (times >= t) & (times <= part.t[-1])
+        expected[:, inside] = part.sol(times[inside])
+        t, y, touching, events = float(part.t[-1]), list(part.y[:, -1]), not touching, events + 1
+    assert events >= 8
+    close(result["mesh_twist"].values, expected[0])
+    close(result["inertia_speed"].values, expected[1])
