@@ -42,7 +42,8 @@ bench: $(VENV)/built
 	$(BIN)/pip install -q --group bench
 	command -v valgrind >/dev/null || { apt-get update -q && apt-get install -qy valgrind; } || echo 'without valgrind'
 	echo '#include <cvode/cvode.h>' | c++ -E -x c++ - >/dev/null 2>&1 || { apt-get update -q && apt-get install -qy libsundials-dev; } || echo 'without SUNDIALS'
-	$(BIN)/cmake -S . -B build/bench -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_BENCHMARKS=ON -DLOSTMOTION_WERROR=ON >build/bench.log
+	$(BIN)/python benchmarks/baseline.py build/baseline
+	$(BIN)/cmake -S . -B build/bench -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_BENCHMARKS=ON -DLOSTMOTION_WERROR=ON -DLOSTMOTION_BASELINE=$(abspath build/baseline) >build/bench.log
 	$(BIN)/cmake --build build/bench
 	$(BIN)/python benchmarks/bench.py build/bench
 

@@ -9,9 +9,11 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
+import baseline
 import costs
 import one_run
 import studies
+import trains
 from report import Report, best
 
 import lostmotion as lm
@@ -28,7 +30,12 @@ def start_up(*command: str) -> float:
 def outputs(build: Path) -> dict[str, list[list[str]]]:
     """What the C++ programs print, in all builds that this processor can run; costs in the one for the widest vectors."""
     builds = _instruction_set.builds()
-    wanted = [*(f"bench_run_{name}" for name in builds), f"bench_costs_{builds[0]}", "peer_cvode"]
+    wanted = [
+        *(f"bench_run_{name}" for name in builds),
+        f"bench_costs_{builds[0]}",
+        f"bench_trains_{builds[0]}",
+        "peer_cvode",
+    ]
     return {
         p: [
             line.split("|")
@@ -72,6 +79,8 @@ def main() -> None:
         f"lostmotion {version('lostmotion')}, {', '.join(f'{m} {version(m)}' for m in PEERS)}.",
     )
     one_run.section(report, scenario, programs)
+    baseline.section(report, build, _instruction_set.builds())
+    trains.section(report, programs)
     costs.section(report, scenario, build, programs)
     studies.section(report, scenario)
     start_up_section(report)

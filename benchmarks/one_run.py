@@ -11,14 +11,13 @@ import peer_mujoco
 import peer_pathsim
 import peer_scipy
 from contact_drive import ContactDrive
-from report import Report, best
+from report import VECTORS, Report, best
 from xarray import Dataset
 
 import lostmotion as lm
 from lostmotion.paper import paper_scenario
 
 Row = tuple[str, float, str]  # name, [ms], largest error
-VECTORS = {"avx512": ", AVX-512", "avx2": ", AVX2"}  # of a build
 
 
 def error_of(load_speed: np.ndarray, twist: np.ndarray, exact: Dataset) -> float:
@@ -51,7 +50,7 @@ def section(report: Report, scenario: lm.Scenario, programs: dict[str, list[list
         rows = [
             (f"C++: {cells[1]}{VECTORS.get(program.rsplit('_', 1)[1], '')}", float(cells[2]), cells[3])
             for program, lines in programs.items()
-            if not program.startswith("bench_costs")
+            if program.startswith(("bench_run", "peer_cvode"))
             for cells in lines
             if cells[0] == loss_map and (program in (widest, "peer_cvode") or "exact" in cells[1])
         ]

@@ -1,80 +1,111 @@
-// Times the paper's run by SUNDIALS CVODE with root functions: the same regimes, the same contact logic at events,
-// another integrator. Prints lines as bench_run does.
+// Times the paper's run and runs of trains by SUNDIALS CVODE with root functions: the same regimes, the same contact
+// logic at events, another integrator. Prints lines as bench_run does, for trains without samples.
 #include <cvode/cvode.h>
 #include <nvector/nvector_serial.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
 #include <cstdio>
+#include <numeric>
 
-#include "paper_run.hpp"
+#include "train_runs.hpp"
 
 using namespace lostmotion;
 
 namespace {
 
 // What CVODE's callbacks need of the regime that is under way.
+template <class System>
 struct Context {
-    const Regime* regime = nullptr;
-    Memory memory;
-    InputState<DriveDims>* input = nullptr;
-    LinearRates linear;
-    Column constant{};
+    using D = typename System::Dims;
+
+    const typename System::Regime* regime = nullptr;
+    typename D::Memory memory;
+    InputState<D>* input = nullptr;
+    const LinearRatesOf<D>* linear = nullptr;
+    ColumnOf<D> constant{};
+    std::vector<int> states;  // those that CVODE integrates, one after the other
     // Guards that have been off zero since the regime began. CVODE refuses to go on from a root, or from near one.
-    std::array<bool, max_guards> left_zero{};
+    std::vector<bool> left_zero = std::vector<bool>(D::guards);
+
+    StateOf<D> state_of(N_Vector y) const {
+        StateOf<D> x{};
+        for (std::size_t k = 0; k < states.size(); ++k) x[states[k]] = N_VGetArrayPointer(y)[k];
+        return x;
+    }
+    void put(const StateOf<D>& x, N_Vector y) const {
+        for (std::size_t k = 0; k < states.size(); ++k) N_VGetArrayPointer(y)[k] = x[states[k]];
+    }
 };
 
-State state_of(N_Vector y) {
-    State x{};
-    std::copy_n(N_VGetArrayPointer(y), n_states, x.begin());
-    return x;
-}
-
+template <class System>
 int rates(realtype t, N_Vector y, N_Vector rate, void* user) {
-    auto& c = *static_cast<Context*>(user);
-    c.input->anchor(t);
-    const State out = c.linear(state_of(y), c.constant, c.input->values());
-    std::copy_n(out.begin(), n_states, N_VGetArrayPointer(rate));
+    auto& c = *static_cast<Context<System>*>(user);
+    c.input->follow(t);
+    c.put((*c.linear)(c.state_of(y), c.constant, c.input->values()), rate);
     return 0;
 }
 
+template <class System>
 int roots(realtype t, N_Vector y, realtype* g, void* user) {
-    auto& c = *static_cast<Context*>(user);
-    c.input->anchor(t);
-    const State x = state_of(y);
+    using D = typename System::Dims;
+    auto& c = *static_cast<Context<System>*>(user);
+    c.input->follow(t);
+    const StateOf<D> x = c.state_of(y);
     const auto u = c.input->values();
-    for (int k = 0; k < max_guards; ++k) {
+    for (int k = 0; k < D::guards; ++k) {
         g[k] = 1.0;
         if (k >= c.regime->n_guards) continue;
-        const LinearForm& form = c.regime->guards[k].form;
-        const double value = evaluate(form, x, c.memory, u), size = magnitude(form, x, c.memory, u);
+        const LinearFormOf<D>& form = c.regime->guards[k].form;
+        const double value = evaluate<D>(form, x, c.memory, u), size = magnitude<D>(form, x, c.memory, u);
         c.left_zero[k] = c.left_zero[k] || value > 1e-6 * size;
         g[k] = c.left_zero[k] ? value : size;
     }
     return 0;
 }
 
+// A run that is to be made, from this state.
+template <class System>
+struct Task {
+    using D = typename System::Dims;
+
+    const System& system;
+    const SignalsOf<D>& signals;
+    StateOf<D> start, rated, balanced;  // the state, its natural sizes
+    std::vector<int> states;            // those that the drive has
+    std::array<int, 2> watched;         // load speed and twist
+    RegimeCache<System>& cache;         // kept from run to run
+};
+
+template <class System>
 class Cvode {
  public:
-    Cvode(const Drive& drive, const Signals& signals, int method, double tolerance)
-        : drive_(drive), system_(drive_), cache_(system_), basis_(input_basis(signals)), input_(signals, basis_) {
+    using D = typename System::Dims;
+    using State = StateOf<D>;
+    using Guard = typename System::Guard;
+
+    Cvode(const Task<System>& task, int method, double tolerance)
+        : task_(task), basis_(input_basis(task.signals)), input_(task.signals, basis_) {
+        const auto n = static_cast<sunindextype>(task.states.size());
+        user_.states = task.states;
+        user_.input = &input_;
         SUNContext_Create(nullptr, &context_);
-        y_ = N_VNew_Serial(n_states, context_);
-        N_Vector absolute = N_VNew_Serial(n_states, context_);
-        for (int k = 0; k < n_states; ++k) NV_Ith_S(absolute, k) = tolerance * drive_.rated_scale()[k];
-        matrix_ = SUNDenseMatrix(n_states, n_states, context_);
+        y_ = N_VNew_Serial(n, context_);
+        N_Vector absolute = N_VNew_Serial(n, context_);
+        user_.put(task.rated, absolute);
+        N_VScale(tolerance, absolute, absolute);
+        matrix_ = SUNDenseMatrix(n, n, context_);
         solver_ = SUNLinSol_Dense(y_, matrix_, context_);
         memory_ = CVodeCreate(method, context_);
         N_VConst(0.0, y_);
-        CVodeInit(memory_, rates, 0.0, y_);
+        CVodeInit(memory_, rates<System>, 0.0, y_);
         CVodeSVtolerances(memory_, tolerance, absolute);
         CVodeSetUserData(memory_, &user_);
         CVodeSetLinearSolver(memory_, solver_, matrix_);
         CVodeSetMaxNumSteps(memory_, 1000000);
-        CVodeRootInit(memory_, max_guards, roots);
+        CVodeRootInit(memory_, D::guards, roots<System>);
         CVodeSetNoInactiveRootWarn(memory_);
         N_VDestroy(absolute);
-        user_.input = &input_;
     }
     Cvode(const Cvode&) = delete;
     Cvode& operator=(const Cvode&) = delete;
@@ -86,68 +117,69 @@ class Cvode {
         SUNContext_Free(&context_);
     }
 
-    // Load speed and twist at `samples` instants, as channels of a table. False if it gives up.
-    bool run(double interval, std::size_t samples, double* table) {
+    // Calls keep(state) at `samples` instants. False if it gives up.
+    template <class Keep>
+    bool run(double interval, std::size_t samples, Keep&& keep) {
         Instant now;
-        RegimeKey key;
-        see(now, 0.0);
-        if (system_.start(cache_, now, key) != Found::yes) return false;
+        typename System::Key key;
+        now.x = task_.start;
+        input_.anchor(0.0);
+        see_inputs(input_, 0.0, now);
+        if (task_.system.start(task_.cache, now, key) != Found::yes) return false;
         enter(now, key);
-        std::size_t next = 0;
-        const auto keep = [&](const State& x) {
-            table[ch_load_speed * samples + next] = x[load_speed];
-            table[ch_twist * samples + next] = x[twist];
-            ++next;
-        };
         keep(now.x);
-        std::array<int, max_guards> found{};
-        while (next < samples) {
+        std::array<int, D::guards> found{};
+        for (std::size_t next = 1; next < samples;) {
             realtype t = 0.0;
             const double wanted = static_cast<double>(next) * interval;
+            CVodeSetStopTime(memory_, limit_);
             const int status = CVode(memory_, wanted, y_, &t, CV_NORMAL);
             if (status < 0) return false;
-            if (status != CV_ROOT_RETURN) {
-                keep(state_of(y_));
-                continue;
+            if (status == CV_SUCCESS || (status == CV_TSTOP_RETURN && t == wanted)) {
+                keep(user_.state_of(y_));
+                ++next;
             }
-            CVodeGetRootInfo(memory_, found.data());
-            now.x = state_of(y_);
-            see(now, t);
-            const Regime& old = cache_.regime(key);
+            if (status == CV_SUCCESS) continue;
             const Guard* fired = nullptr;
-            for (int k = 0; k < old.n_guards; ++k)
-                if (found[k] < 0) fired = &old.guards[k];
-            if (fired == nullptr) continue;  // a guard that rises from zero, where the regime began
-            if (system_.next(cache_, now, fired, key, now.input[0]) != Found::yes) return false;
+            if (status == CV_ROOT_RETURN) {
+                CVodeGetRootInfo(memory_, found.data());
+                const auto& old = task_.cache.regime(key);
+                for (int k = 0; k < old.n_guards; ++k)
+                    if (found[k] < 0) fired = &old.guards[k];
+                if (fired == nullptr) continue;  // a guard that rises from zero, where the regime began
+            }
+            now.x = user_.state_of(y_);
+            input_.follow(t);
+            const auto before = input_.values();
+            input_.anchor(t);
+            see_inputs(input_, t, now);
+            if (task_.system.next(task_.cache, now, fired, key, before) != Found::yes) return false;
             enter(now, key);
         }
         return true;
     }
 
  private:
-    void see(Instant& now, double t) {
-        input_.anchor(t);
-        now.time = t;
-        now.input = input_.jet();
-        now.input_magnitudes = input_.magnitudes();
-    }
-    void enter(const Instant& now, const RegimeKey& key) {
-        const Regime& r = cache_.regime(key);
+    using Instant = InstantOf<D>;
+
+    void enter(const Instant& now, const typename System::Key& key) {
+        const auto& r = task_.cache.regime(key);
         user_.regime = &r;
         user_.memory = now.memory;
-        user_.left_zero = {};
-        user_.linear = LinearRates(r.rate);
-        user_.constant = user_.linear.constant(now.memory);
-        std::copy_n(now.x.begin(), n_states, N_VGetArrayPointer(y_));
+        std::fill(user_.left_zero.begin(), user_.left_zero.end(), false);
+        user_.linear = &task_.cache.entry(key).rates;
+        user_.constant = user_.linear->constant(now.memory);
+        limit_ = next_breakpoint(task_.signals, now.time);
+        if (r.driving_input >= 0) limit_ = input_.turning(r.driving_input, r.driving_way, limit_);
+        user_.put(now.x, y_);
         CVodeReInit(memory_, now.time, y_);
     }
 
-    const Drive& drive_;
-    SwitchedDrive system_;
-    RegimeCache<SwitchedDrive> cache_;
+    const Task<System>& task_;
     std::vector<InputBasis> basis_;
-    InputState<DriveDims> input_;
-    Context user_;
+    InputState<D> input_;
+    Context<System> user_;
+    double limit_ = 0.0;  // [s], of the stretch that has no jump of an input
     SUNContext context_ = nullptr;
     N_Vector y_ = nullptr;
     SUNMatrix matrix_ = nullptr;
@@ -155,26 +187,100 @@ class Cvode {
     void* memory_ = nullptr;
 };
 
-void compare(const char* map, const PaperRun& paper) {
-    const Table exact = paper.exact();
-    for (const auto& [method, name] : {std::pair{CV_ADAMS, "Adams"}, std::pair{CV_BDF, "BDF"}})
+// Load speed and twist at `samples` instants, one after the other.
+class Watched {
+ public:
+    Watched(std::array<int, 2> states, std::size_t samples) : states_(states), samples_(samples) {}
+    template <class State>
+    void keep(const State& x) {
+        for (std::size_t c = 0; c < 2; ++c) table_[c].push_back(x[states_[c]]);
+    }
+    double gap(const Watched& exact) const {
+        double worst = 0.0;
+        for (std::size_t c = 0; c < 2; ++c)
+            worst = std::max(worst, relative_gap(table_[c].data(), exact.table_[c].data(), samples_));
+        return worst;
+    }
+
+ private:
+    std::array<int, 2> states_;
+    std::size_t samples_;
+    std::array<Table, 2> table_;
+};
+
+template <class System>
+Watched exact_run(const Task<System>& task, double interval, std::size_t samples) {
+    struct {
+        bool segment(const Segment<System>&) { return true; }
+    } nothing;
+    Watched out(task.watched, samples);
+    ExactSolver<System> solver(task.system, task.signals, interval, task.balanced);
+    Status status = solver.begin(0.0, task.start, {});
+    for (std::size_t k = 0; k < samples && status == Status::done; ++k) {
+        status = solver.advance(static_cast<double>(k) * interval, nothing);
+        out.keep(solver.state());
+    }
+    return out;
+}
+
+// sampled: in the run that is timed, too.
+template <class System>
+void compare(const char* name, const Task<System>& task, double interval, std::size_t samples, bool sampled) {
+    const Watched exact = exact_run(task, interval, samples);
+    for (const auto& [method, method_name] : {std::pair{CV_ADAMS, "Adams"}, std::pair{CV_BDF, "BDF"}})
         for (const double tolerance : {1e-6, 1e-8}) {
-            Table table(n_channels * paper.samples);
-            bool done = true;
-            const double time = best_ms(20, [&] {
-                Cvode cvode(paper.drive, paper.signals, method, tolerance);
-                done = cvode.run(1e-3, paper.samples, table.data()) && done;
+            Watched other(task.watched, samples);
+            bool done =
+                Cvode<System>(task, method, tolerance).run(interval, samples, [&](const auto& x) { other.keep(x); });
+            const double timed_interval = sampled ? interval : static_cast<double>(samples - 1) * interval;
+            const double time = best_ms(done ? 20 : 0, [&] {
+                Watched unused(task.watched, samples);
+                done = Cvode<System>(task, method, tolerance)
+                           .run(timed_interval, sampled ? samples : 2, [&](const auto& x) { unused.keep(x); }) &&
+                       done;
             });
             if (done)
-                std::printf("%s|SUNDIALS CVODE %s in C, rtol %g|%.6f|%.3g\n", map, name, tolerance, time,
-                            paper.error(table, exact));
+                std::printf("%s|SUNDIALS CVODE %s in C, rtol %g|%.6f|%.3g\n", name, method_name, tolerance, time,
+                            other.gap(exact));
             else
-                std::printf("%s|SUNDIALS CVODE %s in C, rtol %g: gave up|nan|-\n", map, name, tolerance);
+                std::printf("%s|SUNDIALS CVODE %s in C, rtol %g: gave up|nan|-\n", name, method_name, tolerance);
         }
 }
 
 }  // namespace
 
 int main() {
-    for (const auto& [map, paper] : PaperRun::both()) compare(map, paper);
+    for (const auto& [map, paper] : PaperRun::both()) {
+        const SwitchedDrive system(paper.drive);
+        RegimeCache<SwitchedDrive> cache(system);
+        std::vector<int> states(n_states);
+        std::iota(states.begin(), states.end(), 0);
+        compare(map,
+                Task<SwitchedDrive>{system,
+                                    paper.signals,
+                                    {},
+                                    paper.drive.rated_scale(),
+                                    paper.drive.balanced_scale(),
+                                    states,
+                                    {load_speed, twist},
+                                    cache},
+                1e-3, paper.samples, true);
+    }
+    std::vector<TimedTrain> trains = timed_trains();
+    trains.resize(3);
+    for (const TimedTrain& t : trains)
+        in_kernel(t, [&]<class D>(const TrainIn<D>& in) {
+            const model::Places& p = in.assembly.places();
+            RegimeCache<model::TrainSystem<D>> cache(in.system);
+            compare(t.name.c_str(),
+                    Task<model::TrainSystem<D>>{in.system,
+                                                in.signals,
+                                                in.start,
+                                                in.system.rated_scale(),
+                                                in.system.balanced_scale(),
+                                                in.states(),
+                                                {p.shafts.back().speed, p.gears.back().twist},
+                                                cache},
+                    t.duration / (t.samples - 1), static_cast<std::size_t>(t.samples), false);
+        });
 }

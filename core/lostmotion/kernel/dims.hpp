@@ -20,6 +20,22 @@ struct AngleSpeeds<D> {
     void set(int, int) {}
 };
 
+// How many of the inputs and of the memory, from the first on, the equations of a regime depend on: known when
+// compiled, or from regime to regime, since few trains have as many as there is room for.
+template <class D>
+struct DependsOn {
+    int inputs = 1, memory = 1;
+    void see_input(int i, double coefficient) { inputs = coefficient != 0.0 && i >= inputs ? i + 1 : inputs; }
+    void see_memory(int k, double coefficient) { memory = coefficient != 0.0 && k >= memory ? k + 1 : memory; }
+};
+template <class D>
+    requires requires { D::first_angle_speed; }
+struct DependsOn<D> {
+    static constexpr int inputs = D::inputs, memory = D::memory;
+    void see_input(int, double) {}
+    void see_memory(int, double) {}
+};
+
 template <int coupled_, int angles_, int inputs_, int memory_, int contacts_, int guards_>
 struct Dims {
     static constexpr int coupled = coupled_;    // states that act on one another

@@ -183,7 +183,11 @@ class FormTable {
         for (int j = D::coupled; j < D::states; ++j) assert(f.c[j] == 0.0);
         for (int k = 0; k < D::terms; ++k) column_[k][row] = f.c[k];
         rows_ = std::max(rows_, (row + vec_width) / vec_width * vec_width);
-        for (int i = 0; i < D::inputs; ++i) driven_ = driven_ || f.c[D::first_input + i] != 0.0;
+        for (int i = 0; i < D::inputs; ++i) {
+            driven_ = driven_ || f.c[D::first_input + i] != 0.0;
+            depends_on_.see_input(i, f.c[D::first_input + i]);
+        }
+        for (int k = 0; k < D::memory; ++k) depends_on_.see_memory(k, f.c[D::first_memory + k]);
     }
     int rows() const { return rows_; }  // rounded up to whole vectors
     double coefficient(int row, int term) const { return column_[term][row]; }
@@ -197,7 +201,7 @@ class FormTable {
     void constants(const Memory& m, Values& out) const {
         for (int g = 0; g < rows_; g += vec_width) {
             Vec sum = at(D::one, g);
-            for (int k = 0; k < D::memory; ++k) sum += m[k] * at(D::first_memory + k, g);
+            for (int k = 0; k < depends_on_.memory; ++k) sum += m[k] * at(D::first_memory + k, g);
             store(sum, &out[g]);
         }
     }
@@ -217,7 +221,7 @@ class FormTable {
     void magnitudes(const Memory& m, const State& x, const Inputs& u, Values& out) const {
         for (int g = 0; g < rows_; g += vec_width) {
             Vec kept = m[0] * absolute(at(D::first_memory, g));
-            for (int k = 1; k < D::memory; ++k) kept += m[k] * absolute(at(D::first_memory + k, g));
+            for (int k = 1; k < depends_on_.memory; ++k) kept += m[k] * absolute(at(D::first_memory + k, g));
             store(absolute(at(D::one, g)) + kept + terms<true>(g, x, u), &out[g]);
         }
     }
@@ -226,12 +230,12 @@ class FormTable {
     double magnitude(int row, const Memory& m, const State& x, const Input& input) const {
         const auto c = [&](int term) { return std::fabs(column_[term][row]); };
         double kept = m[0] * c(D::first_memory);
-        for (int k = 1; k < D::memory; ++k) kept += m[k] * c(D::first_memory + k);
+        for (int k = 1; k < depends_on_.memory; ++k) kept += m[k] * c(D::first_memory + k);
         double sum = sum_in_fours<D::coupled>([&](auto k) { return c(k) * x[k]; });
         if (driven_) {
             const Inputs u = input.magnitudes();
             double forced = c(D::first_input) * u[0];
-            for (int i = 1; i < D::inputs; ++i) forced += c(D::first_input + i) * u[i];
+            for (int i = 1; i < depends_on_.inputs; ++i) forced += c(D::first_input + i) * u[i];
             sum += forced;
         }
         return c(D::one) + kept + sum;
@@ -252,13 +256,14 @@ class FormTable {
         const Vec sum = sum_in_fours<D::coupled>([&](auto k) { return c(k) * x[k]; });
         if (!driven_) return sum;
         Vec forced = c(D::first_input) * u[0];
-        for (int i = 1; i < D::inputs; ++i) forced += c(D::first_input + i) * u[i];
+        for (int i = 1; i < depends_on_.inputs; ++i) forced += c(D::first_input + i) * u[i];
         return sum + forced;
     }
 
     alignas(64) std::array<std::array<double, N>, D::terms> column_{};
     int rows_ = 0;
     bool driven_ = false;
+    [[no_unique_address]] DependsOn<D> depends_on_;
 };
 
 }  // namespace lostmotion

@@ -357,6 +357,11 @@ class InputState {
     // For each input, what it begins with and the terms of its sines.
     template <class Term>
     [[gnu::always_inline]] Inputs sum(const Inputs& begin, Term&& term) const {
+        if constexpr (n_inputs > 2) {  // of many inputs few have a sine
+            Inputs out = begin;
+            for (int q = 0; q < sines_end_[n_inputs - 1]; q += 2) out[basis_[q].input] += term(q);
+            return out;
+        }
         Inputs out;
         int q = 0;
         const auto add = [&](std::size_t i) __attribute__((always_inline)) {

@@ -84,6 +84,7 @@ struct LinearRatesOf {
     std::array<Column, D::inputs> input_column{};
     Column fixed{};                              // the constant: its column for 1 ...
     std::array<Column, D::memory> per_memory{};  // ... and those for the memory
+    [[no_unique_address]] DependsOn<D> depends_on;
 
     LinearRatesOf() = default;
     // From the rates of all states.
@@ -99,16 +100,22 @@ struct LinearRatesOf {
             const LinearFormOf<D>& f = of[r];
             for (int j = D::coupled; j < D::states; ++j) assert(f.c[j] == 0.0);
             for (int c = 0; c < D::coupled; ++c) rate.column[c][r] = f.c[c];
-            for (int i = 0; i < D::inputs; ++i) input_column[i][r] = f.c[D::first_input + i];
+            for (int i = 0; i < D::inputs; ++i) {
+                input_column[i][r] = f.c[D::first_input + i];
+                depends_on.see_input(i, input_column[i][r]);
+            }
             fixed[r] = f.c[D::one];
-            for (int k = 0; k < D::memory; ++k) per_memory[k][r] = f.c[D::first_memory + k];
+            for (int k = 0; k < D::memory; ++k) {
+                per_memory[k][r] = f.c[D::first_memory + k];
+                depends_on.see_memory(k, per_memory[k][r]);
+            }
         }
     }
 
     // The part of dx/dt that depends on neither state nor inputs.
     Column constant(const Memory& m) const {
         Coupled kept = m[0] * load(per_memory[0]);
-        for (int k = 1; k < D::memory; ++k) kept = kept + m[k] * load(per_memory[k]);
+        for (int k = 1; k < depends_on.memory; ++k) kept = kept + m[k] * load(per_memory[k]);
         Column c;
         (load(fixed) + kept).store(c.data());
         return c;
@@ -116,7 +123,7 @@ struct LinearRatesOf {
     // The part of it that the inputs bring.
     [[gnu::always_inline]] Coupled forced(const Inputs& u) const {
         Coupled sum = u[0] * load(input_column[0]);
-        for (int i = 1; i < D::inputs; ++i) sum = sum + u[i] * load(input_column[i]);
+        for (int i = 1; i < depends_on.inputs; ++i) sum = sum + u[i] * load(input_column[i]);
         return sum;
     }
     // The rates of the angles.
@@ -142,13 +149,13 @@ struct LinearRatesOf {
     State size(const State& x, const Memory& m, const Inputs& u) const {
         State out = higher_size(x, u);
         Coupled kept = m[0] * absolute(load(per_memory[0]));
-        for (int k = 1; k < D::memory; ++k) kept = kept + m[k] * absolute(load(per_memory[k]));
+        for (int k = 1; k < depends_on.memory; ++k) kept = kept + m[k] * absolute(load(per_memory[k]));
         (coupled(out) + (absolute(load(fixed)) + kept)).store(out.data());
         return out;
     }
     State higher_size(const State& derivative, const Inputs& u) const {
         Coupled forced = u[0] * absolute(load(input_column[0]));
-        for (int i = 1; i < D::inputs; ++i) forced = forced + u[i] * absolute(load(input_column[i]));
+        for (int i = 1; i < depends_on.inputs; ++i) forced = forced + u[i] * absolute(load(input_column[i]));
         State out;
         (sum_in_fours<D::coupled>([&](auto k) { return derivative[k] * absolute(rate.at(k)); }) + forced)
             .store(out.data());

@@ -175,7 +175,7 @@ class Taylor {
     [[gnu::always_inline]] Coupled fourth_derivative(const Coupled& rate, const InputState<D>& input) const {
         Coupled sum = cubed_ * rate;
         const auto u = input.template jet<4>();
-        for (int i = 0; i < D::inputs; ++i)
+        for (int i = 0; i < rates_->depends_on.inputs; ++i)
             if (input.varies(i)) sum = sum + input_[i].bring(u[1][i], u[2][i], u[3][i]);
         return sum;
     }
@@ -254,11 +254,19 @@ class Taylor {
             else
                 recur(free);
         } else {
-            recur([&](Coupled x, int k) {
-                for (int i = 0; i < D::inputs; ++i)
-                    if (varies[i]) x = force(x, k, i);
-                return x;
-            });
+            std::array<int, D::inputs> varying;
+            int n = 0;
+            for (int i = 0; i < rates_->depends_on.inputs; ++i)
+                if (varies[i]) varying[n++] = i;
+            if (n == 0)
+                recur(free);
+            else if (n == 1)
+                recur([&, i = varying[0]](Coupled x, int k) __attribute__((always_inline)) { return force(x, k, i); });
+            else
+                recur([&](Coupled x, int k) {
+                    for (int j = 0; j < n; ++j) x = force(x, k, varying[j]);
+                    return x;
+                });
         }
     }
 

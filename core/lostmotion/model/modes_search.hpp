@@ -72,14 +72,14 @@ template <class Sizes>
 template <class Cache, class Now, class G, class Input>
 Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& key, const Input& input) const {
     if (fired != nullptr ? goes_on(cache, now, *fired, key) : stays(cache, now, key, input)) return Found::yes;
-    Now left = now;
-    left.input[0] = input;
+    const auto right = std::exchange(now.input[0], input);  // the torques before
     const auto& old = cache.regime(key);
     Event event;
     event.before = key;
-    for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], left);
+    for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], now);
     for (std::size_t k = 0; k < train().couplings.size(); ++k)
-        event.coupling[k] = evaluate(n_, old.contact_torque[places().couplings[k].contact], left);
+        event.coupling[k] = evaluate(n_, old.contact_torque[places().couplings[k].contact], now);
+    now.input[0] = right;
     double margin_size = 0.0, near = 0.0;
     if (fired != nullptr) {
         event.with_guard = true;
@@ -130,17 +130,25 @@ bool SwitchedTrain<Sizes>::breaks_away(Cache& cache, Now& now, const Event& even
     if (settle(cache, now, modes, slipping, slips).found == Found::yes) {
         // With a self-locking gear more torque may turn it the other way; by rounding it only seems to. (Of two shafts
         // the solver finds that at once, by the speed that falls, and the contact is stuck again.)
-        const auto& r = cache.regime(slips);
-        Motion<Sizes, std::decay_t<decltype(r)>, Now> motion(n_, r, now);
-        const double mode = event.neighbour;
-        if (train().shafts.size() == 2 ||
-            motion.sign(mode * assembly_.contact_speed(event.contact)).relative >= -max_violation) {
+        if (train().shafts.size() == 2 || !turns_the_other_way(look_up(cache, slips), now, event)) {
             key = slips;
             return true;
         }
     }
     now.memory = memory;
     return false;
+}
+
+// Does a contact that is to slip turn against that just after now, by more than rounding may make?
+template <class Sizes>
+template <class E, class Now>
+bool SwitchedTrain<Sizes>::turns_the_other_way(const E& e, const Now& now, const Event& event) const {
+    const ContactPlace& c = places().contacts[event.contact];
+    std::decay_t<decltype(regime_of(e).guards[0].form)> speed;
+    speed.c[places().shafts[c.a].speed] = event.neighbour * c.per_a;
+    if (c.b != nowhere) speed.c[places().shafts[c.b].speed] = event.neighbour * c.per_b;
+    auto along = flow(e, now);
+    return sign_after(along, speed, evaluate(n_, speed, now), magnitude(n_, speed, now)).relative < -max_violation;
 }
 
 // Tries the combinations of modes. Usually pieces and cells are found by a walk from those before. If the guards that
@@ -212,15 +220,18 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
             for (const int mode : {0, +1, -1})
                 if (!(p.one_way && mode > 0)) choice[c][n[c]++] = mode;
     }
-    std::vector<std::vector<std::pair<Key, bool>>> by_slips(static_cast<std::size_t>(contacts()) + 1);
+    struct Combination {
+        std::array<std::int8_t, max_contacts> modes{};
+        int slips = 0;
+    };
+    std::vector<Combination> all;
+    all.reserve(27);
     while (true) {
-        Key modes;
-        std::size_t slips = 0;
+        Combination& next = all.emplace_back();
         for (int c = 0; c < contacts(); ++c) {
-            modes.modes[c] = static_cast<std::int8_t>(choice[c][at[c]]);
-            slips += modes.modes[c] != 0;
+            next.modes[c] = static_cast<std::int8_t>(choice[c][at[c]]);
+            next.slips += next.modes[c] != 0;
         }
-        by_slips[slips].emplace_back(modes, at_its_limit(modes));
         int c = contacts() - 1;
         while (c >= 0 && ++at[c] == n[c]) at[c--] = 0;
         if (c < 0) break;
@@ -229,19 +240,21 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
     Found worst = Found::inconsistent;
     const double limit = event.closest ? max_violation : std::numeric_limits<double>::infinity();
     double smallest = limit;
-    Key closest;
+    Key modes, closest;
     auto of_closest = before;
-    for (const bool limit : {false, true})
-        for (const auto& group : by_slips)
-            for (const auto& [modes, is_limit] : group) {
-                if (is_limit != limit) continue;
+    for (const bool at_limit : {false, true})
+        for (int slips = 0; slips <= contacts(); ++slips)
+            for (const Combination& next : all) {
+                if (next.slips != slips) continue;
+                modes.modes = next.modes;
+                if (at_its_limit(modes) != at_limit) continue;
                 now.memory = before;
-                const Found found = limit ? settle_at_limit(cache, now, modes, event, key)
-                                          : settle(cache, now, modes, event, key).found;
-                if (found == Found::yes && !event.closest && !limit) return found;
+                const Found found = at_limit ? settle_at_limit(cache, now, modes, event, key)
+                                             : settle(cache, now, modes, event, key).found;
+                if (found == Found::yes && !event.closest && !at_limit) return found;
                 if (found == Found::outside) worst = found;
                 if (found != Found::yes) continue;
-                const double v = event.closest ? violation(cache.regime(key), now, event)
+                const double v = event.closest ? violation(look_up(cache, key), now, event)
                                                : torque_change(cache.regime(key), now, event);
                 if (v < smallest) {
                     smallest = v;
@@ -317,7 +330,7 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
             return Found::yes;
         }
         if (trial.found == Found::yes) {
-            const double v = violation(cache.regime(key), now, event);
+            const double v = violation(look_up(cache, key), now, event);
             if (v < smallest) {
                 smallest = v;
                 closest = key;
@@ -384,19 +397,20 @@ void SwitchedTrain<Sizes>::hold_where_possible(Cache& cache, Now& now, const Mem
 // By how much the contacts' guards of a regime are violated, each in units of the sum of its terms' magnitudes: by the
 // value or, of one that is zero to rounding, by the rate.
 template <class Sizes>
-template <class R, class Now>
-double SwitchedTrain<Sizes>::violation(const R& r, const Now& now, const Event& event) const {
-    const Guards ignored = moving(r, event.at_rest);
-    Motion<Sizes, R, Now> motion(n_, r, now);
+template <class E, class Now>
+double SwitchedTrain<Sizes>::violation(const E& e, const Now& now, const Event& event) const {
+    const auto& r = regime_of(e);
+    const Guards ignored = moving(e, event.at_rest);
+    auto along = flow(e, now);
     double worst = 0.0;
     for (std::size_t g = 0; g < guard_count(r); ++g) {
         const auto& guard = r.guards[g];
-        if (ignored[g] || guard.is_edge() || guard.kind == Guard::outside) continue;
+        if (ignored[g] || !guard.is_of_contact()) continue;
         const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);
-        const auto [rate, rate_magnitude] = motion.derivative(guard.form, 1);
-        const bool zero = std::fabs(value) <= motion.noise(size, rate);
+        const double rate = along.rate(guard.form, 1);
+        const bool zero = std::fabs(value) <= along.noise(size, rate);
         if (zero && rate < 0.0 && !event.by_value_alone(guard))
-            worst = std::fmax(worst, -rate / rate_magnitude);
+            worst = std::fmax(worst, -rate / along.rate_magnitude(guard.form, 1));
         else if (!zero && value < 0.0)
             worst = std::fmax(worst, -value / size);
     }
@@ -409,13 +423,13 @@ template <class Sizes>
 template <class Cache, class Now, class G>
 bool SwitchedTrain<Sizes>::goes_on(Cache& cache, Now& now, const G& fired, Key& key) const {
     if (!fired.is_edge()) return false;
-    Key beyond = key;
+    const auto& e = beyond(cache, key, fired);
+    if (!regime_of(e).solvable) return false;
     const auto before = now.memory;
-    cross(fired, now, beyond);
-    const auto& r = cache.regime(beyond);
+    shift(fired, now);
     std::vector<Violation> of_contacts;
-    if (r.solvable && violated(r, now, Guards{}, nullptr, of_contacts) == nullptr && of_contacts.empty()) {
-        key = beyond;
+    if (violated(e, now, Guards{}, nullptr, of_contacts) == nullptr && of_contacts.empty()) {
+        key = regime_of(e).key;
         return true;
     }
     now.memory = before;
@@ -427,12 +441,13 @@ bool SwitchedTrain<Sizes>::goes_on(Cache& cache, Now& now, const G& fired, Key& 
 template <class Sizes>
 template <class Cache, class Now, class Input>
 bool SwitchedTrain<Sizes>::stays(Cache& cache, const Now& now, const Key& key, const Input& input) const {
-    const auto& r = cache.regime(key);
+    const auto& e = look_up(cache, key);
+    const auto& r = regime_of(e);
     if (const int i = r.driving_input; i >= 0 && r.driving_way * (now.input[0][i] - input[i]) < 0.0) return false;
     Event lasting;
     lasting.by_value = true;
     std::vector<Violation> of_contacts;
-    return violated(r, now, moving(r, r.at_rest), &lasting, of_contacts) == nullptr && of_contacts.empty();
+    return violated(e, now, moving(e, r.at_rest), &lasting, of_contacts) == nullptr && of_contacts.empty();
 }
 
 }  // namespace lostmotion::model

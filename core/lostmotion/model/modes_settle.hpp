@@ -226,10 +226,11 @@ auto SwitchedTrain<Sizes>::walk(Cache& cache, Now& now, const Event& event, Key 
     Guards along;  // edges that lead back to where the walk came from: the motion goes along them
     Trial result;
     for (int step = 0; step < longest_walk; ++step) {
-        const auto& r = cache.regime(trial);
+        const auto& e = look_up(cache, trial);
+        const auto& r = regime_of(e);
         result.violations.clear();
         if (!r.solvable) return result;
-        const auto* left = violated(r, now, moving(r, event.at_rest) | along, &event, result.violations);
+        const auto* left = violated(e, now, moving(e, event.at_rest) | along, &event, result.violations);
         if (left != nullptr && left->kind == Guard::outside) {
             result.found = Found::outside;
             return result;
@@ -253,13 +254,12 @@ auto SwitchedTrain<Sizes>::walk(Cache& cache, Now& now, const Event& event, Key 
         }
         Key next = trial;
         const auto g = static_cast<std::size_t>(left - &r.guards[0]);
-        Now across = now;
-        cross(*left, across, next);
+        cross(*left, next);
         if (step > 0 && next == previous) {
             along.set(g);
             continue;
         }
-        now.memory = across.memory;
+        shift(*left, now);
         previous = std::exchange(trial, next);
         along.reset();
     }

@@ -43,37 +43,27 @@ double magnitude(const Sizes& n, const F& f, const Now& now) {
     return sum;
 }
 
-// Time derivatives of the state, computed as far as they are asked for.
+// Time derivatives along the flow of one regime, computed as far as they are asked for: the kernel's Flow for forms of
+// a run-time layout.
 template <class Sizes, class Regime, class Now>
-class Motion {
+class RowFlow {
  public:
-    Motion(const Sizes& sizes, const Regime& regime, const Now& now) : n_(sizes), regime_(regime), now_(now) {}
+    RowFlow(const Sizes& sizes, const Regime& regime, const Now& now) : n_(sizes), regime_(regime), now_(now) {}
 
-    struct Sign {
-        int sign = 0;
-        int order = 0;          // of the first derivative that is not zero
-        double relative = 0.0;  // to the sum of the magnitudes of its terms
-    };
-    // The sign that a form has just after now: that of the first of its derivatives that is not zero.
-    template <class F>
-    Sign sign(const F& form, bool by_value_alone = false) {
-        double value = evaluate(n_, form, now_), size = magnitude(n_, form, now_);
-        for (int k = 0; k + 1 < n_derivatives; ++k) {
-            const auto [rate, rate_magnitude] = derivative(form, k + 1);
-            if (std::fabs(value) > noise(size, rate))
-                return {value > 0.0 ? +1 : -1, k, size > 0.0 ? value / size : 0.0};
-            if (by_value_alone) return {};
-            value = rate;
-            size = rate_magnitude;
-        }
-        return {};
-    }
-    // What counts as zero: rounding of the terms, and since the instant itself is known to its rounding only, a value
-    // may be off by that times its rate.
     double noise(double size, double rate) const {
         return rounding * size + time_rounding * std::fabs(now_.time * rate);
     }
     // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
+    template <class F>
+    double rate(const F& f, int k) {
+        return derivative(f, k).first;
+    }
+    template <class F>
+    double rate_magnitude(const F& f, int k) {
+        return derivative(f, k).second;
+    }
+
+ private:
     template <class F>
     std::pair<double, double> derivative(const F& f, int k) {
         while (order_ < k) extend();
@@ -88,8 +78,6 @@ class Motion {
         }
         return {sum, size};
     }
-
- private:
     void extend() {
         const int k = order_++;
         for (int r = 0; r < n_.states; ++r) {
@@ -111,5 +99,25 @@ class Motion {
     int order_ = 0;
     std::array<std::array<double, max_states>, n_derivatives + 1> x_, size_;  // as far as they are known
 };
+
+struct Sign {
+    int sign = 0;
+    int order = 0;          // of the first derivative that is not zero
+    double relative = 0.0;  // to the sum of the magnitudes of its terms
+};
+// The sign that a form has just after now, from its value and the sum of the magnitudes of its terms: that of the first
+// of its derivatives that is not zero.
+template <class F, class Form>
+Sign sign_after(F& flow, const Form& form, double value, double size, bool by_value_alone = false) {
+    for (int k = 0; k + 1 < n_derivatives; ++k) {
+        const double rate = flow.rate(form, k + 1);
+        if (std::fabs(value) > flow.noise(size, rate))
+            return {value > 0.0 ? +1 : -1, k, size > 0.0 ? value / size : 0.0};
+        if (by_value_alone) return {};
+        value = rate;
+        size = flow.rate_magnitude(form, k + 1);
+    }
+    return {};
+}
 
 }  // namespace lostmotion::model

@@ -59,6 +59,7 @@ struct PackedGuard {
 
 template <class D>
 struct PackedRegime {
+    Key key;
     std::array<PackedForm<D>, D::states> rate{};
     std::array<PackedForm<D>, D::contacts> output_torque{};   // of each gear [N m]
     std::array<PackedForm<D>, D::contacts> contact_torque{};  // of each contact [N m]
@@ -83,6 +84,7 @@ template <class D>
 PackedRegime<D> pack(const Regime& r, const Assembly& a) {
     const Layout& n = a.layout();
     PackedRegime<D> out;
+    out.key = r.key;
     for (int k = 0; k < n.states; ++k) out.rate[k < n.coupled ? k : D::coupled + k - n.coupled] = pack<D>(r.rate[k], n);
     for (std::size_t g = 0; g < r.output_torque.size(); ++g) out.output_torque[g] = pack<D>(r.output_torque[g], n);
     for (std::size_t c = 0; c < r.contact_torque.size(); ++c) out.contact_torque[c] = pack<D>(r.contact_torque[c], n);

@@ -1,6 +1,8 @@
 // One regime of a train: its key, the rates of the states and the guards that end it.
 #pragma once
 
+#include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -16,10 +18,12 @@ struct Key {
 
     friend bool operator==(const Key&, const Key&) = default;
     std::size_t hash() const {
-        std::uint64_t h = 0x9e3779b97f4a7c15u;
-        const auto mix = [&h](auto v) { h = (h ^ static_cast<std::uint16_t>(v)) * 0x100000001b3u; };
-        for (const auto m : modes) mix(m);
-        for (const auto b : branch) mix(b);
+        // A sum of products that do not wait for one another, each with another odd number.
+        std::uint64_t h = 0, factor = 0x9e3779b97f4a7c15u;
+        for (const std::uint64_t word : std::bit_cast<std::array<std::uint64_t, sizeof(Key) / 8>>(*this)) {
+            h += (word ^ (word >> 29)) * factor;
+            factor += 0xc2b2ae3d27d4eb4eu;
+        }
         return static_cast<std::size_t>(h ^ (h >> 32));
     }
 };
@@ -49,6 +53,8 @@ struct Guard {
 
     // Edge of a law or limit of an input, with a neighbour beyond.
     bool is_edge() const { return kind == edge || kind == input_limit; }
+    // Says whether a contact goes on in its mode.
+    bool is_of_contact() const { return kind == speed || kind == capacity || kind == turning; }
 };
 
 // Speeds that the contacts at rest tie together: w_k = factor * w_leader, or 0.

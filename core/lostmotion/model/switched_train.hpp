@@ -12,9 +12,11 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <bitset>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -36,7 +38,8 @@ std::size_t guard_count(const R& r) {
 
 using lostmotion::Found;
 
-// Sizes: Layout, or the kernel's dimensions. Cache: regime(key) gives a regime that stays where it is.
+// Sizes: Layout, or the kernel's dimensions. Cache: regime(key) gives a regime that stays where it is; that of the
+// kernel has entries, with the guards of a regime as a table.
 template <class Sizes = Layout>
 class SwitchedTrain {
  public:
@@ -58,6 +61,16 @@ class SwitchedTrain {
     // input: the inputs up to this instant.
     template <class Cache, class Now, class G, class Input>
     Found next(Cache& cache, Now& now, const G* fired, Key& key, const Input& input) const;
+
+    // What each guard has to exceed, beside its share of its terms, to be far from an event.
+    template <class Table, class Values>
+    void near_event(const Table& guards, Values& out) const {
+        StateOf<Sizes> state{};
+        InputsOf<Sizes> input{};
+        std::copy_n(near_state_.begin(), n_.states, state.begin());
+        std::copy_n(near_input_.begin(), n_.inputs, input.begin());
+        guards.rate_magnitudes(state, input, out);
+    }
 
     using Rest = std::array<bool, max_contacts>;
     // Sets the speeds of contacts at rest to what they are, to the last bit, and marks those that this implies.
@@ -117,11 +130,14 @@ class SwitchedTrain {
         return sum;
     }
 
+    // Across an edge: the branch beyond and, where it shifts a memory, that.
+    template <class G>
+    static void cross(const G& guard, Key& key) {
+        if (guard.branch != nowhere) key.branch[guard.branch] = static_cast<std::int16_t>(guard.neighbour);
+    }
     template <class G, class Now>
-    static void cross(const G& guard, Now& now, Key& key) {
-        if (guard.branch == nowhere) return;
-        key.branch[guard.branch] = static_cast<std::int16_t>(guard.neighbour);
-        if (guard.memory != nowhere) now.memory[guard.memory] += guard.shift;
+    static void shift(const G& guard, Now& now) {
+        if (guard.branch != nowhere && guard.memory != nowhere) now.memory[guard.memory] += guard.shift;
     }
 
     bool at_its_limit(const Key& key) const;
@@ -144,6 +160,8 @@ class SwitchedTrain {
     Trial walk(Cache& cache, Now& now, const Event& event, Key trial, Key& key) const;
     template <class Cache, class Now>
     bool breaks_away(Cache& cache, Now& now, const Event& event, double margin_size, double near, Key& key) const;
+    template <class E, class Now>
+    bool turns_the_other_way(const E& e, const Now& now, const Event& event) const;
     template <class Now>
     void locate(const Now& now, Key& trial) const;
     template <class Now>
@@ -153,34 +171,109 @@ class SwitchedTrain {
     template <class Now>
     double motor_torque(const Now& now, int motor) const;
 
+    // What a cache knows of a regime: an entry of the kernel's, or the regime itself.
+    template <class Cache>
+    static const auto& look_up(Cache& cache, const Key& key) {
+        if constexpr (requires { cache.entry(key); })
+            return cache.entry(key);
+        else
+            return cache.regime(key);
+    }
+    template <class E>
+    static const auto& regime_of(const E& e) {
+        if constexpr (requires { e.regime; })
+            return e.regime;
+        else
+            return e;
+    }
+    // The regime that lies beyond an edge of the one with this key.
+    template <class Cache, class G>
+    static const auto& beyond(Cache& cache, const Key& key, const G& edge) {
+        const auto neighbour = [&] {
+            Key k = key;
+            cross(edge, k);
+            return k;
+        };
+        if constexpr (requires { cache.entry(key); }) {
+            auto& from = cache.entry(key);
+            return cache.beyond(from, static_cast<int>(&edge - from.regime.guards.data()), neighbour);
+        } else {
+            return cache.regime(neighbour());
+        }
+    }
+    template <class E, class Now>
+    auto flow(const E& e, const Now& now) const {
+        if constexpr (requires { e.regime; })
+            return Flow<Sizes>(e.rates, now);
+        else
+            return RowFlow<Sizes, E, Now>(n_, e, now);
+    }
     // The guards of the speeds of contacts that move: their modes were chosen by their speeds.
-    template <class R, class AtRest>
-    static Guards moving(const R& r, const AtRest& at_rest) {
+    template <class E, class AtRest>
+    Guards moving(const E& e, const AtRest& at_rest) const {
         Guards out;
-        for (std::size_t g = 0; g < guard_count(r); ++g)
-            out[g] = r.guards[g].kind == Guard::speed && !at_rest[r.guards[g].contact];
+        if constexpr (requires { e.regime; }) {
+            std::uint64_t all = 0;
+            for (int c = 0; c < contacts(); ++c)
+                if (!at_rest[c]) all |= e.speeds[c];
+            out = all;
+        } else {
+            for (std::size_t g = 0; g < guard_count(e); ++g)
+                out[g] = e.guards[g].kind == Guard::speed && !at_rest[e.guards[g].contact];
+        }
         return out;
     }
+    // Calls use(guard, value, magnitude) for each guard that is not clear of zero, until it returns false.
+    template <class E, class Now, class Use>
+    void each_near_zero(const E& e, const Now& now, const Guards& ignored, Use&& use) const {
+        const auto& r = regime_of(e);
+        if constexpr (requires { e.regime; }) {
+            typename std::decay_t<decltype(e.guards)>::Values constant, value, size;
+            e.guards.constants(now.memory, constant);
+            e.guards.evaluate(constant, now.x, now.input[0], value);
+            e.guards.magnitudes(magnitudes(now.memory), magnitudes(now.x), now.input_magnitudes, size);
+            std::uint64_t near = 0;
+            for (int g = 0; g < e.guards.rows(); g += vec_width) {
+                const Vec clear = clear_of_zero * load(&size[g]) + load(&e.near_event[g]);
+                near |= std::uint64_t{all_bits & ~above(load(&value[g]), clear)} << g;
+            }
+            near &= ~(ignored.to_ullong() | e.behind);
+            for (; near != 0; near &= near - 1) {
+                const int g = std::countr_zero(near);
+                if (!use(r.guards[g], value[g], size[g])) return;
+            }
+        } else {
+            for (std::size_t g = 0; g < guard_count(r); ++g) {
+                const auto& guard = r.guards[g];
+                if (ignored[g] || guard.behind) continue;
+                const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);
+                if (value > clear_of_zero * size + near_event(guard.form)) continue;
+                if (!use(guard, value, size)) return;
+            }
+        }
+    }
     // A guard of a law or an input that does not hold just after now; those of contacts are collected.
-    template <class R, class Now>
-    auto violated(const R& r, const Now& now, const Guards& ignored, const Event* event,
-                  std::vector<Violation>& of_contacts) const -> decltype(&r.guards[0]) {
-        Motion<Sizes, R, Now> motion(n_, r, now);
+    template <class E, class Now>
+    auto violated(const E& e, const Now& now, const Guards& ignored, const Event* event,
+                  std::vector<Violation>& of_contacts) const {
+        const auto& r = regime_of(e);
+        auto along = flow(e, now);
+        decltype(&r.guards[0]) left = nullptr;
         if (r.driving_input >= 0 && turns_back(r, now))
             of_contacts.push_back({r.driven_contact, 0, n_derivatives, 0.0, true});
-        for (std::size_t g = 0; g < guard_count(r); ++g) {
-            const auto& guard = r.guards[g];
-            if (ignored[g] || guard.behind) continue;
-            const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);
-            if (value > clear_of_zero * size + near_event(guard.form)) continue;
-            const auto s = motion.sign(guard.form, event != nullptr && event->by_value_alone(guard));
-            if (s.sign >= 0) continue;
-            if (guard.is_edge() || guard.kind == Guard::outside) return &guard;
+        each_near_zero(e, now, ignored, [&](const auto& guard, double value, double size) {
+            const Sign s = sign_after(along, guard.form, value, size, event != nullptr && event->by_value_alone(guard));
+            if (s.sign >= 0) return true;
+            if (!guard.is_of_contact()) {
+                left = &guard;
+                return false;
+            }
             const bool of_speed = guard.kind == Guard::speed;
             of_contacts.push_back({guard.contact, of_speed ? 0 : guard.neighbour, s.order - (of_speed ? 1 : 0),
                                    -s.relative, guard.kind == Guard::turning});
-        }
-        return nullptr;
+            return true;
+        });
+        return left;
     }
     // Does the input that drives a contact at its limit turn back just after now?
     template <class R, class Now>
@@ -192,8 +285,8 @@ class SwitchedTrain {
             if (std::fabs(way(k)) > time_rounding * std::fabs(now.time * way(k + 1))) return way(k) < 0.0;
         return false;
     }
-    template <class R, class Now>
-    double violation(const R& r, const Now& now, const Event& event) const;
+    template <class E, class Now>
+    double violation(const E& e, const Now& now, const Event& event) const;
     template <class R, class Now>
     double torque_change(const R& r, const Now& now, const Event& event) const {
         double sum = 0.0;

@@ -14,7 +14,6 @@ using Wide = Dims<16, 4, 16, 20, 24, 64>;
 
 template <class D>
 struct TrainRegime : PackedRegime<D> {
-    model::Key key;
     model::Regime rows;  // as composed: torques and power flows of the elements
 };
 
@@ -38,7 +37,7 @@ class TrainSystem {
 
     Regime build(const Key& key) const {
         model::Regime rows = assembly_.build(key);
-        Regime r{pack<D>(rows, assembly_), key, {}};
+        Regime r{pack<D>(rows, assembly_), {}};
         r.rows = std::move(rows);
         if (!r.complete) overflowed_ = true;
         return r;
@@ -52,6 +51,9 @@ class TrainSystem {
     Found next(Cache& cache, InstantOf<D>& now, const Guard* fired, Key& key, const InputsOf<D>& input) const {
         const Found found = search_.next(cache, now, fired, key, input);
         return overflowed_ ? Found::outside : found;
+    }
+    void near_event(const FormTable<D, D::guards>& guards, typename FormTable<D, D::guards>::Values& out) const {
+        search_.near_event(guards, out);
     }
     template <class X, class AtRest>
     void stop(X& x, AtRest& at_rest) const {

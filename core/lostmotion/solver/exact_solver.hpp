@@ -299,7 +299,8 @@ class ExactSolver {
         if (e.regime.n_guards == 0 && LongStep<D>::pays(p, limit - time_) && leap(e, limit)) return Status::done;
         evaluate(e, constant, *cursor, *here);
         Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
-        for (int i = 0; i < D::inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
+        for (int i = 0; i < e.rates.depends_on.inputs; ++i)
+            forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
         int level = std::min(last_level_, p.level_below(limit - time_));
         const double shortest = 1e-7 * p.length(0);
         for (long count = 1; time_ < limit; ++count) {

@@ -1,0 +1,78 @@
+// What runs of trains cost, without samples, in the narrowest kernel that holds each; first the classic drive, which
+// the others are compared with. Prints one line a case: name, states, switchings, event checks, time of the same train
+// again and of a new one [ms]. With the number of a train and that of runs: makes them and prints nothing.
+#include <cstdio>
+#include <cstdlib>
+
+#include "train_runs.hpp"
+
+using namespace lostmotion;
+
+namespace {
+
+struct Nothing {
+    template <class S>
+    bool segment(const S&) {
+        return true;
+    }
+};
+
+template <class System>
+struct Run {
+    const System& system;
+    const SignalsOf<typename System::Dims>& signals;
+    StateOf<typename System::Dims> start, scale;
+    double duration;
+    std::size_t switchings = 0;
+    long event_checks = 0;
+
+    void operator()(RegimeCache<System>& cache) {
+        ExactSolver<System> solver(system, signals, 1e-3, scale, &cache);
+        Nothing nothing;
+        Status status = solver.begin(0.0, start, {});
+        if (status == Status::done) status = solver.advance(duration, nothing);
+        if (status != Status::done) {
+            std::fprintf(stderr, "the run ends at %g s, status %d\n", solver.time(), static_cast<int>(status));
+            std::exit(1);
+        }
+        switchings = solver.switchings();
+        event_checks = solver.event_checks();
+    }
+};
+
+template <class System>
+void time_run(const char* name, int states, Run<System> run) {
+    const double first = best_ms(100, [&] {
+        RegimeCache<System> cache(run.system);
+        run(cache);
+    });
+    RegimeCache<System> cache(run.system);
+    const double again = best_ms(400, [&] { run(cache); });
+    std::printf("%s|%d|%zu|%ld|%.6f|%.6f\n", name, states, run.switchings, run.event_checks, again, first);
+}
+
+template <class D>
+Run<model::TrainSystem<D>> run_of(const TrainIn<D>& in, const TimedTrain& t) {
+    return {in.system, in.signals, in.start, in.system.balanced_scale(), t.duration};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    const std::vector<TimedTrain> trains = timed_trains();
+    if (argc > 2) {
+        const TimedTrain& t = trains.at(static_cast<std::size_t>(std::atoi(argv[1])));
+        in_kernel(t, [&]<class D>(const TrainIn<D>& in) {
+            auto run = run_of(in, t);
+            RegimeCache<model::TrainSystem<D>> cache(in.system);
+            for (int k = std::atoi(argv[2]); k > 0; --k) run(cache);
+        });
+        return 0;
+    }
+    const PaperRun paper;
+    const SwitchedDrive drive(paper.drive);
+    time_run("the paper's drive", n_coupled,
+             Run<SwitchedDrive>{drive, paper.signals, {}, paper.drive.balanced_scale(), 2.0});
+    for (const TimedTrain& t : trains)
+        in_kernel(t, [&](const auto& in) { time_run(t.name.c_str(), in.assembly.layout().coupled, run_of(in, t)); });
+}
