@@ -142,7 +142,7 @@ class Breakaway {
         const int place = assembly_.places().couplings[static_cast<std::size_t>(k)].input;
         const double u = place == model::nowhere ? 0.0 : input(place), way = from_input ? 1.0 : -1.0;
         const double torque = way * to_turn(other, s, &c);  // that it has to pass on
-        return way * std::clamp(torque, -c.capacity(-1, u), c.capacity(+1, u));
+        return way * std::clamp(torque, -c.capacity(-1, u, true), c.capacity(+1, u, true));
     }
 
     const model::Assembly& assembly_;
