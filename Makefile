@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-FORMATTED := $(wildcard core/lostmotion/*/*.hpp core/tests/*.[ch]pp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.cpp examples/*.c benchmarks/*.[ch]pp)
+FORMATTED := $(wildcard core/lostmotion/*/*.hpp core/tests/*.[ch]pp core/portable/*.cpp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.cpp examples/*.c benchmarks/*.[ch]pp)
 SOURCES := $(wildcard core/lostmotion/*/*.hpp bindings/*.cpp bindings/*.hpp scenarios/*.toml) CMakeLists.txt pyproject.toml
 
 .PHONY: demo test bench docs lint format clean

@@ -79,34 +79,11 @@ class SharedDrive : public WorkspacePool {
     std::vector<std::unique_ptr<Workspace>> idle_;
 };
 
-// Without a torsion curve the gearbox is rigid, without a loss map its efficiency is constant.
 inline Drive make_drive(const std::map<std::string, double>& values, bool torque_source, const TorsionCurve* curve,
                         const LossMap* map) {
-    Drive drive;
-    for (const auto& [key, value] : values) {
-        const Parameter* parameter = find_parameter(key);
-        if (parameter == nullptr) throw nb::value_error(("a drive has no parameter " + key).c_str());
-        parameter->in(drive) = value;
-    }
-    drive.motor.kind = torque_source ? Motor::torque_source : Motor::dc;
-    if (curve != nullptr) {
-        drive.gearbox.compliance = Gearbox::torsion_curve;
-        drive.gearbox.curve = *curve;
-    }
-    if (map != nullptr) {
-        drive.gearbox.losses = Gearbox::loss_map;
-        drive.gearbox.map = *map;
-    }
-    return drive;
-}
-
-inline Signal make_signal(const std::vector<std::array<double, 3>>& breakpoints,
-                          const std::vector<std::array<double, 3>>& sines) {
-    Signal s;
-    s.breakpoints.clear();
-    for (const auto& [time, value, slope] : breakpoints) s.breakpoints.push_back({time, value, slope});
-    for (const auto& [amplitude, frequency, phase] : sines) s.sines.push_back({amplitude, frequency, phase});
-    return s;
+    for (const auto& [key, value] : values)
+        if (find_parameter(key) == nullptr) throw nb::value_error(("a drive has no parameter " + key).c_str());
+    return drive_of(values, torque_source, curve, map);
 }
 
 inline void bind_drives(nb::module_& m) {
@@ -134,7 +111,7 @@ inline void bind_drives(nb::module_& m) {
         .def(
             "__init__",
             [](Signal* self, const std::vector<std::array<double, 3>>& breakpoints,
-               const std::vector<std::array<double, 3>>& sines) { new (self) Signal(make_signal(breakpoints, sines)); },
+               const std::vector<std::array<double, 3>>& sines) { new (self) Signal(signal_of(breakpoints, sines)); },
             "breakpoints"_a, "sines"_a);
 }
 

@@ -1,4 +1,4 @@
-// A drive train as Python describes it: elements by name, added in the order of the equations.
+// Drive trains and their runs.
 #pragma once
 
 #include <nanobind/stl/optional.h>
@@ -12,15 +12,14 @@
 #include "interruption.hpp"
 #include "lostmotion/analysis/steady_regime.hpp"
 #include "lostmotion/analysis/train_batch.hpp"
+#include "lostmotion/model/train_description.hpp"
 
 namespace lostmotion::binding {
 
-class TrainDescription {
+// As Python describes a train.
+class TrainDescription : public model::TrainDescription {
  public:
-    using Parameters = std::map<std::string, double>;
     using Friction = std::tuple<double, double, std::vector<double>, std::vector<double>>;
-
-    model::Train train;
 
     void add_shaft(const std::string& name, double inertia, double viscous_friction, const Friction& friction,
                    const TorsionCurve* drag, bool loaded) {
@@ -32,36 +31,19 @@ class TrainDescription {
         s.friction = {torque, breakaway, speeds, torques};
         if (drag != nullptr) s.drag = *drag;
         s.loaded = loaded;
-        train.shafts.push_back(std::move(s));
+        model::TrainDescription::add_shaft(std::move(s));
     }
-    void add_motor(const std::string& name, const std::string& shaft, const Parameters& parameters, bool torque_source,
+    void add_motor(const std::string& name, const std::string& shaft, const Named& parameters, bool torque_source,
                    double torque_limit) {
         const Motor law = make_drive(parameters, torque_source, nullptr, nullptr).motor;
-        train.motors.push_back({name, place_of(shaft), law, torque_limit});
+        model::TrainDescription::add_motor(name, shaft, law, torque_limit);
     }
-    void add_gear(const std::string& name, const std::string& input, const std::string& output,
-                  const Parameters& parameters, const TorsionCurve* curve, const LossMap* map,
+    void add_gear(const std::string& name, const std::string& input, const std::string& output, const Named& parameters,
+                  const TorsionCurve* curve, const LossMap* map,
                   const std::optional<std::pair<double, double>>& efficiencies, double mesh_damping,
                   const model::PeriodicCurve* transmission_error) {
-        model::Gear g;
-        g.name = name;
-        g.input = place_of(input);
-        g.output = place_of(output);
-        g.law = make_drive(parameters, false, curve, map).gearbox;
-        if (efficiencies) g.efficiencies.emplace(efficiencies->first, efficiencies->second);
-        g.mesh_damping = mesh_damping;
-        if (transmission_error != nullptr) g.transmission_error = *transmission_error;
-        train.gears.push_back(std::move(g));
-    }
-    void add_brake(const std::string& name, const std::string& shaft, double torque, double breakaway_torque) {
-        train.brakes.push_back({name, place_of(shaft), torque, breakaway_torque});
-    }
-    void add_coupling(const std::string& name, const std::string& input, const std::string& output, double torque,
-                      double breakaway_torque, model::Coupling::Kind kind) {
-        train.couplings.push_back({name, kind, place_of(input), place_of(output), torque, breakaway_torque});
-    }
-    void add_angle_torque(const std::string& name, const std::string& shaft, const model::PeriodicCurve& torque) {
-        train.angle_torques.push_back({name, place_of(shaft), torque});
+        const Gearbox law = make_drive(parameters, false, curve, map).gearbox;
+        model::TrainDescription::add_gear(name, input, output, law, efficiencies, mesh_damping, transmission_error);
     }
 
     std::string check() const { return TrainRun(train).error(); }
@@ -102,14 +84,6 @@ class TrainDescription {
         std::copy(r.rate.begin(), r.rate.end(), rate.get());
         return nb::make_tuple(r.states, as_array(std::move(rate), {n, n}), r.determined);
     }
-
- private:
-    // -1 if there is none of that name, which check() finds.
-    int place_of(const std::string& shaft) const {
-        for (std::size_t k = 0; k < train.shafts.size(); ++k)
-            if (train.shafts[k].name == shaft) return static_cast<int>(k);
-        return -1;
-    }
 };
 
 // What ended a regime; -1: an input jumped.
@@ -122,15 +96,9 @@ inline std::vector<std::pair<int, std::string>> train_causes() {
             {model::Guard::turning, "driving torque turned"}};
 }
 
-// Time, cause, the modes of all contacts before and after.
 inline Array train_switching_table(const TrainReport& report, int contacts) {
     return column(report.switchings, {2 + 2 * static_cast<std::size_t>(contacts)},
-                  [&](const TrainSwitching& s, double* to) {
-                      *to++ = s.time;
-                      *to++ = s.input_jump ? input_changed : static_cast<int>(s.kind);
-                      to = std::copy_n(s.before.modes.begin(), contacts, to);
-                      std::copy_n(s.after.modes.begin(), contacts, to);
-                  });
+                  [&](const TrainSwitching& s, double* to) { write_switching(s, contacts, to); });
 }
 
 inline void check_train_run(const TrainReport& report, const model::Assembly& a) {
@@ -157,7 +125,6 @@ inline nb::dict run_train(const TrainDescription& description, const std::vector
     const TrainRun run(description.train);
     const model::Assembly& a = run.assembly();
     const model::Layout& n = a.layout();
-    const std::vector<std::string> states = model::state_names(a);
     TrainOptions options = train_options(duration, interval, samples, energy, max_switchings);
     options.tolerance = tolerance;
     options.interrupted = poll_signals;
@@ -168,17 +135,12 @@ inline nb::dict run_train(const TrainDescription& description, const std::vector
         report = run.run(inputs, {start, capacities}, options, data.get());
     }
     check_train_run(report, a);
-    Named end;
-    for (std::size_t k = 0; k < states.size(); ++k) end[states[k]] = report.x[k];
-    for (std::size_t g = 0; g < description.train.gears.size(); ++g)
-        if (const int h = a.places().gears[g].hysteresis; h != model::nowhere)
-            end[description.train.gears[g].name + "_hysteresis_capacity"] = report.memory[static_cast<std::size_t>(h)];
     nb::dict out;
     out["values"] = as_array(std::move(data), {run.channels().size(), samples});
     out["switchings"] = train_switching_table(report, n.contacts);
     out["switching_count"] = report.switching_count;
     out["energy"] = named_ledger(report, a);
-    out["end_state"] = end;
+    out["end_state"] = named_end(report, a);
     out["left_data_at"] = report.left_data_at;
     out["steps"] = report.steps;
     return out;

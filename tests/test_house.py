@@ -68,6 +68,17 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     TopologicalSorter({m: imports_of(m) for m in MODULES}).prepare()  # raises CycleError, which names the circle
 
 
+# The same for the rooms of the core.
+CORE_LAYERS = [{"kernel"}, {"solver", "parts"}, {"drive", "model"}, {"simulation"}, {"analysis"}]
+
+
+@pytest.mark.parametrize("header", HEADERS, ids=lambda h: f"{h.parent.name}-{h.stem}")
+def test_includes_go_to_lower_layers_only(header: Path) -> None:
+    layer = next(k for k, rooms in enumerate(CORE_LAYERS) if header.parent.name in rooms)
+    others = set(re.findall(r'#include "\.\./(\w+)/', header.read_text()))
+    assert others <= set().union(*CORE_LAYERS[:layer])
+
+
 def test_no_headers_include_each_other_in_a_circle() -> None:
     includes = {
         h: {(h.parent / name).resolve() for name in re.findall(r'#include "(.*)"', h.read_text())} for h in HEADERS
@@ -75,6 +86,36 @@ def test_no_headers_include_each_other_in_a_circle() -> None:
     assert set().union(*includes.values()) <= includes.keys()
     assert sum(map(len, includes.values())) > len(HEADERS) / 2  # the pattern finds them
     TopologicalSorter(includes).prepare()
+
+
+# What ties code to a platform: threads, exceptions, and functions of the mathematical library that it need not round
+# correctly, so that their last bits differ from system to system (sqrt, fma, floor, ldexp and the like are exact).
+PORTABLE = ("kernel", "solver", "parts", "model", "drive", "simulation")
+PLATFORM = (
+    r"\b(thread_local|throw|try|catch)\b"
+    r"|#include <(thread|mutex|atomic|condition_variable|future|exception|stdexcept|iostream)>"
+    r"|std::(a?(sin|cos|tan)h?|atan2|exp2?|expm1|log(2|10|1p)?|pow|cbrt|hypot)\("
+)
+
+
+@pytest.mark.parametrize("header", [h for h in HEADERS if h.parent.name in PORTABLE], ids=lambda h: h.stem)
+def test_what_solves_is_bound_to_no_platform(header: Path) -> None:
+    code = re.sub(r"//.*", "", header.read_text())
+    assert re.search(PLATFORM, code) is None
+
+
+def test_what_binds_to_a_platform_is_recognised() -> None:
+    for line in (
+        "thread_local int n;",
+        "#include <mutex>",
+        "throw 1;",
+        "y = std::sin(x);",
+        "std::pow(x, 3)",
+        "std::log(x)",
+    ):
+        assert re.search(PLATFORM, line)
+    for line in ("std::sqrt(x)", "std::floor(x)", "sine_cosine(x)", "#include <memory>", "// country"):
+        assert not re.search(PLATFORM, line)
 
 
 SCREEN = 50  # lines of a function, without its heading and docstring

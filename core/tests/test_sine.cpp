@@ -5,6 +5,7 @@
 #include <limits>
 #include <random>
 
+#include "lostmotion/kernel/powers.hpp"
 #include "lostmotion/kernel/sine.hpp"
 
 using namespace lostmotion;
@@ -58,5 +59,31 @@ TEST_SUITE("sine") {
             CHECK(sine_cosine(-x).cos == sine_cosine(x).cos);
         }
         CHECK(sine_cosine(0.0).cos == 1.0);
+    }
+}
+
+TEST_SUITE("powers") {
+    // The last step of Horner's scheme rounds a quotient, a product and a sum: 1/2 ulp and what r <= 0.35 leaves of
+    // two.
+    TEST_CASE("the exponential is exact to 1.1 units in the last place") {
+        std::mt19937_64 random(9);
+        std::uniform_real_distribution<double> share(-1.0, 1.0);
+        for (const double reach : {1e-6, 0.3, 0.4, 5.0, 100.0, 700.0})
+            for (int k = 0; k < 20000; ++k) {
+                const double x = reach * share(random);
+                CHECK(error(exponential(x), expq(x)) < 1.1);
+            }
+        CHECK(exponential(0.0) == 1.0);
+        CHECK(exponential(-1e3) == 0.0);
+    }
+    // A fifth of the five roundings of x y^5, at most one unit in the last place, and half a unit of the last sum.
+    TEST_CASE("the inverse fifth root is exact to 1.5 units in the last place") {
+        std::mt19937_64 random(10);
+        std::uniform_real_distribution<double> exponent(-1000.0, 1000.0);
+        for (int k = 0; k < 20000; ++k) {
+            const double x = std::exp2(exponent(random));
+            CHECK(error(inverse_fifth_root(x), powq(x, -0.2Q)) < 1.5);
+        }
+        for (int k = -200; k <= 200; ++k) CHECK(inverse_fifth_root(std::ldexp(1.0, 5 * k)) == std::ldexp(1.0, -k));
     }
 }

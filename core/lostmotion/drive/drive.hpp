@@ -97,6 +97,11 @@ class Drive {
     void add_loss_guards(const RegimeKey& key, const Equations& e, Regime& r) const;
     void add_turning(const RegimeKey& key, Regime& r) const;
 
+    static constexpr Motor::Terms motor_terms{motor_torque, motor_speed, command, one};
+    template <class F>
+    LossTerms<F> losses_of(const F& T_2) const {
+        return gearbox.loss_terms(one, motor_speed, T_2);
+    }
     static LinearForm closed(const Open& f) {
         LinearForm g;
         std::copy_n(f.c.begin(), n_terms, g.c.begin());
@@ -119,7 +124,7 @@ inline Regime Drive::build(const RegimeKey& key) const {
     Equations e = compose(key, r);
     r.solvable = solve_reactions(key, r, e);
 
-    r.rate[motor_torque] = motor.torque_rate<LinearForm>(key.amplifier);
+    r.rate[motor_torque] = motor.torque_rate<LinearForm>(motor_terms, key.amplifier);
     if (!r.at_rest[input_contact]) r.rate[motor_speed] = closed(e.input_acceleration);
     if (!r.at_rest[load_contact])
         r.rate[load_speed] =
@@ -143,7 +148,7 @@ inline Drive::Equations Drive::compose(const RegimeKey& key, const Regime& r) co
     const double i = gearbox.ratio;
     const bool all_stuck = input == 0 && slip == 0 && bearing == 0;
     Equations e;
-    e.M_D = motor.torque<Open>();
+    e.M_D = motor.torque<Open>(motor_terms);
 
     // Output torque: rigid, it is whatever is needed (7); else T_2 = P(d) + H (15). While everything stands, the
     // split between the contacts is not determined by the motion; T_2 then stays as it was.
@@ -167,7 +172,7 @@ inline Drive::Equations Drive::compose(const RegimeKey& key, const Regime& r) co
         const double s = input;
         e.F_input = Open::unit(one, s * motor.friction_torque);
         if (gearbox.losses == Gearbox::loss_map) {
-            const Open M_2B_signed = gearbox.loss_while_turning(key.cell, input, e.T_2);
+            const Open M_2B_signed = losses_of(e.T_2).turning(gearbox.map.plane(key.cell), s);
             e.F_input += M_2B_signed / i;
             e.T_1 += M_2B_signed / i;
         }
@@ -303,8 +308,7 @@ inline void Drive::add_turning(const RegimeKey& key, Regime& r) const {
 // Capacity of the input contact while it is stuck, cell edges while it slips.
 inline void Drive::add_loss_guards(const RegimeKey& key, const Equations& e, Regime& r) const {
     const bool has_map = gearbox.losses == Gearbox::loss_map;
-    const double T_2R = gearbox.rated_output_torque;
-    const LinearForm T_2 = closed(e.T_2);
+    const LossTerms<LinearForm> losses = losses_of(closed(e.T_2));
     const auto add = [&r](const LinearForm& form, Guard::Kind kind, int neighbour) {
         r.guards[r.n_guards++] = Guard{form, kind, input_contact, neighbour};
     };
@@ -314,8 +318,8 @@ inline void Drive::add_loss_guards(const RegimeKey& key, const Equations& e, Reg
             if (has_map) {
                 const int j = s > 0 ? key.cell : key.cell_back;
                 const auto kind = s > 0 ? Guard::loss_cell : Guard::loss_cell_back;
-                const LinearForm mu = s / T_2R * T_2;
-                F += gearbox.loss_at_rest(j, mu);
+                const LinearForm mu = losses.load(s);
+                F += losses.at_rest(gearbox.map.line_at_standstill(j), s);
                 const double low = gearbox.map.load_interval_lower(j), high = gearbox.map.load_interval_upper(j);
                 const bool first = j == 0, last = j + 1 == gearbox.map.load_intervals();
                 add(1.0 / (high - low) * (LinearForm::unit(one, high) - mu), last ? Guard::outside : kind, j + 1);
@@ -328,13 +332,9 @@ inline void Drive::add_loss_guards(const RegimeKey& key, const Equations& e, Reg
         const double s = key.modes[input_contact];
         Edge edges[3];
         const int n = gearbox.map.edges(key.cell, edges);
-        for (int k = 0; k < n; ++k) {
-            const Plane& p = edges[k].inside;
-            add(LinearForm::unit(one, p.at_zero) +
-                    LinearForm::unit(motor_speed, s * p.per_speed / gearbox.rated_input_speed) +
-                    s * p.per_load / T_2R * T_2,
-                edges[k].neighbour < 0 ? Guard::outside : Guard::loss_cell, edges[k].neighbour);
-        }
+        for (int k = 0; k < n; ++k)
+            add(losses.edge(edges[k].inside, s), edges[k].neighbour < 0 ? Guard::outside : Guard::loss_cell,
+                edges[k].neighbour);
         r.in_data = gearbox.map.in_data(key.cell);
     }
 }

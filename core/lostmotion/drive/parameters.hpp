@@ -3,6 +3,8 @@
 #pragma once
 
 #include <array>
+#include <map>
+#include <string>
 #include <string_view>
 
 #include "drive.hpp"
@@ -50,6 +52,24 @@ inline const Parameter* find_parameter(std::string_view key) {
     for (const Parameter& p : parameters)
         if (p.key == key) return &p;
     return nullptr;
+}
+
+// A drive of parameters by key, all of which must be in the table. Without a torsion curve the gearbox is rigid,
+// without a loss map its efficiency is constant.
+inline Drive drive_of(const std::map<std::string, double>& values, bool torque_source, const TorsionCurve* curve,
+                      const LossMap* map) {
+    Drive drive;
+    for (const auto& [key, value] : values) find_parameter(key)->in(drive) = value;
+    drive.motor.kind = torque_source ? Motor::torque_source : Motor::dc;
+    if (curve != nullptr) {
+        drive.gearbox.compliance = Gearbox::torsion_curve;
+        drive.gearbox.curve = *curve;
+    }
+    if (map != nullptr) {
+        drive.gearbox.losses = Gearbox::loss_map;
+        drive.gearbox.map = *map;
+    }
+    return drive;
 }
 
 }  // namespace lostmotion

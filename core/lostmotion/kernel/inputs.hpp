@@ -53,6 +53,16 @@ struct Signal {
     }
 };
 
+// breakpoints: time, value, slope; sines: amplitude, frequency, phase.
+inline Signal signal_of(const std::vector<std::array<double, 3>>& breakpoints,
+                        const std::vector<std::array<double, 3>>& sines) {
+    Signal s;
+    s.breakpoints.clear();
+    for (const auto& [time, value, slope] : breakpoints) s.breakpoints.push_back({time, value, slope});
+    for (const auto& [amplitude, frequency, phase] : sines) s.sines.push_back({amplitude, frequency, phase});
+    return s;
+}
+
 template <class D>
 using SignalsOf = std::array<Signal, D::inputs>;
 
@@ -311,8 +321,10 @@ class InputState {
     // third derivative, so that none is stepped over.
     double turning(int i, double way, double limit) const {
         double B = 0.0;
-        for (const Sine& s : (*signals_)[i].sines)
-            B += std::fabs(s.amplitude) * std::pow(2.0 * std::numbers::pi * s.frequency, 3);
+        for (const Sine& s : (*signals_)[i].sines) {
+            const double omega = 2.0 * std::numbers::pi * s.frequency;
+            B += std::fabs(s.amplitude) * omega * omega * omega;
+        }
         if (B == 0.0) return limit;
         for (InputState at = *this; at.time_ < limit;) {
             const auto u = at.jet<3>();

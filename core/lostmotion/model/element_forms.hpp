@@ -46,6 +46,16 @@ class ElementForms {
         return terms_.state(places_.gears[gear].twist, g.law.curve.slope(piece)) +
                terms_.one(g.law.curve.offset(piece));
     }
+    Motor::Terms motor_terms(int motor) const {
+        const MotorPlace& p = places_.motors[motor];
+        return {p.torque, places_.shafts[train_.motors[motor].shaft].speed, layout().first_input + p.command,
+                layout().one};
+    }
+    // The loss law of a gear, where T_2 is its output torque.
+    LossTerms<Row> losses(int gear, const Row& T_2) const {
+        const Gear& g = train_.gears[gear];
+        return g.loss_terms(layout().one, places_.shafts[g.input].speed, T_2);
+    }
     Row angle_torque(int k, const Key& key) const {
         const PeriodicCurve& curve = train_.angle_torques[k].torque;
         const AngleTorquePlace& p = places_.angle_torques[k];

@@ -74,11 +74,9 @@ inline void Equations::compose_motors(const Key& key, Regime& r) const {
         const ShaftMotor& motor = train_.motors[m];
         const MotorPlace& p = places_.motors[m];
         const int limit = p.branch == nowhere ? 0 : key.branch[p.branch];
-        if (motor.law.kind == Motor::dc)
-            r.motor_torque.push_back(terms_.state(p.torque));
-        else
-            r.motor_torque.push_back(limit == 0 ? terms_.input(p.command, motor.law.rated_torque)
-                                                : terms_.one(limit * motor.torque_limit));
+        r.motor_torque.push_back(motor.law.kind == Motor::torque_source && limit != 0
+                                     ? terms_.one(limit * motor.torque_limit)
+                                     : motor.law.torque<Row>(forms_.motor_terms(static_cast<int>(m))));
     }
 }
 
@@ -117,12 +115,7 @@ inline void Equations::compose_gear(int gear, const Key& key, Regime& r, std::ve
     }
     const double s = mode(key, places_.shafts[g.input].contact);
     if (s == 0.0) return;
-    const Plane m = g.loss_plane(key.branch[p.cell]);
-    const double T_2R = g.rated_torque();
-    const Row M_2B_signed = terms_.one(s * T_2R * m.at_zero) +
-                            terms_.state(places_.shafts[g.input].speed, T_2R * m.per_speed / g.law.rated_input_speed) +
-                            m.per_load * T_2;
-    loss[gear] = M_2B_signed / i;
+    loss[gear] = forms_.losses(gear, T_2).turning(g.loss_plane(key.branch[p.cell]), s) / i;
 }
 
 inline void Equations::compose_coupling(int coupling, const Key& key, Regime& r) const {
@@ -178,13 +171,8 @@ inline void Equations::set_rates(const Key& key, const std::vector<Row>& acceler
         const Motor& motor = train_.motors[m].law;
         const MotorPlace& p = places_.motors[m];
         if (motor.kind != Motor::dc) continue;
-        // The motor states its law in terms of its own.
-        const auto law = motor.torque_rate<Form<n_terms>>(p.branch == nowhere ? 0 : key.branch[p.branch]);
-        Row& rate = r.rate[p.torque];
-        rate.c[p.torque] = law.c[lostmotion::motor_torque];
-        rate.c[places_.shafts[train_.motors[m].shaft].speed] = law.c[lostmotion::motor_speed];
-        rate.c[layout_.first_input + p.command] = law.c[lostmotion::command];
-        rate.c[layout_.one] = law.c[lostmotion::one];
+        r.rate[p.torque] = motor.torque_rate<Row>(forms_.motor_terms(static_cast<int>(m)),
+                                                  p.branch == nowhere ? 0 : key.branch[p.branch]);
     }
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
         const int leader = r.ties.leader[s];

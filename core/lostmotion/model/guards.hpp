@@ -130,10 +130,9 @@ inline void RegimeGuards::add_loss_cells(int gear, int s, Row& capacity) {
     const GearPlace& p = places_.gears[gear];
     const int contact = places_.shafts[g.input].contact, branch = s > 0 ? p.cell : p.cell_back;
     const int j = regime_.key.branch[branch];
-    const double T_2R = g.rated_torque();
-    const Plane m = g.loss_at_standstill(j);
-    const Row mu = s / T_2R * regime_.output_torque[gear];
-    capacity += T_2R / g.law.ratio * (terms_.one(m.at_zero) + m.per_load * mu);
+    const LossTerms<Row> losses = forms_.losses(gear, regime_.output_torque[gear]);
+    const Row mu = losses.load(s);
+    capacity += losses.at_rest(g.loss_at_standstill(j), s);
     const double low = g.load_lower(j), high = g.load_upper(j);
     const bool bounded = std::isfinite(low) && std::isfinite(high);
     const double scale = bounded ? 1.0 / (high - low) : 1.0;
@@ -150,16 +149,13 @@ inline void RegimeGuards::add_loss_edges(int gear) {
     const Gear& g = train_.gears[gear];
     const GearPlace& p = places_.gears[gear];
     const int contact = places_.shafts[g.input].contact;
-    const double s = regime_.key.modes[contact], T_2R = g.rated_torque();
+    const double s = regime_.key.modes[contact];
+    const LossTerms<Row> losses = forms_.losses(gear, regime_.output_torque[gear]);
     Edge edges[3];
     const int n = g.loss_edges(regime_.key.branch[p.cell], edges);
-    for (int k = 0; k < n; ++k) {
-        const Plane& inside = edges[k].inside;
-        add(terms_.one(inside.at_zero) +
-                terms_.state(places_.shafts[g.input].speed, s * inside.per_speed / g.law.rated_input_speed) +
-                s * inside.per_load / T_2R * regime_.output_torque[gear],
-            edges[k].neighbour < 0 ? Guard::outside : Guard::edge, contact, p.cell, edges[k].neighbour);
-    }
+    for (int k = 0; k < n; ++k)
+        add(losses.edge(edges[k].inside, s), edges[k].neighbour < 0 ? Guard::outside : Guard::edge, contact, p.cell,
+            edges[k].neighbour);
     regime_.in_data = regime_.in_data && g.in_data(regime_.key.branch[p.cell]);
 }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "../kernel/powers.hpp"
+
 namespace lostmotion::model {
 
 struct DryFriction {
@@ -43,12 +45,13 @@ struct DryFriction {
         const double drop = breakaway - coulomb;
         if (!(drop > error) || !(error > 0.0)) return f;
         // |d2/dx2 exp(-x^2)| <= 2, so a chord of length h departs by at most h^2/4.
-        const double end = std::sqrt(std::log(drop / error));
-        const int n = std::max(1, static_cast<int>(std::ceil(end / std::sqrt(4.0 * error / drop))));
-        for (int k = 0; k <= n; ++k) {
-            const double x = end * k / n;
+        const double h = std::sqrt(4.0 * error / drop);
+        double above = drop;  // the torque at slip without end
+        for (int k = 0; above > error; ++k) {
+            const double x = h * k;
+            above = drop * exponential(-x * x);
             f.speeds.push_back(stribeck_speed * x);
-            f.torques.push_back(coulomb + drop * std::exp(-x * x));
+            f.torques.push_back(coulomb + above);
         }
         return f;
     }

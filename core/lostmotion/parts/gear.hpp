@@ -37,6 +37,10 @@ struct Gear {
     auto with_losses(Use&& use) const {
         return efficiencies ? use(*efficiencies) : use(law.map);
     }
+    template <class F>
+    LossTerms<F> loss_terms(int one, int speed, const F& T_2) const {
+        return {rated_torque(), law.rated_input_speed, law.ratio, one, speed, T_2};
+    }
     Plane loss_plane(int cell) const {
         return with_losses([&](const auto& m) { return m.plane(cell); });
     }

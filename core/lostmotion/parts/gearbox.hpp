@@ -1,7 +1,6 @@
 // The gearbox: a compliance and a loss law, chosen independently.
 #pragma once
 
-#include "../drive/variables.hpp"
 #include "loss_map.hpp"
 #include "torsion_curve.hpp"
 
@@ -43,18 +42,10 @@ struct Gearbox {
         if (losses != loss_map) return 0.0;
         return rated_output_torque * map(s * T_2 / rated_output_torque, std::fabs(w_M) / rated_input_speed);
     }
-    // The same as forms, in one cell of the map. Turning: M_2B sign(w_M).
+    // The same as forms.
     template <class F>
-    F loss_while_turning(int cell, int s, const F& T_2) const {
-        const Plane m = map.plane(cell);
-        return F::unit(one, s * rated_output_torque * m.at_zero) +
-               F::unit(motor_speed, rated_output_torque * m.per_speed / rated_input_speed) + m.per_load * T_2;
-    }
-    // At rest, in an interval of the relative load mu = s T_2/T_2R: M_2B/i, what the input contact holds of it.
-    template <class F>
-    F loss_at_rest(int interval, const F& mu) const {
-        const Plane m = map.line_at_standstill(interval);
-        return rated_output_torque / ratio * (F::unit(one, m.at_zero) + m.per_load * mu);
+    LossTerms<F> loss_terms(int one, int speed, const F& T_2) const {
+        return {rated_output_torque, rated_input_speed, ratio, one, speed, T_2};
     }
 };
 

@@ -18,6 +18,30 @@ struct Edge {
     int neighbour = -1;  // triangle on the other side; -1: the end of the extended map
 };
 
+// The loss law (12) of a gear as forms, in one plane m of its losses. The forms may be those of a drive or of a train.
+template <class F>
+struct LossTerms {
+    double T_2R, n_1R;  // scale mu and m_2B, and v
+    double ratio;
+    int one, speed;  // the terms 1 and w_M
+    F T_2;
+
+    F load(double s) const { return s / T_2R * T_2; }  // mu
+    // M_2B sign(w_M) [N m at the output] while the input shaft turns in direction s.
+    F turning(const Plane& m, double s) const {
+        return F::unit(one, s * T_2R * m.at_zero) + F::unit(speed, T_2R * m.per_speed / n_1R) + m.per_load * T_2;
+    }
+    // M_2B/i that the input contact holds at rest, before it turns in direction s.
+    F at_rest(const Plane& m, double s) const {
+        return T_2R / ratio * (F::unit(one, m.at_zero) + m.per_load * load(s));
+    }
+    // Of an edge of the cell: positive inside.
+    F edge(const Plane& inside, double s) const {
+        return F::unit(one, inside.at_zero) + F::unit(speed, s * inside.per_speed / n_1R) +
+               s * inside.per_load / T_2R * T_2;
+    }
+};
+
 class LossMap {
  public:
     LossMap() = default;

@@ -8,6 +8,7 @@
 
 #include <cmath>
 
+#include "../kernel/sine.hpp"
 #include "loss_map.hpp"
 
 namespace lostmotion::model {
@@ -18,7 +19,11 @@ class MeshEfficiency {
 
     // Of a worm with lead angle g and friction angle r [rad]: eta_f = tan g/tan(g + r), eta_b = tan(g - r)/tan g.
     static MeshEfficiency worm(double g, double r) {
-        return {std::tan(g) / std::tan(g + r), std::tan(g - r) / std::tan(g)};
+        const auto tan = [](double x) {
+            const auto [sin, cos] = sine_cosine(x);
+            return sin / cos;
+        };
+        return {tan(g) / tan(g + r), tan(g - r) / tan(g)};
     }
 
     double driving() const { return driving_; }          // eta_f

@@ -3,8 +3,6 @@
 
 #include <limits>
 
-#include "../drive/variables.hpp"
-
 namespace lostmotion {
 
 struct Motor {
@@ -18,19 +16,24 @@ struct Motor {
     double armature_voltage_constant = 2.0;  // k_N [-], stall torque / rated torque at rated voltage
     double voltage_limit = std::numeric_limits<double>::infinity();  // of |E_Z| [-]
 
+    // The terms of its forms: M_D, w_M, the command E_C and 1.
+    struct Terms {
+        int torque, speed, command, one;
+    };
+
     // Torque on the rotor [N m]. A torque source follows its command, in units of the rated torque, without delay.
     template <class F>
-    F torque() const {
-        return kind == dc ? F::unit(motor_torque) : F::unit(command, rated_torque);
+    F torque(const Terms& of) const {
+        return kind == dc ? F::unit(of.torque) : F::unit(of.command, rated_torque);
     }
 
     // dM_D/dt by eq. (2), with E_Z = E_C, or the limit with the sign of `amplifier` if that is not 0.
     template <class F>
-    F torque_rate(int amplifier) const {
+    F torque_rate(const Terms& of, int amplifier) const {
         if (kind == torque_source) return F{};
-        const F voltage = amplifier == 0 ? F::unit(command) : F::unit(one, amplifier * voltage_limit);
-        const F m_D = F::unit(motor_torque, 1.0 / rated_torque);
-        const F back_emf = F::unit(motor_speed, (armature_voltage_constant - 1.0) / rated_speed);
+        const F voltage = amplifier == 0 ? F::unit(of.command) : F::unit(of.one, amplifier * voltage_limit);
+        const F m_D = F::unit(of.torque, 1.0 / rated_torque);
+        const F back_emf = F::unit(of.speed, (armature_voltage_constant - 1.0) / rated_speed);
         return rated_torque / electrical_time_constant * (armature_voltage_constant * voltage - back_emf - m_D);
     }
 

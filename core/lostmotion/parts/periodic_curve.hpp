@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "../kernel/sine.hpp"
+
 namespace lostmotion::model {
 
 class PeriodicCurve {
@@ -24,15 +26,20 @@ class PeriodicCurve {
     static PeriodicCurve sine(double amplitude, int n, double phase, double error) {
         // Nodes on a circle of radius c: off by c - 1 there and by 1 - c cos(h/2) between, both tan^2(h/4) if
         // c = 2/(1 + cos(h/2)).
-        const double a = std::fabs(amplitude);
-        const double h = 4.0 * std::atan(std::sqrt(std::min(error, a) / a));
-        const int pieces = 4 * std::max(1, static_cast<int>(std::ceil(std::numbers::pi / 2.0 / h)));
+        const double a = std::fabs(amplitude), share = std::min(error, a) / a;
+        const auto off = [](int quarter) {  // with so many nodes in a quarter of a turn
+            const auto [sin, cos] = sine_cosine(std::numbers::pi / 8.0 / quarter);
+            return (sin / cos) * (sin / cos);
+        };
+        int quarter = std::max(1, static_cast<int>(std::numbers::pi / 8.0 / std::sqrt(share)));  // tan x > x
+        while (off(quarter) > share) ++quarter;
+        const int pieces = 4 * quarter;
         const double width = 2.0 * std::numbers::pi / pieces;
-        const double outwards = 2.0 / (1.0 + std::cos(0.5 * width));
+        const double outwards = 2.0 / (1.0 + sine_cosine(0.5 * width).cos);
         std::vector<double> angles, values;
         for (int k = 0; k < pieces; ++k) {
             angles.push_back(width / n * k);
-            values.push_back(amplitude * outwards * std::sin(width * k + phase));
+            values.push_back(amplitude * outwards * sine_cosine(width * k + phase).sin);
         }
         PeriodicCurve chords(2.0 * std::numbers::pi / n, std::move(angles), std::move(values));
         chords.sine_ = {amplitude, n, phase};

@@ -54,6 +54,14 @@ struct TrainSwitching {
     model::Key before, after;
 };
 
+// Time, cause, the modes of all contacts before and after.
+inline double* write_switching(const TrainSwitching& s, int contacts, double* to) {
+    *to++ = s.time;
+    *to++ = s.input_jump ? input_changed : static_cast<int>(s.kind);
+    to = std::copy_n(s.before.modes.begin(), contacts, to);
+    return std::copy_n(s.after.modes.begin(), contacts, to);
+}
+
 struct TrainEnergy {
     std::string name;
     model::PowerFlow::Kind kind;
@@ -234,6 +242,17 @@ inline std::string check_start(const model::Assembly& a, std::span<const double>
     for (const model::ShaftPlace& s : a.places().shafts)
         speeds.push_back(start.empty() ? 0.0 : start[static_cast<std::size_t>(s.speed)]);
     return model::check_start(a.train(), speeds);
+}
+
+// States, and capacities of the hysteresis of gears [N m].
+inline Named named_end(const TrainReport& report, const model::Assembly& a) {
+    Named end;
+    const std::vector<std::string> states = model::state_names(a);
+    for (std::size_t k = 0; k < states.size(); ++k) end[states[k]] = report.x[k];
+    for (std::size_t g = 0; g < a.train().gears.size(); ++g)
+        if (const int h = a.places().gears[g].hysteresis; h != model::nowhere)
+            end[a.train().gears[g].name + "_hysteresis_capacity"] = report.memory[static_cast<std::size_t>(h)];
+    return end;
 }
 
 // start: the states by the layout of the assembly, or nothing for rest.

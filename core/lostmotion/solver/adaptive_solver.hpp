@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "../kernel/powers.hpp"
 #include "exact_solver.hpp"
 
 namespace lostmotion {
@@ -217,7 +218,7 @@ class AdaptiveSolver {
             const double error = take_step(motion, h, dense, x);
             if (!(error < 1.0)) {
                 if (!(h > 1e-14 * std::max(1.0, time_))) return Status::outside;
-                h *= std::isfinite(error) ? std::clamp(0.9 * std::pow(error, -0.2), 0.2, 0.9) : 0.1;
+                h *= std::isfinite(error) ? std::clamp(0.9 * inverse_fifth_root(error), 0.2, 0.9) : 0.1;
                 continue;
             }
             const double end = last ? std::nextafter(limit, time_) : time_ + h;
@@ -232,7 +233,7 @@ class AdaptiveSolver {
             if (fired != nullptr) return Status::done;
             dense.k[0] = dense.k[DormandPrince::stages - 1];
             std::swap(here, there);
-            step_ = h *= std::clamp(0.9 * std::pow(std::max(error, 1e-10), -0.2), 0.2, 5.0);
+            step_ = h *= std::clamp(0.9 * inverse_fifth_root(std::max(error, 1e-10)), 0.2, 5.0);
         }
         return Status::done;
     }

@@ -1,0 +1,54 @@
+// A train as it is described from outside: elements by name, added in the order of the equations.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "train.hpp"
+
+namespace lostmotion::model {
+
+class TrainDescription {
+ public:
+    Train train;
+
+    void add_shaft(Shaft shaft) { train.shafts.push_back(std::move(shaft)); }
+    void add_motor(const std::string& name, const std::string& shaft, const Motor& law, double torque_limit) {
+        train.motors.push_back({name, place_of(shaft), law, torque_limit});
+    }
+    // efficiencies: driving and overrunning, in place of the losses of the law.
+    void add_gear(const std::string& name, const std::string& input, const std::string& output, const Gearbox& law,
+                  const std::optional<std::pair<double, double>>& efficiencies, double mesh_damping,
+                  const PeriodicCurve* transmission_error) {
+        Gear g;
+        g.name = name;
+        g.input = place_of(input);
+        g.output = place_of(output);
+        g.law = law;
+        if (efficiencies) g.efficiencies.emplace(efficiencies->first, efficiencies->second);
+        g.mesh_damping = mesh_damping;
+        if (transmission_error != nullptr) g.transmission_error = *transmission_error;
+        train.gears.push_back(std::move(g));
+    }
+    void add_brake(const std::string& name, const std::string& shaft, double torque, double breakaway_torque) {
+        train.brakes.push_back({name, place_of(shaft), torque, breakaway_torque});
+    }
+    void add_coupling(const std::string& name, const std::string& input, const std::string& output, double torque,
+                      double breakaway_torque, Coupling::Kind kind) {
+        train.couplings.push_back({name, kind, place_of(input), place_of(output), torque, breakaway_torque});
+    }
+    void add_angle_torque(const std::string& name, const std::string& shaft, const PeriodicCurve& torque) {
+        train.angle_torques.push_back({name, place_of(shaft), torque});
+    }
+
+ private:
+    // -1 if there is none of that name, which the check of the train finds.
+    int place_of(const std::string& shaft) const {
+        for (std::size_t k = 0; k < train.shafts.size(); ++k)
+            if (train.shafts[k].name == shaft) return static_cast<int>(k);
+        return -1;
+    }
+};
+
+}  // namespace lostmotion::model
