@@ -179,7 +179,7 @@ def chatter_map(out: Path) -> None:
         x, y = zip(*((e, r) for e, r, _, d in points if d is does), strict=True)
         left.scatter(x, y, s=26, label=label, **marker)
     eta = np.linspace(-1.0, -0.03, 300)
-    left.plot(eta, -1.0 / eta, color="black", linewidth=1.3, label="paradox of rigid friction, 1/|η_b|")
+    left.plot(eta, -1.0 / eta, color="black", linewidth=1.3, label=r"paradox of rigid friction, $1/|\eta_b|$")
     left.plot(
         ETAS,
         [boundary(float(e)) for e in ETAS],
@@ -189,11 +189,11 @@ def chatter_map(out: Path) -> None:
         label="verdict, with oil and mesh damping",
     )
     left.set(
-        xlabel="backward efficiency η_b [-]",
-        ylabel="inertia ratio J_2/(J_1 i²) [-]",
+        xlabel=r"backward efficiency $\eta_b$ [-]",
+        ylabel="inertia ratio $J_2/(J_1 i^2)$ [-]",
         yscale="log",
         ylim=(0.6, 55.0),
-        title="ζ = 0.05 in the mesh, b = 0.1 J_1 ω, ω = √(k/J_2)",
+        title=r"$\zeta$ = 0.05 in the mesh, $b = 0.1\, J_1\sqrt{k/J_2}$ at the worm",
     )
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=2, fontsize=8, frameon=False)
     stiffnesses = np.geomspace(1e3, 1e5, 7)
@@ -205,12 +205,12 @@ def chatter_map(out: Path) -> None:
             color="black",
             linestyle=line,
             linewidth=1.2,
-            label=f"η_b = {eta_b:g}, J_2/(J_1 i²) = {ratio:g}",
+            label=rf"$\eta_b$ = {eta_b:g}, $J_2/(J_1 i^2)$ = {ratio:g}",
         )
         right.plot(stiffnesses, [r for _, r in rates], "o", color="#0b3c5d", markersize=4.5)
     right.set(
-        xlabel="stiffness of the mesh k [N·m/rad]",
-        ylabel="growth of a disturbance λ [1/s]",
+        xlabel="stiffness of the mesh $k$ [N·m/rad]",
+        ylabel=r"growth of a disturbance $\lambda$ [1/s]",
         xscale="log",
         yscale="log",
         title="without damping: closed form (lines), runs (points)",
@@ -282,4 +282,4 @@ def write(out: Path) -> None:
     histories(out)
     three_degrees(out)
     chatter_map(out)
-    (out / "worm-gears.md").write_text(worm_table(), encoding="utf-8")
+    (out / "worm-gears.inc").write_text(worm_table(), encoding="utf-8")

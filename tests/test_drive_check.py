@@ -242,8 +242,19 @@ def test_leaving_the_data_of_the_loss_map_is_found():
     assert by_rule(lm.load(path, {"load.torque": 100.0}))["loss_map"].verdict == "warning"
 
 
+def test_a_worm_gear_that_locks_lowers_smoothly_or_chatters():
+    losses = {"kind": "map", "speeds": [0, 1], "loads": [0, 1], "values": [[0, 0], [1.3, 1.3]], "mirrored": True}
+    stiffness = {"kind": "linear", "stiffness": 2e4}
+    worm = {"gearbox.losses": losses, "gearbox.stiffness": stiffness, "load.torque": 4.0, "command": {"mean": -1.0}}
+    # eta_b = -0.3: the critical ratio is 1/0.3; mine are 1e-4 kg m2 at 50:1.
+    for ratio, verdict in ((3.3, "ok"), (3.4, "warning")):
+        found = by_rule(move(**worm, **{"load.inertia": ratio * 1e-4 * 50.0**2}))["self_locking"]
+        assert found.verdict == verdict
+        assert "takes more than 0.024 N·m" in found.value  # 0.3 times 4 N m/50
+
+
 def test_every_rule_is_tried_and_names_its_source():
-    assert set(OTHERWISE) | {"loss_map"} == set(RULES)
+    assert set(OTHERWISE) | {"loss_map", "self_locking"} == set(RULES)
     for finding in check_drive(move()):
         assert finding.source
         assert f"[{finding.source}]" in str(finding)

@@ -320,8 +320,14 @@ def test_shipped_trains_load_and_survive_json(path: Path) -> None:
 
 
 def test_what_takes_a_drive_alone_says_so() -> None:
-    with pytest.raises(lm.InputError, match=r"scenario: .* must be a Scenario"):
-        lm.check_drive(train())
+    with pytest.raises(
+        lm.InputError, match=r"drive: .* is a drive train, and this is defined for one motor, one gearbox"
+    ):
+        lm.rigid_constants(train())
+    with pytest.raises(
+        lm.InputError, match=r"gearbox: .* the test rig measures one gear; give one, such as scenario.gears"
+    ):
+        lm.TestRig(train())
 
 
 # --- runs ---

@@ -65,6 +65,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "load_study": (lm.load_study, {"path": "none.toml"}),
     "measure": (lm.measure, {"gearbox": None, "sheet": None, "notes": (), "progress": dangle}),
     "motor": (lm.motor, {"name": "paper-motor", "voltage_limit": None}),
+    "overrunning": (lm.overrunning, {"gear": SCENARIO.gearbox, "load_torque": 10.0, "input_speed": 100.0}),
+    "self_locking": (lm.self_locking, {"train": SCENARIO.drive().train(), "gear": "gearbox", "load_torque": 10.0, "input_speed": 100.0}),
     "open_result": (lm.open_result, {"path": "none.csv"}),
     "periodic_motion": (lm.periodic_motion, {"drive": SCENARIO, "command": None, "load_torque": 0.0, "multiple": 1, "start": lm.Initial(), "max_periods": 5}),
     "periodic_motions": (lm.periodic_motions, {"drive": SCENARIO, "command": None, "load_torque": 0.0, "starts": [lm.Initial()], "multiples": [1]}),

@@ -31,7 +31,8 @@ WANTED = {
     "Mapping": "a mapping of names to values",
     "xarray.Dataset": "a dataset, such as simulate returns",
     "Drive": "a Drive",
-    "DriveTrain": "a DriveTrain",
+    "DriveTrain": "a DriveTrain, such as scenario.train() returns",
+    "Gear": "a Gear of a drive train",
     "Gearbox": 'a Gearbox, such as gearbox("schaeffler-rt1-h-20-100") returns',
     "GearboxSheet": "a GearboxSheet, such as catalogue() lists",
     "Initial": "a state, such as Initial(motor_speed=100)",
@@ -74,6 +75,9 @@ def _read(name: str, value: Any, annotation: str, known: Mapping[str, Any]) -> A
     for option in options:
         if _fits(value, option, known):
             return _converted(name, value, option, known)
+    refused = getattr(type(value), "refused_as", {})
+    if reason := next((refused[option] for option in options if option in refused), None):
+        raise InputError(f"{name}: {shown(value)} {reason}")
     asked = dict.fromkeys(_wording(option) for option in options if option not in SILENT)
     raise InputError(f"{name}: {shown(value)} must be {', or '.join(asked)}")
 

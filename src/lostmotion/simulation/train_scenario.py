@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -48,6 +48,13 @@ class TrainInitial(Part):
 
 class TrainScenario(TrainElements):
     """A drive train, what acts on it, and what is wanted of it."""
+
+    # Why it is refused where another object is wanted, and what to use.
+    refused_as: ClassVar[Mapping[str, str]] = {
+        "Scenario": "is a drive train, and this is defined for one motor, one gearbox and one load; give a scenario with [motor], "
+        "[gearbox] and [load], or take simulate, check_drive or self_locking of the train",
+        "Gearbox": 'is a drive train, and the test rig measures one gear; give one, such as scenario.gears["NAME"]',
+    }
 
     title: str = ""
     shafts: Elements[ShaftTable] = Field(min_length=1)
