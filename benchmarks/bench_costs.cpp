@@ -2,7 +2,7 @@
 // floating-point peak of this machine. Prints one line a case: table, then its cells.
 #include <cstdio>
 
-#include "lostmotion/analysis/response.hpp"
+#include "lostmotion/analysis/drive_response.hpp"
 #include "paper_run.hpp"
 
 using namespace lostmotion;
@@ -87,13 +87,15 @@ void response(const Drive& drive) {
             points.push_back({Signals{sine(a, f), Signal{}}, 1.0 / f, {}});
         }
     Pool pool(drive);
+    DrivePlant plant(pool);
     const auto going = [](std::size_t) { return true; };
     int missed = 0;
     const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
     for (const unsigned threads : {cores, 1u}) {
         const double time = best_ms(3, [&] {
             missed = 0;
-            for (const ResponseResult& r : respond_all(pool, points, {}, threads, going)) missed += !r.motion.converged;
+            for (const ResponseResult& r : respond_all(plant, points, {}, threads, going))
+                missed += !r.motion.converged;
         });
         std::printf("response|480 points by shooting, %u thread%s, %d not found|%.6f\n", threads,
                     threads > 1 ? "s" : "", missed, time);

@@ -1,64 +1,12 @@
-// Periodic motions, linear models, explanations.
+// Linear models, explanations.
 #pragma once
 
 #include "drives.hpp"
 #include "interruption.hpp"
 #include "lostmotion/analysis/explain.hpp"
-#include "lostmotion/analysis/response.hpp"
+#include "lostmotion/simulation/run.hpp"
 
 namespace lostmotion::binding {
-
-// Command, load torque, period, state, hysteresis capacity.
-using Point = std::tuple<Signal, Signal, double, StateNumbers, double>;
-
-inline nb::dict as_dict(const std::vector<ResponseResult>& results, const ResponseSpec& spec) {
-    using R = const ResponseResult&;
-    std::vector<std::string> errors;
-    for (R r : results) errors.push_back(status_text(r.motion.status, r.motion.time, r.motion.contact));
-    const auto harmonics = static_cast<std::size_t>(spec.harmonics) + 1;
-    nb::dict out;
-    out["error"] = errors;
-    out["converged"] = numbers(results, [](R r) { return r.motion.converged; });
-    out["smooth"] = numbers(results, [](R r) { return r.motion.smooth; });
-    out["periods"] = numbers(results, [](R r) { return r.motion.periods; });
-    out["newton_steps"] = numbers(results, [](R r) { return r.motion.newton_steps; });
-    out["residual"] = numbers(results, [](R r) { return r.motion.residual; });
-    out["angle_advance"] = numbers(results, [](R r) { return r.motion.angle_advance; });
-    out["hysteresis_capacity"] = numbers(results, [](R r) { return r.motion.start.memory.hysteresis_capacity; });
-    out["motor_power"] = numbers(results, [](R r) { return r.motor_power; });
-    out["load_power"] = numbers(results, [](R r) { return r.load_power; });
-    out["gear_loss"] = numbers(results, [](R r) { return r.gear_loss; });
-    out["start"] =
-        column(results, {n_states}, [](R r, double* to) { std::copy_n(r.motion.start.x.begin(), n_states, to); });
-    out["jacobian"] = column(results, {n_components, n_components}, [](R r, double* to) {
-        for (const Components& row : r.motion.jacobian.row) to = std::copy(row.begin(), row.end(), to);
-    });
-    out["harmonics"] = column(results, {n_channels, harmonics, 2},
-                              [](R r, double* to) { std::copy(r.harmonic.begin(), r.harmonic.end(), to); });
-    out["mean_square"] = column(results, {n_channels},
-                                [](R r, double* to) { std::copy(r.mean_square.begin(), r.mean_square.end(), to); });
-    if (spec.keep_table)
-        out["table"] = column(results, {n_channels, spec.samples},
-                              [](R r, double* to) { std::copy(r.table.begin(), r.table.end(), to); });
-    return out;
-}
-
-inline nb::dict respond_to(SharedDrive& drive, const std::vector<Point>& asked, std::size_t samples, int harmonics,
-                           int max_periods, double tolerance, bool keep_table, unsigned threads,
-                           const nb::object& progress) {
-    const ResponseSpec spec{samples, harmonics, max_periods, tolerance, keep_table};
-    std::vector<ResponsePoint> points;
-    for (const auto& [command, load_torque, period, x, capacity] : asked)
-        points.push_back({Signals{command, load_torque}, period, {to_state(x), {capacity, 0.0}}});
-    std::vector<ResponseResult> results;
-    Watch watch(progress);
-    {
-        nb::gil_scoped_release release;
-        results = respond_all(drive, points, spec, threads, std::ref(watch));
-    }
-    watch.check();
-    return as_dict(results, spec);
-}
 
 // A form as a row: what it takes of the states, of the inputs, and its constant.
 inline constexpr std::size_t row_width = n_states + n_inputs + 1;
@@ -135,12 +83,6 @@ inline nb::tuple explain_at(const SharedDrive& shared, const Signal& command, co
 
 // Tuples are spelled out for the stub.
 inline void bind_analysis(nb::module_& m) {
-    m.def("respond", &respond_to, "drive"_a, "points"_a, "samples"_a, "harmonics"_a, "max_periods"_a, "tolerance"_a,
-          "keep_table"_a, "threads"_a, "progress"_a = nb::none(),
-          nb::sig("def respond(drive: Drive, points: collections.abc.Sequence[tuple[Signal, Signal, float, "
-                  "collections.abc.Sequence[float], float]], samples: int, harmonics: int, max_periods: int, "
-                  "tolerance: float, keep_table: bool, threads: int, "
-                  "progress: collections.abc.Callable[[int], None] | None = None) -> dict[str, typing.Any]"));
     m.def("linearization", &linearization, "drive"_a, "state"_a, "hysteresis_capacity"_a, "inputs"_a, "input_rates"_a,
           nb::sig("def linearization(drive: Drive, state: collections.abc.Sequence[float], hysteresis_capacity: "
                   "float, inputs: collections.abc.Sequence[float], input_rates: collections.abc.Sequence[float]) -> "

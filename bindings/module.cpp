@@ -1,5 +1,6 @@
 // Thin binding: the core as a Python module.
 #include "names.hpp"
+#include "responses.hpp"
 #include "runs.hpp"
 #include "stepping.hpp"
 #include "train.hpp"
@@ -15,4 +16,5 @@ NB_MODULE(CORE_MODULE, m) {
     bind_analysis(m);
     bind_stepping(m);
     bind_train(m);
+    bind_responses(m);
 }

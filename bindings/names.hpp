@@ -3,7 +3,7 @@
 
 #include "arrays.hpp"
 #include "lostmotion/analysis/batch.hpp"
-#include "lostmotion/analysis/sensitivity.hpp"
+#include "lostmotion/simulation/result_names.hpp"
 
 namespace lostmotion::binding {
 
@@ -25,14 +25,6 @@ inline void bind_names(nb::module_& m) {
         },
         nb::sig("def channels() -> list[tuple[str, str, str, str]]"), "Name, symbol, unit, meaning.");
     m.def("states", [] { return names_of(state_names); }, nb::sig("def states() -> list[str]"));
-    m.def(
-        "components",
-        [] {
-            std::vector<std::string> names;
-            for (int k = 0; k < n_components; ++k) names.emplace_back(component_name(k));
-            return names;
-        },
-        nb::sig("def components() -> list[str]"), "What a Jacobian goes over: the states and the memory.");
     m.def("contacts", [] { return names_of(contact_names); }, nb::sig("def contacts() -> list[str]"));
     m.def("energy_entries", [] { return names_of(energy_entries); }, nb::sig("def energy_entries() -> list[str]"));
     m.def(

@@ -146,12 +146,8 @@ inline Named train_ledger(const TrainReport& report) {
 inline void check_train_run(const TrainReport& report, const model::Assembly& a) {
     if (!report.message.empty()) throw nb::value_error(report.message.c_str());
     if (report.status == Status::interrupted) throw nb::python_error();
-    if (report.too_many_guards)
-        throw SolverError("the train has a regime with more conditions than the solver has room for, at t = " +
-                          std::to_string(report.time) + " s; use fewer pieces in its laws");
-    if (report.status == Status::done) return;
-    const std::string contact = report.contact < 0 ? "" : model::contact_name(a, report.contact);
-    throw SolverError(status_text(report.status, report.time, contact));
+    const std::string error = train_status_text(a, report.status, report.time, report.contact, report.too_many_guards);
+    if (!error.empty()) throw SolverError(error);
 }
 
 // start: states by name; capacities: of the hysteresis of gears by name. What is left out is 0.

@@ -3,7 +3,7 @@
 
 #include <cstdio>
 
-#include "lostmotion/analysis/periodic.hpp"
+#include "lostmotion/analysis/drive_response.hpp"
 #include "support.hpp"
 
 using namespace lostmotion;

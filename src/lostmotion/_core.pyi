@@ -1,5 +1,5 @@
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, overload
 
 import numpy
 import numpy.typing
@@ -12,9 +12,6 @@ def channels() -> list[tuple[str, str, str, str]]:
     """Name, symbol, unit, meaning."""
 
 def states() -> list[str]: ...
-
-def components() -> list[str]:
-    """What a Jacobian goes over: the states and the memory."""
 
 def contacts() -> list[str]: ...
 
@@ -59,8 +56,6 @@ def run(drive: Drive, command: Signal, load_torque: Signal, state: Sequence[floa
 def run_batch(drive: Drive, command: Signal, load_torque: Signal, state: Sequence[float], hysteresis_capacity: float, fields: Sequence[int], values: numpy.typing.NDArray[numpy.float64], duration: float, interval: float, samples: int, energy: bool, channels: Sequence[int], kept: Sequence[tuple[int, int]], threads: int, progress: Callable[[int], None] | None = None) -> tuple[numpy.typing.NDArray[numpy.float64], list[str], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]: ...
 
 def reduce_rows(how: int, values: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]: ...
-
-def respond(drive: Drive, points: Sequence[tuple[Signal, Signal, float, Sequence[float], float]], samples: int, harmonics: int, max_periods: int, tolerance: float, keep_table: bool, threads: int, progress: Callable[[int], None] | None = None) -> dict[str, Any]: ...
 
 def linearization(drive: Drive, state: Sequence[float], hysteresis_capacity: float, inputs: Sequence[float], input_rates: Sequence[float]) -> tuple[numpy.typing.NDArray[numpy.float64], dict[str, numpy.typing.NDArray[numpy.float64]], list[int]]: ...
 
@@ -140,3 +135,9 @@ class Train:
     def contact_names(self) -> list[str]: ...
 
 def run_train(train: Train, inputs: Sequence[Signal], start: Mapping[str, float], hysteresis_capacities: Mapping[str, float], duration: float, interval: float, samples: int, energy: bool, tolerance: float, max_switchings: int) -> dict[str, Any]: ...
+
+@overload
+def respond(drive: Drive, points: Sequence[tuple[Sequence[Signal], float, Mapping[str, float]]], samples: int, harmonics: int, max_periods: int, tolerance: float, keep_table: bool, threads: int, progress: Callable[[int], None] | None = None) -> dict[str, Any]: ...
+
+@overload
+def respond(train: Train, points: Sequence[tuple[Sequence[Signal], float, Mapping[str, float]]], samples: int, harmonics: int, max_periods: int, tolerance: float, keep_table: bool, threads: int, progress: Callable[[int], None] | None = None) -> dict[str, Any]: ...

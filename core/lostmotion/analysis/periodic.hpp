@@ -2,33 +2,37 @@
 // Poincare map), with its exact Jacobian. Where Newton does not converge, the transient is followed for a while.
 #pragma once
 
+#include <limits>
 #include <vector>
 
-#include "../simulation/run.hpp"
 #include "rank_solve.hpp"
 #include "sensitivity.hpp"
 
 namespace lostmotion {
 
 // All that it takes to continue a motion.
-struct Station {
-    State x{};
-    Memory memory;
-    RegimeKey key;
+template <class System>
+struct StationOf {
+    StateOf<typename System::Dims> x{};
+    typename System::Dims::Memory memory{};
+    typename System::Key key;
 };
 
-struct PeriodicMotion {
+template <class System>
+struct PeriodicMotionOf {
+    using D = typename System::Dims;
+
     Status status = Status::done;
     double time = 0.0;  // [s] reached, if the status is not done
-    Contact contact = input_contact;
+    typename D::Contact contact{};
     bool converged = false;
-    bool smooth = true;          // whether the Jacobian is exact: no grazing among the switchings
-    int periods = 0;             // followed, all in all
-    int newton_steps = 0;        // of the attempt that converged
-    double residual = 0.0;       // largest change of a state over one period / its largest magnitude within it
-    double angle_advance = 0.0;  // of the load angle over one period [rad]; the angle itself is neutral
-    Station start;               // at t = 0
-    Jacobian jacobian;           // of the map over one period, at the start
+    bool smooth = true;       // whether the Jacobian is exact: no grazing among the switchings
+    int periods = 0;          // followed, all in all
+    int newton_steps = 0;     // of the attempt that converged
+    double residual = 0.0;    // largest change of a state over one period / its largest magnitude within it
+    StateOf<D> advance{};     // of each state over one period: zero but for angles
+    StationOf<System> start;  // at t = 0
+    JacobianOf<D> jacobian;   // of the map over one period, at the start
 };
 
 struct ShootingOptions {
@@ -39,32 +43,39 @@ struct ShootingOptions {
     void* interrupted_context = nullptr;
 };
 
-class Shooting {
+template <class System>
+class ShootingOf {
  public:
-    // The inputs must repeat with the period. unit: as of ExactSolver.
-    Shooting(Workspace& workspace, const Signals& signals, double unit, const ShootingOptions& options)
-        : workspace_(workspace),
-          drive_(workspace.drive),
+    using D = typename System::Dims;
+    using Station = StationOf<System>;
+    using Motion = PeriodicMotionOf<System>;
+
+    // The inputs must repeat with the period. Workspace: a system and its regimes. unit: as of ExactSolver.
+    template <class Workspace>
+    ShootingOf(Workspace& workspace, const SignalsOf<D>& signals, double unit, const ShootingOptions& options)
+        : system_(workspace.system),
+          cache_(workspace.cache),
+          laws_(system_),
           options_(options),
-          solver_(workspace.system, signals, unit, workspace.drive.balanced_scale(), &workspace.cache) {
+          solver_(system_, signals, unit, workspace.balanced_scale(), &cache_) {
         solver_.interrupted = options.interrupted;
         solver_.interrupted_context = options.interrupted_context;
     }
 
-    PeriodicMotion solve(const Start& start) {
-        PeriodicMotion motion;
+    Motion solve(const StartOf<D>& start) {
+        Motion motion;
         motion.status = solver_.begin(0.0, start.x, start.memory);
         if (motion.status != Status::done) return motion;
         Station here{solver_.state(), solver_.memory(), solver_.key()};
         for (int follow = first_follow; motion.periods < options_.max_periods; follow *= 2) {
             for (int k = 0; k < follow; ++k, ++motion.periods) {
-                Image image(workspace_);
+                Image image(laws_, cache_);
                 if (!advance(here, image, motion)) return motion;
                 motion.residual = residual(here, image);
                 // A motion that repeats to the last bit needs no more.
                 if (motion.residual == 0.0) return finish(motion, here, image, 0);
                 here = image.end;
-                here.x[load_angle] = 0.0;
+                laws_.rewind(here.x, here.memory);
             }
             if (newton(here, motion)) return motion;
             if (motion.status == Status::interrupted) return motion;
@@ -73,22 +84,23 @@ class Shooting {
         return motion;
     }
 
-    // Samples one period from a station: n_channels x samples.
-    Status sample(const Station& start, std::size_t samples, double* out) {
-        Sampler sampler(drive_, 0.0, options_.period / static_cast<double>(samples), samples, out);
+    // Runs through one period from a station.
+    template <class Observer>
+    Status run(const Station& start, Observer& observer) {
         const Status status = enter(start);
-        return status == Status::done ? solver_.advance(options_.period, sampler) : status;
+        return status == Status::done ? solver_.advance(options_.period, observer) : status;
     }
 
  private:
     static constexpr int first_follow = 2;
     static constexpr int max_newton = 15;
+    static constexpr double neutral = 1e-9;  // of a pivot, in units of the scales
 
     // A station after one period, and how it depends on the one before.
     struct Image {
-        explicit Image(Workspace& workspace) : sensitivity(workspace.drive, workspace.cache) {}
+        Image(const ComponentLaws<System>& laws, RegimeCache<System>& cache) : sensitivity(laws, cache) {}
         Station end;
-        Sensitivity sensitivity;
+        SensitivityOf<System> sensitivity;
     };
 
     Status enter(const Station& s) {
@@ -96,7 +108,7 @@ class Shooting {
         return solver_.inputs_changed();
     }
 
-    bool advance(const Station& from, Image& image, PeriodicMotion& motion) {
+    bool advance(const Station& from, Image& image, Motion& motion) {
         motion.status = enter(from);
         if (motion.status == Status::done) motion.status = solver_.advance(options_.period, image.sensitivity);
         motion.time = solver_.time();
@@ -106,33 +118,34 @@ class Shooting {
         return true;
     }
 
+    static double value(const Station& s, int k) { return k < D::states ? s.x[k] : s.memory[k - D::states]; }
+    double change(const Station& a, const Station& b, int k) const { return laws_.change(k, value(a, k), value(b, k)); }
+
     double residual(const Station& a, const Image& image) const {
-        const Station& b = image.end;
-        double worst = std::fabs(b.memory.hysteresis_capacity - a.memory.hysteresis_capacity) / torque_magnitude();
-        if (b.key.modes[0] == 0 && b.key.modes[1] == 0 && b.key.modes[2] == 0)
-            worst = std::fmax(worst, std::fabs(b.memory.locked_torque - a.memory.locked_torque) / torque_magnitude());
-        for (int k = 0; k < n_states; ++k)
-            if (k != load_angle && image.sensitivity.magnitude[k] > 0.0)
-                worst = std::fmax(worst, std::fabs(b.x[k] - a.x[k]) / image.sensitivity.magnitude[k]);
+        double worst = 0.0;
+        for (int k = 0; k < component_count<D>; ++k) {
+            if (laws_.neutral(k) || !laws_.matters(image.end.key, k)) continue;
+            const double scale = k < D::states ? image.sensitivity.magnitude[k] : laws_.magnitude(k);
+            if (scale > 0.0) worst = std::fmax(worst, std::fabs(change(a, image.end, k)) / scale);
+        }
         return worst;
     }
-    double torque_magnitude() const { return drive_.gearbox.rated_output_torque; }
 
-    PeriodicMotion& finish(PeriodicMotion& motion, const Station& start, const Image& image, int steps) const {
+    Motion& finish(Motion& motion, const Station& start, const Image& image, int steps) const {
         motion.converged = true;
         motion.smooth = image.sensitivity.smooth;
         motion.newton_steps = steps;
         motion.start = start;
         motion.jacobian = image.sensitivity.jacobian;
-        motion.angle_advance = image.end.x[load_angle] - start.x[load_angle];
+        for (int k = 0; k < D::states; ++k) motion.advance[k] = image.end.x[k] - start.x[k];
         return motion;
     }
 
     // Newton's method from a station, as long as each step gains; true if it ends within the tolerance.
-    bool newton(Station y, PeriodicMotion& motion) {
+    bool newton(Station y, Motion& motion) {
         double best = std::numeric_limits<double>::infinity();
         for (int step = 0; step <= max_newton; ++step) {
-            Image image(workspace_);
+            Image image(laws_, cache_);
             if (!advance(y, image, motion)) return false;
             const double now = residual(y, image), before = best;
             if (now < best) {
@@ -148,51 +161,51 @@ class Shooting {
 
     // y + (1 - J)^-1 (image - y), leaving out the directions in which the motion is neutral.
     bool step_from(Station& y, const Image& image) {
-        constexpr std::array<int, n_components - 1> active{motor_torque, motor_speed,          load_speed,
-                                                           twist,        hysteresis_component, locked_component};
-        constexpr int n = active.size();
-        std::array<std::array<double, n>, n> M{};
-        std::array<double, n> rhs{}, scale{};
-        const auto value = [](const Station& s, int k) {
-            return k < n_states                ? s.x[k]
-                   : k == hysteresis_component ? s.memory.hysteresis_capacity
-                                               : s.memory.locked_torque;
-        };
-        for (int r = 0; r < n; ++r) {
-            scale[r] = active[r] < n_states ? image.sensitivity.magnitude[active[r]] : torque_magnitude();
+        std::vector<int> active;
+        for (int k = 0; k < component_count<D>; ++k)
+            if (!laws_.neutral(k)) active.push_back(k);
+        const std::size_t n = active.size();
+        std::vector<std::vector<double>> M(n, std::vector<double>(n));
+        std::vector<double> rhs(n), scale(n);
+        for (std::size_t r = 0; r < n; ++r) {
+            scale[r] = active[r] < D::states ? image.sensitivity.magnitude[active[r]] : laws_.magnitude(active[r]);
             if (!(scale[r] > 0.0)) scale[r] = 1.0;
         }
-        for (int r = 0; r < n; ++r) {
-            rhs[r] = (value(image.end, active[r]) - value(y, active[r])) / scale[r];
-            for (int c = 0; c < n; ++c)
+        for (std::size_t r = 0; r < n; ++r) {
+            rhs[r] = change(y, image.end, active[r]) / scale[r];
+            for (std::size_t c = 0; c < n; ++c)
                 M[r][c] =
                     (r == c ? 1.0 : 0.0) - image.sensitivity.jacobian.row[active[r]][active[c]] * scale[c] / scale[r];
         }
-        const std::array<double, n> delta = solve_leaving_neutral<n>(M, rhs, neutral);
-        for (int k = 0; k < n; ++k) {
+        for (const ComponentsOf<D>& kept : laws_.constraints(y.key)) {
+            M.emplace_back();
+            double largest = 0.0;
+            for (std::size_t c = 0; c < n; ++c) {
+                M.back().push_back(kept[active[c]] * scale[c]);
+                largest = std::fmax(largest, std::fabs(M.back()[c]));
+            }
+            for (double& v : M.back()) v /= largest;
+            rhs.push_back(0.0);
+        }
+        const std::vector<double> delta = solve_leaving_neutral(std::move(M), std::move(rhs), n, neutral);
+        for (std::size_t k = 0; k < n; ++k) {
             const double change = delta[k] * scale[k];
             if (!std::isfinite(change)) return false;
-            if (active[k] < n_states)
-                y.x[active[k]] += change;
-            else if (active[k] == hysteresis_component)
-                y.memory.hysteresis_capacity = std::fmax(0.0, y.memory.hysteresis_capacity + change);
-            else
-                y.memory.locked_torque += change;
+            laws_.add(y.x, y.memory, active[k], change);
         }
         // What is at rest at the end of the period is at rest at its beginning, to the last bit.
         y.key = image.end.key;
-        std::array<bool, n_contacts> at_rest = workspace_.cache.regime(y.key).at_rest;
-        workspace_.system.stop(y.x, at_rest);
-        workspace_.system.direct(y.x, y.key);
+        auto at_rest = cache_.regime(y.key).at_rest;
+        system_.stop(y.x, at_rest);
+        laws_.direct(y.x, y.key);
         return true;
     }
 
-    static constexpr double neutral = 1e-9;  // of a pivot, in units of the scales
-
-    Workspace& workspace_;
-    const Drive& drive_;
+    const System& system_;
+    RegimeCache<System>& cache_;
+    const ComponentLaws<System> laws_;
     ShootingOptions options_;
-    ExactSolver<SwitchedDrive> solver_;
+    ExactSolver<System> solver_;
 };
 
 }  // namespace lostmotion

@@ -1,8 +1,18 @@
 // Harmonic response over many points: the periodic motion of each, its Fourier coefficients and mean powers, on several
 // threads. Points do not know of each other, so the result does not depend on the number of threads.
+//
+// Plant: what is asked.
+//   System, Workspace         a system with the regimes that runs of it have visited
+//   channels(), powers()      how many channels a record has, and which of them give powers
+//   sampler(workspace, interval, count, out)    an observer of the solver that records
+//   take(), give_back()       a workspace for a thread
+//   spoiled(workspace)        nothing more can be done with it
+//   components()              of its motions, by name
 #pragma once
 
 #include <functional>
+#include <memory>
+#include <string>
 
 #include "harmonics.hpp"
 #include "periodic.hpp"
@@ -10,10 +20,19 @@
 
 namespace lostmotion {
 
-struct ResponsePoint {
-    Signals signals;      // constant, or of this period
-    double period = 1.0;  // [s] of the motion that is looked for
-    Start start;
+// A component of a motion, and its place in the kernel's dimensions.
+struct NamedComponent {
+    std::string name;
+    int place;
+    bool neutral;  // nothing depends on it
+};
+
+template <class System>
+struct ResponsePointOf {
+    using D = typename System::Dims;
+    SignalsOf<D> signals;  // constant, or of this period
+    double period = 1.0;   // [s] of the motion that is looked for
+    StartOf<D> start;
 };
 
 struct ResponseSpec {
@@ -24,68 +43,98 @@ struct ResponseSpec {
     bool keep_table = false;  // of the samples, with each result
 };
 
-struct ResponseResult {
-    PeriodicMotion motion;
-    std::vector<double> harmonic;  // n_channels x (harmonics + 1) x (cos, sin), of exp(-i n w t) from t = 0
-    std::array<double, n_channels> mean_square{};
-    double motor_power = 0.0;   // [W] mean of M_D w_M
-    double load_power = 0.0;    // [W] mean of T_2 w
-    double gear_loss = 0.0;     // [W] mean of T_1 w_M - T_2 w
-    std::vector<double> table;  // n_channels x samples, if it is kept
+// Channels whose products are powers.
+struct PowerChannels {
+    struct Pair {
+        int torque, speed;
+    };
+    struct Gear {
+        Pair in, out;
+        bool last;  // its output shaft turns no other gear
+    };
+    std::vector<Pair> motors;
+    std::vector<Gear> gears;
 };
 
-inline void add_mean_powers(const std::vector<double>& table, std::size_t samples, ResponseResult& result) {
-    const auto channel = [&](Channel c) { return table.data() + static_cast<std::size_t>(c) * samples; };
+template <class System>
+struct ResponseResultOf {
+    PeriodicMotionOf<System> motion;
+    bool spoiled = false;          // its workspace, where it was looked for
+    std::vector<double> harmonic;  // channels x (harmonics + 1) x (cos, sin), of exp(-i n w t) from t = 0
+    std::vector<double> mean_square;
+    double motor_power = 0.0;   // [W] mean of M_D w_M, of all motors
+    double load_power = 0.0;    // [W] mean of T_2 w, of the last gears
+    double gear_loss = 0.0;     // [W] mean of T_1 w_M - T_2 w, of all gears
+    std::vector<double> table;  // channels x samples, if it is kept
+};
+
+template <class Result>
+void add_mean_powers(const std::vector<double>& table, std::size_t samples, const PowerChannels& powers,
+                     Result& result) {
     for (std::size_t k = 0; k < samples; ++k) {
-        const double in = channel(ch_input_torque)[k] * channel(ch_motor_speed)[k];
-        const double out = channel(ch_output_torque)[k] * channel(ch_load_speed)[k];
-        result.motor_power += channel(ch_motor_torque)[k] * channel(ch_motor_speed)[k];
-        result.load_power += out;
-        result.gear_loss += in - out;
+        const auto power = [&](const PowerChannels::Pair& p) {
+            return table[static_cast<std::size_t>(p.torque) * samples + k] *
+                   table[static_cast<std::size_t>(p.speed) * samples + k];
+        };
+        for (const PowerChannels::Pair& m : powers.motors) result.motor_power += power(m);
+        for (const PowerChannels::Gear& g : powers.gears) {
+            const double in = power(g.in), out = power(g.out);
+            if (g.last) result.load_power += out;
+            result.gear_loss += in - out;
+        }
     }
     for (double* p : {&result.motor_power, &result.load_power, &result.gear_loss}) *p /= static_cast<double>(samples);
 }
 
-inline ResponseResult respond(Workspace& workspace, const ResponsePoint& point, const ResponseSpec& spec,
-                              const UnitCircle& circle, std::vector<double>& table, bool (*interrupted)(void*),
-                              void* context) {
-    ResponseResult result;
+template <class Plant, class System = typename Plant::System>
+ResponseResultOf<System> respond(const Plant& plant, typename Plant::Workspace& workspace,
+                                 const ResponsePointOf<System>& point, const ResponseSpec& spec,
+                                 const UnitCircle& circle, std::vector<double>& table, bool (*interrupted)(void*),
+                                 void* context) {
+    ResponseResultOf<System> result;
     ShootingOptions options;
     options.period = point.period;
     options.max_periods = spec.max_periods;
     options.tolerance = spec.tolerance;
     options.interrupted = interrupted;
     options.interrupted_context = context;
-    Shooting shooting(workspace, point.signals, point.period / static_cast<double>(spec.samples), options);
+    const double interval = point.period / static_cast<double>(spec.samples);
+    ShootingOf<System> shooting(workspace, point.signals, interval, options);
     result.motion = shooting.solve(point.start);
     if (result.motion.status != Status::done || !result.motion.converged) return result;
-    table.resize(n_channels * spec.samples);
-    result.motion.status = shooting.sample(result.motion.start, spec.samples, table.data());
+    table.resize(plant.channels() * spec.samples);
+    auto sampler = plant.sampler(workspace, interval, spec.samples, table.data());
+    result.motion.status = shooting.run(result.motion.start, sampler);
     if (result.motion.status != Status::done) return result;
     const std::size_t width = 2 * (static_cast<std::size_t>(spec.harmonics) + 1);
-    result.harmonic.resize(n_channels * width);
-    for (std::size_t c = 0; c < n_channels; ++c)
+    result.harmonic.resize(plant.channels() * width);
+    result.mean_square.resize(plant.channels());
+    for (std::size_t c = 0; c < plant.channels(); ++c)
         result.mean_square[c] =
             harmonics_of(&table[c * spec.samples], circle, spec.harmonics, &result.harmonic[c * width]);
-    add_mean_powers(table, spec.samples, result);
+    add_mean_powers(table, spec.samples, plant.powers(), result);
     if (spec.keep_table) result.table = table;
     return result;
 }
 
 // What the caller's `waiting` has stopped stays `interrupted`.
-inline std::vector<ResponseResult> respond_all(WorkspacePool& pool, const std::vector<ResponsePoint>& points,
-                                               const ResponseSpec& spec, unsigned threads,
-                                               const std::function<bool(std::size_t)>& waiting) {
-    std::vector<ResponseResult> results(points.size());
-    for (ResponseResult& r : results) r.motion.status = Status::interrupted;
+template <class Plant, class System = typename Plant::System>
+std::vector<ResponseResultOf<System>> respond_all(Plant& plant, const std::vector<ResponsePointOf<System>>& points,
+                                                  const ResponseSpec& spec, unsigned threads,
+                                                  const std::function<bool(std::size_t)>& waiting) {
+    std::vector<ResponseResultOf<System>> results(points.size());
+    for (auto& r : results) r.motion.status = Status::interrupted;
     const UnitCircle circle(spec.samples);
     distribute(points.size(), threads, waiting, [&](auto next, std::atomic<bool>& stop) {
         const auto stopped = [](void* flag) { return static_cast<std::atomic<bool>*>(flag)->load(); };
-        std::unique_ptr<Workspace> workspace = pool.take();
+        auto workspace = plant.take();
         std::vector<double> table;
-        for (std::size_t k = next(); k < points.size() && !stop; k = next())
-            results[k] = respond(*workspace, points[k], spec, circle, table, stopped, &stop);
-        pool.give_back(std::move(workspace));
+        for (std::size_t k = next(); k < points.size() && !stop; k = next()) {
+            results[k] = respond(plant, *workspace, points[k], spec, circle, table, stopped, &stop);
+            results[k].spoiled = plant.spoiled(*workspace);
+            if (results[k].spoiled) workspace = plant.take();
+        }
+        plant.give_back(std::move(workspace));
     });
     return results;
 }

@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
+#include <vector>
 
-#include "../kernel/form.hpp"
+#include "../kernel/inputs.hpp"
+#include "../solver/components.hpp"
 #include "assembly.hpp"
 
 namespace lostmotion::model {
@@ -97,6 +100,24 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
     out.driven_contact = r.driven_contact;
     out.in_data = r.in_data;
     return out;
+}
+
+// One signal for each input.
+template <class D>
+SignalsOf<D> packed_signals(const std::vector<Signal>& inputs) {
+    SignalsOf<D> signals;
+    std::copy(inputs.begin(), inputs.end(), signals.begin());
+    return signals;
+}
+// x: the states by the layout of the assembly, or nothing for rest.
+template <class D>
+StartOf<D> packed_start(const Layout& n, std::span<const double> x, std::span<const double> memory) {
+    StartOf<D> start;
+    const auto coupled = static_cast<std::size_t>(n.coupled);
+    for (std::size_t k = 0; k < x.size(); ++k)
+        start.x[k < coupled ? k : static_cast<std::size_t>(D::coupled) + k - coupled] = x[k];
+    std::copy(memory.begin(), memory.end(), start.memory.begin());
+    return start;
 }
 
 }  // namespace lostmotion::model

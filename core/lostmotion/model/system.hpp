@@ -53,8 +53,8 @@ class TrainSystem {
         const Found found = search_.next(cache, now, fired, key, input);
         return overflowed_ ? Found::outside : found;
     }
-    template <class AtRest>
-    void stop(State& x, AtRest& at_rest) const {
+    template <class X, class AtRest>
+    void stop(X& x, AtRest& at_rest) const {
         search_.stop(x, at_rest);
     }
     int n_twists() const { return n_twists_; }

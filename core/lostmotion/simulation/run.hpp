@@ -4,16 +4,14 @@
 #include <vector>
 
 #include "../solver/adaptive_solver.hpp"
+#include "../solver/components.hpp"
 #include "energy.hpp"
 #include "sampler.hpp"
 #include "workspace.hpp"
 
 namespace lostmotion {
 
-struct Start {
-    State x{};
-    Memory memory;
-};
+using Start = StartOf<DriveDims>;
 
 struct RunOptions {
     double duration = 1.0;          // [s]

@@ -8,9 +8,11 @@
 
 #include "../model/check.hpp"
 #include "../model/power.hpp"
+#include "../solver/adaptive_solver.hpp"
 #include "power_integral.hpp"
 #include "sampler.hpp"
 #include "train_reader.hpp"
+#include "train_status.hpp"
 
 namespace lostmotion {
 
@@ -187,16 +189,8 @@ TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std:
     report.message = model::check_start(a.train(), speeds);
     if (!report.message.empty()) return report;
     const System system(a);
-    SignalsOf<D> signals;
-    std::copy_n(inputs.begin(), std::min<std::size_t>(inputs.size(), static_cast<std::size_t>(n.inputs)),
-                signals.begin());
-    StateOf<D> x{};
-    for (std::size_t k = 0; k < start.size(); ++k) {
-        const auto coupled = static_cast<std::size_t>(n.coupled);
-        x[k < coupled ? k : static_cast<std::size_t>(D::coupled) + k - coupled] = start[k];
-    }
-    typename D::Memory m{};
-    std::copy(memory.begin(), memory.end(), m.begin());
+    const SignalsOf<D> signals = model::packed_signals<D>(inputs);
+    const auto [x, m] = model::packed_start<D>(n, start, memory);
     TrainRecorder<D> recorder(model, options, out, report);
     const auto finish = [&](auto& solver) {
         report.time = solver.time();
@@ -261,24 +255,29 @@ class TrainRun {
     const model::Assembly& assembly() const { return *assembly_; }
     const std::vector<TrainChannel>& channels() const { return channels_; }
 
+    // What `use` gives in the narrowest kernel that holds the train.
+    template <class Use>
+    auto in_kernel(const Use& use) const {
+        const model::Train& train = assembly_->train();
+        const model::Layout& n = assembly_->layout();
+        const auto in = [&]<class D>(D) {
+            const typename TrainReader<D>::Model model{*assembly_, channels_};
+            return use.template operator()<D>(model);
+        };
+        if (model::fits<model::Narrow>(train, n)) return in(model::Narrow{});
+        if (model::fits<model::Middle>(train, n)) return in(model::Middle{});
+        return in(model::Wide{});
+    }
+
     // inputs: one signal each, as model::input_names. out: channels x samples, channel by channel.
     TrainReport run(const std::vector<Signal>& inputs, std::span<const double> start, std::span<const double> memory,
                     const TrainOptions& options, double* out) const {
-        const model::Train& train = assembly_->train();
-        const model::Layout& n = assembly_->layout();
-        if (model::fits<model::Narrow>(train, n)) return in<model::Narrow>(inputs, start, memory, options, out);
-        if (model::fits<model::Middle>(train, n)) return in<model::Middle>(inputs, start, memory, options, out);
-        return in<model::Wide>(inputs, start, memory, options, out);
+        return in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
+            return run_train_in<D>(model, inputs, start, memory, options, out);
+        });
     }
 
  private:
-    template <class D>
-    TrainReport in(const std::vector<Signal>& inputs, std::span<const double> start, std::span<const double> memory,
-                   const TrainOptions& options, double* out) const {
-        const typename TrainReader<D>::Model model{*assembly_, channels_};
-        return run_train_in<D>(model, inputs, start, memory, options, out);
-    }
-
     std::string error_;
     std::unique_ptr<model::Assembly> assembly_;
     std::vector<TrainChannel> channels_;

@@ -21,6 +21,8 @@ struct Workspace {
         cache.forget();
     }
 
+    State balanced_scale() const { return drive.balanced_scale(); }
+
     Drive drive;
     SwitchedDrive system{drive};
     RegimeCache<SwitchedDrive> cache{system};

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,9 @@ from .terminal import busy, progress
 
 if TYPE_CHECKING:
     import xarray
+
+    from ..simulation.scenario import Scenario
+    from ..simulation.train_scenario import TrainScenario
 
 
 def response(
@@ -31,18 +35,29 @@ def response(
         str, typer.Option("--frequencies", metavar="LIST", help="[Hz], written as the amplitudes.")
     ] = "0.1..100:60",
     source: Annotated[
-        str, typer.Option("--input", metavar="NAME", help="command or load_torque: what is a sine.")
-    ] = "command",
+        str | None,
+        typer.Option(
+            "--input",
+            metavar="NAME",
+            help="What is a sine: command or load_torque; of a train <motor>_command, <shaft>_load_torque ... Left out, the command of "
+            "the only motor.",
+        ),
+    ] = None,
     variable: Annotated[
-        str, typer.Option("--variable", metavar="NAME", help="Which variable's response to draw.")
-    ] = "load_speed",
+        str | None,
+        typer.Option(
+            "--variable",
+            metavar="NAME",
+            help="Which variable's response to draw; left out, load_speed, of a train the speed of its last shaft.",
+        ),
+    ] = None,
     refine: Annotated[
         float | None,
         typer.Option("--refine", metavar="DB", parser=number(), help="Add frequencies where a curve bends by more."),
     ] = None,
     compare: Annotated[
         list[str] | None,
-        typer.Option("--compare", metavar="OTHER", help="Overlay the drive of another scenario."),
+        typer.Option("--compare", metavar="OTHER", help="Overlay the drive or train of another scenario."),
     ] = None,
     overrides: Overrides = None,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
@@ -51,7 +66,7 @@ def response(
 ) -> None:
     """Frequency response over amplitude: each point from a periodic motion, on all cores.
 
-    Of the scenario the drive and the constant parts of command and load torque are taken. Writes Bode figures (bode.png, .svg, .csv), maps of gain, phase, efficiency and distortion over amplitude and
+    Of the scenario the drive or train and the constant parts of its inputs are taken. Writes Bode figures (bode.png, .svg, .csv), maps of gain, phase, efficiency and distortion over amplitude and
     frequency (maps.png, .svg), and all numbers (response.csv, characteristics.csv, and response.nc where NetCDF is
     installed).
 
@@ -59,29 +74,26 @@ def response(
     lostmotion response drive.toml --amplitudes 0.025,1 --frequencies 0.1..100:60
     lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
     """
-    from ..simulation.sources import load_drive
+    from ..simulation.sources import load
+
+    name = Path(scenario).stem
+    loaded = {name: load(scenario, overrides or ())} | {Path(other).stem: load(other) for other in compare or ()}
+    unit, variable = _known(loaded, source, variable)
+    from ..response.harmonic import frequency_response
     from .grids import parse_grid
 
-    _check_names(source, variable)
-    wanted = parse_grid(amplitudes, "amplitudes", "" if source == "command" else "N*m")
+    wanted = parse_grid(amplitudes, "amplitudes", unit)
     grid = parse_grid(frequencies, "frequencies", "Hz")
     try_directory(output)
-    name = Path(scenario).stem
-    loaded = {name: load_drive(scenario, overrides or ())} | {
-        Path(other).stem: load_drive(other) for other in compare or ()
-    }
-    from ..response.harmonic import Source, frequency_response
-
     responses = {}
     with progress(len(loaded) * len(wanted) * len(grid), "Response") as step:
         for title, s in loaded.items():
-            kind: Source = "command" if source == "command" else "load_torque"
-            responses[title] = frequency_response(s, grid, wanted, source=kind, refine=refine, progress=step)
+            responses[title] = frequency_response(s, grid, wanted, source=source, refine=refine, progress=step)
     first = loaded[name]
     with writing(output), busy("Drawing"):
         from ..reports.response import write_response
 
-        figure, found = write_response(output, responses, first.drive(), variable)
+        figure, found = write_response(output, responses, first, variable)
     print(first.title or name)
     _print_characteristics(found)
     _print_reasons(responses[name])
@@ -90,14 +102,24 @@ def response(
         print('response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"')
 
 
-def _check_names(source: str, variable: str) -> None:
+def _known(loaded: Mapping[str, Scenario | TrainScenario], source: str | None, variable: str | None) -> tuple[str, str]:
+    """The unit of the input, and the name of the variable, which all of the scenarios must have."""
     from ..errors import InputError
-    from ..simulation.variables import CHANNEL_NAMES
+    from ..response.plant import plant_of
 
-    if source not in ("command", "load_torque"):
-        raise InputError(f"--input {source}: must be command or load_torque")
-    if variable not in CHANNEL_NAMES:
-        raise InputError(f"--variable {variable}: must be one of {', '.join(CHANNEL_NAMES)}")
+    units: list[str] = []
+    variables: list[str] = []
+    for scenario in loaded.values():
+        plant = plant_of(scenario)
+        try:
+            units.append(plant.unit(plant.known_source(source)))
+        except InputError as error:
+            raise InputError(f"--input{f' {source}' if source else ''}: {error}") from None
+        try:
+            variables.append(plant.known_output(variables[0] if variables else variable))
+        except InputError as error:
+            raise InputError(f"--variable {variable or variables[0]}: {error}") from None
+    return "" if units[0] == "1" else units[0], variables[0]
 
 
 def _print_characteristics(found: xarray.Dataset) -> None:
@@ -106,10 +128,11 @@ def _print_characteristics(found: xarray.Dataset) -> None:
         text = [f"-3 dB at {band:.4g} Hz" if math.isfinite(band) else "-3 dB outside the frequencies, or no motion"]
         text += [f"-180 degrees at {cross:.4g} Hz"] if math.isfinite(cross) else []
         print(f"  amplitude {a:g}: {', '.join(text)}")
-    print(
-        f"  dead zone: from rest the load moves above a constant command of {found.attrs['dead_zone_forward']:.4g} and "
-        f"below {found.attrs['dead_zone_backward']:.4g}"
-    )
+    if "dead_zone_forward" in found.attrs:
+        print(
+            f"  dead zone: from rest the load moves above a constant command of {found.attrs['dead_zone_forward']:.4g} and "
+            f"below {found.attrs['dead_zone_backward']:.4g}"
+        )
 
 
 def _print_reasons(result: xarray.Dataset) -> None:

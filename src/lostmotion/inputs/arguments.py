@@ -26,7 +26,6 @@ WANTED = {
     "Count": "a whole number above 0",
     "float": "a number, or text with a number and its unit",
     "SolverName": 'the name of a solver, "exact" or "dormand-prince"',
-    "Source": '"command" or "load_torque"',
     "Callable": "a function",
     "Executor": "an executor, such as a ProcessPoolExecutor",
     "Mapping": "a mapping of names to values",
@@ -37,6 +36,7 @@ WANTED = {
     "Initial": "a state, such as Initial(motor_speed=100)",
     "Scenario": "a Scenario, such as load(path) returns",
     "Simulation": "a Simulation",
+    "TrainInitial": 'a state of a train, such as TrainInitial(speeds={"motor": 100})',
     "TrainScenario": "a TrainScenario, such as load(path) returns",
     "Study": "a Study, such as load_study(path) returns",
 }
@@ -113,7 +113,7 @@ def _fits(value: Any, option: str, known: Mapping[str, Any]) -> bool:
             return _is_dataset(value)
         case "Count":
             return isinstance(value, Integral) and not isinstance(value, bool) and 0 < int(value) < 2**31
-        case "str" | "SolverName" | "Source":
+        case "str" | "SolverName":
             return isinstance(value, str)
         case "bool":
             return isinstance(value, bool)

@@ -35,13 +35,13 @@ class ResultAccessor:
         return "result.lm: plot(), plot_maps(), summary(), scenario, energy"
 
     @checked
-    def plot(self, output: str = "load_speed") -> Figure:
+    def plot(self, output: str | None = None) -> Figure:
         """The figure that the command line draws: of a run the overview, of a frequency response the Bode figure.
 
         Parameters
         ----------
         output
-            The variable of a frequency response.
+            The variable of a frequency response; left out, the load's speed, of a train that of its last shaft.
 
         Raises
         ------
@@ -51,8 +51,8 @@ class ResultAccessor:
         from . import plots, response_figures, train_figures
 
         if "response" in self._dataset:
-            of_output(self._dataset, output)
-            return response_figures.bode_figure({"": self._dataset}, output)
+            name = str(of_output(self._dataset, output)["output"].item())
+            return response_figures.bode_figure({"": self._dataset}, name)
         if is_train_result(self._dataset):
             return train_figures.train_overview(self._dataset)
         lacking = [name for name in plots.OVERVIEW if name not in self._dataset]
@@ -63,7 +63,7 @@ class ResultAccessor:
         return plots.overview(self._dataset)
 
     @checked
-    def plot_maps(self, output: str = "load_speed") -> Figure:
+    def plot_maps(self, output: str | None = None) -> Figure:
         """Gain, phase, efficiency and distortion of a frequency response over amplitude and frequency.
 
         Raises
@@ -73,8 +73,8 @@ class ResultAccessor:
         """
         from . import response_figures
 
-        of_output(self._dataset, output)
-        return response_figures.maps_figure(self._dataset, output)
+        name = str(of_output(self._dataset, output)["output"].item())
+        return response_figures.maps_figure(self._dataset, name)
 
     def summary(self) -> str:
         """A run in a few lines, as `lostmotion run` prints it."""

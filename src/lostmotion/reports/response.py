@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..atomic_writer import write_bytes
-from ..model.drive import Drive
 from ..response.bandwidth import characteristics
+from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainScenario
 from .pages import panels_csv, save_figure, table_csv, write_text
 from .response_figures import bode, bode_figure, maps_figure
 
@@ -26,7 +27,7 @@ def for_file(response: xarray.Dataset) -> xarray.Dataset:
         parts = {f"{name}_real": response[name].real, f"{name}_imag": response[name].imag}
         out = out.drop_vars(name).assign(parts)
     out = out.assign(stable=response["stable"].astype("int8"), reason=response["reason"].astype(str))
-    return out.assign_coords(output=response["output"].astype(str))
+    return out.assign_coords({name: response[name].astype(str) for name in ("output", "unit")})
 
 
 def points_csv(response: xarray.Dataset, output: str) -> str:
@@ -47,7 +48,7 @@ def points_csv(response: xarray.Dataset, output: str) -> str:
 
 
 def write_response(
-    directory: Path, responses: Mapping[str, xarray.Dataset], drive: Drive, output: str
+    directory: Path, responses: Mapping[str, xarray.Dataset], scenario: Scenario | TrainScenario, output: str
 ) -> tuple[Path, xarray.Dataset]:
     """Figures and tables of the first response, overlaid with the others, in a directory that is made if missing.
 
@@ -65,7 +66,7 @@ def write_response(
     write_text(directory / "response.csv", points_csv(response, output))
     if find_spec("h5netcdf") is not None:
         write_bytes(directory / "response.nc", bytes(for_file(response).to_netcdf(engine="h5netcdf")))
-    found = characteristics(response, drive, output)
+    found = characteristics(response, scenario, output)
     rows = zip(
         found["amplitude"].values.tolist(),
         found["bandwidth"].values.tolist(),

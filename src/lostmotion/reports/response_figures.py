@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from . import plots
-from .panels import LABELS, Curve, Panel
+from .panels import Curve, Panel
 
 if TYPE_CHECKING:
     import xarray
@@ -18,7 +18,12 @@ if TYPE_CHECKING:
 
 LINES: tuple[Any, ...] = ("-", "--", "-.", ":")
 MAP_DEPTH = 60.0  # [dB] of the gain that maps show
-UNITS = {"command": "-", "load_torque": "N·m"}
+
+
+def unit_of_source(response: xarray.Dataset) -> str:
+    """Of the input, for labels."""
+    unit = str(response["amplitude"].attrs["units"])
+    return "-" if unit == "1" else unit.replace("*", "·")
 
 
 def bode(responses: Mapping[str, xarray.Dataset], output: str) -> list[Panel]:
@@ -38,11 +43,11 @@ def bode(responses: Mapping[str, xarray.Dataset], output: str) -> list[Panel]:
             label = f"{name}, {amplitude:.6g}"
             gain.append(Curve(label, f, np.abs(values), style, legend))
             phase.append(Curve(label, f, np.degrees(np.unwrap(np.angle(values))), style, legend))
-    source = first.attrs["source"]
-    unit = LABELS[output].unit.replace("*", "·")
-    title = f"{output.replace('_', ' ')} / {source.replace('_', ' ')} by amplitude [{UNITS[source]}]"
+    source, of_source = first.attrs["source"], unit_of_source(first)
+    unit = str(first["unit"].sel(output=output).item()).replace("*", "·")
+    title = f"{output.replace('_', ' ')} / {source.replace('_', ' ')} by amplitude [{of_source}]"
     return [
-        Panel(title, "frequency [Hz]", f"gain [{unit} / {UNITS[source]}]", tuple(gain), log_x=True, log_y=True),
+        Panel(title, "frequency [Hz]", f"gain [{unit} / {of_source}]", tuple(gain), log_x=True, log_y=True),
         Panel("phase", "frequency [Hz]", "phase [degrees]", tuple(phase), log_x=True),
     ]
 
@@ -85,7 +90,7 @@ def maps_figure(response: xarray.Dataset, output: str) -> Figure:
             "maps need at least two amplitudes and two frequencies; plot() draws the response over frequency"
         )
     source = response.attrs["source"]
-    label = f"amplitude of the {source.replace('_', ' ')} [{UNITS[source]}]"
+    label = f"amplitude of the {source.replace('_', ' ')} [{unit_of_source(response)}]"
     return plots.amplitude_maps(
         response["frequency"].values, response["amplitude"].values, maps(response, output), label
     )

@@ -11,9 +11,10 @@ from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Frequency, Number, Torque
 from ..model.drive import Drive
-from ..simulation.scenario import Initial, Scenario, drive_of, mean_inputs
-from ..simulation.variables import CHANNEL_NAMES
-from .harmonic import known_output, of_output, sine_inputs
+from ..simulation.scenario import Scenario, drive_of
+from ..simulation.train_scenario import TrainScenario
+from .harmonic import of_output
+from .plant import plant_of
 from .shooting import MAX_PERIODS, reason_of, respond
 
 if TYPE_CHECKING:
@@ -23,7 +24,9 @@ THREE_DECIBELS = math.sqrt(2.0)  # the bandwidth ends where the gain has fallen 
 
 
 @checked
-def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: str = "load_speed") -> xarray.Dataset:
+def characteristics(
+    response: xarray.Dataset, drive: Drive | Scenario | TrainScenario, output: str | None = None
+) -> xarray.Dataset:
     """Bandwidth and phase crossover as functions of amplitude, with the dead zone of the drive.
 
     Parameters
@@ -33,30 +36,34 @@ def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: s
     drive
         The drive, or its scenario.
     output
-        The result variable that is looked at.
+        The result variable that is looked at; left out, the load's speed, of a train that of its last shaft.
 
     Returns
     -------
     xarray.Dataset
         Over ``amplitude``: ``bandwidth`` [Hz], where the gain first falls 3 dB below that at the lowest frequency;
         ``phase_crossover`` [Hz], where the phase first falls through -180 degrees; NaN where that lies outside the
-        frequencies. Attributes ``dead_zone_forward``, ``dead_zone_backward``: constant commands beyond which the load
-        moves from rest.
+        frequencies. Of a drive, the attributes ``dead_zone_forward``, ``dead_zone_backward``: constant commands beyond
+        which the load moves from rest.
     """
     import xarray as xr
 
     values, frequencies = of_output(response, output).values, response["frequency"].values
     bandwidth = [three_decibels_down(frequencies, np.abs(curve)) for curve in values]
     crossover = [_falls_through(frequencies, np.degrees(np.unwrap(np.angle(curve))), -180.0) for curve in values]
-    core = drive_of(drive).core()
-    forward, backward = (core.smallest_command(0.0, 0.0, s) for s in (+1, -1))
+    dead_zone = {}
+    if not isinstance(drive, TrainScenario):
+        core = drive_of(drive).core()
+        dead_zone = {
+            f"dead_zone_{way}": core.smallest_command(0.0, 0.0, s) for way, s in (("forward", +1), ("backward", -1))
+        }
     return xr.Dataset(
         {
             "bandwidth": ("amplitude", bandwidth, {"units": "Hz", "long_name": "-3 dB against the lowest frequency"}),
             "phase_crossover": ("amplitude", crossover, {"units": "Hz", "long_name": "phase of -180 degrees"}),
         },
         coords={"amplitude": response["amplitude"]},
-        attrs={"dead_zone_forward": forward, "dead_zone_backward": backward},
+        attrs=dead_zone,
     )
 
 
@@ -78,10 +85,11 @@ def _falls_through(frequencies: np.ndarray, y: np.ndarray, level: float) -> floa
 
 @checked
 def bandwidth(
-    drive: Drive | Scenario,
+    drive: Drive | Scenario | TrainScenario,
     amplitude: Number,
     *,
-    output: str = "load_speed",
+    output: str | None = None,
+    source: str | None = None,
     mean_command: Number | None = None,
     mean_load_torque: Torque | None = None,
     lowest: Frequency = 0.1,
@@ -95,11 +103,15 @@ def bandwidth(
     Parameters
     ----------
     drive
-        A drive, or a scenario, of which the drive and the constant parts of command and load torque are taken.
+        A drive, or a scenario, of which the drive or train and the constant parts of its inputs are taken.
     amplitude
-        Of the command, E_CA [-].
+        Of the command, E_CA [-], or of another input.
+    output
+        The result variable that is looked at; left out, the load's speed, of a train that of its last shaft.
+    source
+        The input, as of `frequency_response`; left out, the command of the only motor.
     mean_command, mean_load_torque
-        Constant parts of E_C [-] and M_Z [N·m]; left out, those of the scenario, or 0.
+        Constant parts of E_C [-] and M_Z [N·m] of a drive; left out, those of the scenario, or 0.
     lowest, highest
         [Hz]. Where the gain has not fallen at the highest, the bandwidth is NaN.
 
@@ -117,13 +129,13 @@ def bandwidth(
         raise InputError(f"no bandwidth: the amplitude {amplitude:g} of the command must be positive")
     if not 0.0 < lowest < highest:
         raise InputError(f"no bandwidth: lowest {lowest:g} Hz must be above 0 and below highest, {highest:g} Hz")
-    channel = CHANNEL_NAMES.index(known_output(output, CHANNEL_NAMES))
-    means = mean_inputs(drive, mean_command, mean_load_torque)
-    drive = drive_of(drive)
+    plant = plant_of(drive).with_means(mean_command, mean_load_torque)
+    output, source = plant.known_output(output), plant.known_source(source)
+    channel = plant.channels.index(output)
 
     def gain(frequency: float) -> float:
-        point = (*sine_inputs("command", amplitude, frequency, *means), 1.0 / frequency, Initial())
-        r = respond(drive, [point], harmonics=1, keep_table=False, max_periods=MAX_PERIODS, threads=1, progress=None)
+        point = (plant.sine(source, amplitude, frequency), 1.0 / frequency, plant.rest)
+        r = respond(plant, [point], harmonics=1, keep_table=False, max_periods=MAX_PERIODS, threads=1, progress=None)
         if reason := reason_of(r, 0):
             raise RuntimeError(f"no bandwidth: at {frequency:.4g} Hz {reason}")
         return math.hypot(*r["harmonics"][0, channel, 1]) / amplitude

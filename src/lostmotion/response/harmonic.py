@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Torque, arguments
-from ..inputs.validation import shown
 from ..model.drive import Drive
-from ..model.signals import CommandSignal, TorqueSignal
-from ..simulation.scenario import Initial, Scenario, drive_of, mean_inputs
-from ..simulation.variables import CHANNEL_NAMES
+from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainScenario
 from .linear import python_control
+from .plant import Plant, known_output, plant_of
 from .shooting import MAX_PERIODS, SAMPLES_PER_PERIOD, floquet_multipliers, is_stable, reason_of, respond
 
 if TYPE_CHECKING:
@@ -24,16 +23,13 @@ if TYPE_CHECKING:
     import xarray
 
 
-Source = Literal["command", "load_torque"]
-
-
 @checked
 def frequency_response(
-    drive: Drive | Scenario,
+    drive: Drive | Scenario | TrainScenario,
     frequencies: Sequence[float] | float,
     amplitudes: Sequence[float] | float,
     *,
-    source: Source = "command",
+    source: str | None = None,
     mean_command: Number | None = None,
     mean_load_torque: Torque | None = None,
     harmonics: Count = 8,
@@ -50,19 +46,20 @@ def frequency_response(
     Parameters
     ----------
     drive
-        A drive, or a scenario, of which the drive and the constant parts of command and load torque are taken.
+        A drive, or a scenario, of which the drive or train and the constant parts of its inputs are taken.
     frequencies
         [Hz].
     amplitudes
         Of the input: E_CA [-], or [N·m] for a load torque.
     source
-        ``"command"`` or ``"load_torque"``; the other one is constant.
+        The input that is a sine, ``"command"`` or ``"load_torque"``, of a train ``"<motor>_command"``,
+        ``"<shaft>_load_torque"`` ...; the others are constant. Left out, the command of the only motor.
     mean_command, mean_load_torque
-        Constant parts of E_C [-] and M_Z [N·m]; left out, those of the scenario, or 0.
+        Constant parts of E_C [-] and M_Z [N·m] of a drive; left out, those of the scenario, or 0.
     harmonics
         How many to keep.
     refine
-        Adds frequencies where a curve bends: until, at each one, gain and phase of the load speed lie within this many
+        Adds frequencies where a curve bends: until, at each one, gain and phase of the load's speed (of a train, that of its last shaft) lie within this many
         decibels (and ten times as many degrees) of the straight line through its neighbours, or the grid is sixteen
         times as fine.
     threads
@@ -75,8 +72,8 @@ def frequency_response(
     xarray.Dataset
         Over ``amplitude`` and ``frequency`` [Hz], with ``output`` and ``harmonic``: complex ``response`` (first harmonic
         of each output / that of the input), ``harmonics`` (complex amplitudes, 0 the mean), ``distortion`` (rms of all
-        above the first / of the first), ``efficiency`` (mean power out of the gear / mean motor power), ``motor_power``,
-        ``load_power``, ``gear_loss`` [W], ``angle_advance`` [rad] of the load a period, ``residual`` of periodicity, ``periods``,
+        above the first / of the first), ``efficiency`` (mean power out of the last gears / mean power of the motors), ``motor_power``,
+        ``load_power``, ``gear_loss`` [W], ``angle_advance`` [rad] of the load, or last shaft, a period, ``residual`` of periodicity, ``periods``,
         ``newton_steps``, ``multiplier`` (largest Floquet multiplier), ``stable``, ``reason`` (empty where a motion was
         found; elsewhere why not, and the values are NaN).
 
@@ -85,9 +82,10 @@ def frequency_response(
     InputError
         An argument cannot be used.
     """
-    frequencies, amplitudes = _checked(frequencies, amplitudes, source)
-    means = mean_inputs(drive, mean_command, mean_load_torque)
-    drive = drive_of(drive)
+    plant = plant_of(drive)
+    source = plant.known_source(source)
+    frequencies, amplitudes = _checked(frequencies, amplitudes, plant.unit(source))
+    plant = plant.with_means(mean_command, mean_load_torque)
 
     def compute(new: Sequence[float]) -> xarray.Dataset:
         seen = 0
@@ -99,9 +97,9 @@ def frequency_response(
                     progress()
             seen = done
 
-        points = [(*sine_inputs(source, a, f, *means), 1.0 / f, Initial()) for a in amplitudes for f in new]
+        points = [(plant.sine(source, a, f), 1.0 / f, plant.rest) for a in amplitudes for f in new]
         r = respond(
-            drive,
+            plant,
             points,
             harmonics=harmonics,
             keep_table=False,
@@ -109,7 +107,7 @@ def frequency_response(
             threads=threads,
             progress=report,
         )
-        return _labelled(r, amplitudes, new, source, harmonics)
+        return _labelled(r, plant, amplitudes, new, source)
 
     result = compute(frequencies)
     for _ in range(4 if refine is not None else 0):
@@ -125,32 +123,21 @@ def frequency_response(
 
 
 def _checked(
-    frequencies: Sequence[float] | float, amplitudes: Sequence[float] | float, source: Source
+    frequencies: Sequence[float] | float, amplitudes: Sequence[float] | float, unit: str
 ) -> tuple[list[float], list[float]]:
     """Frequencies [Hz], rising, and amplitudes."""
     frequencies = sorted(set(arguments("frequencies", frequencies, "Hz")))
-    amplitudes = arguments("amplitudes", amplitudes, "" if source == "command" else "N*m")
+    amplitudes = arguments("amplitudes", amplitudes, "" if unit == "1" else unit)
     if not frequencies or frequencies[0] <= 0.0:
         raise InputError("frequencies must be positive; give at least one")
     if not amplitudes or min(amplitudes) <= 0.0:
         raise InputError("amplitudes must be positive; give at least one")
-    if source not in ("command", "load_torque"):
-        raise InputError(f"source {source!r} is not known; it must be command or load_torque")
     return frequencies, amplitudes
-
-
-def sine_inputs(
-    source: Source, amplitude: float, frequency: float, mean_command: float, mean_load_torque: float
-) -> tuple[CommandSignal, TorqueSignal]:
-    """Command and load torque of one point: constants, and a sine on the source."""
-    command, load_torque = {"mean": mean_command}, {"mean": mean_load_torque}
-    (command if source == "command" else load_torque).update(amplitude=amplitude, frequency=frequency)
-    return CommandSignal.model_validate(command), TorqueSignal.model_validate(load_torque)
 
 
 def _bends(result: xarray.Dataset, tolerance: float) -> list[float]:
     """Frequencies halfway to the neighbours of each one off the straight line between them."""
-    values = result["response"].sel(output="load_speed").values  # amplitude x frequency
+    values = of_output(result).values  # amplitude x frequency
     x = np.log(result["frequency"].values)
     with np.errstate(divide="ignore", invalid="ignore"):
         gain, phase = 20.0 * np.log10(np.abs(values)), np.degrees(np.unwrap(np.angle(values), axis=1))
@@ -186,17 +173,17 @@ OF_A_MOTION = ("motor_power", "load_power", "gear_loss", "angle_advance")
 
 
 def _labelled(
-    r: dict[str, Any], amplitudes: Sequence[float], frequencies: Sequence[float], source: Source, harmonics: int
+    r: dict[str, Any], plant: Plant, amplitudes: Sequence[float], frequencies: Sequence[float], source: str
 ) -> xarray.Dataset:
     import xarray as xr
 
     shape = (len(amplitudes), len(frequencies))
     reasons = np.array([reason_of(r, k) for k in range(shape[0] * shape[1])], dtype=object).reshape(shape)
     found = reasons == ""
-    c, response, distortion = _harmonics(r, found, source, harmonics)
+    c, response, distortion = _harmonics(r, found, plant.channels.index(source))
     points, stable = _of_each_point(r, found)
     grid, each = ("amplitude", "frequency"), ("output", "amplitude", "frequency")
-    unit = "1" if source == "command" else "N*m"
+    units = {v.name: v.unit for v in plant.variables}
     return xr.Dataset(
         {
             "response": (each, np.moveaxis(response, -1, 0), {"long_name": f"first harmonic / that of the {source}"}),
@@ -214,24 +201,28 @@ def _labelled(
             "reason": (grid, reasons, {"long_name": "why there is no periodic motion"}),
         },
         coords={
-            "amplitude": ("amplitude", list(amplitudes), {"units": unit, "long_name": f"amplitude of the {source}"}),
+            "amplitude": (
+                "amplitude",
+                list(amplitudes),
+                {"units": plant.unit(source), "long_name": f"amplitude of the {source}"},
+            ),
             "frequency": ("frequency", list(frequencies), {"units": "Hz", "long_name": "frequency"}),
-            "output": ("output", list(CHANNEL_NAMES)),
-            "harmonic": ("harmonic", np.arange(harmonics + 1)),
+            "output": ("output", list(plant.channels)),
+            "unit": ("output", [units[name] for name in plant.channels], {"long_name": "of the outputs"}),
+            "harmonic": ("harmonic", np.arange(c.shape[-1])),
         },
-        attrs={"source": source, "samples_per_period": SAMPLES_PER_PERIOD},
+        attrs={"source": source, "output": plant.output, "samples_per_period": SAMPLES_PER_PERIOD},
     )
 
 
-def _harmonics(
-    r: dict[str, Any], found: np.ndarray, source: Source, harmonics: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _harmonics(r: dict[str, Any], found: np.ndarray, source: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Complex amplitudes of all outputs, the first of them / that of the source, and the distortion."""
-    c = (r["harmonics"][..., 0] + 1j * r["harmonics"][..., 1]).reshape(*found.shape, len(CHANNEL_NAMES), harmonics + 1)
+    c = r["harmonics"][..., 0] + 1j * r["harmonics"][..., 1]
+    c = c.reshape(*found.shape, *c.shape[1:])
     c = np.where(found[..., None, None], c, np.nan)
     first = c[..., 1]
     above = r["mean_square"].reshape(*found.shape, -1) - np.abs(c[..., 0]) ** 2 - 0.5 * np.abs(first) ** 2
-    drive_in = first[..., CHANNEL_NAMES.index(source)]
+    drive_in = first[..., source]
     with np.errstate(divide="ignore", invalid="ignore"):
         distortion = np.sqrt(np.maximum(above, 0.0)) / (np.abs(first) / math.sqrt(2.0))
         return c, first / drive_in[..., None], distortion
@@ -245,14 +236,14 @@ def _of_each_point(r: dict[str, Any], found: np.ndarray) -> tuple[dict[str, np.n
     with np.errstate(divide="ignore", invalid="ignore"):
         efficiency = points["load_power"] / points["motor_power"]
     points["efficiency"] = np.where(points["motor_power"] > 0.0, efficiency, np.nan)
-    multipliers = [floquet_multipliers(j) for j in r["jacobian"]]
+    multipliers = [floquet_multipliers(r, k) for k in range(found.size)]
     largest_multiplier = np.array([abs(m[0]) for m in multipliers]).reshape(found.shape)
     points["multiplier"] = np.where(found, largest_multiplier, np.nan)
     return points, found & np.array([is_stable(m) for m in multipliers]).reshape(found.shape)
 
 
-def of_output(response: xarray.Dataset, output: str) -> xarray.DataArray:
-    """The response of one output over amplitude and frequency.
+def of_output(response: xarray.Dataset, output: str | None = None) -> xarray.DataArray:
+    """The response of one output over amplitude and frequency; left out, that of the load's speed.
 
     Raises
     ------
@@ -262,25 +253,12 @@ def of_output(response: xarray.Dataset, output: str) -> xarray.DataArray:
     if "response" not in response:
         raise InputError("this dataset is no frequency response; lm.frequency_response makes one")
     known = [str(name) for name in response["output"].values]
+    output = response.attrs["output"] if output is None else output
     return response["response"].sel(output=known_output(output, known))
 
 
-def known_output(output: str, known: Sequence[str]) -> str:
-    """The name of an output, if it is one of those that are known.
-
-    Raises
-    ------
-    InputError
-    """
-    if output not in known:
-        raise InputError(f"output {shown(output)} is not known; it must be one of {', '.join(known)}")
-    return output
-
-
 @checked
-def to_control(
-    response: xarray.Dataset, amplitude: Number, output: str = "load_speed"
-) -> control.FrequencyResponseData:
+def to_control(response: xarray.Dataset, amplitude: Number, output: str | None = None) -> control.FrequencyResponseData:
     """One curve of a response for python-control, as data over frequency.
 
     Raises

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,10 +14,9 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Torque
 from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
-from ..simulation.results import add_derived
-from ..simulation.run import start_state
-from ..simulation.scenario import Initial, Scenario, drive_of
-from ..simulation.variables import CHANNEL_NAMES, STATES, VARIABLES
+from ..simulation.scenario import Initial, Scenario
+from ..simulation.train_scenario import TrainInitial, TrainScenario
+from .plant import Plant, Signal, plant_of
 
 if TYPE_CHECKING:
     import xarray
@@ -27,10 +26,6 @@ MAX_PERIODS = 20_000
 PERIODICITY = 1e-10  # largest change of a state over one period / its magnitude, for a motion to count as periodic
 NEUTRAL = 1e-6  # a Floquet multiplier this near 1 belongs to a direction in which a sticking drive may rest anywhere
 SAME = 1e-5  # solutions that differ by less, relative to their magnitude, are one
-
-# Of the components that the core's Jacobian goes over: all but the load angle, which is neutral.
-COMPONENTS = tuple(_core.components())
-_ACTIVE = [k for k, name in enumerate(COMPONENTS) if name != "load_angle"]
 
 
 def reason_of(result: dict[str, Any], k: int) -> str:
@@ -42,15 +37,16 @@ def reason_of(result: dict[str, Any], k: int) -> str:
     return ""
 
 
-def floquet_multipliers(jacobian: np.ndarray) -> np.ndarray:
-    """Floquet multipliers, largest first."""
-    values = np.linalg.eigvals(jacobian[np.ix_(_ACTIVE, _ACTIVE)])
+def floquet_multipliers(result: Mapping[str, Any], k: int) -> np.ndarray:
+    """Floquet multipliers of a point, largest first; without the angles that nothing depends on, which are neutral."""
+    active = np.flatnonzero(np.logical_not(result["neutral"]))
+    values = np.linalg.eigvals(result["jacobian"][k][np.ix_(active, active)])
     return values[np.argsort(-np.abs(values))]
 
 
 def respond(
-    drive: Drive,
-    points: Sequence[tuple[CommandSignal, TorqueSignal, float, Initial]],
+    plant: Plant,
+    points: Sequence[tuple[Sequence[_core.Signal], float, Mapping[str, float]]],
     *,
     harmonics: int,
     keep_table: bool,
@@ -58,11 +54,10 @@ def respond(
     threads: int | None,
     progress: Callable[[int], None] | None,
 ) -> dict[str, Any]:
-    """Periodic motions, one for each (command, load torque, period [s], start): arrays of the core, a row a point."""
-    core = [(c.core(), t.core(), period, start_state(s), s.hysteresis_capacity) for c, t, period, s in points]
-    return _core.respond(
-        drive.core(),
-        core,
+    """Periodic motions, one for each (inputs, period [s], components at the start): arrays of the core, a row a point."""
+    result = _core.respond(
+        plant.core,
+        points,
         SAMPLES_PER_PERIOD,
         harmonics,
         max_periods,
@@ -71,9 +66,11 @@ def respond(
         threads or os.cpu_count() or 1,
         progress,
     )
+    result["angle_advance"] = result["advance"][:, result["components"].index(plant.angle)]
+    return result
 
 
-def _period(*signals: CommandSignal | TorqueSignal) -> float:
+def _period(signals: Iterable[Signal]) -> float:
     """The common period [s] of signals that are sums of sines and constants.
 
     Raises
@@ -100,88 +97,101 @@ def _period(*signals: CommandSignal | TorqueSignal) -> float:
 
 @checked
 def periodic_motion(
-    drive: Drive | Scenario,
+    drive: Drive | Scenario | TrainScenario,
     command: CommandSignal | Number | None = None,
     load_torque: TorqueSignal | Torque | None = None,
     *,
     multiple: Count = 1,
-    start: Initial | None = None,
+    start: Initial | TrainInitial | None = None,
     max_periods: Count = MAX_PERIODS,
 ) -> xarray.Dataset:
     """A periodic motion under periodic inputs, by shooting.
 
     Newton's method on the map over one period, with its exact Jacobian; it is entered after a few periods from `start`,
-    and where it does not converge, the transient is followed further. The load angle is neutral: it may advance from period to period.
+    and where it does not converge, the transient is followed further. The load angle is neutral: it may advance from
+    period to period. An angle that torques depend on may advance by whole periods of these.
 
     Parameters
     ----------
     drive
-        A drive, or a scenario.
+        A drive, a scenario, or a scenario of a drive train.
     command, load_torque
-        E_C [-] and M_Z [N·m]: constants, or signals of mean and sines with a common period; left out, those of the
-        scenario, or 0.
+        E_C [-] and M_Z [N·m] of a drive: constants, or signals of mean and sines with a common period; left out, those
+        of the scenario, or 0. What acts on a train stands in its scenario.
     multiple
         The motion may repeat after this many periods of the inputs (sub-harmonics).
     start
-        From where; the initial state of the scenario, or rest, if left out. Coexisting motions are reached from different ones.
+        From where, a `TrainInitial` for a train; the initial state of the scenario, or rest, if left out. Coexisting motions
+        are reached from different ones.
 
     Returns
     -------
     xarray.Dataset
         The result variables over one period, and the ``jacobian`` of the map over it. Attributes: ``residual`` (largest change of a state over the period / its
-        largest magnitude), ``angle_advance`` of the load [rad], ``multipliers_real`` and ``multipliers_imag`` (Floquet),
+        largest magnitude), ``angle_advance`` of the load, of a train the last shaft [rad], ``multipliers_real`` and ``multipliers_imag`` (Floquet),
         ``stable``, ``smooth`` (the multipliers are exact: no switching grazes), ``periods`` followed, ``newton_steps``,
-        ``start_<state>``, ``period`` [s], ``gear_ratio``.
+        ``start_<component>``, ``period`` [s], of a drive ``gear_ratio``.
 
     Raises
     ------
     RuntimeError
         None was found; the message says why.
     """
-    if isinstance(drive, Scenario):
-        command = drive.command if command is None else command
-        load_torque = drive.load.torque if load_torque is None else load_torque
-        start = start or drive.initial
-    drive = drive_of(drive)
-    command = command if isinstance(command, CommandSignal) else CommandSignal(mean=command or 0.0)
-    load_torque = load_torque if isinstance(load_torque, TorqueSignal) else TorqueSignal(mean=load_torque or 0.0)
-    period = multiple * _period(command, load_torque)
-    r = respond(
-        drive,
-        [(command, load_torque, period, start or Initial())],
-        harmonics=1,
-        keep_table=True,
-        max_periods=max_periods,
-        threads=1,
-        progress=None,
-    )
+    plant = plant_of(drive)
+    signals = _replaced(plant.signals, {"command": command, "load_torque": load_torque})
+    period = multiple * _period(signals.values())
+    point = ([s.core() for s in signals.values()], period, plant.start if start is None else _start(plant, start))
+    r = respond(plant, [point], harmonics=1, keep_table=True, max_periods=max_periods, threads=1, progress=None)
     if reason := reason_of(r, 0):
         raise RuntimeError(f"no periodic motion was found: {reason}")
-    return _motion(r, drive, period)
+    return _motion(r, plant, period)
 
 
-def _motion(r: dict[str, Any], drive: Drive, period: float) -> xarray.Dataset:
+def _replaced(signals: Mapping[str, Signal], given: Mapping[str, Any]) -> dict[str, Signal]:
+    """The inputs of a plant, with those that are given in place of its own."""
+    out = dict(signals)
+    for name, value in given.items():
+        if value is None:
+            continue
+        if name not in signals:
+            raise InputError(
+                f"{name}: is for drives; what acts on a train stands in its scenario, as {', '.join(signals)}; change it by "
+                "scenario.replace"
+            )
+        out[name] = type(signals[name])(mean=value) if isinstance(value, int | float) else value
+    return out
+
+
+def _start(plant: Plant, start: Initial | TrainInitial) -> Mapping[str, float]:
+    wanted = Initial if isinstance(plant.core, _core.Drive) else TrainInitial
+    if not isinstance(start, wanted):
+        raise InputError(f"start: {type(start).__name__} does not fit; it must be of the kind {wanted.__name__}")
+    return plant.start_of(start)
+
+
+def _motion(r: dict[str, Any], plant: Plant, period: float) -> xarray.Dataset:
     """The dataset of the one motion that `respond` has found."""
     import xarray as xr
 
-    data = dict(zip(CHANNEL_NAMES, r["table"][0], strict=True))
-    add_derived(data, drive.gearbox.ratio)
-    multipliers = floquet_multipliers(r["jacobian"][0])
+    data = dict(zip(plant.channels, r["table"][0], strict=True))
     time = np.arange(SAMPLES_PER_PERIOD) * (period / SAMPLES_PER_PERIOD)
+    plant.derive(data, time)
+    multipliers = floquet_multipliers(r, 0)
     variables: dict[str, Any] = {
-        v.name: ("time", data[v.name], {"units": v.unit, "long_name": v.meaning, "symbol": v.symbol}) for v in VARIABLES
+        v.name: ("time", data[v.name], {"units": v.unit, "long_name": v.meaning, "symbol": v.symbol})
+        for v in plant.variables
     }
     meaning = "derivative of each component after the period by each at its start (SI)"
     return xr.Dataset(
         variables | {"jacobian": (("to", "by"), r["jacobian"][0], {"long_name": meaning})},
         coords={
             "time": ("time", time, {"units": "s", "long_name": "time within the period"}),
-            "to": ("to", list(COMPONENTS)),
-            "by": ("by", list(COMPONENTS)),
+            "to": ("to", r["components"]),
+            "by": ("by", r["components"]),
         },
         attrs={
             "period": period,
-            "gear_ratio": drive.gearbox.ratio,
+            **plant.attributes,
             "residual": float(r["residual"][0]),
             "angle_advance": float(r["angle_advance"][0]),
             "multipliers_real": multipliers.real.tolist(),
@@ -190,8 +200,11 @@ def _motion(r: dict[str, Any], drive: Drive, period: float) -> xarray.Dataset:
             "smooth": int(r["smooth"][0]),
             "periods": int(r["periods"][0]),
             "newton_steps": int(r["newton_steps"][0]),
-            "start_hysteresis_capacity": float(r["hysteresis_capacity"][0]),
-            **{f"start_{name}": float(v) for name, v in zip(STATES, r["start"][0], strict=True)},
+            **{
+                f"start_{name}": float(v)
+                for name, v in zip(r["components"], r["start"][0], strict=True)
+                if not name.endswith("locked_torque")
+            },
         },
     )
 
@@ -203,17 +216,19 @@ def is_stable(multipliers: np.ndarray) -> bool:
 
 @checked
 def periodic_motions(
-    drive: Drive | Scenario,
+    drive: Drive | Scenario | TrainScenario,
     command: CommandSignal | Number | None = None,
     load_torque: TorqueSignal | Torque | None = None,
     *,
-    starts: Iterable[Initial],
+    starts: Iterable[Any],
     multiples: Iterable[Count] = (1,),
 ) -> list[xarray.Dataset]:
     """The different periodic motions that several starts lead to, each once.
 
-    Motions that differ by a whole period of the inputs only, or by the load angle, count as one.
+    Motions that differ by a whole period of the inputs only, or by the load angle, count as one. The starts are as of
+    `periodic_motion`.
     """
+    floors = plant_of(drive).floors
     found: list[xarray.Dataset] = []
     starts = list(starts)
     for multiple in multiples:
@@ -222,23 +237,21 @@ def periodic_motions(
                 motion = periodic_motion(drive, command, load_torque, multiple=multiple, start=start)
             except RuntimeError:
                 continue
-            if not any(_same(drive_of(drive), motion, other) for other in found):
+            if not any(_same(floors, motion, other) for other in found):
                 found.append(motion)
     return found
 
 
-def _same(drive: Drive, a: xarray.Dataset, b: xarray.Dataset) -> bool:
-    """Whether two motions are one; that of the longer period is compared at each shift by the shorter one."""
+def _same(floors: Mapping[str, float], a: xarray.Dataset, b: xarray.Dataset) -> bool:
+    """Whether two motions are one; that of the longer period is compared at each shift by the shorter one.
+
+    Parameters
+    ----------
+    floors
+        Rated magnitudes: what is smaller than `SAME` of them is no difference between motions.
+    """
     if a.attrs["period"] < b.attrs["period"]:
         a, b = b, a
-    g = drive.gearbox
-    # What is smaller than this is no difference between motions.
-    floors = {
-        "motor_speed": SAME * g.rated_input_speed,
-        "load_speed": SAME * g.rated_input_speed / g.ratio,
-        "output_torque": SAME * g.rated_output_torque,
-        "twist": 0.0,
-    }
     times = round(a.attrs["period"] / b.attrs["period"])
     t = a["time"].values
     allowed = SAME if times == 1 else 1e-3  # between samples there is a straight line
@@ -248,7 +261,7 @@ def _same(drive: Drive, a: xarray.Dataset, b: xarray.Dataset) -> bool:
         for name, floor in floors.items():
             x, y = a[name].values, b[name].values
             other = y if times == 1 else np.interp(at, b["time"].values, y, period=b.attrs["period"])
-            gaps.append(np.max(np.abs(x - other)) / max(np.max(np.abs(x)), np.max(np.abs(y)), floor, 1e-300))
+            gaps.append(np.max(np.abs(x - other)) / max(np.max(np.abs(x)), np.max(np.abs(y)), SAME * floor, 1e-300))
         if max(gaps) < allowed:
             return True
     return False

@@ -34,7 +34,7 @@ def run_train(scenario: TrainScenario, options: tuple[Any, ...], how: str, *, le
     result = _core.run_train(core, inputs, start_values(train, scenario.initial), capacities, *options)
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     data = dict(zip((name for name, _, _ in core.channels()), result["values"], strict=True))
-    _add_derived(train, data, time)
+    add_derived_of_train(train, data, time)
     attributes = _attributes(scenario, result, how, ledger=ledger)
     return RawResult(time, data, attributes | {CONTACTS_OF_TRAIN: " ".join(core.contact_names())})
 
@@ -62,7 +62,7 @@ def _attributes(scenario: TrainScenario, result: dict[str, Any], how: str, *, le
     return attributes
 
 
-def _add_derived(train: DriveTrain, data: dict[str, np.ndarray], time: np.ndarray) -> None:
+def add_derived_of_train(train: DriveTrain, data: dict[str, np.ndarray], time: np.ndarray) -> None:
     """Adds what the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
     for name, gear in train.gears.items():
         if isinstance(gear.stiffness, Rigid):

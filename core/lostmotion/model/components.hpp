@@ -1,0 +1,273 @@
+// The components of a train's motion, and how those that a switching sets anew depend on the ones before.
+#pragma once
+
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "../solver/components.hpp"
+#include "system.hpp"
+
+namespace lostmotion::model {
+
+// The shortest angle [rad] that is a whole number of each of these periods; 0 if there is none up to a hundred of the
+// longest.
+inline double common_period(const std::vector<double>& periods) {
+    if (periods.empty()) return 0.0;
+    const double longest = *std::max_element(periods.begin(), periods.end());
+    for (int n = 1; n <= 100; ++n) {
+        const auto is_whole = [&](double p) {
+            const double q = n * longest / p;
+            return std::fabs(q - std::round(q)) <= 1e-9 * q;
+        };
+        if (std::all_of(periods.begin(), periods.end(), is_whole)) return n * longest;
+    }
+    return 0.0;
+}
+
+// An angle that torques or a transmission error depend on.
+struct PeriodicAngle {
+    struct Turn {
+        int memory;
+        double period;
+    };
+    int shaft, state;
+    std::vector<Turn> turns;
+    double period = 0.0;  // common to all of them
+
+    double change(double from, double to) const { return period > 0.0 ? std::remainder(to - from, period) : to - from; }
+    template <class State, class Memory>
+    void rewind(State& x, Memory& memory) const {
+        const double back = period > 0.0 ? period * std::round(x[state] / period) : 0.0;
+        if (back == 0.0) return;
+        x[state] -= back;
+        for (const Turn& t : turns) memory[t.memory] = t.period * std::round((memory[t.memory] - back) / t.period);
+    }
+};
+
+inline std::vector<PeriodicAngle> periodic_angles(const Assembly& a) {
+    std::vector<PeriodicAngle> angles;
+    const Train& train = a.train();
+    for (std::size_t s = 0; s < train.shafts.size(); ++s) {
+        PeriodicAngle angle{static_cast<int>(s), a.places().shafts[s].angle, {}};
+        if (angle.state == nowhere) continue;
+        for (std::size_t k = 0; k < train.angle_torques.size(); ++k)
+            if (train.angle_torques[k].shaft == angle.shaft)
+                angle.turns.push_back({a.places().angle_torques[k].turn, train.angle_torques[k].torque.period()});
+        for (std::size_t g = 0; g < train.gears.size(); ++g)
+            if (train.gears[g].input == angle.shaft && train.gears[g].transmission_error.present())
+                angle.turns.push_back({a.places().gears[g].error_turn, train.gears[g].transmission_error.period()});
+        std::vector<double> periods;
+        for (const PeriodicAngle::Turn& t : angle.turns) periods.push_back(t.period);
+        angle.period = common_period(periods);
+        angles.push_back(std::move(angle));
+    }
+    return angles;
+}
+
+// What gears tie together whatever the motion: forms in the states that keep their values, such as the twist of a gear
+// less the angles of its shafts if torques depend on both, or the sum of the twists around a loop. (Each twist is a
+// difference of two angles; what eliminates all angles is constant.)
+inline std::vector<Row> geometric_constraints(const Assembly& a, const Key& key) {
+    struct Equation {
+        std::array<double, max_shafts> angle{};  // of the shafts
+        Row state;                               // equal to it, but for a constant
+    };
+    std::vector<Equation> equations;
+    const Terms terms(a.layout());
+    for (std::size_t s = 0; s < a.train().shafts.size(); ++s)
+        if (const int k = a.places().shafts[s].angle; k != nowhere) {
+            equations.push_back({{}, terms.state(k)});
+            equations.back().angle[s] = 1.0;
+        }
+    for (std::size_t g = 0; g < a.train().gears.size(); ++g) {
+        const Gear& gear = a.train().gears[g];
+        Equation e;
+        e.angle[static_cast<std::size_t>(gear.input)] = a.per_input(static_cast<int>(g), key);
+        e.angle[static_cast<std::size_t>(gear.output)] = -1.0;
+        if (!gear.rigid()) e.state = terms.state(a.places().gears[g].twist);
+        equations.push_back(e);
+    }
+    for (std::size_t s = 0; s < a.train().shafts.size(); ++s) {
+        const auto of_shaft = [s](const Equation& x, const Equation& y) {
+            return std::fabs(x.angle[s]) < std::fabs(y.angle[s]);
+        };
+        const auto found = std::max_element(equations.begin(), equations.end(), of_shaft);
+        if (found == equations.end() || std::fabs(found->angle[s]) < loop_rounding) continue;
+        const Equation pivot = *found;
+        equations.erase(found);
+        for (Equation& e : equations) {
+            const double factor = e.angle[s] / pivot.angle[s];
+            if (factor == 0.0) continue;
+            for (std::size_t k = 0; k < e.angle.size(); ++k) e.angle[k] -= factor * pivot.angle[k];
+            e.angle[s] = 0.0;
+            e.state -= factor * pivot.state;
+        }
+    }
+    std::vector<Row> kept;
+    for (const Equation& e : equations)
+        if (std::any_of(e.state.c.begin(), e.state.c.end(), [](double v) { return v != 0.0; })) kept.push_back(e.state);
+    return kept;
+}
+
+}  // namespace lostmotion::model
+
+namespace lostmotion {
+
+template <class D>
+class ComponentLaws<model::TrainSystem<D>> {
+ public:
+    using System = model::TrainSystem<D>;
+    using State = StateOf<D>;
+    using Memory = typename D::Memory;
+    using Components = ComponentsOf<D>;
+
+    explicit ComponentLaws(const System& system)
+        : assembly_(system.assembly()), angles_(model::periodic_angles(assembly_)) {
+        neutral_.fill(true);
+        const model::Layout& n = assembly_.layout();
+        std::fill_n(neutral_.begin(), n.coupled, false);
+        for (std::size_t g = 0; g < gears().size(); ++g)
+            if (const int h = gears()[g].hysteresis; h != model::nowhere)
+                set_torque(h, assembly_.train().gears[g].law.rated_output_torque);
+        for (const model::ContactPlace& c : contacts())
+            if (c.locked != model::nowhere) set_torque(c.locked, model::rated_torque(assembly_.train(), c.b));
+    }
+
+    // The turns of angles follow from these.
+    bool neutral(int k) const { return neutral_[k]; }
+    bool matters(const model::Key& key, int k) const {
+        for (std::size_t c = 0; c < contacts().size(); ++c)
+            if (contacts()[c].locked != model::nowhere && D::states + contacts()[c].locked == k)
+                return ties(key.modes).redundant[c];
+        return true;
+    }
+    double magnitude(int k) const { return magnitude_[k - D::states]; }
+    double change(int k, double from, double to) const {
+        for (const model::PeriodicAngle& a : angles_)
+            if (a.state == k) return a.change(from, to);
+        return to - from;
+    }
+    void add(State& x, Memory& memory, int k, double change) const {
+        if (k < D::states) {
+            x[k] += change;
+            return;
+        }
+        double& torque = memory[k - D::states];
+        torque += change;
+        for (const model::GearPlace& g : gears())
+            if (D::states + g.hysteresis == k && g.hysteresis != model::nowhere) torque = std::fmax(0.0, torque);
+    }
+    void rewind(State& x, Memory& memory) const {
+        for (int j = D::coupled; j < D::states; ++j) x[j] = 0.0;
+        for (const model::PeriodicAngle& a : angles_) a.rewind(x, memory);
+    }
+    void direct(const State& x, model::Key& key) const {
+        for (std::size_t c = 0; c < contacts().size(); ++c) {
+            if (key.modes[c] == 0 || contacts()[c].one_way) continue;
+            const model::Row form = assembly_.contact_speed(static_cast<int>(c));
+            double speed = 0.0;
+            for (int k = 0; k < assembly_.layout().coupled; ++k) speed += form.c[k] * x[k];
+            if (speed != 0.0) key.modes[c] = speed > 0.0 ? +1 : -1;
+        }
+    }
+    std::vector<Components> constraints(const model::Key& key) const {
+        std::vector<Components> out;
+        for (const model::Row& r : model::geometric_constraints(assembly_, key))
+            out.push_back(gradient<D>(model::pack<D>(r, assembly_.layout())));
+        return out;
+    }
+
+    // Speeds that stop or follow another, hysteresis at turning points, locked torques. A period that an angle begins
+    // anew moves its turn by a constant.
+    ResetRatesOf<D> reset(const ResetOf<System>& r, JacobianOf<D>& jump) const {
+        std::array<std::int8_t, model::max_contacts> modes{};
+        for (std::size_t c = 0; c < contacts().size(); ++c) modes[c] = r.before.at_rest[c] ? 0 : 1;
+        if (r.switching.guard >= 0 && r.switching.kind == model::Guard::speed) modes[r.switching.contact] = 0;
+        const model::Ties t = ties(modes);
+        const auto& shafts = assembly_.places().shafts;
+        for (std::size_t s = 0; s < shafts.size(); ++s) {
+            const auto leader = static_cast<std::size_t>(t.leader[s]);
+            if (!t.at_rest[s] && leader == s) continue;
+            jump.row[shafts[s].speed] = {};
+            if (!t.at_rest[s]) jump.row[shafts[s].speed][shafts[leader].speed] = t.factor[s];
+        }
+        for (std::size_t g = 0; g < gears().size(); ++g) {
+            const model::GearPlace& p = gears()[g];
+            if (p.hysteresis == model::nowhere || r.before.at_rest[p.contact]) continue;
+            if (!model::kept_at_rest(contacts()[p.contact], t)) continue;
+            jump.row[D::states + p.hysteresis] = {};
+            jump.row[D::states + p.hysteresis][p.twist] =
+                assembly_.train().gears[g].law.hysteresis_capacity_slope(r.x[p.twist]);
+        }
+        ResetRatesOf<D> rates;
+        const model::Ties after = ties(r.switching.after.modes);
+        for (std::size_t c = contacts().size(); c-- > 0;)  // as they are held: from the load to the motors
+            if (contacts()[c].locked != model::nowhere) lock(c, after.redundant[c], r, jump, rates);
+        return rates;
+    }
+
+ private:
+    const std::vector<model::ContactPlace>& contacts() const { return assembly_.places().contacts; }
+    const std::vector<model::GearPlace>& gears() const { return assembly_.places().gears; }
+    template <class Modes>
+    model::Ties ties(const Modes& modes) const {
+        return model::tie(contacts(), static_cast<int>(assembly_.train().shafts.size()), modes.data());
+    }
+    void set_torque(int memory, double magnitude) {
+        neutral_[D::states + memory] = false;
+        magnitude_[memory] = magnitude;
+    }
+
+    // A torque that the motion does not determine stays as it was, or comes to stand at the limit of a contact.
+    void lock(std::size_t c, bool used, const ResetOf<System>& r, JacobianOf<D>& jump, ResetRatesOf<D>& rates) const {
+        const model::ContactPlace& contact = contacts()[c];
+        const int k = D::states + contact.locked;
+        Components& row = jump.row[k];
+        row = {};
+        if (!used) return;
+        const auto& was = contact.kind == model::ContactPlace::gear ? r.before.output_torque[contact.element]
+                                                                    : r.before.contact_torque[c];
+        const double locked = r.switching.memory[contact.locked];
+        const double size = magnitude_of(was, r.x, r.memory, r.input[0]);
+        if (std::fabs(evaluate<D>(was, r.x, r.memory, r.input[0]) - locked) <= rounding * size) {
+            row = gradient<D>(was);
+            rates.by_time[k] = input_part<D>(was, r.input[1]);
+            return;
+        }
+        const auto* limit = limit_of(c, r);
+        rates.exact = rates.exact && limit != nullptr;
+        if (limit == nullptr) return;
+        const Components g = gradient<D>(*limit);
+        rates.by_time[k] = -input_part<D>(*limit, r.input[1]) / g[k];
+        for (int j = 0; j < component_count<D>; ++j) {
+            if (j == k || g[j] == 0.0) continue;
+            for (int i = 0; i < component_count<D>; ++i) row[i] -= g[j] / g[k] * jump.row[j][i];
+            rates.by_time[k] -= g[j] / g[k] * rates.by_time[j];
+        }
+    }
+    // The margin of a contact that the locked torque has used up.
+    const LinearFormOf<D>* limit_of(std::size_t c, const ResetOf<System>& r) const {
+        for (int g = 0; g < r.after.n_guards; ++g) {
+            const auto& guard = r.after.guards[g];
+            if (guard.kind != model::Guard::capacity) continue;
+            if (guard.form.c[D::first_memory + contacts()[c].locked] == 0.0) continue;
+            const StateOf<D>& x = r.switching.x;
+            const Memory& m = r.switching.memory;
+            if (std::fabs(evaluate<D>(guard.form, x, m, r.input_after)) <=
+                rounding * magnitude_of(guard.form, x, m, r.input_after))
+                return &guard.form;
+        }
+        return nullptr;
+    }
+    static double magnitude_of(const LinearFormOf<D>& f, const State& x, const Memory& m, const InputsOf<D>& u) {
+        return lostmotion::magnitude<D>(f, x, m, u);
+    }
+
+    const model::Assembly& assembly_;
+    const std::vector<model::PeriodicAngle> angles_;
+    std::array<bool, static_cast<std::size_t>(component_count<D>)> neutral_;
+    Memory magnitude_{};
+};
+
+}  // namespace lostmotion

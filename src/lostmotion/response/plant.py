@@ -1,0 +1,190 @@
+"""What a response is asked of: a drive or a drive train, with the inputs that act on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..errors import InputError
+from ..inputs.validation import shown
+from ..model.drive import Drive
+from ..model.signals import CommandSignal, TorqueSignal
+from ..simulation.results import add_derived
+from ..simulation.scenario import Initial, Scenario, mean_inputs
+from ..simulation.train_results import add_derived_of_train
+from ..simulation.train_scenario import TrainInitial, TrainScenario
+from ..simulation.train_state import start_values
+from ..simulation.train_variables import train_variables
+from ..simulation.variables import CHANNELS, STATES, VARIABLES, Variable
+
+Signal = CommandSignal | TorqueSignal
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A drive or a train as the core's search for periodic motions takes it."""
+
+    core: _core.Drive | _core.Train
+    signals: Mapping[str, Signal]
+    """by the name of their variable, in the order of the core"""
+    source: str | None
+    """the input that is meant if none is named: the command of the only motor"""
+    start: Mapping[str, float]
+    """of the scenario, by component; what is left out is 0"""
+    rest: Mapping[str, float]
+    """where responses begin: at rest, a train with the angles and twists of its scenario, on which gravity may depend"""
+    start_of: Callable[[Any], Mapping[str, float]]
+    """the same of another initial state"""
+    channels: tuple[str, ...]
+    variables: tuple[Variable, ...]
+    """the channels, and what is derived from them"""
+    derive: Callable[[dict[str, Any], np.ndarray], None]
+    """adds them to the channels, over time"""
+    output: str
+    """the variable that is looked at if none is named: the speed of the load"""
+    angle: str
+    """whose advance over a period is told: that of the load"""
+    floors: Mapping[str, float]
+    """rated magnitudes of the variables by which motions are compared"""
+    attributes: Mapping[str, float]
+
+    def known_source(self, source: str | None) -> str:
+        """The name of an input, if it is one, or of the only motor's command.
+
+        Raises
+        ------
+        InputError
+        """
+        names = list(self.signals)
+        listed = " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+        if source is None and self.source is None:
+            raise InputError(f"source is missing, and there is not one motor alone; name an input: {listed}")
+        if source is not None and source not in names:
+            raise InputError(f"source {shown(source)} is not known; it must be {listed}")
+        return source or self.source or ""
+
+    def known_output(self, output: str | None) -> str:
+        """The name of an output, if it is one, or of the speed of the load.
+
+        Raises
+        ------
+        InputError
+        """
+        return self.output if output is None else known_output(output, self.channels)
+
+    def unit(self, source: str) -> str:
+        """Of an input."""
+        return "N*m" if isinstance(self.signals[source], TorqueSignal) else "1"
+
+    def with_means(self, command: float | None, load_torque: float | None) -> Plant:
+        """The same with other constant inputs of a drive.
+
+        Raises
+        ------
+        InputError
+            It is a train.
+        """
+        given = {"command": command, "load_torque": load_torque}
+        wanted = {name: mean for name, mean in given.items() if mean is not None}
+        for name in wanted:
+            if name not in self.signals:
+                raise InputError(
+                    f"mean_{name}: is for drives; of a train the constant parts of its inputs are those of its scenario, "
+                    f"{', '.join(self.signals)}; change them by scenario.replace"
+                )
+        means = {name: type(s)(mean=wanted.get(name, s.mean)) for name, s in self.signals.items()}
+        return replace(self, signals=means)
+
+    def sine(self, source: str, amplitude: float, frequency: float) -> list[_core.Signal]:
+        """The inputs of one point: their constant parts, and a sine on the source."""
+        waves = {source: {"amplitude": amplitude, "frequency": frequency}}
+        return [
+            type(s).model_validate({"mean": s.mean, **waves.get(name, {})}).core() for name, s in self.signals.items()
+        ]
+
+
+def plant_of(what: Drive | Scenario | TrainScenario) -> Plant:
+    """The plant of a drive without inputs, or of a scenario with its own."""
+    if isinstance(what, TrainScenario):
+        return _plant_of_train(what)
+    scenario = what if isinstance(what, Scenario) else None
+    drive = what if isinstance(what, Drive) else what.drive()
+    command, load_torque = mean_inputs(what)
+    g = drive.gearbox
+    speed, torque = g.rated_input_speed, g.rated_output_torque
+    return Plant(
+        core=drive.core(),
+        signals={
+            "command": scenario.command if scenario else CommandSignal(mean=command),
+            "load_torque": scenario.load.torque if scenario else TorqueSignal(mean=load_torque),
+        },
+        source="command",
+        start=_start_of_drive(scenario.initial if scenario else Initial()),
+        rest={},
+        start_of=_start_of_drive,
+        channels=tuple(v.name for v in CHANNELS),
+        variables=VARIABLES,
+        derive=lambda data, _: add_derived(data, g.ratio),
+        output="load_speed",
+        angle="load_angle",
+        floors={"motor_speed": speed, "load_speed": speed / g.ratio, "output_torque": torque, "twist": 0.0},
+        attributes={"gear_ratio": g.ratio},
+    )
+
+
+def _start_of_drive(initial: Initial) -> dict[str, float]:
+    return {name: getattr(initial, name) for name in (*STATES, "hysteresis_capacity")}
+
+
+def _plant_of_train(scenario: TrainScenario) -> Plant:
+    train = scenario.train()
+    core = train.core(scenario.loaded())
+    signals = scenario.signals()
+    variables = train_variables(train, scenario.loaded())
+    last = list(train.shafts)[-1]
+    motors = list(train.motors)
+
+    def start_of(initial: TrainInitial) -> dict[str, float]:
+        capacities = initial.hysteresis_capacities.items()
+        return start_values(train, initial) | {f"{name}_hysteresis_capacity": h for name, h in capacities}
+
+    floors = {f"{name}_speed": 0.0 for name in train.shafts}
+    for name, gear in train.gears.items():
+        floors |= {f"{name}_output_torque": gear.rated_output_torque or 0.0, f"{name}_twist": 0.0}
+        if gear.rated_input_speed is not None:
+            floors |= {
+                f"{gear.input}_speed": gear.rated_input_speed,
+                f"{gear.output}_speed": gear.rated_input_speed / gear.ratio,
+            }
+    return Plant(
+        core=core,
+        signals={name: signals[name] for name in core.input_names()},
+        source=f"{motors[0]}_command" if len(motors) == 1 else None,
+        start=start_of(scenario.initial),
+        rest=start_of(TrainInitial(angles=scenario.initial.angles, twists=scenario.initial.twists)),
+        start_of=start_of,
+        channels=tuple(name for name, _, _ in core.channels()),
+        variables=variables,
+        derive=partial(add_derived_of_train, train),
+        output=f"{last}_speed",
+        angle=f"{last}_angle",
+        floors=floors,
+        attributes={},
+    )
+
+
+def known_output(output: str, known: Sequence[str]) -> str:
+    """The name of an output, if it is one of those that are known.
+
+    Raises
+    ------
+    InputError
+    """
+    if output not in known:
+        raise InputError(f"output {shown(output)} is not known; it must be one of {', '.join(known)}")
+    return output
