@@ -41,7 +41,7 @@ TWO_STAGES: dict[str, Any] = {
             "hysteresis": {"efficiency": 0.9},
         },
     },
-    "command": {"m": {"amplitude": 0.6, "frequency": 3.0}},
+    "command": {"m": {"amplitude": 0.2, "frequency": 1.0}},
     "simulation": RUN,
 }
 
@@ -126,10 +126,10 @@ def test_shooting_on_two_stages_with_backlash_agrees_with_a_long_transient() -> 
     assert motion.attrs["stable"] and motion.attrs["residual"] < 1e-10
     assert (motion["table_contact"].values == 0.0).any()  # it stops on its way
     assert np.ptp(motion["belt_twist"].values) > 4e-3  # through all of the gap
-    samples, periods = motion.sizes["time"], 200
+    samples, periods = motion.sizes["time"], 100
     interval = float(motion.attrs["period"]) / samples
     long = lm.simulate(
-        scenario.replace(**{"simulation.duration": periods / 3.0, "simulation.sample_interval": interval})
+        scenario.replace(**{"simulation.duration": float(periods), "simulation.sample_interval": interval})
     )
     for name in ("motor_speed", "middle_speed", "table_speed", "belt_twist", "gearbox_twist", "m_torque"):
         last = long[name].values[(periods - 1) * samples : periods * samples]
@@ -195,7 +195,7 @@ def test_newton_keeps_the_assembly_of_shafts_whose_angles_both_matter() -> None:
 
 def test_several_threads_give_the_same_bits() -> None:
     scenario = lm.TrainScenario(**TWO_STAGES)
-    one, three = (lm.frequency_response(scenario, [1.0, 3.0, 9.0], [0.3, 0.6], threads=n) for n in (1, 3))
+    one, three = (lm.frequency_response(scenario, [1.0, 9.0], [0.3, 0.6], threads=n) for n in (1, 3))
     assert one.identical(three)
 
 

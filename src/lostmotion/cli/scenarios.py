@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def scenarios() -> None:
-    """List the scenarios that come with the package; `run` and `response` take their names, `drive check` those of drives."""
+    """List the scenarios that come with the package; `run`, `response` and `drive check` take their names."""
     from ..inputs.toml_files import read_toml
     from ..simulation.scenario_files import shipped_scenarios
 
