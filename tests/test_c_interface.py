@@ -1,0 +1,283 @@
+"""The C interface: the same bits as Python, by way of its header alone."""
+
+import ctypes as c
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from conftest import ROOT, TRAINS
+from lostmotion.model.parameters import numbers
+from lostmotion.model.torsion import Rigid
+from lostmotion.simulation.train_state import start_values
+
+LIBRARY = ROOT / "build" / "c" / "liblostmotion.so"
+STATES, INPUTS, VARIABLES, CAPACITIES = range(4)
+OK, JAMMED, INVALID = 0, 2, 100
+
+
+class Parameter(c.Structure):
+    _fields_ = [("key", c.c_char_p), ("value", c.c_double)]
+
+
+class Curve(c.Structure):
+    _fields_ = [("breaks", c.POINTER(c.c_double)), ("slopes", c.POINTER(c.c_double)), ("n_breaks", c.c_size_t)]
+
+
+class Signal(c.Structure):
+    _fields_ = [
+        ("breakpoints", c.POINTER(c.c_double)),
+        ("n_breakpoints", c.c_size_t),
+        ("sines", c.POINTER(c.c_double)),
+        ("n_sines", c.c_size_t),
+    ]
+
+
+def doubles(values: Any) -> Any:
+    flat = [float(v) for v in np.ravel(np.asarray(values, dtype=float))]
+    return (c.c_double * max(1, len(flat)))(*flat)
+
+
+@pytest.fixture(scope="module")
+def library() -> c.CDLL:
+    """`make test` builds it; a checkout that only runs pytest builds it here."""
+    if not LIBRARY.exists():
+        subprocess.run(["make", "c-library"], cwd=ROOT, check=True)
+    lib = c.CDLL(str(LIBRARY))
+    for name in ("lm_train_new", "lm_simulation_new"):
+        getattr(lib, name).restype = c.c_void_p
+    for name in ("lm_train_error", "lm_error", "lm_name", "lm_unit", "lm_parameter_key", "lm_parameter_unit"):
+        getattr(lib, name).restype = c.c_char_p
+    for name in ("lm_count", "lm_state_size", "lm_parameter_count"):
+        getattr(lib, name).restype = c.c_size_t
+    lib.lm_time.restype = c.c_double
+    return lib
+
+
+class Train:
+    """A train of the C interface from a scenario in the long form, element by element."""
+
+    def __init__(self, library: c.CDLL, scenario: lm.TrainScenario) -> None:
+        self.lib, self.train = library, c.c_void_p(library.lm_train_new())
+        train = scenario.train()
+        for name, s in train.shafts.items():
+            torque, breakaway, speeds, _ = s.friction()
+            assert not speeds
+            assert s.drag is None
+            self.add(
+                "lm_add_shaft", name, s.inertia, s.viscous_friction, torque, breakaway, None, name in scenario.loaded()
+            )
+        for name, m in train.motors.items():
+            limit = m.torque_limit if m.torque_limit is not None else float("inf")
+            parameters = self.parameters(m, "motor")
+            self.add("lm_add_motor", name, m.shaft, *parameters, m.kind == "torque_source", limit)
+        for name, g in train.gears.items():
+            curve = None
+            if not isinstance(g.stiffness, Rigid):
+                breaks, slopes = g.stiffness.pieces()
+                curve = c.byref(Curve(doubles(breaks), doubles(slopes), len(breaks)))
+            both = doubles(g.losses.efficiencies()) if hasattr(g.losses, "efficiencies") else None
+            parameters = self.parameters(g, "gearbox")
+            self.add("lm_add_gear", name, g.input, g.output, *parameters, curve, None, both, g.mesh_damping, None)
+        for name, b in train.brakes.items():
+            self.add("lm_add_brake", name, b.shaft, b.torque, b.breakaway_torque or 0.0)
+
+    def parameters(self, part: Any, table: str) -> tuple[Any, int]:
+        given = numbers(part, table)
+        array = (Parameter * max(1, len(given)))(*(Parameter(k.encode(), v) for k, v in given.items()))
+        return array, len(given)
+
+    def add(self, function: str, *arguments: Any) -> None:
+        assert self.attempt(function, *arguments) == OK, self.error()
+
+    def attempt(self, function: str, *arguments: Any) -> int:
+        types = {str: lambda a: a.encode(), float: c.c_double, bool: c.c_int, int: c.c_size_t}
+        converted = [types[type(a)](a) if type(a) in types else a for a in arguments]
+        return int(getattr(self.lib, function)(self.train, *converted))
+
+    def error(self) -> str:
+        return self.lib.lm_train_error(self.train).decode()
+
+    def simulation(self, step: float) -> "Simulation":
+        made = self.lib.lm_simulation_new(self.train, c.c_double(step))
+        assert made, self.error()
+        self.lib.lm_train_free(self.train)
+        return Simulation(self.lib, c.c_void_p(made))
+
+
+class Simulation:
+    def __init__(self, library: c.CDLL, handle: c.c_void_p) -> None:
+        self.lib, self.handle = library, handle
+
+    def names(self, kind: int) -> list[str]:
+        count = self.lib.lm_count(self.handle, kind)
+        return [self.lib.lm_name(self.handle, kind, c.c_size_t(k)).decode() for k in range(count)]
+
+    def error(self) -> str:
+        return self.lib.lm_error(self.handle).decode()
+
+    def state(self) -> Any:
+        values = (c.c_double * self.lib.lm_state_size(self.handle))()
+        assert self.lib.lm_get_state(self.handle, values) == OK
+        return values
+
+    def advance(self, interval: float, inputs: Any) -> int:
+        given = doubles(inputs)
+        return int(self.lib.lm_advance(self.handle, c.c_double(interval), given, given))
+
+    def read(self) -> np.ndarray:
+        values = (c.c_double * len(self.names(VARIABLES)))()
+        assert self.lib.lm_read(self.handle, values) == OK, self.error()
+        return np.array(values)
+
+
+PLAIN = [path for path in TRAINS if path.stem in ("worm-lowering", "two-motors-one-ring")]
+
+
+@pytest.mark.parametrize("path", PLAIN, ids=lambda path: path.stem)
+def test_a_run_has_the_bits_of_python(library: c.CDLL, path: Path) -> None:
+    scenario = lm.load(path)
+    simulation = Train(library, scenario).simulation(scenario.simulation.sample_interval)
+    signals = scenario.signals()
+    names = simulation.names(INPUTS)
+    array = (Signal * len(names))(
+        *(
+            Signal(doubles(s.breakpoint_list()), len(s.breakpoint_list()), doubles(s.sine_list()), len(s.sine_list()))
+            for s in (signals[name] for name in names)
+        )
+    )
+    start = start_values(scenario.train(), scenario.initial)
+    states = doubles([start.get(name, 0.0) for name in simulation.names(STATES)])
+    samples = scenario.simulation.samples
+    table = np.zeros((len(simulation.names(VARIABLES)), samples))
+    status = library.lm_run(
+        simulation.handle,
+        array,
+        states,
+        None,
+        c.c_double(scenario.simulation.duration),
+        c.c_double(scenario.simulation.sample_interval),
+        c.c_size_t(samples),
+        table.ctypes.data_as(c.POINTER(c.c_double)),
+    )
+    assert status == OK, simulation.error()
+    result = lm.simulate(scenario)
+    for name, row in zip(simulation.names(VARIABLES), table, strict=True):
+        assert np.array_equal(row, result[name].to_numpy()), name
+
+
+@pytest.fixture
+def worm(library: c.CDLL) -> Simulation:
+    return Train(library, lm.load("worm-lowering")).simulation(1e-3)
+
+
+def test_stepping_from_a_kept_state_repeats_bit_for_bit(worm: Simulation) -> None:
+    inputs = [-0.15 if name == "motor_command" else 20.0 for name in worm.names(INPUTS)]
+    for _ in range(200):
+        assert worm.advance(1e-3, inputs) == OK, worm.error()
+    kept = worm.state()
+    for _ in range(300):
+        assert worm.advance(1e-3, inputs) == OK
+    first = worm.read()
+    assert worm.lib.lm_set_state(worm.handle, kept) == OK
+    for _ in range(300):
+        assert worm.advance(1e-3, inputs) == OK
+    assert np.array_equal(first, worm.read())
+    assert worm.lib.lm_time(worm.handle) == pytest.approx(0.5, abs=1e-12)
+
+
+def test_directional_derivatives_are_those_of_finite_differences(worm: Simulation) -> None:
+    inputs = np.array([-0.15 if name == "motor_command" else 20.0 for name in worm.names(INPUTS)])
+    for _ in range(150):
+        assert worm.advance(1e-3, inputs) == OK
+    states, variables = worm.names(STATES), worm.names(VARIABLES)
+    kept, h = worm.state(), 1e-7
+    place = {name: k for k, name in enumerate(states)}
+
+    def rates(more: np.ndarray) -> np.ndarray:
+        assert worm.lib.lm_set_state(worm.handle, kept) == OK
+        before = dict(zip(variables, worm.read(), strict=True))
+        assert worm.advance(h, more) == OK
+        after = dict(zip(variables, worm.read(), strict=True))
+        return np.array([(after[name] - before[name]) / h for name in states if name in variables])
+
+    step = np.array([0.01, 0.0])
+    difference = rates(inputs + step) - rates(inputs)
+    out, values = (c.c_double * len(states))(), (c.c_double * len(variables))()
+    assert worm.lib.lm_set_state(worm.handle, kept) == OK
+    assert worm.lib.lm_directional_derivative(worm.handle, None, doubles(step), out, values) == OK, worm.error()
+    expected = [out[place[name]] for name in states if name in variables]
+    assert np.allclose(difference, expected, rtol=1e-4, atol=1e-4 * np.abs(expected).max())
+    assert np.abs(expected).max() > 1.0
+    assert values[variables.index("motor_command")] == step[0]
+
+
+def test_what_is_wrong_is_said_in_one_line(library: c.CDLL, worm: Simulation) -> None:
+    train = Train(library, lm.load("worm-lowering"))
+    brake = ("lm_add_brake", "b", "nix", 1.0, 0.0)
+    assert train.attempt(*brake) == OK
+    assert library.lm_train_check(train.train) == INVALID
+    assert "brake 'b'" in train.error()
+    assert train.attempt("lm_add_brake", "worm", "worm", 1.0, 0.0) == INVALID
+    assert train.error() == "the name 'worm' is taken; use another one"
+    wrong = (Parameter * 1)(Parameter(b"motor.colour", 1.0))
+    assert train.attempt("lm_add_motor", "m2", "worm", wrong, 1, False, 1.0) == INVALID
+    assert train.error() == "motor 'm2': there is no parameter 'motor.colour'"
+    assert worm.advance(float("nan"), [0.0, 0.0]) == INVALID
+    assert worm.error().startswith("the interval must be > 0")
+    assert worm.advance(1e-3, [0.0, float("inf")]) == INVALID
+    assert worm.error() == "an input is missing or not finite"
+
+
+def test_a_jam_is_said_as_in_python(library: c.CDLL) -> None:
+    """A rigid self-locking worm under a heavy load (drivetrain: effective inertia below zero)."""
+    scenario = lm.TrainScenario(
+        shafts={"worm": {}, "drum": {"inertia": 2.0, "torque": 20.0}},
+        motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 1e-4}},
+        gears={
+            "gear": {
+                "input": "worm",
+                "output": "drum",
+                "ratio": 50,
+                "stiffness": {"kind": "rigid"},
+                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.44, "backdrive_efficiency": -0.2},
+            }
+        },
+        command={"motor": -0.5},
+        simulation={"duration": 0.1, "sample_interval": 1e-3},
+    )
+    with pytest.raises(lm.SolverError) as jammed:
+        lm.simulate(scenario)
+    simulation = Train(library, scenario).simulation(1e-3)
+    inputs = [-0.5 if name == "motor_command" else 20.0 for name in simulation.names(INPUTS)]
+    assert simulation.advance(1e-3, inputs) == JAMMED
+    assert simulation.error() == str(jammed.value)
+
+
+def test_parameters_are_those_of_scenario_files(library: c.CDLL) -> None:
+    keys = [library.lm_parameter_key(c.c_size_t(k)).decode() for k in range(library.lm_parameter_count())]
+    assert "gearbox.ratio" in keys
+    assert library.lm_parameter_key(c.c_size_t(len(keys))) is None
+    units = {key: library.lm_parameter_unit(c.c_size_t(k)).decode() for k, key in enumerate(keys)}
+    assert units["motor.rotor_inertia"] == "kg*m^2"
+
+
+def test_the_example_in_c_compiles_without_a_warning_and_runs(library: c.CDLL, tmp_path: Path) -> None:
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    assert compiler is not None
+    program = tmp_path / "worm"
+    subprocess.run(
+        [compiler, "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{ROOT / 'bindings' / 'c'}",
+         str(ROOT / "examples" / "worm.c"), f"-L{LIBRARY.parent}", "-llostmotion", f"-Wl,-rpath,{LIBRARY.parent}", "-lm",
+         "-o", str(program)],
+        check=True,
+    )  # fmt: skip
+    out = subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout
+    assert out.startswith("t = 2 s\n")
+    values = {line.split()[0]: float(line.split()[1]) for line in out.splitlines()[1:]}
+    assert values["worm_speed"] == 0.0
+    assert values["gear_output_torque"] == pytest.approx(-20.0, abs=1e-6)
