@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import self_locking_figures
+import two_motors_figures
 from typer.main import get_command
 
 import lostmotion as lm
@@ -297,6 +298,7 @@ def generate(out: Path = OUT) -> None:
         "gallery": gallery(out),
     }
     self_locking_figures.write(out)
+    two_motors_figures.write(out)
     for name, text in pages.items():
         (out / f"{name}.md").write_text(text, encoding="utf-8")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainScenario
 from ..sizing.drive_check import check_drive
 from ..sizing.finding import RULES
 from .select import SHARES, USE
@@ -15,7 +16,7 @@ COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in SHARES} 
 """each with what stands in the row of a run that has failed"""
 
 
-def check_columns(scenario: Scenario) -> dict[str, float | str]:
+def check_columns(scenario: Scenario | TrainScenario) -> dict[str, float | str]:
     """The columns of one run.
 
     Raises

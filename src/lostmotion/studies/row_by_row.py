@@ -80,6 +80,7 @@ def run_trains(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     )
     for row, text in zip(where.tolist(), texts, strict=True):
         errors[row] = text
+    checks = _checks_of(trains, errors) if checks_drives(study) else {}
     return Runs(
         parameters=parameters,
         samples={}
@@ -87,11 +88,27 @@ def run_trains(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         else _samples(study, trains, dict(zip(sampled, made.swapaxes(0, 1), strict=True)), errors),
         kept={name: spread(made[:, k], where, n) for k, name in enumerate(reduced)},
         energy={name: spread(energies[:, k], where, n) for k, (name, _) in enumerate(entries)},
-        checks={},
+        checks=checks,
         switchings=np.nan_to_num(spread(switchings, where, n)),
         errors=errors,
         ratio=np.full(n, np.nan),
     )
+
+
+def _checks_of(trains: dict[int, TrainScenario], errors: list[str]) -> dict[str, list[float | str]]:
+    """The drive check of each run; where there is none, the run's error says why."""
+    checks = {name: [empty] * len(errors) for name, empty in COLUMNS.items()}
+    for run, scenario in trains.items():
+        if errors[run]:
+            continue
+        try:
+            found = check_columns(scenario)
+        except (RuntimeError, ValueError) as error:
+            errors[run] = str(error)
+            continue
+        for name, value in found.items():
+            checks[name][run] = value
+    return checks
 
 
 def _samples(

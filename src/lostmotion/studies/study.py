@@ -171,10 +171,6 @@ class Study(Part):
         return self.scenario
 
     def _check_selection(self, select: Selection) -> None:
-        if select.drive_check and not isinstance(self.scenario, Scenario):
-            raise ValueError(
-                "select: the drive check is of a drive of one motor, gearbox and load; of a drive train set drive_check = false"
-            )
         numbers = {v.title: v.unit for v in self.vary if v.names is None}
         units = numbers | {name: e.unit for name, e in self.expressions.items()}
         if select.drive_check:
