@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "lostmotion/drive/variables.hpp"
 #include "referee_motion.hpp"
 
 namespace lostmotion::referee {
@@ -227,7 +228,7 @@ class Referee {
             for (const int input : options(model_.input_contact, x_.w_M))
                 for (const int d : twist)
                     for (const int load : options(model_.load_contact, x_.w)) {
-                        // Where two of the three stand, so does the third.
+                        // Where two of the three are at rest, so is the third.
                         if ((input == stuck) + (d == stuck) + (load == stuck) == 2 && input != absent && d != absent &&
                             load != absent)
                             continue;
@@ -286,10 +287,10 @@ class Referee {
         return true;
     }
 
-    // While all contacts stand the torque is not determined: it keeps its value, or goes to the nearest that twist and
-    // load can hold. If the input cannot hold that one, and no other combination is consistent, it goes to the nearest
-    // that all three can hold (`with_input`). The torques that can be held are an interval for each curve piece and
-    // pair of cells; nearest first.
+    // While all contacts are at rest the torque is not determined: it keeps its value, or goes to the nearest that
+    // twist and load can hold. If the input cannot hold that one, and no other combination is consistent, it goes to
+    // the nearest that all three can hold (`with_input`). The torques that can be held are an interval for each curve
+    // piece and pair of cells; nearest first.
     std::vector<Combination> held(const std::vector<Combination>& all, const Inputs& u, bool with_input) const {
         std::vector<std::pair<Quad, Combination>> found;
         for (Combination c : all) {

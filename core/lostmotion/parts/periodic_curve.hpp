@@ -47,11 +47,11 @@ class PeriodicCurve {
     }
 
     bool present() const { return !values_.empty(); }
-    // Whether it stands for a sine, of which the adaptive solver takes the remainder.
+    // Whether it approximates a sine, of which the adaptive solver takes the remainder.
     bool of_sine() const { return sine_.amplitude != 0.0; }
-    double smooth(double phi) const { return sine_.amplitude * std::sin(sine_.order * phi + sine_.phase); }
+    double smooth(double phi) const { return sine_.amplitude * sine_cosine(sine_.order * phi + sine_.phase).sin; }
     double smooth_slope(double phi) const {
-        return sine_.amplitude * sine_.order * std::cos(sine_.order * phi + sine_.phase);
+        return sine_.amplitude * sine_.order * sine_cosine(sine_.order * phi + sine_.phase).cos;
     }
     double period() const { return period_; }
     int pieces() const { return static_cast<int>(values_.size()) - 1; }
