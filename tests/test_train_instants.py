@@ -269,8 +269,11 @@ def test_within_a_regime_a_run_follows_the_exponential_of_its_matrix(scenario: l
         whole = np.zeros((n + 1, n + 1))
         whole[:n, :n], whole[:n, n] = model.A, model.B @ u + model.rate
         x0 = np.array([model.point[name] for name in model.states])
-        read = simulation[list(model.outputs)]
-        assert model.C @ x0 + model.D @ u + model.offset == pytest.approx(read, rel=1e-10, abs=1e-10)
+        outputs = dict(zip(model.outputs, model.C @ x0 + model.D @ u + model.offset, strict=True))
+        for name, gear in scenario.gears.items():
+            if simulation[f"{gear.input}_speed"] == 0.0:  # a share of what a contact at rest holds is not linear
+                del outputs[f"{name}_input_torque"]
+        assert list(outputs.values()) == pytest.approx(simulation[list(outputs)], rel=1e-10, abs=1e-10)
         before = {c: simulation[c] for c in model.contacts}
         simulation.advance(h, **inputs)
         again = lm.linearize(simulation)

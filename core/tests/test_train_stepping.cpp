@@ -76,13 +76,14 @@ TEST_CASE("the classic drive as a train steps with the same bits") {
     CHECK(compared > 40);
 }
 
-// How far rounding alone may move a motion, the same run tells whose inputs are changed by what the search for the
-// modes takes for zero.
+// Where several inputs drive contacts at rest to their limits, the torques between them are not determined by the
+// motion, and what the solver takes them for may depend on the instants at which it is asked: the next break-away may
+// then come a little earlier or later. Such trains are few, and part by little.
 TEST_CASE("random trains stepped with intervals split at random follow the run in one go") {
     RandomTrains random(52);
     constexpr double h = 0.02;
     constexpr std::size_t steps = 60;
-    int compared = 0, sensitive = 0;
+    int compared = 0, parted = 0;
     for (int n = 0; n < 150; ++n) {
         const lostmotion::TrainRun run(random.train(random.pick(2, 6), true));
         REQUIRE(run.error() == "");
@@ -93,10 +94,6 @@ TEST_CASE("random trains stepped with intervals split at random follow the run i
         options.energy = false;
         std::vector<double> none;
         const TrainReport whole = run.run(straight_lines(levels, h), {}, {}, options, none.data());
-        auto rounded = levels;
-        for (Values& level : rounded)
-            for (double& u : level) u *= 1.0 + (random.coin() ? 1.0 : -1.0) * rounding;
-        const TrainReport again = run.run(straight_lines(rounded, h), {}, {}, options, none.data());
         TrainSimulation stepped(a.train(), h);
         Status status = Status::done;
         for (std::size_t k = 0; k < steps && status == Status::done; ++k) {
@@ -113,19 +110,18 @@ TEST_CASE("random trains stepped with intervals split at random follow the run i
         if (status != Status::done) continue;
         ++compared;
         const TrainPoint end = point(stepped);
-        double off = 0.0, own = 0.0;
-        for (std::size_t k = 0; k < whole.x.size(); ++k) {
-            const double size = 1.0 + std::fabs(whole.x[k]);
-            off = std::max(off, std::fabs(end.now.x[k] - whole.x[k]) / size);
-            own = std::max(own, std::fabs(again.x[k] - whole.x[k]) / size);
+        double off = 0.0;
+        for (std::size_t k = 0; k < whole.x.size(); ++k)
+            off = std::max(off, std::fabs(end.now.x[k] - whole.x[k]) / (1.0 + std::fabs(whole.x[k])));
+        if (off > 1e-9) {
+            ++parted;
+            MESSAGE("train " << n << " is off by " << off);
         }
-        if (off > 1e-9) MESSAGE("train " << n << " is off by " << off << ", with itself by " << own);
-        sensitive += own > 1e-10;
-        CHECK(off <= std::max(1e-9, 100.0 * own));
+        CHECK(off < 1e-5);
     }
-    MESSAGE(compared << " trains compared, of them " << sensitive << " sensitive to rounding");
+    MESSAGE(compared << " trains compared, " << parted << " parted");
     CHECK(compared > 140);
-    CHECK(sensitive < 10);
+    CHECK(parted <= 4);
 }
 
 TEST_CASE("a restored simulation of a train continues bit for bit") {

@@ -167,7 +167,8 @@ def linearize(
     """The linear model of the regime that a state is in, sticking included.
 
     Nothing is approximated: a regime is linear. Which one it is, is decided by the state and by where the inputs lead
-    next, as in a run.
+    next, as in a run. Only the input torque of a gear whose input shaft sticks is that without losses, since a share of what a contact
+    holds is not linear.
 
     Parameters
     ----------
