@@ -178,8 +178,9 @@ def explain(what: Scenario | Simulation | TrainScenario, time: Time | None = Non
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     if isinstance(what, TrainScenario):
-        core, *case = core_case(what)
-        return _of_train(what.train(), core, time, *_core.explain_train_at(core, *case, time))
+        core, inputs, start, capacities = core_case(what)
+        explained = _core.explain_train_at(core, inputs, start, capacities, time)
+        return _of_train(what.train(), core, time, *explained)
     return _explanation(what.drive(), time, *_core.explain_at(*core_inputs(what), time))
 
 
