@@ -349,6 +349,13 @@ def test_explain_says_that_a_gearbox_locks():
     assert "self-locking" not in str(lm.explain(lm.load("paper-2dof-nl-small"), 0.5))
 
 
+def test_of_a_train_the_gear_that_locks_is_named_and_no_other():
+    text = str(lm.explain(lm.load("worm-lowering"), 0.05))
+    assert "worm_gear: self-locking: holds its load at rest and stops it in motion" in text
+    assert "lowering 20 N·m takes more than 0.09003 N·m of motor; chatters" in text
+    assert "coupling: not self-locking" not in text
+
+
 def test_a_gear_that_is_not_there_is_refused():
     train = lm.load("worm-lowering").train()
     with pytest.raises(lm.InputError, match=r"worm_gaer is no gear of this train; did you mean worm_gear\?"):

@@ -94,8 +94,8 @@ class SelfLocking:
 
     @property
     def notable(self) -> bool:
-        """Whether it locks, or its motion is unstable."""
-        return self.overrunning.holds or self.lowering != "smooth"
+        """Whether it locks, or makes the motion unstable: its input is pushed the less, the more the load pulls."""
+        return self.overrunning.holds or (self.lowering != "smooth" and self.overrunning.slope < 0.0)
 
     @property
     def brief(self) -> str:
