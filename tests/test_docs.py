@@ -241,7 +241,7 @@ def test_the_table_of_equations_names_functions_and_tests_that_exist(equation: s
     assert functions
     for function in functions:
         # Defined there, not only called: nothing but a type, or `def`, in front of it.
-        assert re.search(rf"^(?!.*\breturn )[\w:<>&*,\[\] ]*[\w>&*\]] {function}\(", code, re.M), function
+        assert re.search(rf"^(?!.*\breturn )[\w:<>&*,\[\] ]*[\w>&*\]] (?:[\w<>]+::)?{function}\(", code, re.M), function
     file, *names = re.findall(r"`([^`]+)`", test)
     if file.endswith(".cpp"):
         titles = re.findall(r'TEST_CASE\("(.*?)"\)', (ROOT / "core" / "tests" / file).read_text())

@@ -1,0 +1,116 @@
+// What goes on with a regime beside its state: the rate under constant inputs, with its rounding, and rest.
+#pragma once
+
+#include <bit>
+
+#include "exact_run.hpp"
+
+namespace lostmotion {
+
+template <class System>
+auto ExactSolver<System>::has_settled(const Regime& regime, const State& rate) const -> bool {
+    for (int k = 0; k < D::coupled; ++k) {
+        if (regime.following[k]) continue;
+        if (!(std::fabs(rate[k]) <= settled * scale_[k])) return false;
+    }
+    return true;
+}
+
+// Under inputs that vary, the states that they do not reach decay for ever: once they are below what squares allow,
+// they are zero. Returns whether one has become so.
+template <class System>
+inline auto ExactSolver<System>::rest_unforced(const Entry& e, const State& rate) -> bool {
+    typename Cache::States forced = 0;
+    for (int i = 0; i < D::inputs; ++i)
+        if (begin_->input().varies(i)) forced |= e.reached[i];
+    bool changed = false;
+    for (typename Cache::States left = ~forced & Cache::all_states; left != 0; left &= left - 1) {
+        const int k = std::countr_zero(left);
+        const double limit = settled * scale_[k];
+        if (now_.x[k] == 0.0 || !(std::fabs(now_.x[k]) <= limit && std::fabs(rate[k]) <= limit)) continue;
+        now_.x[k] = 0.0;
+        changed = true;
+    }
+    return changed;
+}
+
+// After a change of the inputs: if the regime goes on, the rate jumps by no more than what they bring.
+template <class System>
+inline auto ExactSolver<System>::follow_inputs(const Key& before) -> void {
+    if (!course_.rate_known || !(key_ == before)) {
+        course_.forget();
+        return;
+    }
+    Entry& e = cache_.entry(key_);
+    Lanes rate = load(course_.rate);
+    for (int i = 0; i < D::inputs; ++i)
+        rate.coupled = rate.coupled + (now_.input[0][i] - course_.input[i]) * load(e.rates.input_column[i]);
+    const Coupled before_jump = bound_ahead(e, coupled(course_.rate)), after_jump = bound_ahead(e, rate.coupled);
+    for (int t = 0; t < e.n_twists; ++t) {
+        auto& twist = course_.twist[t];
+        const double was = before_jump[e.twists[t].state], is = after_jump[e.twists[t].state];
+        twist.doubt = is > 0.0 ? std::fmin(1.0, twist.doubt * was / is) : 0.0;
+        twist.off_zero = false;
+        twist.grazing_magnitude = 0.0;
+    }
+    rate.store(course_.rate.data());
+}
+
+// Bound on the coupled states over the first event check, from what they are.
+template <class System>
+inline auto ExactSolver<System>::bound_ahead(Entry& e, const Coupled& x) const -> Coupled {
+    if (!e.propagator.ready()) e.prepare(rotations_, scale_);
+    return e.propagator.level(first_level).exponential_bound * absolute(x);
+}
+
+// Rounding of a rate that is computed from the state, where a regime begins, as far as it acts on the twists. What
+// the search for the modes takes for zero must not be seen to fall at once.
+template <class System>
+inline auto ExactSolver<System>::begin_in_doubt(Entry& e, const Cursor& at, const Memory& memory) -> void {
+    State size = e.rates.size(magnitudes(at.x()), magnitudes(memory), at.input().magnitudes());
+    for (int t = 0; t < e.n_twists; ++t)
+        if (const int k = e.twists[t].state; at.rate()[k] == 0.0) size[k] = 0.0;  // it starts from rest
+    const Coupled ahead = bound_ahead(e, coupled(at.rate())), rounding_ahead = bound_ahead(e, coupled(size));
+    for (int t = 0; t < e.n_twists; ++t) {
+        auto& twist = course_.twist[t];
+        const double bound = ahead[e.twists[t].state];
+        twist.most_doubt = rounding * rounding_ahead[e.twists[t].state];
+        twist.doubt = bound > twist.most_doubt ? twist.most_doubt / bound : 1.0;
+    }
+}
+
+// Rounding of the speed of the twist where it is its rate, carried on from where the regime began. The doubt there
+// dies out with the motion; where the motion grows, it is one that began with another rounding.
+template <class System>
+inline auto ExactSolver<System>::twist_speed_rounding(Entry& e, int t, const Cursor& at) const -> double {
+    const double bound = bound_ahead(e, coupled(at.rate()))[e.twists[t].state];
+    return rounding * bound + std::fmin(course_.twist[t].doubt * bound, course_.twist[t].most_doubt);
+}
+
+// The motion has settled.
+template <class System>
+inline auto ExactSolver<System>::rest(const Segment<System>& segment, const Cursor& at, double limit) -> void {
+    now_.x = at.x();
+    if (time_ == segment.begin) {
+        for (int j = D::coupled; j < D::states; ++j) now_.x[j] += at.rate()[j] * (limit - time_);
+        time_ = limit;
+    }
+    keep_course(segment.entry, at);
+    for (int k = 0; k < D::coupled; ++k) course_.rate[k] = 0.0;
+    course_.rate_known = true;
+}
+
+// At the end of a stretch that no guard ends.
+template <class System>
+inline auto ExactSolver<System>::keep_course(const Entry& e, const Cursor& at) -> void {
+    // Carried on for long, the speeds that a stuck twist ties together drift apart by rounding.
+    if constexpr (requires(std::array<bool, D::contacts> at_rest) { system_.stop(now_.x, at_rest); }) {
+        std::array<bool, D::contacts> at_rest = e.regime.at_rest;
+        if (at.carries_rate() && e.followed) system_.stop(now_.x, at_rest);
+    }
+    course_.rate = at.rate();
+    course_.rate_known = at.carries_rate();
+    course_.input = at.input().values();
+}
+
+}  // namespace lostmotion

@@ -1,0 +1,112 @@
+// When a guard that falls through zero does so.
+#pragma once
+
+#include <limits>
+
+#include "../kernel/polynomial.hpp"
+#include "exact_run.hpp"
+
+namespace lostmotion {
+
+// Earliest of the certified crossings; there_ is left at it.
+template <class System>
+inline auto ExactSolver<System>::first_crossing(Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here,
+                                                const Ends& there, double h, const Guard*& fired) -> void {
+    double best = std::numeric_limits<double>::infinity();
+    const auto cubic = [&](int g) { return Cubic(here.value[g], here.slope[g], there.value[g], there.slope[g], h); };
+    std::array<double, D::guards> estimate;
+    for (int k = 0; k < n_crossing_; ++k) {
+        const auto& [g, grazing, starts_on_zero] = crossing_[k];
+        const Cubic c = cubic(g);
+        estimate[g] = grazing ? c.lowest_at() : c.zero(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
+    }
+    if (n_crossing_ > 1)
+        std::sort(crossing_.begin(), crossing_.begin() + n_crossing_,
+                  [&](const Crossing& a, const Crossing& b) { return estimate[a.guard] < estimate[b.guard]; });
+    for (int k = 0; k < n_crossing_; ++k) {
+        const auto& [g, grazing, starts_on_zero] = crossing_[k];
+        // Still positive where another has crossed: later.
+        if (k > 0 && cubic(g)(best / h) > bounds_.error[g]) continue;
+        double s = estimate[g] * h;
+        if (grazing) {
+            trial_->advance_from(cursor, s);
+        } else {
+            s = find_zero(e, g, memory, cursor, starts_on_zero, s, h);
+        }
+        if (s < best) {
+            best = s;
+            std::swap(there_, trial_);
+            fired = &e.regime.guards[g];
+        }
+    }
+}
+
+// A guard that starts on zero and rises, by the derivative of this order: where it comes back to zero before `end`,
+// at most one base interval on; else `end`. Leaves trial_ there.
+template <class System>
+inline auto ExactSolver<System>::first_return(const LinearForm& form, const Cursor& cursor, std::size_t order,
+                                              double end) -> double {
+    cursor.expand(expansion_);
+    Polynomial guard = expansion_.polynomial(form, 0.0);
+    for (std::size_t k = 1; k < order; ++k) guard.part[0].set(static_cast<int>(k - 1), 0.0);
+    double low = 0.0, high = end;
+    if (guard.value(end) < 0.0)
+        while (high - low > 4.0 * std::numeric_limits<double>::epsilon() * high) {
+            const double middle = 0.5 * (low + high);
+            (guard.value(middle) > 0.0 ? low : high) = middle;
+        }
+    *trial_ = cursor;
+    trial_->taylor_step(expansion_, high);
+    return high;
+}
+
+// Where a guard falls through zero within h, near an estimate. Leaves trial_ there,
+// returns when. About the nearest instant that whole levels lead to, the guard is a polynomial to rounding.
+template <class System>
+inline auto ExactSolver<System>::find_zero(Entry& e, int g, const Memory& memory, const Cursor& cursor,
+                                           bool starts_on_zero, double estimate, double h) -> double {
+    const LinearForm form = e.guards.form(g);
+    const double base = e.propagator.length(0);
+    double low = 0.0, high = h, s = estimate;
+    if (starts_on_zero) {
+        if (const auto order = departure(e, memory, cursor, g).order; order > 0) {
+            const double end = std::min(h, base);
+            if (const double z = first_return(form, cursor, order, end); z < end) return z;
+            low = end;
+            s = std::clamp(estimate, low, h);
+        }
+    }
+    const double earliest = low;
+    for (int m = 0; m < 100; ++m) {
+        const double rest = trial_->advance_by_levels(cursor, s), from = s - rest;
+        const auto of_rate = rate_multiple(e, *trial_, g);
+        const double value = of_rate.factor != 0.0
+                                 ? of_rate.factor * trial_->rate()[e.twists[of_rate.twist].state]
+                                 : lostmotion::evaluate<D>(form, trial_->x(), memory, trial_->input().values());
+        trial_->expand(expansion_);
+        const Polynomial guard = expansion_.polynomial(form, value);
+        const double reach = std::fabs(rest) + 0.25 * base, at = trial_->time();
+        double z = rest;
+        bool found = false;
+        for (int n = 0; n < 60 && !found && std::fabs(z) <= reach; ++n) {
+            // Halley's method
+            const double f = guard.value(z), slope = guard.slope(z);
+            const double moved = -f * slope / (slope * slope - f * guard.half_curvature(z));
+            z += moved;
+            found = std::fabs(moved) <= converging * std::fabs(z) || at + moved == at;
+        }
+        if (found && std::fabs(z) <= reach && (from + z >= earliest || earliest == 0.0)) {
+            s = std::clamp(from + z, 0.0, h);
+            trial_->taylor_step(expansion_, s - from);
+            return s;
+        }
+        // The zero lies elsewhere: where the last step led, or in half of what is left.
+        (value > 0.0 ? low : high) = from;
+        s = from + z;
+        if (!(s > low && s < high)) s = 0.5 * (low + high);
+    }
+    trial_->advance_from(cursor, s);
+    return s;
+}
+
+}  // namespace lostmotion

@@ -1,0 +1,294 @@
+// The exact solver: from regime to regime, by matrix exponentials.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+
+#include "../kernel/cursor.hpp"
+#include "course.hpp"
+#include "regime_cache.hpp"
+#include "switching.hpp"
+
+namespace lostmotion {
+
+// A stretch of time spent in one regime, from which an observer can evaluate the exact state at any instant.
+template <class System>
+struct Segment {
+    using Entry = typename RegimeCache<System>::Entry;
+    Entry& entry;
+    const Cursor<typename System::Dims>& at;  // where it begins
+    double begin, end;                        // [s]
+    bool last;                                // no further segment follows in this call: `end` belongs to it
+    typename System::Dims::Memory memory;
+    ColumnOf<typename System::Dims> constant;  // the part of dx/dt that depends on neither state nor inputs
+    StateOf<typename System::Dims> x_end;      // at end, before any stop there
+};
+
+template <class System>
+class ExactSolver {
+ public:
+    using Cache = RegimeCache<System>;
+    using Entry = typename Cache::Entry;
+    using D = typename System::Dims;
+    using Regime = typename System::Regime;
+    using Key = typename System::Key;
+    using Guard = typename System::Guard;
+    using GuardTable = typename Cache::GuardTable;
+    using Guards = typename Cache::Guards;
+    using Contact = typename D::Contact;
+    using Memory = typename D::Memory;
+    using State = StateOf<D>;
+    using Coupled = CoupledOf<D>;
+    using Lanes = LanesOf<D>;
+    using Matrix = MatrixOf<D>;
+    using LinearForm = LinearFormOf<D>;
+    using Signals = SignalsOf<D>;
+    using Course = CourseOf<D>;
+    using Cursor = lostmotion::Cursor<D>;
+    using InputState = lostmotion::InputState<D>;
+    using Propagator = lostmotion::Propagator<D>;
+    using Expansion = lostmotion::Expansion<D>;
+
+    // unit: a length of time [s] that is to be a power-of-two multiple of the elementary steps, such as the
+    // sampling interval. scale: natural sizes of the states.
+    // shared: regimes of the same system that an earlier solver has left, if any.
+    ExactSolver(const System& system, const Signals& signals, double unit, const State& scale, Cache* shared = nullptr)
+        : system_(system),
+          signals_(without_idle_sines(signals)),
+          own_(shared == nullptr ? std::make_unique<Cache>(system) : nullptr),
+          cache_(shared == nullptr ? *own_ : *shared),
+          scale_(scale),
+          unit_(elementary(unit)),
+          rotations_(cache_.serve(unit_, input_basis(signals_))),
+          cursors_{start(), start(), start(), start()},
+          input_bound_(begin_->input().fourth_derivative_bound()) {}
+    ExactSolver(const ExactSolver&) = delete;
+    ExactSolver& operator=(const ExactSolver&) = delete;
+
+    // Polled now and then; true ends the run.
+    bool (*interrupted)(void*) = nullptr;
+    void* interrupted_context = nullptr;
+
+    double time() const { return time_; }
+    const State& state() const { return now_.x; }
+    const Memory& memory() const { return now_.memory; }
+    const Key& key() const { return key_; }
+    const Regime& regime() { return cache_.regime(key_); }
+    const Regime& regime(const Key& key) { return cache_.regime(key); }
+    const std::vector<InputBasis>& basis() const { return rotations_.basis(); }
+    double unit() const { return unit_; }
+    Contact stopped_at() const { return stopped_at_; }
+    long event_checks() const { return event_checks_; }
+    std::size_t switchings() const { return switchings_; }
+
+    // Sets the state and finds the regime it is in.
+    Status begin(double time, const State& x, const Memory& memory) {
+        set_time(time);
+        course_ = {};
+        switchings_ = 0;
+        now_.x = x;
+        now_.memory = memory;
+        anchor_inputs();
+        course_.input = now_.input[0];
+        return status_of(system_.start(cache_, now_, key_));
+    }
+    // Continues from a state with a known regime.
+    void resume(double time, const State& x, const Memory& memory, const Key& key, const Course& course = {}) {
+        set_time(time);
+        now_.x = x;
+        now_.memory = memory;
+        key_ = key;
+        course_ = course;
+    }
+    const Course& course() const { return course_; }
+    // From now on the input is value + slope * (t - now). Only for signals made with ramped_inputs().
+    void set_ramp(int input, double value, double slope) { signals_[input].breakpoints[0] = {time_, value, slope}; }
+    // The inputs have changed at this instant: finds the regime anew.
+    Status inputs_changed() {
+        const Key before = key_;
+        anchor_inputs();
+        const Status status = status_of(system_.next(cache_, now_, nullptr, key_, course_.input));
+        follow_inputs(before);
+        return status;
+    }
+
+    // Runs to t_end. The observer gets every segment as it comes and, if it wants them, the switchings between.
+    template <class Observer>
+    Status advance(double t_end, Observer& observer) {
+        begin_->inputs().anchor(time_);
+        crossings_ = 0;  // so that what follows depends on the state alone
+        if (jump_pending_) {
+            jump_pending_ = false;
+            const Status status = change_regime(nullptr, observer);
+            if (status != Status::done) return status;
+        }
+        while (true) {
+            Entry& entry = cache_.entry(key_);
+            if (!entry.propagator.ready()) entry.prepare(rotations_, scale_);
+            Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
+                                    now_.x};
+            begin_->place(entry.propagator, segment.constant, now_.x, course_.rate_known ? &course_.rate : nullptr);
+            if (begin_->constant_inputs()) {
+                if (has_settled(entry.regime, begin_->rate())) begin_->settle();
+            } else if (rest_unforced(entry, begin_->rate())) {
+                segment.x_end = now_.x;
+                begin_->place(entry.propagator, segment.constant, now_.x);
+            }
+            if (!(time_ < breakpoint_)) breakpoint_ = next_breakpoint(signals_, time_);
+            double limit = std::min(t_end, breakpoint_);
+            if (const Regime& r = entry.regime; r.driving_input >= 0) [[unlikely]]
+                limit = begin_->input().turning(r.driving_input, r.driving_way, limit);
+            const Guard* fired = nullptr;
+            const Status status = run_regime(segment, limit, fired);
+            if (status != Status::done) return status;
+            segment.end = time_;
+            segment.x_end = now_.x;
+            segment.last = fired == nullptr && time_ >= t_end;
+            if (!observer.segment(segment)) return Status::interrupted;
+            if (segment.last) {
+                jump_pending_ = breakpoint_ == t_end;  // it belongs to what comes after
+                return Status::done;
+            }
+            if (fired == nullptr && time_ < limit) continue;  // the motion has settled
+            const Status switched = change_regime(fired, observer);
+            if (switched != Status::done) return switched;
+        }
+    }
+
+ private:
+    static constexpr double converging = 1e-7;   // the next correction is less than the square of the last
+    static constexpr int first_level = 6;        // of the first event check
+    static constexpr double settled = 0x1p-400;  // of a rate [1/s], in natural sizes: below it, squares would underflow
+    // A third of the length times the error of the slope of a cubic, over the error of its value.
+    static constexpr double slope_share = 0.00802 / 3.0 * 384.0;
+
+    Cursor start() const { return Cursor(InputState(signals_, rotations_.basis())); }
+    static double elementary(double unit) {
+        while (unit > 1e-2) unit *= 0.5;
+        return unit;
+    }
+    void set_time(double time) {
+        time_ = time;
+        accumulation_ = {};
+        jump_pending_ = false;
+        breakpoint_ = time;
+        last_level_ = first_level;  // so that what follows depends on the state alone
+    }
+    void anchor_inputs() {
+        begin_->inputs().anchor(time_);
+        see_inputs(begin_->input(), time_, now_);
+    }
+
+    template <class Observer>
+    Status change_regime(const Guard* fired, Observer& observer) {
+        if (fired != nullptr) {
+            std::swap(begin_, there_);
+            if (++crossings_ % 8 == 0) begin_->inputs().anchor(time_);
+        }
+        const Key before = key_;
+        const Status status = switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, observer);
+        if (fired != nullptr) stopped_at_ = fired->contact;
+        if (status != Status::done) return status;
+        if (fired == nullptr)
+            follow_inputs(before);
+        else
+            course_.forget();
+        ++switchings_;
+        return accumulation_.add(time_, unit_) ? Status::zeno : Status::done;
+    }
+
+    enum class Verdict { clear, crossing, uncertain };
+
+    // Guards at one end of a event check.
+    struct Ends {
+        typename GuardTable::Values value, slope;
+    };
+    // Guards all through it: a lower bound of their cubics, and how far they may lie from these.
+    struct Bounds {
+        typename GuardTable::Values lower, error, fourth;
+    };
+
+    // What is known beside the state: exact_course.hpp.
+    static bool moderate(const State& rate) {
+        return sum_in_fours<D::coupled>([&](auto k) { return std::fabs(rate[k]); }) < 1e100;
+    }
+    [[gnu::noinline]] bool has_settled(const Regime& regime, const State& rate) const;
+    bool rest_unforced(const Entry& e, const State& rate);
+    [[gnu::cold]] void follow_inputs(const Key& before);
+    [[gnu::cold]] Coupled bound_ahead(Entry& e, const Coupled& x) const;
+    [[gnu::cold]] void begin_in_doubt(Entry& e, const Cursor& at, const Memory& memory);
+    [[gnu::cold]] void rest(const Segment<System>& segment, const Cursor& at, double limit);
+    [[gnu::cold]] void keep_course(const Entry& e, const Cursor& at);
+    double twist_speed_rounding(Entry& e, int t, const Cursor& at) const;
+    // Where the rate is carried on: how many times the rate of a twist a guard is.
+    static typename Entry::TwistSpeed rate_multiple(const Entry& e, const Cursor& at, int g) {
+        return at.carries_rate() ? e.twist_speed(g) : typename Entry::TwistSpeed{g, 0, 0.0};
+    }
+
+    // Event checks: exact_event_check.hpp.
+    // The order of the first derivative of a guard, up to the third, that is not zero; 0 if there is none or it is
+    // negative.
+    struct Departure {
+        std::size_t order = 0;
+        std::array<double, 4> derivative{};
+    };
+    Status run_regime(const Segment<System>& segment, double limit, const Guard*& fired);
+    [[gnu::noinline]] bool leap(const Entry& e, double limit);
+    [[gnu::always_inline]] static void evaluate(const Entry& e, const typename GuardTable::Values& constant, Cursor& at,
+                                                Ends& out);
+    [[gnu::always_inline]] void bound_fourth(const GuardTable& guards, const Matrix& exponential_bound,
+                                             const Coupled& size);
+    Guards enclose(int rows, const Ends& here, const Ends& there, double h);
+    Verdict judge(Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here, const Ends& there, double h,
+                  bool shortest);
+    bool departs(const Entry& e, const Memory& memory, const Cursor& cursor, int g, double h) const;
+    Departure departure(const Entry& e, const Memory& memory, const Cursor& cursor, int g) const;
+
+    // Roots: exact_roots.hpp.
+    void first_crossing(Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here, const Ends& there,
+                        double h, const Guard*& fired);
+    [[gnu::cold]] double first_return(const LinearForm& form, const Cursor& cursor, std::size_t order, double end);
+    double find_zero(Entry& e, int g, const Memory& memory, const Cursor& cursor, bool starts_on_zero, double estimate,
+                     double h);
+
+    const System& system_;
+    Signals signals_;
+    std::unique_ptr<Cache> own_;
+    Cache& cache_;
+    State scale_;
+    double unit_;
+
+    double time_ = 0.0;
+    double breakpoint_ = 0.0;  // [s], the next of the inputs; it has been found if it lies ahead
+    InstantOf<D> now_;
+    Key key_;
+    int last_level_ = first_level;
+    long event_checks_ = 0;
+    std::size_t switchings_ = 0;
+    PhaseRotations& rotations_;
+    // Where the present segment begins, the two ends of a event check, and one that is tried out. They change their
+    // roles, not their contents.
+    std::array<Cursor, 4> cursors_;
+    Cursor *begin_ = &cursors_[0], *here_ = &cursors_[1], *there_ = &cursors_[2], *trial_ = &cursors_[3];
+    InputsOf<D> input_bound_;  // on the fourth derivative of each, for all time
+    Expansion expansion_;
+    int crossings_ = 0;
+    Ends ends_[2];
+    Bounds bounds_;
+    int halvings_ = 1;    // how many times an uncertain event check ought to be halved
+    bool roomy_ = false;  // in the last event check the guards that were clear were so by far
+    struct Crossing {
+        int guard;
+        bool grazing, starts_on_zero;
+    };
+    std::array<Crossing, D::guards> crossing_{};
+    int n_crossing_ = 0;
+    Course course_;
+    Accumulation accumulation_;
+    bool jump_pending_ = false;
+    Contact stopped_at_{};
+};
+
+}  // namespace lostmotion
