@@ -62,7 +62,7 @@ class ExactSolver {
     using Expansion = lostmotion::Expansion<D>;
 
     // unit: a length of time [s] that is to be a power-of-two multiple of the elementary steps, such as the
-    // sampling interval. scale: natural sizes of the states.
+    // sampling interval. scale: natural magnitudes of the states.
     // shared: regimes of the same system that an earlier solver has left, if any.
     ExactSolver(const System& system, const Signals& signals, double unit, const State& scale, Cache* shared = nullptr)
         : system_(system),
@@ -168,9 +168,10 @@ class ExactSolver {
     }
 
  private:
-    static constexpr double converging = 1e-7;   // the next correction is less than the square of the last
-    static constexpr int first_level = 6;        // of the first event check
-    static constexpr double settled = 0x1p-400;  // of a rate [1/s], in natural sizes: below it, squares would underflow
+    static constexpr double converging = 1e-7;  // the next correction is less than the square of the last
+    static constexpr int first_level = 6;       // of the first event check
+    static constexpr double settled =
+        0x1p-400;  // of a rate [1/s], in natural magnitudes: below it, squares would underflow
     // A third of the length times the error of the slope of a cubic, over the error of its value.
     static constexpr double slope_share = 0.00802 / 3.0 * 384.0;
 
@@ -245,10 +246,10 @@ class ExactSolver {
     // Rounding of a rate that is computed from the state, where a regime begins, as far as it acts on the twists. What
     // the search for the modes takes for zero must not be seen to fall at once.
     [[gnu::cold]] void begin_in_doubt(Entry& e, const Cursor& at, const Memory& memory) {
-        State size = e.rates.size(magnitudes(at.x()), magnitudes(memory), at.input().magnitudes());
+        State magnitude = e.rates.magnitude(magnitudes(at.x()), magnitudes(memory), at.input().magnitudes());
         for (int t = 0; t < e.n_twists; ++t)
-            if (const int k = e.twists[t].state; at.rate()[k] == 0.0) size[k] = 0.0;  // it starts from rest
-        const Coupled ahead = bound_ahead(e, coupled(at.rate())), rounding_ahead = bound_ahead(e, coupled(size));
+            if (const int k = e.twists[t].state; at.rate()[k] == 0.0) magnitude[k] = 0.0;  // it starts from rest
+        const Coupled ahead = bound_ahead(e, coupled(at.rate())), rounding_ahead = bound_ahead(e, coupled(magnitude));
         for (int t = 0; t < e.n_twists; ++t) {
             auto& twist = course_.twist[t];
             const double bound = ahead[e.twists[t].state];
@@ -327,7 +328,7 @@ class ExactSolver {
                 evaluate(e, constant, *end, *there);
                 bound_fourth(e.guards, p.level(level).exponential_bound, fourth + h * forced);
                 const Verdict verdict = judge(e, segment.memory, *cursor, *here, *there, h, h < shortest);
-                if (verdict == Verdict::uncertain) {  // below the shortest level, by plain halves
+                if (verdict == Verdict::uncertain) {  // below the shortest doubling level, by plain halves
                     h = level > 0 ? std::min(p.length(level = std::max(0, level - halvings_)), left) : 0.5 * h;
                     continue;
                 }
@@ -405,9 +406,9 @@ class ExactSolver {
 
     // |g''''| over the event check, from a bound on the fourth derivative of the state that the flow carries on.
     [[gnu::always_inline]] void bound_fourth(const GuardTable& guards, const Matrix& exponential_bound,
-                                             const Coupled& size) {
+                                             const Coupled& magnitude) {
         State bound;
-        (exponential_bound * size).store(bound.data());
+        (exponential_bound * magnitude).store(bound.data());
         guards.rate_magnitudes(bound, input_bound_, bounds_.fourth);
     }
 
