@@ -50,7 +50,7 @@ def dangle(*_: object, **__: object) -> None:
 
 # A call of each function that does something, and takes a short time.
 CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
-    "bandwidth": (lm.bandwidth, {"drive": SCENARIO, "amplitude": 1.0, "output": "load_speed", "mean_command": 0.0, "mean_load_torque": 0.0, "lowest": 1.0, "highest": 2.0}),
+    "bandwidth": (lm.bandwidth, {"drive": SCENARIO, "amplitude": 1.0, "output": "load_speed", "source": "command", "mean_command": 0.0, "mean_load_torque": 0.0, "lowest": 1.0, "highest": 2.0}),
     "build_loss_map": (lm.build_loss_map, {"sheet": SHEET, "temperature": None, "loss_factor": 1.0}),
     "catalogue": (lm.catalogue, {}),
     "characteristics": (lm.characteristics, {"response": RESPONSE, "drive": SCENARIO, "output": "load_speed"}),
