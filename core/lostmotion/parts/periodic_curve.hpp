@@ -36,10 +36,12 @@ class PeriodicCurve {
         const int pieces = 4 * quarter;
         const double width = 2.0 * std::numbers::pi / pieces;
         const double outwards = 2.0 / (1.0 + sine_cosine(0.5 * width).cos);
-        std::vector<double> angles, values;
+        // No corner at angle 0, where most runs begin: a slope that jumps there would have no value.
+        const auto node = [&](double k) { return amplitude * outwards * sine_cosine(width * k + phase).sin; };
+        std::vector<double> angles{0.0}, values{0.5 * (node(-0.5) + node(0.5))};
         for (int k = 0; k < pieces; ++k) {
-            angles.push_back(width / n * k);
-            values.push_back(amplitude * outwards * sine_cosine(width * k + phase).sin);
+            angles.push_back(width / n * (k + 0.5));
+            values.push_back(node(k + 0.5));
         }
         PeriodicCurve chords(2.0 * std::numbers::pi / n, std::move(angles), std::move(values));
         chords.sine_ = {amplitude, n, phase};
