@@ -12,7 +12,7 @@ namespace lostmotion {
 
 // All that it takes to continue a motion.
 template <class System>
-struct StationOf {
+struct HybridStateOf {
     StateOf<typename System::Dims> x{};
     typename System::Dims::Memory memory{};
     typename System::Key key;
@@ -26,13 +26,13 @@ struct PeriodicMotionOf {
     double time = 0.0;  // [s] reached, if the status is not done
     typename D::Contact contact{};
     bool converged = false;
-    bool smooth = true;       // whether the Jacobian is exact: no grazing among the switchings
-    int periods = 0;          // followed, all in all
-    int newton_steps = 0;     // of the attempt that converged
-    double residual = 0.0;    // largest change of a state over one period / its largest magnitude within it
-    StateOf<D> advance{};     // of each state over one period: zero but for angles
-    StationOf<System> start;  // at t = 0
-    JacobianOf<D> jacobian;   // of the map over one period, at the start
+    bool smooth = true;           // whether the Jacobian is exact: no grazing among the switchings
+    int periods = 0;              // followed, all in all
+    int newton_steps = 0;         // of the attempt that converged
+    double residual = 0.0;        // largest change of a state over one period / its largest magnitude within it
+    StateOf<D> advance{};         // of each state over one period: zero but for angles
+    HybridStateOf<System> start;  // at t = 0
+    JacobianOf<D> jacobian;       // of the map over one period, at the start
 };
 
 struct ShootingOptions {
@@ -47,7 +47,7 @@ template <class System>
 class ShootingOf {
  public:
     using D = typename System::Dims;
-    using Station = StationOf<System>;
+    using HybridState = HybridStateOf<System>;
     using Motion = PeriodicMotionOf<System>;
 
     // The inputs must repeat with the period. Workspace: a system and its regimes. unit: as of ExactSolver.
@@ -66,7 +66,7 @@ class ShootingOf {
         Motion motion;
         motion.status = solver_.begin(0.0, start.x, start.memory);
         if (motion.status != Status::done) return motion;
-        Station here{solver_.state(), solver_.memory(), solver_.key()};
+        HybridState here{solver_.state(), solver_.memory(), solver_.key()};
         for (int follow = first_follow; motion.periods < options_.max_periods; follow *= 2) {
             for (int k = 0; k < follow; ++k, ++motion.periods) {
                 Image image(laws_, cache_);
@@ -86,7 +86,7 @@ class ShootingOf {
 
     // Runs through one period from a station.
     template <class Observer>
-    Status run(const Station& start, Observer& observer) {
+    Status run(const HybridState& start, Observer& observer) {
         const Status status = enter(start);
         return status == Status::done ? solver_.advance(options_.period, observer) : status;
     }
@@ -99,16 +99,16 @@ class ShootingOf {
     // A station after one period, and how it depends on the one before.
     struct Image {
         Image(const ComponentLaws<System>& laws, RegimeCache<System>& cache) : sensitivity(laws, cache) {}
-        Station end;
+        HybridState end;
         SensitivityOf<System> sensitivity;
     };
 
-    Status enter(const Station& s) {
+    Status enter(const HybridState& s) {
         solver_.resume(0.0, s.x, s.memory, s.key);
         return solver_.inputs_changed();
     }
 
-    bool advance(const Station& from, Image& image, Motion& motion) {
+    bool advance(const HybridState& from, Image& image, Motion& motion) {
         motion.status = enter(from);
         if (motion.status == Status::done) motion.status = solver_.advance(options_.period, image.sensitivity);
         motion.time = solver_.time();
@@ -118,10 +118,12 @@ class ShootingOf {
         return true;
     }
 
-    static double value(const Station& s, int k) { return k < D::states ? s.x[k] : s.memory[k - D::states]; }
-    double change(const Station& a, const Station& b, int k) const { return laws_.change(k, value(a, k), value(b, k)); }
+    static double value(const HybridState& s, int k) { return k < D::states ? s.x[k] : s.memory[k - D::states]; }
+    double change(const HybridState& a, const HybridState& b, int k) const {
+        return laws_.change(k, value(a, k), value(b, k));
+    }
 
-    double residual(const Station& a, const Image& image) const {
+    double residual(const HybridState& a, const Image& image) const {
         double worst = 0.0;
         for (int k = 0; k < component_count<D>; ++k) {
             if (laws_.neutral(k) || !laws_.matters(image.end.key, k)) continue;
@@ -131,7 +133,7 @@ class ShootingOf {
         return worst;
     }
 
-    Motion& finish(Motion& motion, const Station& start, const Image& image, int steps) const {
+    Motion& finish(Motion& motion, const HybridState& start, const Image& image, int steps) const {
         motion.converged = true;
         motion.smooth = image.sensitivity.smooth;
         motion.newton_steps = steps;
@@ -142,7 +144,7 @@ class ShootingOf {
     }
 
     // Newton's method from a station, as long as each step gains; true if it ends within the tolerance.
-    bool newton(Station y, Motion& motion) {
+    bool newton(HybridState y, Motion& motion) {
         double best = std::numeric_limits<double>::infinity();
         for (int step = 0; step <= max_newton; ++step) {
             Image image(laws_, cache_);
@@ -160,7 +162,7 @@ class ShootingOf {
     }
 
     // y + (1 - J)^-1 (image - y), leaving out the directions in which the motion is neutral.
-    bool step_from(Station& y, const Image& image) {
+    bool step_from(HybridState& y, const Image& image) {
         std::vector<int> active;
         for (int k = 0; k < component_count<D>; ++k)
             if (!laws_.neutral(k)) active.push_back(k);
