@@ -131,7 +131,7 @@ TEST_SUITE("parts") {
                 for (int i = 0; i < n_states; ++i)
                     for (int j = 0; j < n_states; ++j) {
                         const double e = static_cast<double>(expected[i][j]) - (i == j ? 1.0 : 0.0);
-                        // In balanced units; doubling adds about one rounding a level.
+                        // In balanced units; doubling adds about one rounding a doubling level.
                         const double change = j == load_angle ? 0.0
                                               : i == load_angle
                                                   ? rates.angle_coefficient[0] * step.integral.coupled(load_speed, j)

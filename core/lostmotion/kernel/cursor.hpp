@@ -70,7 +70,7 @@ class Cursor {
         rate_known_ = false;
     }
 
-    // To one step beyond where another stands on the same stretch.
+    // To one step beyond where another is on the same stretch.
     void step_from(const Cursor& from, int level) {
         propagator_ = from.propagator_;
         constant_ = from.constant_;
@@ -87,8 +87,8 @@ class Cursor {
             arrive(x);
         }
     }
-    // To the nearest of the instants that whole levels, but not the shortest, lead to from where another stands; the
-    // longest first. Returns what is left of h >= 0, a base interval forward or backward at most.
+    // To the nearest of the instants that whole doubling levels, but not the shortest, lead to from where another is;
+    // the longest first. Returns what is left of h >= 0, a base interval forward or backward at most.
     [[gnu::always_inline]] double advance_by_levels(const Cursor& from, double h) {
         Propagator<D>& p = *(propagator_ = from.propagator_);
         constant_ = from.constant_;

@@ -1,4 +1,4 @@
-// The sizes of a drive train, known when the kernel is compiled for it.
+// The dimensions of a drive train, known when the kernel is compiled for it.
 #pragma once
 
 #include <array>

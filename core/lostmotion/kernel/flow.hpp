@@ -33,26 +33,26 @@ class Flow {
     // Sign that a form has just after now, from its value and the sum of the magnitudes of its terms: that of the first
     // of the value and its derivatives that is not zero. 0 if it stays at zero or, if asked by value alone, is zero
     // now.
-    int sign(const LinearForm& form, double value, double size, bool by_value_alone) {
+    int sign(const LinearForm& form, double value, double magnitude, bool by_value_alone) {
         for (int k = 1; k < n_derivatives; ++k) {
             const double next = rate(form, k);
-            if (std::fabs(value) > noise(size, next)) return value > 0.0 ? +1 : -1;
+            if (std::fabs(value) > noise(magnitude, next)) return value > 0.0 ? +1 : -1;
             if (by_value_alone) return 0;
             value = next;
-            size = rate_magnitude(form, k);
+            magnitude = rate_magnitude(form, k);
         }
         return 0;
     }
 
     // What counts as zero: rounding of the terms, and since the instant itself is known to its rounding only, a value
     // may be off by that times its rate.
-    double noise(double size, double rate) const {
-        return rounding * size + time_rounding * std::fabs(now_.time * rate);
+    double noise(double magnitude, double rate) const {
+        return rounding * magnitude + time_rounding * std::fabs(now_.time * rate);
     }
     // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
     double rate(const LinearForm& f, int k) { return evaluate_rate<D>(f, derivative(k), now_.input[k]); }
     double rate_magnitude(const LinearForm& f, int k) {
-        const State& terms = size(k);
+        const State& terms = magnitude(k);
         const auto& u = now_.input[k];
         double sum = 0.0;
         for (int i = 0; i < D::inputs; ++i) sum += std::fabs(f.c[D::first_input + i] * u[i]);
@@ -69,20 +69,21 @@ class Flow {
         for (; order_ < k; ++order_) x_[order_ + 1] = rates_.higher(x_[order_], now_.input[order_]);
         return x_[k];
     }
-    const State& size(int k) {
-        if (sized_ == 0) {
-            size_[1] = rates_.size(magnitudes(now_.x), magnitudes(now_.memory), now_.input_magnitudes);
-            sized_ = 1;
+    const State& magnitude(int k) {
+        if (n_magnitudes_ == 0) {
+            magnitude_[1] = rates_.magnitude(magnitudes(now_.x), magnitudes(now_.memory), now_.input_magnitudes);
+            n_magnitudes_ = 1;
         }
-        for (; sized_ < k; ++sized_)
-            size_[sized_ + 1] = rates_.higher_size(size_[sized_], magnitudes(now_.input[sized_]));
-        return size_[k];
+        for (; n_magnitudes_ < k; ++n_magnitudes_)
+            magnitude_[n_magnitudes_ + 1] =
+                rates_.higher_magnitude(magnitude_[n_magnitudes_], magnitudes(now_.input[n_magnitudes_]));
+        return magnitude_[k];
     }
 
     const LinearRates& rates_;
     const Instant& now_;
-    int order_ = 0, sized_ = 0;
-    std::array<State, n_derivatives + 1> x_, size_;  // as far as they are known
+    int order_ = 0, n_magnitudes_ = 0;
+    std::array<State, n_derivatives + 1> x_, magnitude_;  // as far as they are known
 };
 
 }  // namespace lostmotion

@@ -103,11 +103,11 @@ template <std::size_t n>
 }
 template <class D>
 [[gnu::always_inline]] inline StateOf<D> magnitudes(const StateOf<D>& x) {
-    LanesOf<D> size = load(x);
-    size.coupled = absolute(size.coupled);
-    for (double& angle : size.angle) angle = std::fabs(angle);
+    LanesOf<D> magnitude = load(x);
+    magnitude.coupled = absolute(magnitude.coupled);
+    for (double& angle : magnitude.angle) angle = std::fabs(angle);
     StateOf<D> out;
-    size.store(out.data());
+    magnitude.store(out.data());
     return out;
 }
 

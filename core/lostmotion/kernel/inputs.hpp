@@ -351,7 +351,7 @@ class InputState {
 
     // Moves on by h, by which the pairs turn as given.
     [[gnu::always_inline]] void advance(double h, const PhaseRotation* rotations) { advance_from(*this, h, rotations); }
-    // To h beyond where another with the same signals stands, on the same stretch between breakpoints.
+    // To h beyond where another with the same signals is, on the same stretch between breakpoints.
     [[gnu::always_inline]] void advance_from(const InputState& from, double h, const PhaseRotation* rotations) {
         time_ = from.time_ + h;
         breakpoint_ = from.breakpoint_;

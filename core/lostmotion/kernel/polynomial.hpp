@@ -1,4 +1,4 @@
-// Polynomials that stand for a guard: over one event check the cubic Hermite interpolant, enclosed by its Bernstein
+// Polynomials in place of a guard: over one event check the cubic Hermite interpolant, enclosed by its Bernstein
 // coefficients; near its zero the Taylor series.
 #pragma once
 

@@ -52,6 +52,7 @@ struct ResponseOf {
     }
 };
 
+// Doubling level k, for short level: the step of 2^k base intervals, made from two of level k - 1.
 template <class D>
 class Propagator {
  public:
@@ -71,7 +72,7 @@ class Propagator {
     static constexpr double base_norm = 0.25;   // |A| h of the base interval, in scaled units
 
     // rotations: its unit is a length of which some power-of-two multiple or fraction is the base interval.
-    // scale: natural sizes of the states; only for choosing the base interval.
+    // scale: natural magnitudes of the states; only for choosing the base interval.
     // rates and rotations must outlive this.
     void prepare(const LinearRates& rates, PhaseRotations& rotations, const State& scale) {
         rotations_ = &rotations;
@@ -245,8 +246,8 @@ class Propagator {
             (2.0 * load(change) + a.change * change).store(b.change.column[c].data());
             (2.0 * load(integral) + a.change * integral).store(b.integral.coupled.column[c].data());
             // |exp(A (h + s))| <= |exp(A s)| |exp(A h)|, of which the second is known.
-            const Coupled size = absolute(Matrix::identity().at(c) + load(change));
-            at_most(max_of(a.exponential_bound.at(c), a.exponential_bound * size), unbounded)
+            const Coupled magnitude = absolute(Matrix::identity().at(c) + load(change));
+            at_most(max_of(a.exponential_bound.at(c), a.exponential_bound * magnitude), unbounded)
                 .store(b.exponential_bound.column[c].data());
         }
         for (int c = 0; c < D::coupled; ++c)

@@ -146,14 +146,14 @@ struct LinearRatesOf {
     }
 
     // Sums of the magnitudes of the terms of both, from magnitudes of what they depend on.
-    State size(const State& x, const Memory& m, const Inputs& u) const {
-        State out = higher_size(x, u);
+    State magnitude(const State& x, const Memory& m, const Inputs& u) const {
+        State out = higher_magnitude(x, u);
         Coupled kept = m[0] * absolute(load(per_memory[0]));
         for (int k = 1; k < depends_on.memory; ++k) kept = kept + m[k] * absolute(load(per_memory[k]));
         (coupled(out) + (absolute(load(fixed)) + kept)).store(out.data());
         return out;
     }
-    State higher_size(const State& derivative, const Inputs& u) const {
+    State higher_magnitude(const State& derivative, const Inputs& u) const {
         Coupled forced = u[0] * absolute(load(input_column[0]));
         for (int i = 1; i < depends_on.inputs; ++i) forced = forced + u[i] * absolute(load(input_column[i]));
         State out;

@@ -37,7 +37,7 @@ class Stride {
     using State = StateOf<D>;
     using Lanes = LanesOf<D>;
 
-    // On a regime, with steps of one level, from where a cursor stands.
+    // On a regime, with steps of one doubling level, from where a cursor is.
     void place(Propagator<D>& propagator, int level, const ColumnOf<D>& constant, const Cursor<D>& from) {
         step_ = &propagator.level(level);
         const double length = propagator.length(level);

@@ -99,7 +99,7 @@ class AdaptiveSolver {
           scale_(scale),
           remainder_(remainder),
           input_(signals_, basis_) {
-        // A drive that stands has nothing to control the error of; its inputs are to be looked at all the same.
+        // A drive at rest has nothing to control the error of; its inputs are to be looked at all the same.
         for (const InputBasis& b : basis_)
             if (b.omega > 0.0) longest_step_ = std::min(longest_step_, 0.4 / b.omega);
     }

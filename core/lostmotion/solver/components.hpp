@@ -65,7 +65,7 @@ struct ResetOf {
 template <class D>
 struct ResetRatesOf {
     ComponentsOf<D> by_time{};
-    bool exact = true;  // false: where a torque at rest comes to stand is not known to the first order
+    bool exact = true;  // false: where a torque at rest comes to lie is not known to the first order
 };
 
 // What only the system can say of its components. A specialisation for each has

@@ -14,10 +14,10 @@ struct CourseOf {
     bool rate_known = false;
     InputsOf<D> input{};  // up to here; those that the rate belongs to
     // Of the speed of a twist, which ends the regime by touching zero, too. What rounding leaves of a zero is relative
-    // to the largest size of its terms.
+    // to the largest magnitude of its terms.
     struct Twist {
         bool off_zero = false;           // has it been off zero?
-        double grazing_magnitude = 0.0;  // the largest size of its terms [rad/s]
+        double grazing_magnitude = 0.0;  // the largest magnitude of its terms [rad/s]
         double doubt = 0.0;              // rounding of the rate where the regime began, relative to the rate
         double most_doubt = 0.0;         // the same as a speed of the twist [rad/s]
     };

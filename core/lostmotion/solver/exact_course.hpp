@@ -67,10 +67,10 @@ inline auto ExactSolver<System>::bound_ahead(Entry& e, const Coupled& x) const -
 // the search for the modes takes for zero must not be seen to fall at once.
 template <class System>
 inline auto ExactSolver<System>::begin_in_doubt(Entry& e, const Cursor& at, const Memory& memory) -> void {
-    State size = e.rates.size(magnitudes(at.x()), magnitudes(memory), at.input().magnitudes());
+    State magnitude = e.rates.magnitude(magnitudes(at.x()), magnitudes(memory), at.input().magnitudes());
     for (int t = 0; t < e.n_twists; ++t)
-        if (const int k = e.twists[t].state; at.rate()[k] == 0.0) size[k] = 0.0;  // it starts from rest
-    const Coupled ahead = bound_ahead(e, coupled(at.rate())), rounding_ahead = bound_ahead(e, coupled(size));
+        if (const int k = e.twists[t].state; at.rate()[k] == 0.0) magnitude[k] = 0.0;  // it starts from rest
+    const Coupled ahead = bound_ahead(e, coupled(at.rate())), rounding_ahead = bound_ahead(e, coupled(magnitude));
     for (int t = 0; t < e.n_twists; ++t) {
         auto& twist = course_.twist[t];
         const double bound = ahead[e.twists[t].state];

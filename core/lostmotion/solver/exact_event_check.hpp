@@ -56,7 +56,7 @@ inline auto ExactSolver<System>::run_regime(const Segment<System>& segment, doub
             evaluate(e, constant, *end, *there);
             bound_fourth(e.guards, p.level(level).exponential_bound, fourth + h * forced);
             const Verdict verdict = judge(e, segment.memory, *cursor, *here, *there, h, h < shortest);
-            if (verdict == Verdict::uncertain) {  // below the shortest level, by plain halves
+            if (verdict == Verdict::uncertain) {  // below the shortest doubling level, by plain halves
                 h = level > 0 ? std::min(p.length(level = std::max(0, level - halvings_)), left) : 0.5 * h;
                 continue;
             }
@@ -115,7 +115,7 @@ template <class System>
 inline auto ExactSolver<System>::bound_fourth(const GuardTable& guards, const Matrix& exponential_bound,
                                               const Coupled& size) -> void {
     State bound;
-    (exponential_bound * size).store(bound.data());
+    (exponential_bound * magnitude).store(bound.data());
     guards.rate_magnitudes(bound, input_bound_, bounds_.fourth);
 }
 

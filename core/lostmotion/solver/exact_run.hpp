@@ -52,7 +52,7 @@ class ExactSolver {
     using Expansion = lostmotion::Expansion<D>;
 
     // unit: a length of time [s] that is to be a power-of-two multiple of the elementary steps, such as the
-    // sampling interval. scale: natural sizes of the states.
+    // sampling interval. scale: natural magnitudes of the states.
     // shared: regimes of the same system that an earlier solver has left, if any.
     ExactSolver(const System& system, const Signals& signals, double unit, const State& scale, Cache* shared = nullptr)
         : system_(system),
@@ -158,9 +158,10 @@ class ExactSolver {
     }
 
  private:
-    static constexpr double converging = 1e-7;   // the next correction is less than the square of the last
-    static constexpr int first_level = 6;        // of the first event check
-    static constexpr double settled = 0x1p-400;  // of a rate [1/s], in natural sizes: below it, squares would underflow
+    static constexpr double converging = 1e-7;  // the next correction is less than the square of the last
+    static constexpr int first_level = 6;       // of the first event check
+    static constexpr double settled =
+        0x1p-400;  // of a rate [1/s], in natural magnitudes: below it, squares would underflow
     // A third of the length times the error of the slope of a cubic, over the error of its value.
     static constexpr double slope_share = 0.00802 / 3.0 * 384.0;
 
