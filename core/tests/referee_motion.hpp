@@ -90,7 +90,7 @@ struct Combination {
     const MapCell* cell = nullptr;                                 // input slips, loss map
     const StandstillCell *forward = nullptr, *backward = nullptr;  // input sticks, loss map
     Quad h = 0;
-    // While all contacts stand: T_2 as it was, or at the limit with this number, which pushes it.
+    // While all contacts are at rest: T_2 as it was, or at the limit with this number, which pushes it.
     Quad kept_torque = 0;
     int pushed_by = kept;
 };
@@ -122,7 +122,7 @@ struct Inputs {
     Series E, M_Z;
 };
 
-// A condition G + q T_2 >= 0 on the torque while all contacts stand.
+// A condition G + q T_2 >= 0 on the torque while all contacts are at rest.
 struct TorqueLimit {
     const char* name = "";
     Series G;
@@ -148,7 +148,8 @@ class MotionBuilder {
         return motion;
     }
 
-    // Conditions on T_2 alone while all contacts stand: first the limits that may push it, then those of its cells.
+    // Conditions on T_2 alone while all contacts are at rest: first the limits that may push it, then those of its
+    // cells.
     std::vector<TorqueLimit> torque_limits(const Combination& c, Quad d, const Series& M_D, const Series& M_Z) const {
         std::vector<TorqueLimit> limits;
         if (!m_.rigid) {
@@ -244,7 +245,7 @@ class MotionBuilder {
         return M_Z + m_.b_Z * w + (k == 0 ? sign * m_.T_f : Quad(0));
     }
 
-    // k-th coefficient of T_2 from the k-th coefficients of the state; not while all contacts stand.
+    // k-th coefficient of T_2 from the k-th coefficients of the state; not while all contacts are at rest.
     bool output_torque(const Combination& c, const Gear& g, int k, Quad M_D, Quad w_M, Quad w, Quad d, Quad M_Z,
                        Quad& T_2) const {
         if (c.modes.twist != stuck) {

@@ -99,7 +99,7 @@ class Map {
  private:
     Quad node(std::size_t j, std::size_t i) const { return m_[j * v_.size() + i]; }
 
-    // Slopes outside the data: the steepest by which losses rise towards that edge, or level if they fall.
+    // Slopes outside the data: the steepest by which losses rise towards that edge, or constant if they fall.
     void extend() {
         const std::size_t n = v_.size(), m = mu_.size();
         for (std::size_t j = 0; j < m; ++j)

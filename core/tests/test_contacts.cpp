@@ -42,7 +42,7 @@ TEST_SUITE("contacts") {
     }
 
     TEST_CASE("the torque of a standing drive follows what pushes it, and stays where that turns back") {
-        // All stands: T_2 is M_Z followed with a play of T_f on either side, or i M_D with one of i T_10. Between
+        // All is at rest: T_2 is M_Z followed with a play of T_f on either side, or i M_D with one of i T_10. Between
         // instants dt apart a turning point of 2 sin(10 pi t) is missed by less than 2 (10 pi)^2 dt^2/8 = 4e-8.
         const auto check = [](const Drive& d, const Signals& signals, double half_width, auto&& centre) {
             constexpr int steps = 1000;

@@ -88,7 +88,7 @@ TEST_SUITE("events") {
     }
     // A locked input, an undamped load on a spring k with hysteresis, a load torque that grows as a t. The twist rate
     // is (a/k)(1 - cos(Omega t)): after each period T it touches zero without changing sign. There (16) sets h anew,
-    // h_n = (1 - eta)/2 a n T, and the twist stands until the load torque has grown by h_n - h_(n-1) = (1 - eta)/2 a T.
+    // h_n = (1 - eta)/2 a n T, and the twist rests until the load torque has grown by h_n - h_(n-1) = (1 - eta)/2 a T.
     TEST_CASE("a twist rate that touches zero has reached it: the hysteresis is set anew, the twist stands") {
         Drive d = plain_drive(1.0, 1e18, 2.0);
         d.gearbox.compliance = Gearbox::torsion_curve;

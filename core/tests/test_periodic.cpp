@@ -42,7 +42,7 @@ TEST_SUITE("periodic") {
             bool away = false;
             double size = 0.0;
             for (const Channel c : {ch_motor_torque, ch_motor_speed, ch_load_speed, ch_twist}) {
-                size = c == ch_load_speed ? size / drive.gearbox.ratio : 0.0;  // a load may stand but for rounding
+                size = c == ch_load_speed ? size / drive.gearbox.ratio : 0.0;  // a load may be at rest but for rounding
                 for (std::size_t k = 0; k < s.count; ++k) size = std::fmax(size, std::fabs(s(c, k)));
                 for (std::size_t k = 0; k + 64 < s.count; ++k)
                     away = away || std::fabs(s(c, k + 64) - s(c, k)) > 1e-6 * size;

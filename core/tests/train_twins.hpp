@@ -11,7 +11,7 @@ struct Twins {
     Drive drive;
     Assembly assembly;
     const Places& p = assembly.places();
-    std::array<int, lostmotion::n_terms> term{};  // where each of the classic terms stands in the train; -1: nowhere
+    std::array<int, lostmotion::n_terms> term{};  // where each of the classic terms is in the train; -1: nowhere
 
     explicit Twins(const Drive& d) : drive(d), assembly(train_of(d)) {
         const Layout& n = assembly.layout();

@@ -236,8 +236,8 @@ class SwitchedDrive {
         return all;
     }
 
-    // The first combination that is consistent. While everything stands the output torque stays as it was, and gives
-    // way only if neither that nor a motion is consistent, and then by as little as it can.
+    // The first combination that is consistent. While everything is at rest the output torque stays as it was, and
+    // gives way only if neither that nor a motion is consistent, and then by as little as it can.
     template <class Cache>
     Found search(Cache& cache, Instant& now, const Combinations& combinations, const Event& event,
                  RegimeKey& key) const {
@@ -271,7 +271,7 @@ class SwitchedDrive {
     }
 
     // Is this combination, in which a contact is at its limit, consistent, or, if what drives it there turns back, does
-    // everything stand at that torque?
+    // everything rest at that torque?
     template <class Cache>
     Found settle_at_limit(Cache& cache, Instant& now, const Modes& modes, const Event& event, RegimeKey& key) const {
         Event thorough = event;
@@ -464,7 +464,7 @@ class SwitchedDrive {
         return left == nullptr && !overcome;
     }
 
-    // Everything stands: T_2 stays where it was, or at the nearest value that twist and load contact can hold.
+    // Everything is at rest: T_2 stays where it was, or at the nearest value that twist and load contact can hold.
     bool hold(Instant& now, double T_2) const {
         const double M_Z = now.input[0][1], T_f = drive_.load.friction_torque;
         double low = M_Z - T_f, high = M_Z + T_f;

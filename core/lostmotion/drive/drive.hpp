@@ -53,7 +53,7 @@ class Drive {
         return input_inertia() + least * load.inertia / i2;
     }
 
-    // Sizes of the states in which the coupling of the equations is balanced (all time constants of like weight).
+    // Magnitudes of the states in which the coupling of the equations is balanced (all time constants of like weight).
     // They serve to measure rates by a matrix norm, nothing else.
     State balanced_scale() const {
         const double i = gearbox.ratio, J = input_inertia();
@@ -74,7 +74,7 @@ class Drive {
         }
         return s;
     }
-    // Sizes that the states have at rated speed and torque, for error control.
+    // Magnitudes that the states have at rated speed and torque, for error control.
     State rated_scale() const {
         const double w = gearbox.rated_input_speed, i = gearbox.ratio;
         const double d = rigid() ? 1.0 : gearbox.rated_output_torque / gearbox.curve.max_slope();
@@ -150,7 +150,7 @@ inline Drive::Equations Drive::compose(const RegimeKey& key, const Regime& r) co
     Equations e;
     e.M_D = motor.torque<Open>(motor_terms);
 
-    // Output torque: rigid, it is whatever is needed (7); else T_2 = P(d) + H (15). While everything stands, the
+    // Output torque: rigid, it is whatever is needed (7); else T_2 = P(d) + H (15). While everything is at rest, the
     // split between the contacts is not determined by the motion; T_2 then stays as it was.
     const TorsionCurve& curve = gearbox.curve;
     const Open P =
@@ -235,7 +235,7 @@ inline bool Drive::solve_reactions(const RegimeKey& key, const Regime& r, Equati
     };
     for (Open* f : {&e.T_2, &e.T_1, &e.F_input, &e.H, &e.F_load, &e.input_acceleration, &e.load_acceleration})
         substitute(*f);
-    // Turning the rotor forward must need more torque, not less: else the friction jams. While it stands at its limit
+    // Turning the rotor forward must need more torque, not less: else the friction jams. While it rests at its limit
     // this goes for the torque T_2 that it would wind up by giving way.
     const LinearForm result = closed(r.at_rest[input_contact] ? e.T_2 : e.input_acceleration);
     const double per_torque = motor.kind == Motor::dc ? result.c[motor_torque] : result.c[command];
@@ -289,8 +289,8 @@ inline void Drive::add_guards(const RegimeKey& key, const Equations& e, Regime& 
     }
 }
 
-// Everything stands, and one contact "slips": it is at its limit, and T_2 goes along with that as long as what drives
-// it there goes on. When it turns back T_2 stays.
+// Everything is at rest, and one contact "slips": it is at its limit, and T_2 goes along with that as long as what
+// drives it there goes on. When it turns back T_2 stays.
 inline void Drive::add_turning(const RegimeKey& key, Regime& r) const {
     const auto [input, slip, bearing] = key.modes;
     if (slip != 0 || input == absent || bearing == absent || (input == 0) == (bearing == 0)) return;

@@ -81,7 +81,7 @@ struct Regime {
     std::array<bool, n_contacts> at_rest{};  // contacts whose speeds this regime keeps at exactly zero
     // Of the coupled states: speeds that are kept at zero, and those that follow another as the twist at rest has it.
     std::array<bool, n_coupled> resting{}, following{};
-    // While all stands with one contact at its limit, an input by which it is driven there has to go on this way.
+    // While all is at rest with one contact at its limit, an input by which it is driven there has to go on this way.
     int driving_input = -1;  // -1: none
     double driving_way = 0.0;
 };

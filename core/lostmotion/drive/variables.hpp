@@ -17,7 +17,7 @@ enum Term : int {
     load_angle,           // phi [rad]
     one,                  // the constant 1
     hysteresis_capacity,  // h [N m], set anew at every turning point of the twist (eq. 16)
-    locked_torque,        // T_2 [N m] frozen while all contacts stand
+    locked_torque,        // T_2 [N m] frozen while all contacts are at rest
     command,              // E_C [-]
     load_torque,          // M_Z [N m]
     n_terms

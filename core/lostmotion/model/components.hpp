@@ -219,7 +219,7 @@ class ComponentLaws<model::TrainSystem<D>> {
         magnitude_[memory] = magnitude;
     }
 
-    // A torque that the motion does not determine stays as it was, or comes to stand at the limit of a contact.
+    // A torque that the motion does not determine stays as it was, or comes to lie at the limit of a contact.
     void lock(std::size_t c, bool used, const ResetOf<System>& r, JacobianOf<D>& jump, ResetRatesOf<D>& rates) const {
         const model::ContactPlace& contact = contacts()[c];
         const int k = D::states + contact.locked;

@@ -65,7 +65,7 @@ inline void Equations::compose(const Key& key, Regime& r, std::vector<Row>& acce
     }
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
         acceleration[s] = this->acceleration(static_cast<int>(s), key, r);
-    // From here on the torque at the input tells of the losses, too.
+    // From here on the torque at the input includes the losses.
     for (std::size_t g = 0; g < gears; ++g) r.input_torque[g] += loss[g];
 }
 

@@ -203,7 +203,7 @@ Found SwitchedTrain<Sizes>::search(Cache& cache, Now& now, const Event& event, c
     return found == Found::yes || combinations > max_tried ? found : enumerate(cache, now, event, from, key);
 }
 
-// Those with most contacts stuck first. While everything stands the torques stay as they were, and give way only if
+// Those with most contacts stuck first. While everything is at rest the torques stay as they were, and give way only if
 // neither that nor a motion is consistent, and then by as little as they can.
 template <class Sizes>
 template <class Cache, class Now>

@@ -195,7 +195,7 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
 }
 
 // Is this combination, in which a contact is at its limit, consistent, or, if what drives it there turns back, does
-// everything stand at those torques?
+// everything rest at those torques?
 template <class Sizes>
 template <class Cache, class Now>
 Found SwitchedTrain<Sizes>::settle_at_limit(Cache& cache, Now& now, const Key& modes, const Event& event,

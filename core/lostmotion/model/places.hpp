@@ -1,4 +1,4 @@
-// Where the elements of a train stand in its equations: states, contacts, memory, inputs, branches.
+// What belongs to each element of a train in its equations: states, contacts, memory, inputs, branches.
 //
 // Coupled states: [motor torques][shaft speeds][twists][angles that a torque depends on]. Angles: one for each part of
 // the train that hangs together, that of its last shaft.
@@ -57,7 +57,7 @@ struct Places {
 
  private:
     // The narrowest kernel. A train that fits into it has a place for the torque of each motor and the twist of each
-    // gear, whether they move or not: one motor, two shafts and a gear always stand in the same order.
+    // gear, whether they move or not: one motor, two shafts and a gear are always in the same order.
     static constexpr int narrowest = 4;
 
     void place_states(const Train& train);

@@ -8,7 +8,7 @@ namespace lostmotion::model {
 inline constexpr int max_shafts = 16, max_contacts = 32, max_terms = 72, max_columns = max_terms + max_contacts;
 inline constexpr int max_branches = 64, max_guards = 256, max_memory = 32, max_inputs = 24, max_states = 40;
 
-// Where the terms of a form stand: [coupled states][angles][1][memory][inputs], then [reactions of stuck contacts].
+// The order of the terms of a form: [coupled states][angles][1][memory][inputs], then [reactions of stuck contacts].
 // The names are those of the kernel's dimensions.
 struct Layout {
     int coupled = 0, angles = 0, inputs = 0, memory = 0, contacts = 0, branches = 0;

@@ -49,8 +49,8 @@ class LossMap {
     // speeds: v, rising from 0; loads: mu, rising; values: m_2B >= 0, values[j * speeds.size() + i] at (loads[j],
     // speeds[i]).
     //
-    // Outside its data the map goes on with the steepest slope by which its losses rise towards that edge, or level if
-    // they fall (a loss must not become negative); in_data() tells inside from outside.
+    // Outside its data the map goes on with the steepest slope by which its losses rise towards that edge, or constant
+    // if they fall (a loss must not become negative); in_data() distinguishes inside from outside.
     LossMap(std::vector<double> speeds, std::vector<double> loads, std::vector<double> values)
         : speeds_(std::move(speeds)), loads_(std::move(loads)), values_(std::move(values)) {
         extend();

@@ -166,7 +166,7 @@ class PowerIntegral {
         mean_power_ = turned_over / elapsed_;
     }
 
-    // The same by the powers at nodes, from where a cursor stands.
+    // The same by the powers at nodes, from where a cursor is.
     double add_stiff_panel(const Factors& factors, const Cursor<D>& from, double h) {
         Cursor<D>& node = node_.emplace(from);
         Flows sums{}, coarse{}, power;
