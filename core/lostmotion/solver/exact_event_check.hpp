@@ -113,7 +113,7 @@ inline auto ExactSolver<System>::evaluate(const Entry& e, const typename GuardTa
 // |g''''| over the event check, from a bound on the fourth derivative of the state that the flow carries on.
 template <class System>
 inline auto ExactSolver<System>::bound_fourth(const GuardTable& guards, const Matrix& exponential_bound,
-                                              const Coupled& size) -> void {
+                                              const Coupled& magnitude) -> void {
     State bound;
     (exponential_bound * magnitude).store(bound.data());
     guards.rate_magnitudes(bound, input_bound_, bounds_.fourth);

@@ -240,7 +240,7 @@ class ExactSolver {
     [[gnu::always_inline]] static void evaluate(const Entry& e, const typename GuardTable::Values& constant, Cursor& at,
                                                 Ends& out);
     [[gnu::always_inline]] void bound_fourth(const GuardTable& guards, const Matrix& exponential_bound,
-                                             const Coupled& size);
+                                             const Coupled& magnitude);
     Guards enclose(int rows, const Ends& here, const Ends& there, double h);
     Verdict judge(Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here, const Ends& there, double h,
                   bool shortest);
