@@ -30,7 +30,7 @@ int main(void) {
     lm_add_shaft(train, "worm", 0.0, 1e-3, 0.0, 0.0, NULL, 0);
     lm_add_shaft(train, "drum", 0.5, 0.0, 0.0, 0.0, NULL, 1);
     lm_add_motor(train, "motor", "worm", motor, 2, 1, INFINITY);
-    lm_add_gear(train, "gear", "worm", "drum", gear, 1, &mesh, NULL, efficiencies, 0.0, NULL);
+    lm_add_gear(train, "gear", "worm", "drum", gear, 1, &mesh, NULL, efficiencies, 20.0, NULL);
     s = lm_simulation_new(train, 1e-3);
     stop_if(s == NULL, lm_train_error(train));
     lm_train_free(train);

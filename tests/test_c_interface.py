@@ -247,13 +247,16 @@ def test_a_jam_is_said_as_in_python(library: c.CDLL) -> None:
                 "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.44, "backdrive_efficiency": -0.2},
             }
         },
-        command={"motor": -0.5},
+        initial={"speeds": {"worm": -100.0, "drum": -2.0}},
         simulation={"duration": 0.1, "sample_interval": 1e-3},
     )
     with pytest.raises(lm.SolverError) as jammed:
         lm.simulate(scenario)
     simulation = Train(library, scenario).simulation(1e-3)
-    inputs = [-0.5 if name == "motor_command" else 20.0 for name in simulation.names(INPUTS)]
+    start = {"worm_speed": -100.0, "drum_speed": -2.0}
+    states = doubles([start.get(name, 0.0) for name in simulation.names(STATES)])
+    assert library.lm_reset(simulation.handle, states, None) == OK, simulation.error()
+    inputs = [0.0 if name == "motor_command" else 20.0 for name in simulation.names(INPUTS)]
     assert simulation.advance(1e-3, inputs) == JAMMED
     assert simulation.error() == str(jammed.value)
 
@@ -280,4 +283,4 @@ def test_the_example_in_c_compiles_without_a_warning_and_runs(library: c.CDLL, t
     assert out.startswith("t = 2 s\n")
     values = {line.split()[0]: float(line.split()[1]) for line in out.splitlines()[1:]}
     assert values["worm_speed"] == 0.0
-    assert values["gear_output_torque"] == pytest.approx(-20.0, abs=1e-6)
+    assert values["gear_output_torque"] == pytest.approx(20.0, abs=1e-6)

@@ -449,6 +449,8 @@ ELEMENTS = {
 def chords(scenario: lm.TrainScenario) -> float:
     """By how much chords in place of sines move a speed [rad/s] at most: their error over the smallest inertia."""
     smooth: dict[str, Any] = {**scenario.gravity, **scenario.angle_torques}
+    if not smooth:
+        return 0.0
     error = sum(element.error or 1e-3 * 9.80665 * element.mass * element.radius for element in smooth.values())
     return error * scenario.simulation.duration / min(shaft.inertia for shaft in scenario.shafts.values())
 

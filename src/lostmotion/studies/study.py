@@ -66,7 +66,8 @@ class Study(Part):
         base = data.get("scenario") if isinstance(data, dict) else None
         if not isinstance(base, dict):
             return data
-        return data | {"scenario": TrainScenario(**base) if is_train(base) else Scenario(**base)}
+        kind = TrainScenario if is_train(base) else Scenario
+        return data | {"scenario": kind.model_validate(base)}
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
