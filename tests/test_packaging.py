@@ -149,4 +149,6 @@ def test_warnings_are_errors_in_our_own_builds_only(tmp_path: Path, strict: bool
     core = [c["command"] for c in compiled if "-ffp-contract=off" in c["command"]]
     assert core
     assert all(("-Werror" in c) is strict for c in core)
-    assert (ROOT / "Makefile").read_text().count("LOSTMOTION_WERROR=ON") == 5  # tests, C library, soak, benchmark, package
+    assert (ROOT / "Makefile").read_text().count(
+        "LOSTMOTION_WERROR=ON"
+    ) == 5  # tests, C library, soak, benchmark, package
