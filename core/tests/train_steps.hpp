@@ -484,7 +484,7 @@ class TrainSteps {
     }
 
     const Train& train_;
-    const std::vector<Signal>& inputs_;
+    std::vector<Signal> inputs_;
     std::vector<double> inertia_, viscous_, bearing_;
     std::vector<Place> places_;
     std::vector<int> shaft_contact_, gear_contact_, direction_;
