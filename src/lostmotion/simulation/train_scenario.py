@@ -77,9 +77,9 @@ class TrainScenario(TrainElements):
         if idle:
             keys = f"key {idle[0]}: is" if len(idle) == 1 else f"keys {', '.join(idle)}: are"
             raise InputError(f"{keys} missing; add a number from 0 (open) to 1 (full torque), or a signal")
-        for name, element in (*self.brakes.items(), *self.clutches.items()):
+        for name in known:
             try:
-                element.acting(self.command.get(name, CommandSignal()))
+                self._acting(name)
             except ValueError as problem:
                 raise InputError(f"key command.{name}: {problem}") from None
         start_values(train, self.initial)
@@ -98,12 +98,15 @@ class TrainScenario(TrainElements):
 
     def signals(self) -> dict[str, CommandSignal | TorqueSignal]:
         """All that acts on the train, after delays of brakes and clutches, by the name of its result variable."""
-        commands = {f"{name}_command": self.command.get(name, CommandSignal()) for name in self.commanded()}
-        for name, element in (*self.brakes.items(), *self.clutches.items()):
-            if name in self.command:
-                commands[f"{name}_command"] = element.acting(self.command[name])
+        commands = {f"{name}_command": self._acting(name) for name in self.commanded()}
         torques = {f"{name}_load_torque": s.torque for name, s in self.shafts.items() if s.torque is not None}
         return {**commands, **torques}
+
+    def _acting(self, name: str) -> CommandSignal:
+        """The command of a motor, brake or clutch after its delays."""
+        command = self.command.get(name, CommandSignal())
+        element = self.brakes.get(name) or self.clutches.get(name)
+        return command if element is None else element.acting(command)
 
     def __repr__(self) -> str:
         title = f"{self.title!r}, " if self.title else ""
