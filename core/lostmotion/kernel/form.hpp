@@ -219,26 +219,12 @@ class FormTable {
     }
     // Sums of the magnitudes of the terms, from magnitudes of what the forms depend on.
     void magnitudes(const Memory& m, const State& x, const Inputs& u, Values& out) const {
-        for (int g = 0; g < rows_; g += vec_width) {
-            Vec kept = m[0] * absolute(at(D::first_memory, g));
-            for (int k = 1; k < depends_on_.memory; ++k) kept += m[k] * absolute(at(D::first_memory + k, g));
-            store(absolute(at(D::one, g)) + kept + terms<true>(g, x, u), &out[g]);
-        }
+        for (int g = 0; g < rows_; g += vec_width) store(magnitude<Vec>(g, m, x, u), &out[g]);
     }
     // The same of one form.
     template <class Input>
-    double magnitude(int row, const Memory& m, const State& x, const Input& input) const {
-        const auto c = [&](int term) { return std::fabs(column_[term][row]); };
-        double kept = m[0] * c(D::first_memory);
-        for (int k = 1; k < depends_on_.memory; ++k) kept += m[k] * c(D::first_memory + k);
-        double sum = sum_in_fours<D::coupled>([&](auto k) { return c(k) * x[k]; });
-        if (driven_) {
-            const Inputs u = input.magnitudes();
-            double forced = c(D::first_input) * u[0];
-            for (int i = 1; i < depends_on_.inputs; ++i) forced += c(D::first_input + i) * u[i];
-            sum += forced;
-        }
-        return c(D::one) + kept + sum;
+    double magnitude_of(int row, const Memory& m, const State& x, const Input& input) const {
+        return magnitude<double>(row, m, x, driven_ ? input.magnitudes() : Inputs{});
     }
     void rate_magnitudes(const State& rate, const Inputs& input_rate, Values& out) const {
         for (int g = 0; g < rows_; g += vec_width) store(terms<true>(g, rate, input_rate), &out[g]);
@@ -249,15 +235,27 @@ class FormTable {
     }
 
  private:
-    Vec at(int term, int g) const { return load(&column_[term][g]); }
-    template <bool magnitudes = false>
-    [[gnu::always_inline]] Vec terms(int g, const State& x, const Inputs& u) const {
-        const auto c = [&](int term) { return magnitudes ? absolute(at(term, g)) : at(term, g); };
-        const Vec sum = sum_in_fours<D::coupled>([&](auto k) { return c(k) * x[k]; });
+    // V: Vec for as many forms as it holds, from the g-th on; double for that alone.
+    template <class V = Vec>
+    V at(int term, int g) const {
+        V v;
+        __builtin_memcpy(&v, &column_[term][g], sizeof v);
+        return v;
+    }
+    template <bool magnitudes = false, class V = Vec>
+    [[gnu::always_inline]] V terms(int g, const State& x, const Inputs& u) const {
+        const auto c = [&](int term) { return magnitudes ? absolute(at<V>(term, g)) : at<V>(term, g); };
+        const V sum = sum_in_fours<D::coupled>([&](auto k) { return c(k) * x[k]; });
         if (!driven_) return sum;
-        Vec forced = c(D::first_input) * u[0];
+        V forced = c(D::first_input) * u[0];
         for (int i = 1; i < depends_on_.inputs; ++i) forced += c(D::first_input + i) * u[i];
         return sum + forced;
+    }
+    template <class V>
+    [[gnu::always_inline]] V magnitude(int g, const Memory& m, const State& x, const Inputs& u) const {
+        V kept = m[0] * absolute(at<V>(D::first_memory, g));
+        for (int k = 1; k < depends_on_.memory; ++k) kept += m[k] * absolute(at<V>(D::first_memory + k, g));
+        return absolute(at<V>(D::one, g)) + kept + terms<true, V>(g, x, u);
     }
 
     alignas(64) std::array<std::array<double, N>, D::terms> column_{};

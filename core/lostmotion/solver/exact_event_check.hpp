@@ -171,7 +171,7 @@ inline auto ExactSolver<System>::judge(Entry& e, const Memory& memory, const Cur
         const double near = t >= 0 ? grazing[t] : 0.0;
         const bool grazes = t >= 0 && course_.twist[t].off_zero && low - error <= near && c.c3 > near;
         if (low > error && !grazes) continue;
-        const double magnitude = e.guards.magnitude(g, memory_magnitudes, state_magnitudes, cursor.input());
+        const double magnitude = e.guards.magnitude_of(g, memory_magnitudes, state_magnitudes, cursor.input());
         const auto of_rate = rate_multiple(e, cursor, g);
         const double resolution = of_rate.factor != 0.0
                                       ? std::fabs(of_rate.factor) * twist_speed_rounding(e, of_rate.twist, cursor)
