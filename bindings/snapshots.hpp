@@ -56,25 +56,18 @@ inline void to_key(const std::vector<int>& v, model::Key& key) {
 // The course of a motion and whether the inputs are constant.
 template <class D>
 Numbers from_course(const CourseOf<D>& c, bool steady) {
-    Numbers v(c.rate.begin(), c.rate.end());
-    v.insert(v.end(), c.input.begin(), c.input.end());
-    v.push_back(c.rate_known);
-    for (const auto& t : c.twist)
-        for (const double x : {double(t.off_zero), t.grazing_magnitude, t.doubt, t.most_doubt}) v.push_back(x);
+    Numbers v;
+    each_number(c, [&](const auto& number) { v.push_back(static_cast<double>(number)); });
     v.push_back(steady);
     return v;
 }
 template <class D>
 void to_course(const Numbers& v, CourseOf<D>& c, bool& steady) {
-    check_size(v, c.rate.size() + c.input.size() + 4 * c.twist.size() + 2);
+    std::size_t count = 1;
+    each_number(c, [&](const auto&) { ++count; });
+    check_size(v, count);
     const double* next = v.data();
-    for (double& x : c.rate) x = *next++;
-    for (double& x : c.input) x = *next++;
-    c.rate_known = *next++ != 0.0;
-    for (auto& t : c.twist) {
-        t = {next[0] != 0.0, next[1], next[2], next[3]};
-        next += 4;
-    }
+    each_number(c, [&](auto& number) { number = static_cast<std::remove_reference_t<decltype(number)>>(*next++); });
     steady = *next != 0.0;
 }
 

@@ -257,6 +257,7 @@ struct lm_simulation {
         return status;
     }
     int ended(lm::Status status) {
+        if (status == lm::Status::done) return LM_OK;
         return simulation.with([&](const auto& s) {
             return failed(
                 lm::train_status_text(simulation.assembly(), status, s.time(), s.stopped_at(), s.too_many_guards()),
@@ -283,7 +284,7 @@ bool finite(const double* v, std::size_t n) {
 
 // What a snapshot consists of, number by number: use(number) may read or write.
 template <class Snapshot, class Use>
-void each_number(Snapshot& s, Use&& use) {
+void each_number_of_snapshot(Snapshot& s, Use&& use) {
     use(s.time);
     for (auto& x : s.x) use(x);
     for (auto& m : s.memory) use(m);
@@ -292,15 +293,7 @@ void each_number(Snapshot& s, Use&& use) {
     for (auto& u : s.input) use(u);
     use(s.started);
     use(s.steady);
-    for (auto& r : s.course.rate) use(r);
-    for (auto& u : s.course.input) use(u);
-    use(s.course.rate_known);
-    for (auto& t : s.course.twist) {
-        use(t.off_zero);
-        use(t.grazing_magnitude);
-        use(t.doubt);
-        use(t.most_doubt);
-    }
+    lm::each_number(s.course, use);
 }
 
 }  // namespace
@@ -365,13 +358,13 @@ int lm_read(lm_simulation* simulation, double* variables) {
 size_t lm_state_size(const lm_simulation* simulation) {
     return simulation->simulation.with([](const auto& s) {
         std::size_t n = 0;
-        each_number(s.snapshot(), [&](const auto&) { ++n; });
+        each_number_of_snapshot(s.snapshot(), [&](const auto&) { ++n; });
         return n;
     });
 }
 int lm_get_state(const lm_simulation* simulation, double* state) {
     simulation->simulation.with([&](const auto& s) {
-        each_number(s.snapshot(), [&](const auto& number) { *state++ = static_cast<double>(number); });
+        each_number_of_snapshot(s.snapshot(), [&](const auto& number) { *state++ = static_cast<double>(number); });
     });
     return LM_OK;
 }
@@ -379,8 +372,8 @@ int lm_set_state(lm_simulation* simulation, const double* state) {
     if (!finite(state, lm_state_size(simulation))) return simulation->failed("a number of the state is not finite");
     simulation->simulation.with([&](auto& s) {
         auto snapshot = s.snapshot();
-        each_number(snapshot,
-                    [&](auto& number) { number = static_cast<std::remove_reference_t<decltype(number)>>(*state++); });
+        each_number_of_snapshot(
+            snapshot, [&](auto& number) { number = static_cast<std::remove_reference_t<decltype(number)>>(*state++); });
         s.restore(snapshot);
     });
     return LM_OK;

@@ -30,4 +30,18 @@ struct CourseOf {
     }
 };
 
+// use(number) for each of the numbers that a course consists of, to read or to write them.
+template <class Course, class Use>
+void each_number(Course& course, Use&& use) {
+    for (auto& r : course.rate) use(r);
+    for (auto& u : course.input) use(u);
+    use(course.rate_known);
+    for (auto& t : course.twist) {
+        use(t.off_zero);
+        use(t.grazing_magnitude);
+        use(t.doubt);
+        use(t.most_doubt);
+    }
+}
+
 }  // namespace lostmotion
