@@ -3,9 +3,15 @@
 import os
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
+
+import lostmotion as lm
 
 ROOT = Path(__file__).parent.parent
 ALL_SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
@@ -34,3 +40,14 @@ def run_in_build(build: str, *arguments: str) -> subprocess.CompletedProcess[str
         text=True,
         check=False,
     )
+
+
+def rows_by_any_threads_and_executor(study: lm.Study, directory: Path) -> pa.Table:
+    """The table of a study, having found that one thread, three and processes give the same; in folder `1` of the directory."""
+    one = pq.ParquetDataset(lm.study(study, directory / "1", threads=1)).read()
+    three = pq.ParquetDataset(lm.study(study, directory / "3", threads=3)).read()
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        processes = pq.ParquetDataset(lm.study(study, directory / "p", executor=pool)).read()
+    assert one.equals(three)
+    assert one.equals(processes)
+    return one

@@ -8,8 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from multiprocessing import get_context
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,7 @@ from scipy import stats
 from typer.testing import CliRunner
 
 import lostmotion as lm
-from conftest import ROOT
+from conftest import ROOT, rows_by_any_threads_and_executor
 from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
@@ -158,12 +157,7 @@ def test_a_torque_source_has_no_ideal_speed():
 
 def test_rows_do_not_depend_on_threads_or_executor(tmp_path: Path):
     study = make(runs=2 * CHUNK + 24, design="random")
-    one = pq.ParquetDataset(lm.study(study, tmp_path / "1", threads=1)).read()
-    three = pq.ParquetDataset(lm.study(study, tmp_path / "3", threads=3)).read()
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        processes = pq.ParquetDataset(lm.study(study, tmp_path / "p", executor=pool)).read()
-    assert one.equals(three)
-    assert one.equals(processes)
+    rows_by_any_threads_and_executor(study, tmp_path)
     assert [p.name for p in sorted((tmp_path / "1").glob("*.parquet"))] == [f"part-00000{k}.parquet" for k in range(3)]
 
 

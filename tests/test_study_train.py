@@ -2,8 +2,7 @@
 
 import json
 import math
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from multiprocessing import get_context
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import lostmotion as lm
-from conftest import ROOT
+from conftest import ROOT, rows_by_any_threads_and_executor
 from lostmotion.cli import app
 from lostmotion.studies import chunk as study_chunk
 from lostmotion.studies.check import check_columns
@@ -93,12 +92,7 @@ def test_what_the_core_reduces_equals_what_is_made_of_the_samples(tmp_path: Path
 
 def test_rows_do_not_depend_on_threads_executors_or_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     study = make(design="random", runs=500 + 30, keep={"a": "rms(joint_speed)", "b": "final(motor_angle)"})
-    one = pq.ParquetDataset(lm.study(study, tmp_path / "1", threads=1)).read()
-    three = pq.ParquetDataset(lm.study(study, tmp_path / "3", threads=3)).read()
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        processes = pq.ParquetDataset(lm.study(study, tmp_path / "p", executor=pool)).read()
-    assert one.equals(three)
-    assert one.equals(processes)
+    one = rows_by_any_threads_and_executor(study, tmp_path)
     monkeypatch.setattr(study_chunk, "SLOW_RUNS", 7)
     assert pieces(study, 500, 530) == [(500, 507), (507, 514), (514, 521), (521, 528), (528, 530)]
     with ThreadPoolExecutor(1) as pool:
