@@ -29,11 +29,12 @@ inline Train named(Train t) {
 struct Recorded {
     lostmotion::TrainRun run;
     TrainReport report;
-    std::vector<double> out;
+    std::vector<double> out, signals;  // of channels, and of the axes
     std::size_t samples;
 
     Recorded(const Train& train, const std::vector<Signal>& inputs, double duration, double interval,
-             double tolerance = 0.0, std::span<const double> start = {}, std::span<const double> memory = {})
+             double tolerance = 0.0, std::span<const double> start = {}, std::span<const double> memory = {},
+             const TrainControl& control = {})
         : run(named(train)) {
         TrainOptions options;
         options.duration = duration;
@@ -41,6 +42,9 @@ struct Recorded {
         samples = options.samples = static_cast<std::size_t>(duration / interval + 1.5);
         options.tolerance = tolerance;
         out.resize(run.channels().size() * samples);
+        options.control = control;
+        signals.resize(control.axes.size() * control::n_axis_signals * samples);
+        options.control_out = signals.data();
         report = run.run(inputs, start, memory, options, out.data());
     }
     bool done() const { return report.status == Status::done && !report.too_many_guards; }
@@ -77,6 +81,52 @@ struct RandomRun {
         inputs = random.signals(Assembly(train), duration);
     }
 };
+
+// Controllers for some of its motors: torque, speed or position, of plausible gains, with the encoder on any shaft
+// whose angle is known.
+inline TrainControl random_control(RandomTrains& random, const Assembly& a) {
+    using control::Axis;
+    TrainControl c;
+    c.tick = random.spread(5e-4, 5e-3);
+    for (std::size_t m = 0; m < a.train().motors.size(); ++m) {
+        const ShaftMotor& motor = a.train().motors[m];
+        if (m > 0 && random.coin()) continue;
+        TrainAxis axis;
+        axis.motor = static_cast<int>(m);
+        axis.speed_shaft = axis.position_shaft = motor.shaft;
+        if (!shaft_angle(a, motor.shaft)) continue;
+        Axis& law = axis.law;
+        law.mode = static_cast<Axis::Mode>(random.pick(0, 2));
+        law.delay.ticks = random.pick(0, 2);
+        law.estimate.kind = static_cast<control::SpeedEstimate::Kind>(random.pick(0, 2));
+        law.estimate.span = random.pick(1, 3);
+        law.estimate.smoothing = random.uniform(0.2, 1.0);
+        law.estimate.bandwidth = random.uniform(0.05, 0.3) / c.tick;
+        law.speed_schedule.every = law.current_schedule.every = random.pick(1, 2);
+        law.position_schedule = {law.speed_schedule.every * random.pick(1, 4), random.pick(0, 1)};
+        const double bandwidth = random.uniform(0.01, 0.05) / (c.tick * law.speed_schedule.every);
+        law.speed_loop.gain = bandwidth;
+        law.speed_loop.reference_gain = law.speed_loop.gain * random.uniform(0.3, 1.0);
+        law.speed_loop.integral_gain = random.coin() ? law.speed_loop.gain * bandwidth * 0.2 : 0.0;
+        law.speed_loop.torque_limit = random.uniform(0.5, 3.0);
+        law.position_loop.gain = 0.2 * bandwidth;
+        law.position_loop.speed_feedforward = random.uniform(0.0, 1.0);
+        law.feedforward.inertia = random.uniform(0.0, 1.0);
+        law.rated_torque = motor.law.rated_torque;
+        if (motor.law.kind == Motor::dc) {
+            control::CurrentLoop& loop = law.current_loop.emplace();
+            loop.gain = 0.3;
+            loop.integral_gain = 0.02;
+            loop.back_emf = 0.05;
+            loop.limit = 2.0;
+        }
+        const double amplitude = random.uniform(0.1, 1.0);
+        law.reference.sines.push_back({amplitude, random.uniform(0.5, 3.0), random.uniform(0.0, 6.0)});
+        if (random.coin()) law.reference.pieces.push_back({0.1, {0.3, random.uniform(-1.0, 1.0), 0.5, -0.2}});
+        c.axes.push_back(axis);
+    }
+    return c;
+}
 
 // Where contacts are redundant, their torques depend on what they were, or are shared by another rule. If one of them
 // holds more than it takes while it slips, or a loss depends on such a torque, so does the instant at which one of them
@@ -178,10 +228,13 @@ struct SolverTally {
 };
 
 inline void compare_solvers(RandomTrains& random, int shafts, double duration, SolverTally& tally,
-                            const char* tell = nullptr) {
+                            const char* tell = nullptr, bool closed_loop = false) {
     const RandomRun r(random, shafts, duration);
-    const Recorded exact(r.train, r.inputs, duration, duration / 50.0),
-        fine(r.train, r.inputs, duration, duration / 50.0, 1e-10);
+    const TrainControl control = closed_loop ? random_control(random, Assembly(r.train)) : TrainControl{};
+    const auto run = [&](double tolerance) {
+        return Recorded(r.train, r.inputs, duration, duration / 50.0, tolerance, {}, {}, control);
+    };
+    const Recorded exact = run(0.0), fine = run(1e-10);
     if (!exact.done()) {
         ++tally.jammed;
         return;
@@ -189,7 +242,7 @@ inline void compare_solvers(RandomTrains& random, int shafts, double duration, S
     const double gap = fine.done() ? difference(exact, fine) : 1.0;
     double own = 0.0;
     if (gap > 1e-7) {
-        const Recorded coarse(r.train, r.inputs, duration, duration / 50.0, 1e-8);
+        const Recorded coarse = run(1e-8);
         own = fine.done() && coarse.done() ? difference(coarse, fine) : 1.0;
     }
     if (own > 1e-5) {

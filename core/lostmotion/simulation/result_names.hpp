@@ -91,6 +91,7 @@ inline std::string status_text(Status status, double time, const std::string& co
         case Status::zeno:
             return "switching instants of the contact '" + contact + "' accumulate " + at +
                    ": infinitely many in finite time. The model ends here.";
+        case Status::controller: return "the controller failed " + at + ", or its command is no finite number";
         case Status::unseen:
             return "the drive has dry contacts, which do not feel a nonlinear torque. Take them out, or make the "
                    "torque piecewise linear.";

@@ -16,6 +16,7 @@
 #include "result_names.hpp"
 #include "sampler.hpp"
 #include "stepping.hpp"
+#include "train_control.hpp"
 #include "train_point.hpp"
 #include "train_status.hpp"
 
@@ -44,6 +45,8 @@ struct TrainOptions {
     double tolerance = 0.0;               // relative, of the adaptive solver; 0: the exact one
     bool (*interrupted)(void*) = nullptr;
     void* interrupted_context = nullptr;
+    TrainControl control;           // nothing: the inputs alone act
+    double* control_out = nullptr;  // (axes x signals) x samples, as ControlRecord
 };
 
 struct TrainSwitching {
@@ -166,6 +169,7 @@ class TrainRecorder {
         if (options_.energy) meter_.segment(s);
         return sampler_.segment(s);
     }
+    bool flush() { return sampler_.write(); }
     bool wants_switching() const { return report_.switchings.size() < options_.max_switchings; }
     void switching(const SwitchingOf<System>& s) {
         int branch = -1;
@@ -255,6 +259,26 @@ inline Named named_end(const TrainReport& report, const model::Assembly& a) {
     return end;
 }
 
+// From a start to the end, open loop or under the controllers.
+template <class D, class Solver, class Observer>
+Status run_recorded(const model::Assembly& a, Solver& solver, const StartOf<D>& start, const TrainOptions& options,
+                    Observer& observer) {
+    solver.interrupted = options.interrupted;
+    solver.interrupted_context = options.interrupted_context;
+    if (!options.control.present()) {
+        const Status begun = solver.begin(0.0, start.x, start.memory);
+        return begun == Status::done ? solver.advance(options.duration, observer) : begun;
+    }
+    const std::vector<control::Axis> laws = laws_of(options.control);
+    const ClosedLoop<D> loop = closed_loop_of<D>(a, options.control, laws);
+    ClosedLoopRun<Solver> run(solver, loop);
+    ControlRecord record(options.sample_interval, options.control_out == nullptr ? 0 : options.samples,
+                         options.control_out);
+    const Status begun = run.begin(start.x, start.memory);
+    if (begun != Status::done) return begun;
+    return run.advance(options.duration, observer, [&](double end) { record.hold_until(end, loop, run.course()); });
+}
+
 // start: the states by the layout of the assembly, or nothing for rest.
 template <class D>
 TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
@@ -265,6 +289,7 @@ TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std:
     const model::Layout& n = a.layout();
     TrainReport report;
     report.message = check_start(a, start);
+    if (report.message.empty()) report.message = check_control(a, options.control);
     if (!report.message.empty()) return report;
     const System system(a);
     const SignalsOf<D> signals = model::packed_signals<D>(inputs);
@@ -287,19 +312,13 @@ TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std:
             void switching(const SwitchingOf<System>& s) { recorder.switching(s); }
             bool wants_switching() const { return recorder.wants_switching(); }
         } observer{recorder, solver};
-        solver.interrupted = options.interrupted;
-        solver.interrupted_context = options.interrupted_context;
-        report.status = solver.begin(0.0, x, m);
-        if (report.status == Status::done) report.status = solver.advance(options.duration, observer);
+        report.status = run_recorded<D>(a, solver, {x, m}, options, observer);
         report.steps = solver.steps();
         finish(solver);
         return report;
     }
     ExactSolver<System> solver(system, signals, options.sample_interval, system.balanced_scale());
-    solver.interrupted = options.interrupted;
-    solver.interrupted_context = options.interrupted_context;
-    report.status = solver.begin(0.0, x, m);
-    if (report.status == Status::done) report.status = solver.advance(options.duration, recorder);
+    report.status = run_recorded<D>(a, solver, {x, m}, options, recorder);
     recorder.end();
     report.steps = solver.event_checks();
     finish(solver);

@@ -10,7 +10,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <type_traits>
+#include <utility>
 
 #include "../kernel/powers.hpp"
 #include "exact_solver.hpp"
@@ -127,7 +129,19 @@ class AdaptiveSolver {
         see_inputs(system_, input_, time_, now_);
         step_ = 0.0;
         switchings_ = 0;
+        left_.reset();
         return status_of(system_.start(cache_, now_, key_));
+    }
+
+    // As of the exact solver.
+    void set_ramp(int input, double value, double slope) {
+        if (!left_) left_ = input_before(time_, now_.x);
+        signals_[input].breakpoints[0] = {time_, value, slope};
+    }
+    Status inputs_changed() {
+        input_.anchor(time_);
+        see_inputs(system_, input_, time_, now_);
+        return status_of(system_.next(cache_, now_, nullptr, key_, *std::exchange(left_, std::nullopt)));
     }
 
     // observer.step(regime, memory, dense step, whether it is the last), observer.switching(...); the inputs at any
@@ -358,6 +372,7 @@ class AdaptiveSolver {
     double longest_step_ = std::numeric_limits<double>::infinity();
     double time_ = 0.0, step_ = 0.0, t_end_ = 0.0;
     InstantOf<D> now_;
+    std::optional<Inputs> left_;  // inputs before they were changed
     Key key_;
     long steps_ = 0;
     std::size_t switchings_ = 0;

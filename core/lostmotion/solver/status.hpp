@@ -9,10 +9,11 @@ enum class Found { yes, inconsistent, outside };
 enum class Status {
     done,
     interrupted,
-    jammed,   // no combination of contact modes is consistent
-    outside,  // left the extended loss map, or the range of the arithmetic
-    zeno,     // switching instants accumulate
-    unseen,   // a nonlinear remainder acts on a drive whose contacts would not feel it
+    jammed,      // no combination of contact modes is consistent
+    outside,     // left the extended loss map, or the range of the arithmetic
+    zeno,        // switching instants accumulate
+    controller,  // one has failed, or its command is no number
+    unseen,      // a nonlinear remainder acts on a drive whose contacts would not feel it
 };
 
 inline Status status_of(Found found) {

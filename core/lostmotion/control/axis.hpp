@@ -1,0 +1,198 @@
+// The controller of one motor: reference, position, speed and current loop at their sample times.
+//
+//   tick k:  sample        compute, outermost first                                       apply
+//            encoders -> [position loop] -> w* -> [speed loop] -> M* -> [current loop] -> E, `delay` ticks later
+//
+// All loops that are due at a tick use its samples; what is not due keeps its last output.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "current_loop.hpp"
+#include "encoder.hpp"
+#include "feedforward.hpp"
+#include "filter.hpp"
+#include "own_law.hpp"
+#include "position_loop.hpp"
+#include "speed_estimate.hpp"
+#include "speed_loop.hpp"
+
+namespace lostmotion::control {
+
+// When a loop runs: at the ticks phase, phase + every, ...
+struct Schedule {
+    int every = 1, phase = 0;
+
+    bool due(std::int64_t tick) const { return tick >= phase && (tick - phase) % every == 0; }
+    std::int64_t sample(std::int64_t tick) const { return (tick - phase) / every; }
+};
+
+// An encoder, and how often the shaft that a loop works on turns for one turn of the encoder's shaft.
+struct Sensor {
+    Encoder encoder;
+    double scale = 1.0;
+};
+
+// What is sampled of the drive.
+struct Sampled {
+    double position_angle = 0.0;  // of the shaft with the encoder of the position loop [rad]
+    double speed_angle = 0.0;     // of the shaft with the encoder of the speed loop [rad]
+    double speed = 0.0;           // of that shaft [rad/s]
+    double motor_torque = 0.0;    // [N m]
+};
+
+// What an axis shows, held from tick to tick.
+enum AxisSignal : int {
+    position_reference,  // [rad], of the reference's shaft
+    measured_position,   // the same
+    speed_reference,     // [rad/s], of the motor
+    measured_speed,      // the same
+    torque_reference,    // [N m], of the motor
+    n_axis_signals
+};
+
+class Axis {
+ public:
+    enum Mode { torque_mode, speed_mode, position_mode } mode = speed_mode;  // what the reference is of
+    Reference reference;
+    double reference_delay = 0.0;  // [s] by which the reference of the position loop comes later than its feedforward
+    double ratio = 1.0;            // turns of the motor for one of the reference's shaft
+    double rated_torque = 1.0;     // [N m] of command 1, without a current loop
+    TickDelay delay;               // until the command acts
+
+    Sensor speed_sensor;          // to the motor
+    Sensor position_sensor;       // to the reference's shaft
+    bool two_encoders = false;    // else that of the speed serves both
+    double position_share = 1.0;  // of the difference of both angles, taken over at a sample of the position loop
+    SpeedEstimate estimate;
+    Schedule position_schedule, speed_schedule, current_schedule;
+    PositionLoop position_loop;
+    SpeedLoop speed_loop;
+    std::optional<CurrentLoop> current_loop;
+    TorqueFeedforward feedforward;
+    BacklashCompensation backlash;
+    std::vector<DiscreteSystem> speed_filters, torque_filters;
+    OwnLaw own_law;  // instead of all loops
+
+    // Gives each block its slots. Once, after all has been set.
+    void place() {
+        Slots slots;
+        slots.take(n_own_slots);
+        delay.place(slots);
+        speed_sensor.encoder.place(slots);
+        if (two_encoders) position_sensor.encoder.place(slots);
+        estimate.place(slots);
+        position_loop.place(slots);
+        speed_loop.place(slots);
+        if (current_loop) current_loop->place(slots);
+        backlash.place(slots);
+        for (auto* filters : {&speed_filters, &torque_filters})
+            for (DiscreteSystem& f : *filters) f.place(slots);
+        own_law.place(slots);
+        slots_ = slots.count();
+    }
+    int slots() const { return slots_; }
+
+    // Before the first tick: the drive as it is, the integrators empty.
+    void start(const Sampled& y, double tick_length, double* slot) const {
+        std::fill_n(slot, slots_, 0.0);
+        speed_sensor.encoder.start(y.speed_angle, slot);
+        if (two_encoders) position_sensor.encoder.start(y.position_angle, slot);
+        const double angle = speed_sensor.scale * speed_sensor.encoder.reading(y.speed_angle);
+        estimate.start(angle, speed_sensor.scale * y.speed, tick_length * speed_schedule.every, slot);
+        if (two_encoders)
+            slot[blended] = position_sensor.scale * position_sensor.encoder.reading(y.position_angle) - angle / ratio;
+    }
+
+    // One tick. Returns false if the user's own law has failed, or the command is no number.
+    bool step(std::int64_t tick, double tick_length, const Sampled& y, double* slot) const {
+        const double time = static_cast<double>(tick) * tick_length;
+        double command = slot[computed_command];
+        slot[speed_angle] = speed_sensor.scale * speed_sensor.encoder(y.speed_angle, tick, slot);
+        if (two_encoders)
+            slot[position_angle] = position_sensor.scale * position_sensor.encoder(y.position_angle, tick, slot);
+        if (speed_schedule.due(tick))
+            slot[measured_speed] = estimate(slot[speed_angle], speed_sensor.scale * y.speed, slot[torque_reference],
+                                            speed_schedule.sample(tick), tick_length * speed_schedule.every, slot);
+        if (own_law.present()) {
+            if (!run_own_law(time, y, command, slot)) return false;
+        } else {
+            if (mode == position_mode && position_schedule.due(tick))
+                run_position_loop(time, tick_length * position_schedule.every, slot);
+            if (mode != torque_mode && speed_schedule.due(tick))
+                run_speed_loop(time, tick_length * speed_schedule.every, slot);
+            if (mode == torque_mode) slot[torque_reference] = reference.at(time).value;
+            if (!current_loop)
+                command = slot[torque_reference] / rated_torque;
+            else if (current_schedule.due(tick))
+                command = (*current_loop)(slot[torque_reference], y.motor_torque, slot[measured_speed], slot);
+        }
+        if (!std::isfinite(command)) return false;
+        slot[computed_command] = command;
+        slot[acting_command] = delay(command, tick, slot);
+        return true;
+    }
+    // What acts on the motor from this tick on.
+    double command(const double* slot) const { return slot[acting_command]; }
+    static double signal(int s, const double* slot) { return slot[s]; }
+
+ private:
+    // Beside the signals: the angles as read, how far the second encoder's is taken over, and the command.
+    enum OwnSlot : int {
+        speed_angle = n_axis_signals,
+        position_angle,
+        blended,
+        computed_command,
+        acting_command,
+        n_own_slots
+    };
+
+    void run_position_loop(double time, double T, double* slot) const {
+        const ReferencePoint ahead = reference.at(time);
+        slot[position_reference] = reference_delay == 0.0 ? ahead.value : reference.at(time - reference_delay).value;
+        slot[measured_position] = position(slot);
+        const double e = slot[position_reference] + backlash(ahead.rate, T, slot) - slot[measured_position];
+        slot[speed_reference] = ratio * position_loop(e, ahead.rate, T, slot);
+    }
+
+    void run_speed_loop(double time, double T, double* slot) const {
+        const ReferencePoint r = reference.at(time);
+        if (mode == speed_mode) slot[speed_reference] = ratio * r.value;
+        const double speed_ahead = mode == speed_mode ? r.value : r.rate,
+                     gain_ahead = mode == speed_mode ? r.rate : r.second;
+        double wanted = slot[speed_reference];
+        for (const DiscreteSystem& f : speed_filters) wanted = f(wanted, slot);
+        double M =
+            speed_loop(wanted, slot[measured_speed], feedforward(ratio * speed_ahead, ratio * gain_ahead), T, slot);
+        for (const DiscreteSystem& f : torque_filters) M = f(M, slot);
+        slot[torque_reference] = std::clamp(M, -speed_loop.torque_limit, speed_loop.torque_limit);
+    }
+
+    bool run_own_law(double time, const Sampled& y, double& command, double* slot) const {
+        slot[measured_position] = position(slot);
+        const ReferencePoint r = reference.at(time);
+        slot[mode == position_mode ? position_reference
+             : mode == speed_mode  ? speed_reference
+                                   : torque_reference] = mode == speed_mode ? ratio * r.value : r.value;
+        const std::array<double, 3> measured{slot[measured_position], slot[measured_speed], y.motor_torque};
+        const std::array<double, 4> wanted{r.value, r.rate, r.second, r.third};
+        return own_law(time, measured.data(), wanted.data(), &command, slot) == 0;
+    }
+
+    // Of the reference's shaft. With two encoders that of the motor, and what that of the load says beyond it by and
+    // by.
+    double position(double* slot) const {
+        const double by_motor = slot[speed_angle] / ratio;
+        if (!two_encoders) return by_motor;
+        slot[blended] += position_share * (slot[position_angle] - by_motor - slot[blended]);
+        return by_motor + slot[blended];
+    }
+
+    int slots_ = 0;
+};
+
+}  // namespace lostmotion::control

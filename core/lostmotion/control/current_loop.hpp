@@ -1,0 +1,35 @@
+// Current controller: proportional and integral with the zero on the pole of the winding, and its voltage limit.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+
+#include "slots.hpp"
+
+namespace lostmotion::control {
+
+// In the terms of (2): the current is M/M_R, the resistance 1/k_N, a = exp(-T/tau_a), K = g/(k_N (1 - a)):
+// u = sat(K e + I + K_e w),  I += K (1 - a) e while u is not limited. With one period of delay the loop is
+// g/(z (z - 1)).
+struct CurrentLoop {
+    double gain = 0.0;                                       // K, per relative torque
+    double integral_gain = 0.0;                              // K (1 - a)
+    double back_emf = 0.0;                                   // K_e [s/rad], of the speed of the motor
+    double rated_torque = 1.0;                               // M_R [N m]
+    double limit = std::numeric_limits<double>::infinity();  // of the command E
+
+    void place(Slots& slots) { first_ = slots.take(1); }
+    double operator()(double reference, double torque, double speed, double* slot) const {
+        double& integral = slot[first_];
+        const double e = (reference - torque) / rated_torque;
+        const double wanted = gain * e + integral + back_emf * speed;
+        const double u = std::clamp(wanted, -limit, limit);
+        if (u == wanted) integral += integral_gain * e;
+        return u;
+    }
+
+ private:
+    int first_ = 0;
+};
+
+}  // namespace lostmotion::control

@@ -1,0 +1,26 @@
+// What an encoder reads of an angle: its resolution, the error within one of its signal periods, and its delay.
+#pragma once
+
+#include "../kernel/sine.hpp"
+#include "slots.hpp"
+
+namespace lostmotion::control {
+
+// th_hat = q floor(th/q + 1/2) + e sin(N th + psi)
+struct Encoder {
+    double resolution = 0.0;  // q [rad]; 0: none
+    double error = 0.0;       // e [rad]
+    double periods = 0.0;     // N, of the error in a revolution
+    double phase = 0.0;       // psi [rad]
+    TickDelay delay;
+
+    void place(Slots& slots) { delay.place(slots); }
+    double reading(double angle) const {
+        const double read = resolution > 0.0 ? resolution * std::floor(angle / resolution + 0.5) : angle;
+        return error > 0.0 ? read + error * sine_cosine(periods * angle + phase).sin : read;
+    }
+    double operator()(double angle, std::int64_t tick, double* slot) const { return delay(reading(angle), tick, slot); }
+    void start(double angle, double* slot) const { delay.fill(reading(angle), slot); }
+};
+
+}  // namespace lostmotion::control

@@ -1,0 +1,37 @@
+// A linear discrete-time system with one input and one output: filters of references and torques.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "slots.hpp"
+
+namespace lostmotion::control {
+
+// z[k+1] = A z[k] + B u[k], y[k] = C z[k] + D u[k]
+struct DiscreteSystem {
+    std::vector<double> A, B, C;  // row by row
+    double D = 1.0;
+
+    static constexpr int max_order = 16;
+    int order() const { return static_cast<int>(B.size()); }
+    void place(Slots& slots) { first_ = slots.take(order()); }
+    double operator()(double u, double* slot) const {
+        double* z = slot + first_;
+        const std::size_t n = B.size();
+        double y = D * u;
+        std::array<double, max_order> next;
+        for (std::size_t i = 0; i < n; ++i) {
+            y += C[i] * z[i];
+            next[i] = B[i] * u;
+            for (std::size_t j = 0; j < n; ++j) next[i] += A[i * n + j] * z[j];
+        }
+        for (std::size_t i = 0; i < n; ++i) z[i] = next[i];
+        return y;
+    }
+
+ private:
+    int first_ = 0;
+};
+
+}  // namespace lostmotion::control

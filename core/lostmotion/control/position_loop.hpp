@@ -1,0 +1,41 @@
+// Position controller: proportional, with feedforward of the speed and, if wanted, an integrator with a dead zone.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "reference.hpp"
+#include "slots.hpp"
+
+namespace lostmotion::control {
+
+// w* = sat(K_v e + I + k_ff dphi*/dt). The integrator holds while |e| < inner and the reference stands, until
+// |e| > outer, so that an encoder step or a play does not keep the axis hunting.
+struct PositionLoop {
+    double gain = 0.0;                                             // K_v [1/s]
+    double integral_gain = 0.0;                                    // [1/s2]
+    double speed_feedforward = 0.0;                                // k_ff [-]
+    double speed_limit = std::numeric_limits<double>::infinity();  // [rad/s], of the reference's shaft
+    double inner = 0.0, outer = 0.0;                               // [rad]
+
+    void place(Slots& slots) { first_ = slots.take(2); }
+    // e: phi* - phi [rad].
+    double operator()(double e, double reference_rate, double sample_time, double* slot) const {
+        double &integral = slot[first_], &held = slot[first_ + 1];
+        const double wanted = gain * e + integral + speed_feedforward * reference_rate;
+        const double speed = std::clamp(wanted, -speed_limit, speed_limit);
+        if (reference_rate != 0.0 || std::fabs(e) > outer)
+            held = 0.0;
+        else if (std::fabs(e) < inner)
+            held = 1.0;
+        const bool winds_up = speed != wanted && e * wanted > 0.0;
+        if (held == 0.0 && !winds_up) integral += sample_time * integral_gain * e;
+        return speed;
+    }
+
+ private:
+    int first_ = 0;
+};
+
+}  // namespace lostmotion::control

@@ -1,0 +1,70 @@
+// The controllers of a train: which motors they turn, and the shafts that their encoders are on.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "../model/names.hpp"
+#include "../model/shaft_angle.hpp"
+#include "closed_loop.hpp"
+#include "train_reader.hpp"
+
+namespace lostmotion {
+
+struct TrainAxis {
+    control::Axis law;
+    int motor = 0;
+    int position_shaft = 0, speed_shaft = 0;  // with the encoders
+};
+
+struct TrainControl {
+    double tick = 1e-3;  // [s]
+    std::vector<TrainAxis> axes;
+
+    bool present() const { return !axes.empty(); }
+};
+
+// What is wrong with the controllers of a train, or empty.
+inline std::string check_control(const model::Assembly& a, const TrainControl& control) {
+    for (const TrainAxis& axis : control.axes)
+        for (const int shaft : {axis.position_shaft, axis.speed_shaft})
+            if (!model::shaft_angle(a, shaft))
+                return "shaft '" + a.train().shafts[static_cast<std::size_t>(shaft)].name +
+                       "' carries an encoder, but its angle does not follow from that of the load: a clutch or a "
+                       "transmission error lies between; put the encoder on another shaft";
+    return "";
+}
+
+// The same in a kernel. The laws are those of `laws`, which must stay.
+template <class D>
+ClosedLoop<D> closed_loop_of(const model::Assembly& a, const TrainControl& control,
+                             const std::vector<control::Axis>& laws) {
+    const model::Layout& n = a.layout();
+    ClosedLoop<D> loop{control.tick, laws, {}};
+    for (const TrainAxis& axis : control.axes) {
+        const model::MotorPlace& motor = a.places().motors[static_cast<std::size_t>(axis.motor)];
+        const auto packed = [&](const model::Row& row) { return model::pack<D>(row, n); };
+        AxisPlace<D> p;
+        p.input = motor.command;
+        p.position_angle = packed(*model::shaft_angle(a, axis.position_shaft));
+        p.speed_angle = packed(*model::shaft_angle(a, axis.speed_shaft));
+        p.speed = packed(model::Row::unit(a.places().shafts[static_cast<std::size_t>(axis.speed_shaft)].speed));
+        const Motor& law = a.train().motors[static_cast<std::size_t>(axis.motor)].law;
+        p.motor_torque =
+            packed(law.kind == Motor::dc ? model::Row::unit(motor.torque)
+                                         : model::Row::unit(n.first_input + motor.command, law.rated_torque));
+        loop.places.push_back(p);
+    }
+    return loop;
+}
+
+inline std::vector<control::Axis> laws_of(const TrainControl& control) {
+    std::vector<control::Axis> laws;
+    for (const TrainAxis& axis : control.axes) {
+        laws.push_back(axis.law);
+        laws.back().place();
+    }
+    return laws;
+}
+
+}  // namespace lostmotion
