@@ -12,6 +12,7 @@ NB_MODULE(CORE_MODULE, m) {
     bind_names(m);
     bind_drives(m);
     bind_runs(m);
+    bind_control(m);
     bind_train(m);
     bind_instants(m);
     bind_stepping(m);

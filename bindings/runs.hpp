@@ -3,6 +3,7 @@
 
 #include <numeric>
 
+#include "control.hpp"
 #include "drives.hpp"
 #include "interruption.hpp"
 #include "lostmotion/analysis/batch.hpp"
@@ -35,28 +36,32 @@ inline RunOptions to_record(double duration, double interval, std::size_t sample
 
 inline nb::tuple run(SharedDrive& shared, const Signal& command, const Signal& load_torque, const StateNumbers& x,
                      double capacity, double duration, double interval, std::size_t samples, bool energy,
-                     double tolerance, std::size_t max_switchings) {
+                     double tolerance, std::size_t max_switchings, const BoundControl& bound) {
     auto data = std::make_unique_for_overwrite<double[]>(n_channels * samples);
     RunOptions options = to_record(duration, interval, samples, energy);
+    options.control = control_of(bound);
+    auto signals = control_room(options);
     options.max_switchings = max_switchings;
     options.interrupted = poll_signals;
-    const Signals signals{command, load_torque};
+    const Signals inputs{command, load_torque};
     const Start start{to_state(x), {capacity, 0.0}};
     RunReport report;
     {
         nb::gil_scoped_release release;
         if (tolerance > 0.0) {
-            report = run_adaptive(shared.drive, signals, start, options, tolerance, data.get());
+            report = run_adaptive(shared.drive, inputs, start, options, tolerance, data.get());
         } else {
             std::unique_ptr<Workspace> workspace = shared.take();
-            report = run_exact(*workspace, signals, start, options, data.get());
+            report = run_exact(*workspace, inputs, start, options, data.get());
             shared.give_back(std::move(workspace));
         }
     }
+    raise_again(bound);
     check(report.status, report.time, report.contact);
     return nb::make_tuple(as_array(std::move(data), {n_channels, samples}), switching_table(report),
                           report.switching_count, ledger_values(report.energy), from_state(report.x),
-                          report.memory.hysteresis_capacity, report.left_data_at, report.steps);
+                          report.memory.hysteresis_capacity, report.left_data_at, report.steps,
+                          as_array(std::move(signals), control_shape(options)));
 }
 
 // Of each run the text of its error, empty if it has none; switchings; energy, entry by entry; and the samples, or what
@@ -107,12 +112,13 @@ inline Array reduce_rows(int how, const Values& values) {
 // Tuples are spelled out for the stub.
 inline void bind_runs(nb::module_& m) {
     m.def("run", &run, "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a, "duration"_a,
-          "interval"_a, "samples"_a, "energy"_a, "tolerance"_a, "max_switchings"_a,
+          "interval"_a, "samples"_a, "energy"_a, "tolerance"_a, "max_switchings"_a, "control"_a,
           nb::sig("def run(drive: Drive, command: Signal, load_torque: Signal, state: "
                   "collections.abc.Sequence[float], hysteresis_capacity: float, duration: float, interval: float, "
-                  "samples: int, energy: bool, tolerance: float, max_switchings: int) -> "
+                  "samples: int, energy: bool, tolerance: float, max_switchings: int, control: tuple[float, "
+                  "collections.abc.Sequence[tuple[Axis, int, int, int]]]) -> "
                   "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
-                  "int, list[float], list[float], float, float, int]"));
+                  "int, list[float], list[float], float, float, int, numpy.typing.NDArray[numpy.float64]]"));
     m.def("run_batch", &run_many, "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a,
           "fields"_a, "values"_a, "duration"_a, "interval"_a, "samples"_a, "energy"_a, "channels"_a, "kept"_a,
           "threads"_a, "progress"_a = nb::none(),

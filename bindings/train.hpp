@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "control.hpp"
 #include "drives.hpp"
 #include "interruption.hpp"
 #include "lostmotion/analysis/steady_regime.hpp"
@@ -121,21 +122,25 @@ inline TrainOptions train_options(double duration, double interval, std::size_t 
 // start: states by name; capacities: of the hysteresis of gears by name. What is left out is 0.
 inline nb::dict run_train(const TrainDescription& description, const std::vector<Signal>& inputs, const Named& start,
                           const Named& capacities, double duration, double interval, std::size_t samples, bool energy,
-                          double tolerance, std::size_t max_switchings) {
+                          double tolerance, std::size_t max_switchings, const BoundControl& bound) {
     const TrainRun run(description.train);
     const model::Assembly& a = run.assembly();
     const model::Layout& n = a.layout();
     TrainOptions options = train_options(duration, interval, samples, energy, max_switchings);
     options.tolerance = tolerance;
     options.interrupted = poll_signals;
+    options.control = control_of(bound);
     auto data = std::make_unique_for_overwrite<double[]>(run.channels().size() * samples);
+    auto signals = control_room(options);
     TrainReport report;
     {
         nb::gil_scoped_release release;
         report = run.run(inputs, {start, capacities}, options, data.get());
     }
+    raise_again(bound);
     check_train_run(report, a);
     nb::dict out;
+    out["control"] = as_array(std::move(signals), control_shape(options));
     out["values"] = as_array(std::move(data), {run.channels().size(), samples});
     out["switchings"] = train_switching_table(report, n.contacts);
     out["switching_count"] = report.switching_count;
@@ -242,11 +247,12 @@ inline void bind_train(nb::module_& m) {
                      "collections.abc.Sequence[float]) -> tuple[list[str], numpy.typing.NDArray[numpy.float64], bool]"))
         .def("contact_names", &TrainDescription::contact_names);
     m.def("run_train", &run_train, "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a, "duration"_a,
-          "interval"_a, "samples"_a, "energy"_a, "tolerance"_a, "max_switchings"_a,
+          "interval"_a, "samples"_a, "energy"_a, "tolerance"_a, "max_switchings"_a, "control"_a,
           nb::sig("def run_train(train: Train, inputs: collections.abc.Sequence[Signal], start: "
                   "collections.abc.Mapping[str, float], hysteresis_capacities: collections.abc.Mapping[str, float], "
-                  "duration: float, interval: float, samples: int, energy: bool, tolerance: float, max_switchings: int)"
-                  " -> dict[str, typing.Any]"));
+                  "duration: float, interval: float, samples: int, energy: bool, tolerance: float, max_switchings: "
+                  "int, control: tuple[float, "
+                  "collections.abc.Sequence[tuple[Axis, int, int, int]]]) -> dict[str, typing.Any]"));
     m.def("run_trains", &run_train_batch, "cases"_a, "duration"_a, "interval"_a, "samples"_a, "energies"_a,
           "channels"_a, "kept"_a, "threads"_a,
           nb::sig("def run_trains(cases: collections.abc.Sequence[tuple[Train, collections.abc.Sequence[Signal], "

@@ -34,7 +34,7 @@ struct Recorded {
 
     Recorded(const Train& train, const std::vector<Signal>& inputs, double duration, double interval,
              double tolerance = 0.0, std::span<const double> start = {}, std::span<const double> memory = {},
-             const TrainControl& control = {})
+             const Control& control = {})
         : run(named(train)) {
         TrainOptions options;
         options.duration = duration;
@@ -84,14 +84,14 @@ struct RandomRun {
 
 // Controllers for some of its motors: torque, speed or position, of plausible gains, with the encoder on any shaft
 // whose angle is known.
-inline TrainControl random_control(RandomTrains& random, const Assembly& a) {
+inline Control random_control(RandomTrains& random, const Assembly& a) {
     using control::Axis;
-    TrainControl c;
+    Control c;
     c.tick = random.spread(5e-4, 5e-3);
     for (std::size_t m = 0; m < a.train().motors.size(); ++m) {
         const ShaftMotor& motor = a.train().motors[m];
         if (m > 0 && random.coin()) continue;
-        TrainAxis axis;
+        ControlledAxis axis;
         axis.motor = static_cast<int>(m);
         axis.speed_shaft = axis.position_shaft = motor.shaft;
         if (!shaft_angle(a, motor.shaft)) continue;
@@ -230,7 +230,7 @@ struct SolverTally {
 inline void compare_solvers(RandomTrains& random, int shafts, double duration, SolverTally& tally,
                             const char* tell = nullptr, bool closed_loop = false) {
     const RandomRun r(random, shafts, duration);
-    const TrainControl control = closed_loop ? random_control(random, Assembly(r.train)) : TrainControl{};
+    const Control control = closed_loop ? random_control(random, Assembly(r.train)) : Control{};
     const auto run = [&](double tolerance) {
         return Recorded(r.train, r.inputs, duration, duration / 50.0, tolerance, {}, {}, control);
     };

@@ -22,10 +22,10 @@ Train one_shaft() {
 
 constexpr double T = 125e-6;
 
-TrainControl proportional_speed(double gain, control::SpeedEstimate::Kind kind, int delay) {
-    TrainControl c;
+Control proportional_speed(double gain, control::SpeedEstimate::Kind kind, int delay) {
+    Control c;
     c.tick = T;
-    TrainAxis axis;
+    ControlledAxis axis;
     axis.law.estimate.kind = kind;
     axis.law.speed_loop.gain = axis.law.speed_loop.reference_gain = gain;
     axis.law.delay.ticks = delay;
@@ -34,7 +34,7 @@ TrainControl proportional_speed(double gain, control::SpeedEstimate::Kind kind, 
 }
 
 // 2 s from 1 rad/s on, sampled at the ticks.
-Recorded from_speed(const TrainControl& control) {
+Recorded from_speed(const Control& control) {
     const Assembly a(named(one_shaft()));
     std::vector<double> start(static_cast<std::size_t>(a.layout().states));
     start[static_cast<std::size_t>(a.places().shafts[0].speed)] = 1.0;
@@ -58,7 +58,7 @@ double growth(const Recorded& r) {
 TEST_CASE("a proportional speed loop with backward difference and one tick of delay is stable up to f_s/8") {
     const double limit = 2.0 * (std::sqrt(2.0) - 1.0) * 1e-3 / T;
     for (const double share : {0.999, 1.001}) {
-        const TrainControl control = proportional_speed(share * limit, control::SpeedEstimate::difference, 1);
+        const Control control = proportional_speed(share * limit, control::SpeedEstimate::difference, 1);
         const Recorded r = from_speed(control);
         REQUIRE(r.report.status == Status::done);
         const double g = growth(r);
@@ -78,7 +78,7 @@ TEST_CASE("a proportional speed loop with backward difference and one tick of de
 
 TEST_CASE("with the true speed the limit is K T/J = 1, at f_s/6") {
     for (const double share : {0.999, 1.001}) {
-        const TrainControl control = proportional_speed(share * 1e-3 / T, control::SpeedEstimate::exact, 1);
+        const Control control = proportional_speed(share * 1e-3 / T, control::SpeedEstimate::exact, 1);
         const Recorded r = from_speed(control);
         REQUIRE(r.report.status == Status::done);
         CHECK((share < 1.0 ? growth(r) < 0.2 : growth(r) > 5.0));

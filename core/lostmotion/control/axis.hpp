@@ -55,6 +55,17 @@ enum AxisSignal : int {
     n_axis_signals
 };
 
+struct AxisSignalName {
+    const char *name, *unit, *meaning;
+};
+inline constexpr std::array<AxisSignalName, n_axis_signals> axis_signal_names{{
+    {"position_reference", "rad", "angle that the controller wants"},
+    {"measured_position", "rad", "angle that the controller has read"},
+    {"speed_reference", "rad/s", "speed of the motor that the controller wants"},
+    {"measured_speed", "rad/s", "speed of the motor that the controller has read"},
+    {"torque_reference", "N*m", "torque of the motor that the controller wants"},
+}};
+
 class Axis {
  public:
     enum Mode { torque_mode, speed_mode, position_mode } mode = speed_mode;  // what the reference is of

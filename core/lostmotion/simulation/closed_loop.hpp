@@ -7,9 +7,33 @@
 #include <vector>
 
 #include "../control/axis.hpp"
+#include "../solver/components.hpp"
 #include "../solver/exact_solver.hpp"
 
 namespace lostmotion {
+
+// The controller of a motor, by the numbers of the motor and of the shafts that its encoders are on.
+struct ControlledAxis {
+    control::Axis law;
+    int motor = 0;
+    int position_shaft = 0, speed_shaft = 0;
+};
+
+struct Control {
+    double tick = 1e-3;  // [s]
+    std::vector<ControlledAxis> axes;
+
+    bool present() const { return !axes.empty(); }
+    // The controllers, ready to run.
+    std::vector<control::Axis> laws() const {
+        std::vector<control::Axis> out;
+        for (const ControlledAxis& axis : axes) {
+            out.push_back(axis.law);
+            out.back().place();
+        }
+        return out;
+    }
+};
 
 // An axis in a system: the input of its motor, and the forms that give what is sampled.
 template <class D>
@@ -169,5 +193,26 @@ class ClosedLoopRun {
     ControlCourse course_;
     bool changed_ = false;
 };
+
+// From a start to options.duration, open loop or under the controllers of options. make_loop(laws): these in the
+// system.
+template <class Solver, class Options, class Observer, class MakeLoop>
+Status run_recorded(Solver& solver, const StartOf<typename Solver::D>& start, const Options& options,
+                    Observer& observer, MakeLoop&& make_loop) {
+    solver.interrupted = options.interrupted;
+    solver.interrupted_context = options.interrupted_context;
+    if (!options.control.present()) {
+        const Status begun = solver.begin(0.0, start.x, start.memory);
+        return begun == Status::done ? solver.advance(options.duration, observer) : begun;
+    }
+    const std::vector<control::Axis> laws = options.control.laws();
+    const auto loop = make_loop(laws);
+    ClosedLoopRun<Solver> run(solver, loop);
+    ControlRecord record(options.sample_interval, options.control_out == nullptr ? 0 : options.samples,
+                         options.control_out);
+    const Status begun = run.begin(start.x, start.memory);
+    if (begun != Status::done) return begun;
+    return run.advance(options.duration, observer, [&](double end) { record.hold_until(end, loop, run.course()); });
+}
 
 }  // namespace lostmotion

@@ -5,6 +5,7 @@
 
 #include "../solver/adaptive_solver.hpp"
 #include "../solver/components.hpp"
+#include "closed_loop.hpp"
 #include "energy.hpp"
 #include "sampler.hpp"
 #include "workspace.hpp"
@@ -22,6 +23,8 @@ struct RunOptions {
     std::size_t max_switchings = 100000;  // kept; all are counted
     bool (*interrupted)(void*) = nullptr;
     void* interrupted_context = nullptr;
+    Control control;                // nothing: the inputs alone act
+    double* control_out = nullptr;  // (axes x signals) x samples, as ControlRecord
 };
 
 struct RunReport {
@@ -52,6 +55,7 @@ class Recorder {
     bool segment(const Segment<SwitchedDrive>& s) {
         return sampler_.segment(s) && (!options_.energy || meter_.segment(s));
     }
+    bool flush() { return sampler_.write(); }
     bool wants_switching() const { return report_.switchings.size() < options_.max_switchings; }
     void switching(const Switching& s) { report_.switchings.push_back(s); }
     void end(const State& x) {
@@ -68,6 +72,21 @@ class Recorder {
     RunReport& report_;
 };
 
+// Controllers of the drive, whose shafts are 0, the motor's, and 1, the load's. The laws must stay.
+inline ClosedLoop<DriveDims> closed_loop_of(const Drive& drive, const Control& control,
+                                            const std::vector<control::Axis>& laws) {
+    const double i = drive.gearbox.ratio;
+    const LinearForm of_motor = LinearForm::unit(load_angle, i) + LinearForm::unit(twist, i),
+                     of_load = LinearForm::unit(load_angle);
+    ClosedLoop<DriveDims> loop{control.tick, laws, {}};
+    for (const ControlledAxis& axis : control.axes)
+        loop.places.push_back({command - first_input, axis.position_shaft == 0 ? of_motor : of_load,
+                               axis.speed_shaft == 0 ? of_motor : of_load,
+                               LinearForm::unit(axis.speed_shaft == 0 ? motor_speed : load_speed),
+                               drive.motor.torque<LinearForm>({motor_torque, motor_speed, command, one})});
+    return loop;
+}
+
 // out: channels x samples, channel by channel.
 inline RunReport run_exact(Workspace& workspace, const Signals& signals, const Start& start, const RunOptions& options,
                            double* out) {
@@ -75,12 +94,10 @@ inline RunReport run_exact(Workspace& workspace, const Signals& signals, const S
     const Drive& drive = workspace.drive;
     ExactSolver<SwitchedDrive> solver(workspace.system, signals, options.sample_interval, drive.balanced_scale(),
                                       &workspace.cache);
-    solver.interrupted = options.interrupted;
-    solver.interrupted_context = options.interrupted_context;
     Recorder recorder(drive, options, out, report);
-    report.status = solver.begin(0.0, start.x, start.memory);
     recorder.begin(start.x);
-    if (report.status == Status::done) report.status = solver.advance(options.duration, recorder);
+    report.status = run_recorded(solver, start, options, recorder,
+                                 [&](const auto& laws) { return closed_loop_of(drive, options.control, laws); });
     recorder.end(solver.state());
     report.time = solver.time();
     report.contact = solver.stopped_at();
@@ -134,11 +151,9 @@ inline RunReport run_adaptive(const Drive& drive, const Signals& signals, const 
     const SwitchedDrive system(drive);
     using Solver = AdaptiveSolver<SwitchedDrive>;
     Solver solver(system, signals, relative_tolerance, drive.rated_scale());
-    solver.interrupted = options.interrupted;
-    solver.interrupted_context = options.interrupted_context;
     AdaptiveRecorder<Solver> recorder(drive, solver, options, out, report);
-    report.status = solver.begin(0.0, start.x, start.memory);
-    if (report.status == Status::done) report.status = solver.advance(options.duration, recorder);
+    report.status = run_recorded(solver, start, options, recorder,
+                                 [&](const auto& laws) { return closed_loop_of(drive, options.control, laws); });
     report.time = solver.time();
     report.contact = solver.stopped_at();
     report.x = solver.state();

@@ -1,4 +1,4 @@
-// The controllers of a train: which motors they turn, and the shafts that their encoders are on.
+// Controllers in a train.
 #pragma once
 
 #include <string>
@@ -11,22 +11,9 @@
 
 namespace lostmotion {
 
-struct TrainAxis {
-    control::Axis law;
-    int motor = 0;
-    int position_shaft = 0, speed_shaft = 0;  // with the encoders
-};
-
-struct TrainControl {
-    double tick = 1e-3;  // [s]
-    std::vector<TrainAxis> axes;
-
-    bool present() const { return !axes.empty(); }
-};
-
 // What is wrong with the controllers of a train, or empty.
-inline std::string check_control(const model::Assembly& a, const TrainControl& control) {
-    for (const TrainAxis& axis : control.axes)
+inline std::string check_control(const model::Assembly& a, const Control& control) {
+    for (const ControlledAxis& axis : control.axes)
         for (const int shaft : {axis.position_shaft, axis.speed_shaft})
             if (!model::shaft_angle(a, shaft))
                 return "shaft '" + a.train().shafts[static_cast<std::size_t>(shaft)].name +
@@ -37,11 +24,10 @@ inline std::string check_control(const model::Assembly& a, const TrainControl& c
 
 // The same in a kernel. The laws are those of `laws`, which must stay.
 template <class D>
-ClosedLoop<D> closed_loop_of(const model::Assembly& a, const TrainControl& control,
-                             const std::vector<control::Axis>& laws) {
+ClosedLoop<D> closed_loop_of(const model::Assembly& a, const Control& control, const std::vector<control::Axis>& laws) {
     const model::Layout& n = a.layout();
     ClosedLoop<D> loop{control.tick, laws, {}};
-    for (const TrainAxis& axis : control.axes) {
+    for (const ControlledAxis& axis : control.axes) {
         const model::MotorPlace& motor = a.places().motors[static_cast<std::size_t>(axis.motor)];
         const auto packed = [&](const model::Row& row) { return model::pack<D>(row, n); };
         AxisPlace<D> p;
@@ -56,15 +42,6 @@ ClosedLoop<D> closed_loop_of(const model::Assembly& a, const TrainControl& contr
         loop.places.push_back(p);
     }
     return loop;
-}
-
-inline std::vector<control::Axis> laws_of(const TrainControl& control) {
-    std::vector<control::Axis> laws;
-    for (const TrainAxis& axis : control.axes) {
-        laws.push_back(axis.law);
-        laws.back().place();
-    }
-    return laws;
 }
 
 }  // namespace lostmotion

@@ -45,7 +45,7 @@ struct TrainOptions {
     double tolerance = 0.0;               // relative, of the adaptive solver; 0: the exact one
     bool (*interrupted)(void*) = nullptr;
     void* interrupted_context = nullptr;
-    TrainControl control;           // nothing: the inputs alone act
+    Control control;                // nothing: the inputs alone act
     double* control_out = nullptr;  // (axes x signals) x samples, as ControlRecord
 };
 
@@ -259,26 +259,6 @@ inline Named named_end(const TrainReport& report, const model::Assembly& a) {
     return end;
 }
 
-// From a start to the end, open loop or under the controllers.
-template <class D, class Solver, class Observer>
-Status run_recorded(const model::Assembly& a, Solver& solver, const StartOf<D>& start, const TrainOptions& options,
-                    Observer& observer) {
-    solver.interrupted = options.interrupted;
-    solver.interrupted_context = options.interrupted_context;
-    if (!options.control.present()) {
-        const Status begun = solver.begin(0.0, start.x, start.memory);
-        return begun == Status::done ? solver.advance(options.duration, observer) : begun;
-    }
-    const std::vector<control::Axis> laws = laws_of(options.control);
-    const ClosedLoop<D> loop = closed_loop_of<D>(a, options.control, laws);
-    ClosedLoopRun<Solver> run(solver, loop);
-    ControlRecord record(options.sample_interval, options.control_out == nullptr ? 0 : options.samples,
-                         options.control_out);
-    const Status begun = run.begin(start.x, start.memory);
-    if (begun != Status::done) return begun;
-    return run.advance(options.duration, observer, [&](double end) { record.hold_until(end, loop, run.course()); });
-}
-
 // start: the states by the layout of the assembly, or nothing for rest.
 template <class D>
 TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
@@ -295,6 +275,7 @@ TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std:
     const SignalsOf<D> signals = model::packed_signals<D>(inputs);
     const auto [x, m] = model::packed_start<D>(n, start, memory);
     TrainRecorder<D> recorder(model, options, out, report);
+    const auto in_train = [&](const auto& laws) { return closed_loop_of<D>(a, options.control, laws); };
     const auto finish = [&](auto& solver) {
         report.ended(system, solver);
         report.stored_begin = model::stored_energy(a, x);
@@ -312,13 +293,13 @@ TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std:
             void switching(const SwitchingOf<System>& s) { recorder.switching(s); }
             bool wants_switching() const { return recorder.wants_switching(); }
         } observer{recorder, solver};
-        report.status = run_recorded<D>(a, solver, {x, m}, options, observer);
+        report.status = run_recorded(solver, {x, m}, options, observer, in_train);
         report.steps = solver.steps();
         finish(solver);
         return report;
     }
     ExactSolver<System> solver(system, signals, options.sample_interval, system.balanced_scale());
-    report.status = run_recorded<D>(a, solver, {x, m}, options, recorder);
+    report.status = run_recorded(solver, {x, m}, options, recorder, in_train);
     recorder.end();
     report.steps = solver.event_checks();
     finish(solver);

@@ -14,7 +14,7 @@ from .gearbox import Gearbox
 from .load import Load
 from .losses import LossMap
 from .motor import Motor, ShaftMotor
-from .parameters import numbers
+from .parameters import MotorLaw, numbers
 from .shaft import Shaft
 from .torsion import Rigid
 from .train import DriveTrain
@@ -51,18 +51,19 @@ class Drive(Part):
             gears={"gearbox": Gear.of(self.gearbox, input="motor", output="load")},
         )
 
-    def core(self) -> _core.Drive:
-        """The solver's drive; the last ones are kept for equal parts."""
-        return _core_drive(self)
+    def core(self, law: MotorLaw | None = None) -> _core.Drive:
+        """The solver's drive, its motor as a current loop may make it; the last ones are kept for equal parts."""
+        return _core_drive(self, law)
 
 
 @lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes
-def _core_drive(drive: Drive) -> _core.Drive:
+def _core_drive(drive: Drive, law: MotorLaw | None) -> _core.Drive:
+    changes, torque_source = law or ((), drive.motor.kind == "torque_source")
     values = numbers(drive.motor, "motor") | numbers(drive.gearbox, "gearbox") | numbers(drive.load, "load")
     stiffness, losses = drive.gearbox.stiffness, drive.gearbox.losses
     return _core.Drive(
-        values,
-        torque_source=drive.motor.kind == "torque_source",
+        values | dict(changes),
+        torque_source=torque_source,
         torsion_curve=None if isinstance(stiffness, Rigid) else stiffness.core(),
         loss_map=losses.core() if isinstance(losses, LossMap) else None,
     )

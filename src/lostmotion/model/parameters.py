@@ -9,6 +9,9 @@ from .. import _core
 PARAMETERS = tuple(key for key, _ in _core.parameters())
 """such as ``motor.rotor_inertia``: as a scenario file names them"""
 
+MotorLaw = tuple[tuple[tuple[str, float], ...], bool]
+"""changed numbers of a motor's law, as a current loop makes it, and whether it is a torque source"""
+
 
 def numbers(part: Any, table: str) -> dict[str, float]:
     """The parameters of a part that stands in a table of a scenario file, without those that it has not or leaves out."""

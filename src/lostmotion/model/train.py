@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import AfterValidator, Field, model_validator
@@ -19,7 +19,7 @@ from .couplings import Brake, Clutch, Freewheel
 from .gear import Gear
 from .losses import LossMap, MeshEfficiency, WormMesh
 from .motor import ShaftMotor
-from .parameters import numbers
+from .parameters import MotorLaw, numbers
 from .shaft import Shaft
 from .torsion import Rigid
 
@@ -113,15 +113,16 @@ class DriveTrain(TrainElements):
         table = next((table for table in TABLES[kind] if name in getattr(self, table)), TABLES[kind][0])
         raise InputError(f"key {table}.{name}: {text}")
 
-    def core(self, loaded: Collection[str]) -> _core.Train:
-        """The solver's train, where a load torque acts on some of the shafts."""
+    def core(self, loaded: Collection[str], driven: Mapping[str, MotorLaw | None] = {}) -> _core.Train:
+        """The solver's train, where a load torque acts on some of the shafts, and current loops change the law of some motors."""
         train = _core.Train()
         for name, s in self.shafts.items():
             drag = None if s.drag is None else s.drag.core()
             train.add_shaft(name, s.inertia, s.viscous_friction, s.friction(), drag, name in loaded)
         for name, m in self.motors.items():
             limit = math.inf if m.torque_limit is None else m.torque_limit
-            train.add_motor(name, m.shaft, numbers(m, "motor"), m.kind == "torque_source", limit)
+            changes, torque_source = driven.get(name) or ((), m.kind == "torque_source")
+            train.add_motor(name, m.shaft, numbers(m, "motor") | dict(changes), torque_source, limit)
         for name, g in self.gears.items():
             add_gear(train, name, g)
         for name, b in self.brakes.items():

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.arguments import checked
 from .scenario import Scenario
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import packed
 from .train_scenario import TrainScenario, is_train
-from .train_variables import train_variables
+from .train_variables import AXIS_SIGNALS, axis_variables, train_variables
 from .variables import CHANNEL_NAMES, STATES, VARIABLES, Variable
 
 if TYPE_CHECKING:
@@ -57,8 +58,10 @@ class RawResult:
 
 def raw_result(scenario: Scenario, result: Any, solver: str, *, ledger: bool) -> RawResult:
     """What the solver returned, with all that belongs to it."""
-    table, switchings, count, energy, state, capacity, left_data_at, steps = result
+    table, switchings, count, energy, state, capacity, left_data_at, steps, signals = result
     data = dict(zip(CHANNEL_NAMES, table, strict=True))
+    for axis in signals:
+        data |= dict(zip(AXIS_SIGNALS["position"], axis, strict=True))
     add_derived(data, scenario.gearbox.ratio)
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     attributes = {
@@ -108,9 +111,10 @@ def variables_of(attributes: Mapping[str, Any]) -> tuple[Variable, ...]:
     """The variables that a result with these attributes may have: those of a drive, or of its train."""
     tables = json.loads(attributes.get("scenario", "{}"))
     if not is_train(tables):
-        return VARIABLES
+        controller = tables.get("controller")
+        return VARIABLES if controller is None else (*VARIABLES, *axis_variables({"": Controller(**controller)}))
     scenario = TrainScenario(**tables)
-    return train_variables(scenario.train(), scenario.loaded())
+    return (*train_variables(scenario.train(), scenario.loaded()), *axis_variables(scenario.controllers))
 
 
 def add_derived(data: dict[str, Any], ratio: Any) -> None:

@@ -15,7 +15,7 @@ from .results import RawResult, raw_result
 from .scenario import Initial, LoadTable, Scenario, SimulationTable
 from .train_results import run_train
 from .train_scenario import TrainScenario
-from .train_variables import train_variables
+from .train_variables import axis_variables, train_variables
 from .variables import STATES
 
 if TYPE_CHECKING:
@@ -117,7 +117,8 @@ def run(
     table = scenario.simulation
     width = BYTES_PER_SAMPLE
     if isinstance(scenario, TrainScenario):
-        width = 16 * len(train_variables(scenario.train(), scenario.loaded()))
+        axes = axis_variables(scenario.controllers)
+        width = 16 * (len(train_variables(scenario.train(), scenario.loaded())) + len(axes))
     check_memory(table.samples, width)
     how = "exact" if exact else f"dormand-prince, relative tolerance {tolerance:g}"
     options: tuple[Any, ...] = (
@@ -130,7 +131,8 @@ def run(
     )
     if isinstance(scenario, TrainScenario):
         return run_train(scenario, options, how, ledger=energy and exact)
-    result = _core.run(*core_inputs(scenario), *options)
+    _, *inputs = core_inputs(scenario)
+    result = _core.run(scenario.core(), *inputs, *options, scenario.control())
     return raw_result(scenario, result, how, ledger=energy and exact)
 
 

@@ -7,7 +7,11 @@ from typing import Annotated, Any, Self
 
 from pydantic import model_validator
 
+from .. import _core
+from ..control.axis import OPEN_LOOP, Bound, core_control, driven
+from ..control.controller import Controller
 from ..data_sheets.components import Conditions, use_records
+from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Positive, Speed, Time, Torque
 from ..model.drive import Drive
@@ -71,6 +75,8 @@ class Scenario(Part):
     title: str = ""
     command: CommandSignal = CommandSignal()
     """E_C: 1 is rated voltage, or with a torque source rated torque"""
+    controller: Controller | None = None
+    """of the motor, which then has no command; its shafts are `motor` and `load`"""
     motor: Motor
     gearbox: Gearbox
     load: LoadTable
@@ -92,7 +98,20 @@ class Scenario(Part):
                 )
         if drive.motor.kind == "torque_source" and start.motor_torque != 0.0:
             raise ValueError("has initial.motor_torque, but a torque source has no such state; use command")
+        if self.controller is not None and self.command != CommandSignal():
+            raise InputError("keys command, controller: both turn the motor; leave one of them out")
+        self.control()
         return self
+
+    def control(self) -> Bound:
+        """The solver's controllers."""
+        if self.controller is None:
+            return OPEN_LOOP
+        return core_control(self.drive().train(), {"motor": self.controller}, "controller.")
+
+    def core(self) -> _core.Drive:
+        """The solver's drive, its motor as the current loop makes it."""
+        return self.drive().core(None if self.controller is None else driven(self.motor, self.controller))
 
     def drive(self) -> Drive:
         """The drive without its surroundings."""

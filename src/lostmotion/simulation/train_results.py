@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..control.axis import core_control
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from .results import RawResult, installed_version
@@ -28,9 +29,13 @@ def run_train(scenario: TrainScenario, options: tuple[Any, ...], how: str, *, le
         many switchings are kept.
     """
     core, inputs, start, capacities = core_case(scenario)
-    result = _core.run_train(core, inputs, start, capacities, *options)
+    control = core_control(scenario.train(), scenario.controllers)
+    result = _core.run_train(core, inputs, start, capacities, *options, control)
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     data = dict(zip((name for name, _, _ in core.channels()), result["values"], strict=True))
+    shown = [name for name, _, _ in _core.axis_signals()]
+    for motor, signals in zip(scenario.controllers, result["control"], strict=True):
+        data |= {f"{motor}_{name}": values for name, values in zip(shown, signals, strict=True)}
     add_derived_of_train(scenario.train(), data, time)
     attributes = _attributes(scenario, result, how, ledger=ledger)
     return RawResult(time, data, attributes | {CONTACTS_OF_TRAIN: " ".join(core.contact_names())})
@@ -41,7 +46,7 @@ def core_case(
 ) -> tuple[_core.Train, list[_core.Signal], dict[str, float], dict[str, float]]:
     """What every run of the core begins with: train, inputs, state and hysteresis capacities by name."""
     train = scenario.train()
-    core = train.core(scenario.loaded())
+    core = scenario.core()
     signals = scenario.signals()
     inputs = [signals[name].core() for name in core.input_names()]
     return core, inputs, start_values(train, scenario.initial), start_capacities(scenario.initial)

@@ -8,6 +8,9 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
+from .. import _core
+from ..control.axis import core_control, driven
+from ..control.controller import Controller
 from ..data_sheets.components import Conditions
 from ..data_sheets.train_components import RECORDS, use_train_records
 from ..errors import InputError
@@ -60,6 +63,8 @@ class TrainScenario(TrainElements):
     shafts: Elements[ShaftTable] = Field(min_length=1)
     command: Elements[CommandSignal] = Field(default_factory=nothing)
     """of each motor (1 is rated voltage, or with a torque source rated torque; left out, 0), brake and friction clutch (1 is the full torque, 0 none)"""
+    controllers: Elements[Controller] = Field(default_factory=nothing)
+    """of motors, which then have no command"""
     initial: TrainInitial = TrainInitial()
     simulation: SimulationTable
 
@@ -67,7 +72,7 @@ class TrainScenario(TrainElements):
     def _consistent(self) -> Self:
         train = self.train()
         train.check(self.loaded())
-        check_names(train, self.loaded())
+        check_names(train, self.loaded(), self.controllers)
         known = self.commanded()
         for name in self.command:
             if name not in known:
@@ -83,7 +88,22 @@ class TrainScenario(TrainElements):
             except ValueError as problem:
                 raise InputError(f"key command.{name}: {problem}") from None
         start_values(train, self.initial)
+        self._check_controllers(train)
         return self
+
+    def _check_controllers(self, train: DriveTrain) -> None:
+        for name in self.controllers:
+            if name not in self.motors:
+                meant = did_you_mean(name, self.motors, f"the motors are {', '.join(self.motors) or 'none'}")
+                raise InputError(f"key controllers.{name}: is no motor of this train; {meant}")
+            if name in self.command:
+                raise InputError(f"keys command.{name}, controllers.{name}: both turn the same motor; leave one of them out")
+        core_control(train, self.controllers)
+
+    def core(self) -> _core.Train:
+        """The solver's train, its motors as the current loops make them."""
+        driven_by = {name: driven(self.motors[name], c) for name, c in self.controllers.items()}
+        return self.train().core(self.loaded(), driven_by)
 
     def train(self) -> DriveTrain:
         """The drive train without its surroundings."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
+from .. import _core
+from ..control.controller import Controller
 from ..errors import InputError
 from ..model.gear import Gear
 from ..model.train import DriveTrain, TrainElements
@@ -24,6 +26,24 @@ def train_variables(train: DriveTrain, loaded: Collection[str]) -> tuple[Variabl
     channels = [Variable(name, "", unit or "1", meaning) for name, unit, meaning in train.core(loaded).channels()]
     known = {channel.name for channel in channels}
     return (*channels, *(variable for variable in _derived(train) if variable.name not in known))
+
+
+# Of the signals of an axis those that its outermost loop has.
+AXIS_SIGNALS = {
+    "position": tuple(name for name, _, _ in _core.axis_signals()),
+    "speed": ("speed_reference", "measured_speed", "torque_reference"),
+    "torque": ("torque_reference",),
+}
+
+
+def axis_variables(controllers: Mapping[str, Controller]) -> tuple[Variable, ...]:
+    """What the controllers of a run show, after the names of their motors; that of a drive alone without."""
+    return tuple(
+        Variable(f"{motor}_{name}" if motor else name, "", unit, meaning)
+        for motor, controller in controllers.items()
+        for name, unit, meaning in _core.axis_signals()
+        if name in AXIS_SIGNALS[controller.reference.kind]
+    )
 
 
 def _derived(train: DriveTrain) -> Iterator[Variable]:
@@ -69,7 +89,7 @@ def angle_through(gear: Gear, angle: Any, twist: Any, *, forward: bool) -> Any:
     return angle / gear.ratio - twist - e
 
 
-def check_names(train: DriveTrain, loaded: Collection[str]) -> None:
+def check_names(train: DriveTrain, loaded: Collection[str], controllers: Mapping[str, Controller] = {}) -> None:
     """Refuse two elements whose result variables have the same name.
 
     Raises
@@ -77,7 +97,7 @@ def check_names(train: DriveTrain, loaded: Collection[str]) -> None:
     InputError
     """
     seen = {"time"}
-    for variable in train_variables(train, loaded):
+    for variable in (*train_variables(train, loaded), *axis_variables(controllers)):
         if variable.name in seen:
             tables = ("shafts", *TrainElements.model_fields)
             keys = [f"{table}.{name}" for table in tables for name in getattr(train, table)]

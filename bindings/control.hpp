@@ -1,0 +1,207 @@
+// Controllers of axes.
+#pragma once
+
+#include <nanobind/stl/optional.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "arrays.hpp"
+#include "lostmotion/simulation/train_control.hpp"
+
+namespace lostmotion::binding {
+
+// A controller that is a Python function. What it raises ends the run and is raised again after it.
+class PythonLaw {
+ public:
+    PythonLaw(nb::callable function, int states) : function_(std::move(function)), states_(states) {}
+
+    static int call(double time, const double* measured, const double* reference, double* state, double* command,
+                    void* data) {
+        auto& self = *static_cast<PythonLaw*>(data);
+        const nb::gil_scoped_acquire hold;
+        try {
+            const Array slots(state, {static_cast<std::size_t>(self.states_)}, nb::handle());
+            *command =
+                nb::cast<double>(self.function_(time, nb::make_tuple(measured[0], measured[1], measured[2]),
+                                                nb::make_tuple(reference[0], reference[1], reference[2], reference[3]),
+                                                nb::cast(slots, nb::rv_policy::reference)));
+            return 0;
+        } catch (...) {
+            self.raised_ = std::current_exception();
+            return 1;
+        }
+    }
+    // With the lock of the interpreter.
+    void raise_again() {
+        if (raised_) std::rethrow_exception(std::exchange(raised_, nullptr));
+    }
+
+ private:
+    nb::callable function_;
+    int states_;
+    std::exception_ptr raised_;
+};
+
+struct BoundAxis : control::Axis {
+    std::shared_ptr<PythonLaw> python_law;
+
+    void set_python_law(nb::callable function, int states) {
+        python_law = std::make_shared<PythonLaw>(std::move(function), states);
+        own_law = {};
+        own_law.function = PythonLaw::call;
+        own_law.data = python_law.get();
+        own_law.states = states;
+    }
+    // The address of a function of the type control::OwnLawFunction, and of what it is given.
+    void set_compiled_law(std::size_t function, std::size_t data, int states) {
+        own_law = {};
+        own_law.function = reinterpret_cast<control::OwnLawFunction>(function);
+        own_law.data = reinterpret_cast<void*>(data);
+        own_law.states = states;
+    }
+    void set_reference(const std::vector<std::array<double, 5>>& pieces,
+                       const std::vector<std::array<double, 3>>& sines) {
+        reference = {};
+        reference.pieces.clear();
+        for (const auto& [time, value, rate, second, third] : pieces)
+            reference.pieces.push_back({time, {value, rate, second, third}});
+        for (const auto& [amplitude, frequency, phase] : sines)
+            reference.sines.push_back({amplitude, frequency, phase});
+    }
+};
+
+// Base tick [s]; of each axis its controller, motor, and the shafts with the encoders of position and speed.
+using BoundControl = std::pair<double, std::vector<std::tuple<BoundAxis, int, int, int>>>;
+
+inline Control control_of(const BoundControl& bound) {
+    Control c;
+    c.tick = bound.first;
+    for (const auto& [axis, motor, position_shaft, speed_shaft] : bound.second)
+        c.axes.push_back({axis, motor, position_shaft, speed_shaft});
+    return c;
+}
+inline void raise_again(const BoundControl& bound) {
+    for (const auto& [axis, motor, position_shaft, speed_shaft] : bound.second)
+        if (axis.python_law) axis.python_law->raise_again();
+}
+
+// Of what the axes show in a run: the shape, and room for it.
+template <class Options>
+std::vector<std::size_t> control_shape(const Options& options) {
+    return {options.control.axes.size(), control::n_axis_signals, options.samples};
+}
+template <class Options>
+std::unique_ptr<double[]> control_room(Options& options) {
+    auto room = std::make_unique_for_overwrite<double[]>(options.control.axes.size() * control::n_axis_signals *
+                                                         options.samples);
+    options.control_out = room.get();
+    return room;
+}
+
+inline std::vector<std::tuple<std::string, std::string, std::string>> axis_signals() {
+    std::vector<std::tuple<std::string, std::string, std::string>> out;
+    for (const auto& [name, unit, meaning] : control::axis_signal_names) out.emplace_back(name, unit, meaning);
+    return out;
+}
+
+inline void bind_control(nb::module_& m) {
+    using namespace control;
+    nb::class_<TickDelay>(m, "TickDelay").def_rw("ticks", &TickDelay::ticks);
+    nb::class_<Schedule>(m, "Schedule").def_rw("every", &Schedule::every).def_rw("phase", &Schedule::phase);
+    nb::class_<Encoder>(m, "Encoder")
+        .def_rw("resolution", &Encoder::resolution)
+        .def_rw("error", &Encoder::error)
+        .def_rw("periods", &Encoder::periods)
+        .def_rw("phase", &Encoder::phase)
+        .def_rw("delay", &Encoder::delay);
+    nb::class_<Sensor>(m, "Sensor").def_rw("encoder", &Sensor::encoder).def_rw("scale", &Sensor::scale);
+    nb::class_<SpeedEstimate> estimate(m, "SpeedEstimate");
+    nb::enum_<SpeedEstimate::Kind>(estimate, "Kind")
+        .value("exact", SpeedEstimate::exact)
+        .value("difference", SpeedEstimate::difference)
+        .value("observer", SpeedEstimate::observer);
+    estimate.def_rw("kind", &SpeedEstimate::kind)
+        .def_rw("span", &SpeedEstimate::span)
+        .def_rw("smoothing", &SpeedEstimate::smoothing)
+        .def_rw("bandwidth", &SpeedEstimate::bandwidth)
+        .def_rw("damping", &SpeedEstimate::damping)
+        .def_rw("inertia", &SpeedEstimate::inertia);
+    nb::class_<PositionLoop>(m, "PositionLoop")
+        .def_rw("gain", &PositionLoop::gain)
+        .def_rw("integral_gain", &PositionLoop::integral_gain)
+        .def_rw("speed_feedforward", &PositionLoop::speed_feedforward)
+        .def_rw("speed_limit", &PositionLoop::speed_limit)
+        .def_rw("inner", &PositionLoop::inner)
+        .def_rw("outer", &PositionLoop::outer);
+    nb::class_<SpeedLoop>(m, "SpeedLoop")
+        .def_rw("gain", &SpeedLoop::gain)
+        .def_rw("reference_gain", &SpeedLoop::reference_gain)
+        .def_rw("integral_gain", &SpeedLoop::integral_gain)
+        .def_rw("torque_limit", &SpeedLoop::torque_limit);
+    nb::class_<CurrentLoop>(m, "CurrentLoop")
+        .def(nb::init<>())
+        .def_rw("gain", &CurrentLoop::gain)
+        .def_rw("integral_gain", &CurrentLoop::integral_gain)
+        .def_rw("back_emf", &CurrentLoop::back_emf)
+        .def_rw("rated_torque", &CurrentLoop::rated_torque)
+        .def_rw("limit", &CurrentLoop::limit);
+    nb::class_<TorqueFeedforward>(m, "TorqueFeedforward")
+        .def_rw("inertia", &TorqueFeedforward::inertia)
+        .def_rw("viscous_friction", &TorqueFeedforward::viscous_friction)
+        .def_rw("friction_torque", &TorqueFeedforward::friction_torque)
+        .def_rw("load_torque", &TorqueFeedforward::load_torque);
+    nb::class_<BacklashCompensation>(m, "BacklashCompensation")
+        .def_rw("backlash", &BacklashCompensation::backlash)
+        .def_rw("rate", &BacklashCompensation::rate);
+    nb::class_<DiscreteSystem>(m, "DiscreteSystem")
+        .def(
+            "__init__",
+            [](DiscreteSystem* self, const std::vector<double>& A, const std::vector<double>& B,
+               const std::vector<double>& C, double D) {
+                new (self) DiscreteSystem();
+                self->A = A;
+                self->B = B;
+                self->C = C;
+                self->D = D;
+            },
+            "A"_a, "B"_a, "C"_a, "D"_a)
+        .def_ro_static("max_order", &DiscreteSystem::max_order);
+
+    nb::class_<BoundAxis> axis(m, "Axis");
+    nb::enum_<Axis::Mode>(axis, "Mode")
+        .value("torque", Axis::torque_mode)
+        .value("speed", Axis::speed_mode)
+        .value("position", Axis::position_mode);
+    axis.def(nb::init<>())
+        .def_rw("mode", &BoundAxis::mode)
+        .def_rw("reference_delay", &BoundAxis::reference_delay)
+        .def_rw("ratio", &BoundAxis::ratio)
+        .def_rw("rated_torque", &BoundAxis::rated_torque)
+        .def_rw("delay", &BoundAxis::delay)
+        .def_rw("speed_sensor", &BoundAxis::speed_sensor)
+        .def_rw("position_sensor", &BoundAxis::position_sensor)
+        .def_rw("two_encoders", &BoundAxis::two_encoders)
+        .def_rw("position_share", &BoundAxis::position_share)
+        .def_rw("estimate", &BoundAxis::estimate)
+        .def_rw("position_schedule", &BoundAxis::position_schedule)
+        .def_rw("speed_schedule", &BoundAxis::speed_schedule)
+        .def_rw("current_schedule", &BoundAxis::current_schedule)
+        .def_rw("position_loop", &BoundAxis::position_loop)
+        .def_rw("speed_loop", &BoundAxis::speed_loop)
+        .def_rw("current_loop", &BoundAxis::current_loop)
+        .def_rw("feedforward", &BoundAxis::feedforward)
+        .def_rw("backlash", &BoundAxis::backlash)
+        .def_rw("speed_filters", &BoundAxis::speed_filters)
+        .def_rw("torque_filters", &BoundAxis::torque_filters)
+        .def("set_reference", &BoundAxis::set_reference, "pieces"_a, "sines"_a)
+        .def("set_python_law", &BoundAxis::set_python_law, "function"_a, "states"_a)
+        .def("set_compiled_law", &BoundAxis::set_compiled_law, "function"_a, "data"_a, "states"_a);
+    m.def("axis_signals", &axis_signals, nb::sig("def axis_signals() -> list[tuple[str, str, str]]"),
+          "Name, unit, meaning of what each axis shows.");
+}
+
+}  // namespace lostmotion::binding

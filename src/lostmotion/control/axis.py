@@ -1,0 +1,202 @@
+"""Controllers on a drive train, as the solver takes them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .. import _core
+from ..errors import InputError
+from ..inputs.validation import did_you_mean, shown
+from ..model.motor import Motor
+from ..model.parameters import MotorLaw
+from ..model.train import DriveTrain
+from .controller import Controller, whole_multiple
+from .filters import core_filter
+from .loops import CurrentLoop, FirstOrderCurrent
+
+Bound = tuple[float, list[tuple[_core.Axis, int, int, int]]]
+"""base tick [s]; of each axis the controller, its motor, and the shafts of the position's and of the speed's encoder"""
+OPEN_LOOP: Bound = (1.0, [])
+
+
+def turns(train: DriveTrain, start: str, end: str) -> float | None:
+    """How often shaft `start` turns for one turn of `end`, through gears and clutches; None if none lead there."""
+    found, waiting = {start: 1.0}, [start]
+    joints = [(g.input, g.output, g.ratio) for g in train.gears.values()]
+    joints += [(c.input, c.output, 1.0) for table in (train.clutches, train.freewheels) for c in table.values()]
+    while waiting:
+        here = waiting.pop()
+        for one, other, ratio in joints:
+            for a, b, i in ((one, other, ratio), (other, one, 1.0 / ratio)):
+                if a == here and b not in found:
+                    found[b] = found[a] * i
+                    waiting.append(b)
+    return found.get(end)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a controller is in a train."""
+
+    train: DriveTrain
+    name: str
+    controller: Controller
+
+    @property
+    def motor(self) -> Motor:
+        return self.train.motors[self.name]
+
+    @property
+    def motor_shaft(self) -> str:
+        return self.train.motors[self.name].shaft
+
+    @property
+    def shaft(self) -> str:
+        return self.known("shaft", self.controller.shaft, list(self.train.shafts)[-1])
+
+    def known(self, key: str, shaft: str | None, default: str) -> str:
+        if shaft is None:
+            return default
+        if shaft not in self.train.shafts:
+            meant = did_you_mean(shaft, self.train.shafts, f"the shafts are {', '.join(self.train.shafts)}")
+            raise InputError(f"{key}: {shown(shaft)} is no shaft; {meant}")
+        return shaft
+
+    def ratio(self, start: str, end: str, key: str) -> float:
+        i = turns(self.train, start, end)
+        if i is None:
+            raise InputError(f"{key}: no gear leads from the shaft {start} to {end}; name a shaft that the motor turns")
+        return i
+
+    def encoder_shaft(self, key: str) -> str:
+        encoder = getattr(self.controller, key)
+        return self.known(f"{key}.shaft", None if encoder is None else encoder.shaft, self.motor_shaft)
+
+    def axis(self, ticks: int) -> _core.Axis:
+        """The solver's controller; `ticks` of the base tick are its sample time."""
+        c = self.controller
+        out = _core.Axis()
+        out.mode = getattr(_core.Axis.Mode, c.reference.kind)
+        out.set_reference(c.reference.pieces(), c.reference.sine_list())
+        out.ratio = self.ratio(self.motor_shaft, self.shaft, "shaft")
+        out.rated_torque = self.motor.rated_torque
+        out.delay.ticks = c.delay * ticks
+        for name, _, every in c.schedules():
+            getattr(out, f"{name}_schedule").every = every * ticks
+        self._encoders(out, ticks)
+        self._loops(out)
+        if c.phase > 0.0:
+            phase = whole_multiple(c.phase, c.sample_time, "phase") * ticks
+            if phase >= out.position_schedule.every:
+                raise InputError(f"phase: {c.phase:g} s is not below the sample time of the position loop; take less")
+            out.position_schedule.phase = phase
+        if isinstance(c.current, CurrentLoop):
+            out.current_loop = self._current(c.current)
+        return out
+
+    def _encoders(self, out: _core.Axis, ticks: int) -> None:
+        c = self.controller
+        if c.encoder is not None:
+            shaft = self.encoder_shaft("encoder")
+            scale = self.ratio(self.motor_shaft, shaft, "encoder.shaft")
+            out.speed_sensor = c.encoder.core(scale, ticks)
+        if c.position_encoder is not None:
+            shaft = self.encoder_shaft("position_encoder")
+            out.two_encoders = True
+            out.position_sensor = c.position_encoder.core(
+                self.ratio(self.shaft, shaft, "position_encoder.shaft"), ticks
+            )
+            if c.blend_time is not None:
+                out.position_share = -math.expm1(-c.loop_time("position") / c.blend_time)
+
+    def _loops(self, out: _core.Axis) -> None:
+        c = self.controller
+        if c.position is not None:
+            out.position_loop = c.position.core()
+            out.reference_delay = c.position.reference_delay
+        if c.speed is None:
+            return
+        time = c.loop_time("speed")
+        out.speed_loop = c.speed.core()
+        out.estimate = c.speed.core_estimate(time)
+        for key in ("reference_filters", "torque_filters"):
+            filters = []
+            for k, f in enumerate(getattr(c.speed, key)):
+                try:
+                    filters.append(core_filter(f, time))
+                except InputError as problem:
+                    raise InputError(f"speed.{key}.{k}: {problem}") from None
+            setattr(out, "speed_filters" if key == "reference_filters" else key, filters)
+        out.feedforward = c.feedforward.core()
+        if c.feedforward.backlash > 0.0:
+            out.backlash.backlash = c.feedforward.backlash
+            out.backlash.rate = c.feedforward.backlash_rate or 0.0
+
+    def _current(self, loop: CurrentLoop) -> _core.CurrentLoop:
+        """Of (2): relative torque for current, 1/k_N for the resistance, so that K = g/(k_N (1 - a))."""
+        m = self.motor
+        if m.electrical_time_constant is None or m.armature_voltage_constant is None or m.rated_speed is None:
+            raise InputError(
+                'current.kind: "pi" needs a motor with a winding, and this one is a torque source; take "ideal" or "first_order"'
+            )
+        k_N = m.armature_voltage_constant
+        share = -math.expm1(-self.controller.loop_time("current") / m.electrical_time_constant)
+        out = _core.CurrentLoop()
+        out.gain = loop.gain / (k_N * share)
+        out.integral_gain = loop.gain / k_N
+        out.back_emf = loop.back_emf * (k_N - 1.0) / (k_N * m.rated_speed)
+        out.rated_torque = m.rated_torque
+        out.limit = math.inf if m.command_limit is None else m.command_limit
+        return out
+
+
+def core_control(train: DriveTrain, controllers: Mapping[str, Controller], key: str = "controllers.{}.") -> Bound:
+    """The controllers of the motors of a train.
+
+    Parameters
+    ----------
+    key
+        Of the table of one controller in a scenario file, for messages.
+
+    Raises
+    ------
+    InputError
+        One of them does not fit its motor or its shafts, or their sample times do not nest.
+    """
+    if not controllers:
+        return OPEN_LOOP
+    base = min(c.sample_time for c in controllers.values())
+    axes = []
+    for name, controller in controllers.items():
+        place = _Place(train, name, controller)
+        try:
+            ticks = whole_multiple(controller.sample_time, base, "sample_time")
+            position, speed = (place.encoder_shaft(key) for key in ("position_encoder", "encoder"))
+            shafts = list(train.shafts)
+            axes.append(
+                (place.axis(ticks), list(train.motors).index(name), shafts.index(position), shafts.index(speed))
+            )
+        except InputError as problem:
+            raise InputError(f"key {key.format(name)}{problem}") from None
+    return base, axes
+
+
+def driven(motor: Motor, controller: Controller) -> MotorLaw | None:
+    """What a current loop makes of its motor; None where the motor stays what it is.
+
+    One of first order is the law of (2) with k_N = 1: tau dM/dt = M* - M.
+    """
+    current = controller.current
+    if isinstance(current, CurrentLoop):
+        return None
+    if isinstance(current, FirstOrderCurrent):
+        changes = {
+            "motor.electrical_time_constant": current.time_constant,
+            "motor.armature_voltage_constant": 1.0,
+            "motor.rated_speed": 1.0,
+            "motor.command_limit": math.inf,
+        }
+        return tuple(changes.items()), False
+    return (), True

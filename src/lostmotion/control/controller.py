@@ -1,0 +1,107 @@
+"""The controller of a motor: reference, encoders, loops and their sample times."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from ..errors import InputError
+from ..inputs.part import Part
+from ..inputs.quantities import NotNegative, Positive, Time, Whole
+from .encoder import Encoder
+from .loops import CurrentLoop, Feedforward, FirstOrderCurrent, IdealCurrent, PositionLoop, SpeedLoop
+from .references import PositionReference, SpeedReference, TorqueReference
+
+AnyReference = Annotated[PositionReference | SpeedReference | TorqueReference, Field(discriminator="kind")]
+AnyCurrent = Annotated[IdealCurrent | FirstOrderCurrent | CurrentLoop, Field(discriminator="kind")]
+MAX_TICKS = 1_000_000  # of the base tick in the sample time of a loop
+
+
+class Controller(Part):
+    """Cascade of position, speed and current loop, each at its own sample time; what is left out is not there.
+
+    At each tick the encoders are read, the loops that are due are computed, the outermost first, and what the innermost
+    one gives acts `delay` sample times later.
+    """
+
+    reference: AnyReference
+    """of the position, the speed or the torque: what the outermost loop follows"""
+    sample_time: Annotated[Time, Positive]
+    """of the innermost loop, and of those that give none of their own"""
+    delay: Annotated[Whole, Field(ge=0, le=1)] = 1
+    """sample times from reading the encoders until the result acts"""
+    shaft: str | None = None
+    """that position and speed of the reference are of; left out, the last one"""
+    encoder: Encoder | None = None
+    """of the speed loop, and of the position loop unless that has its own"""
+    position_encoder: Encoder | None = None
+    """of the position loop, such as one on the load"""
+    blend_time: Annotated[Time, Positive] | None = None
+    """time constant with which the position encoder is taken over beyond that of the speed loop; left out, it counts alone"""
+    position: PositionLoop | None = None
+    speed: SpeedLoop | None = None
+    current: AnyCurrent = IdealCurrent()
+    feedforward: Feedforward = Feedforward()
+    phase: Annotated[Time, NotNegative] = 0.0
+    """by which the samples of the position loop come after those of the others"""
+
+    @model_validator(mode="after")
+    def _loops_fit_the_reference(self) -> Self:
+        wanted = {"position": ("position", "speed"), "speed": ("speed",), "torque": ()}[self.reference.kind]
+        for loop in ("position", "speed"):
+            present = getattr(self, loop) is not None
+            if present and loop not in wanted:
+                raise ValueError(
+                    f"has a {loop} loop, but its reference is of the {self.reference.kind}; leave {loop} out, or give a reference of the {loop}"
+                )
+            if not present and loop in wanted:
+                raise ValueError(
+                    f"lacks {loop}, the loop that follows a reference of the {self.reference.kind}; add its gain"
+                )
+        if self.encoder is None and (self.speed is not None):
+            raise ValueError("lacks encoder; give its lines, bits or resolution, or ideal = true")
+        if self.position_encoder is not None and self.position is None:
+            raise ValueError("has a position_encoder but no position loop; leave it out")
+        if self.blend_time is not None and self.position_encoder is None:
+            raise ValueError("has a blend_time but no position_encoder to blend; leave it out")
+        if self.feedforward != Feedforward() and self.speed is None:
+            raise ValueError("has a feedforward, which the speed loop adds, but no speed loop; leave it out")
+        list(self.schedules())
+        return self
+
+    def schedules(self) -> Iterator[tuple[str, float, int]]:
+        """Of each loop its name, sample time [s] and how many of the base tick that is.
+
+        Raises
+        ------
+        ValueError
+            One of them is no whole multiple of the base tick.
+        """
+        for name in ("position", "speed", "current"):
+            time = self.loop_time(name)
+            yield name, time, whole_multiple(time, self.sample_time, f"{name}.sample_time")
+
+    def loop_time(self, loop: str) -> float:
+        """Sample time of a loop [s]."""
+        own = getattr(getattr(self, loop), "sample_time", None)
+        return self.sample_time if own is None else float(own)
+
+
+def whole_multiple(time: float, base: float, key: str) -> int:
+    """How many times `base` a sample time is.
+
+    Raises
+    ------
+    InputError
+        It is no whole multiple.
+    """
+    ticks = round(time / base)
+    if ticks < 1 or ticks > MAX_TICKS or not math.isclose(ticks * base, time, rel_tol=1e-9):
+        near = max(1, min(ticks, MAX_TICKS)) * base
+        raise InputError(
+            f"{key}: {time:g} s is no whole multiple of the sample time {base:g} s; take {near:g} s, or another sample time"
+        )
+    return ticks
