@@ -23,7 +23,7 @@ LAYERS = [
     {"units"},
     {"inputs"},
     {"model"},
-    {"data_sheets"},
+    {"data_sheets", "control"},
     {"simulation"},
     {"response", "test_rig"},
     {"sizing"},

@@ -280,6 +280,43 @@ def test_products_of_decimal_units_keep_every_digit(text: str, unit: str, value:
     assert to_si(text, unit) == value
 
 
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("3 rad/s^2", "rad/s^2", 3.0),
+        ("3 rad/s²", "rad/s^2", 3.0),
+        ("3 deg/s^2", "rad/s^2", 3 * DEG),
+        ("3 rev/s^2", "rad/s^2", 6 * math.pi),
+        ("3 rpm/s", "rad/s^2", 3 * RPM),
+        ("3 krpm/s", "rad/s^2", 3000 * RPM),
+        ("3 min-1/s", "rad/s^2", 3 * RPM),
+        ("3 rpm/ms", "rad/s^2", 3000 * RPM),
+        ("3 rad/s^3", "rad/s^3", 3.0),
+        ("3 deg/s³", "rad/s^3", 3 * DEG),
+        ("3 rev/s^3", "rad/s^3", 6 * math.pi),
+        ("3 rpm/s^2", "rad/s^3", 3 * RPM),
+    ],
+)
+def test_accelerations_and_jerks_are_read_in_turns_degrees_and_radians(text: str, unit: str, value: float):
+    assert to_si(text, unit) == pytest.approx(value, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "words"),
+    [
+        ("3 1/s^2", "rad/s^2", 'turns or radians; write "3 rev/s^2" or "3 rad/s^2"'),
+        ("3 kHz/s", "rad/s^2", 'turns or radians; write "3000 rev/s^2" or "3000 rad/s^2"'),
+        ("3 1/min^2", "rad/s^2", 'turns or radians; write "3 rev/min^2" or "3 rad/min^2"'),
+        ("3 s^-3", "rad/s^3", 'turns or radians; write "3 rev/s^3" or "3 rad/s^3"'),
+        ("3 rad/s^2", "rad/s^3", "something else"),
+        ("3 m/s^2", "rad/s^2", "something else"),
+    ],
+)
+def test_accelerations_and_jerks_without_an_angle_are_refused(text: str, unit: str, words: str):
+    with pytest.raises(ValueError, match=re.escape(words)):
+        to_si(text, unit)
+
+
 def test_every_symbol_is_a_unit_of_the_registry_and_is_written_as_it_is_read():
     for symbol, units in symbols().items():
         assert read_unit(plain(symbol)) == units, symbol
@@ -301,7 +338,9 @@ def test_every_unit_of_the_schema_can_be_written():
         | units(train)
         | units(lm.GearboxSheet.model_json_schema())
         | units(lm.MotorSheet.model_json_schema())
+        | units(lm.PositionReference.model_json_schema())
     )
+    assert {"rad/s^2", "rad/s^3"} <= found
     assert {"", "N*m", "rad/s", "Hz", "degC", "K/W", "m^2/s", "kg", "N*m*s^2/rad^2"} <= found
     for unit in found:
         assert to_si(f"3 {unit}", unit) == 3.0

@@ -104,6 +104,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "LinearModel.antiresonances": (LINEAR.antiresonances, {"output": "load_speed", "source": "command"}),
     "ResultAccessor.plot": (RESPONSE.lm.plot, {"output": "load_speed"}),
     "ResultAccessor.plot_maps": (RESPONSE.lm.plot_maps, {"output": "load_speed"}),
+    "PositionReference.at": (lm.PositionReference(moves=[{"to": 1, "speed": 1, "acceleration": 1}]).at, {"time": [0.0, 1.0]}),
     "Motor.at_voltage": (SCENARIO.motor.at_voltage, {"voltage": 24.0}),
     "Scenario.replace": (lambda value: SCENARIO.replace(**{"load.inertia": value}), {"value": 1.0}),
     "Scenario.from_json": (lm.Scenario.from_json, {"text": "{}"}),

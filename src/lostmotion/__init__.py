@@ -13,6 +13,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     __version__: str
     from ._core import SolverError as SolverError
+    from .control.references import Move as Move
+    from .control.references import PositionReference as PositionReference
+    from .control.references import SpeedReference as SpeedReference
+    from .control.references import TorqueReference as TorqueReference
     from .data_sheets.components import gearbox as gearbox
     from .data_sheets.components import motor as motor
     from .data_sheets.gearbox_sheet import GearboxSheet as GearboxSheet
@@ -105,6 +109,7 @@ if TYPE_CHECKING:
 # Where each public name lives; it is imported when first used, so that `import lostmotion` stays quick.
 _HOMES = {
     "_core": ("SolverError",),
+    "control.references": ("Move", "PositionReference", "SpeedReference", "TorqueReference"),
     "data_sheets.components": ("gearbox", "motor"),
     "data_sheets.gearbox_sheet": ("GearboxSheet",),
     "data_sheets.loss_map_builder": ("BuiltMap", "build_loss_map"),

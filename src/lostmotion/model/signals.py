@@ -6,10 +6,12 @@ import bisect
 import itertools
 import math
 from collections import deque
+from collections.abc import Sequence
 from functools import lru_cache
 from numbers import Real
-from typing import Annotated, Any, Generic, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from .. import _core
@@ -17,8 +19,10 @@ from ..inputs.part import Part
 from ..inputs.quantities import Angle, Frequency, NotNegative, Number, Positive, Time, Torque, Whole
 
 V = TypeVar("V")  # the value of the signal, with its unit
+N = TypeVar("N", float, np.ndarray)
 
-Breakpoint = tuple[float, float, float]  # from a time [s] on: value, slope
+Breakpoint = tuple[float, ...]
+"""from a time [s] on: value, slope and, of what is not made of straight lines, the second and third derivative"""
 
 
 class Sine(Part, Generic[V]):
@@ -101,12 +105,18 @@ class Samples(Part, Generic[V]):
 
     def breakpoints(self) -> list[Breakpoint]:
         values = [float(v) for v in self.values]  # type: ignore[arg-type]
-        lines = _polyline(self.times, values)
-        return lines if self.times[0] == 0.0 else [(0.0, values[0], 0.0), *lines]
+        return self._held(_polyline(self.times, values))
+
+    def _held(self, points: list[Breakpoint]) -> list[Breakpoint]:
+        """With the first value from 0 on."""
+        return points if self.times[0] == 0.0 else [(0.0, points[0][1], 0.0), *points]
 
 
-class Signal(Part, Generic[V]):
+class TimeFunction(Part, Generic[V]):
     """The sum of all that is given; a bare number is a constant."""
+
+    derivatives: ClassVar[int] = 1
+    """of which the breakpoints tell, beside the value; all higher ones are 0 between them"""
 
     mean: V = 0.0  # type: ignore[assignment]
     """constant part"""
@@ -118,8 +128,6 @@ class Signal(Part, Generic[V]):
     """more sines"""
     steps: tuple[Step[V], ...] = ()
     ramps: tuple[Ramp[V], ...] = ()
-    chirp: Chirp[V] | None = None
-    samples: Samples[V] | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -142,27 +150,42 @@ class Signal(Part, Generic[V]):
         return [*own, *((s.amplitude, s.frequency, s.phase) for s in self.sines)]  # type: ignore[list-item]
 
     def breakpoint_list(self) -> list[Breakpoint]:
-        """The piecewise-linear part, from t = 0 on."""
-        pieces = [
-            part.breakpoints() for part in (*self.steps, *self.ramps, self.chirp, self.samples) if part is not None
-        ]
+        """All but the sines, from t = 0 on."""
+        pieces = self._pieces()
+        orders = range(1, self.derivatives + 1)
         mean = float(self.mean)  # type: ignore[arg-type]
         breakpoints = []
         waiting = deque(sorted(pieces, key=lambda piece: piece[0][0]))
         active: list[list[Breakpoint]] = []
         final = 0.0  # sum of the pieces that are past their last breakpoint and constant from there on
-        for time in sorted({0.0, *(t for piece in pieces for t, _, _ in piece)}):
+        for time in sorted({0.0, *(point[0] for piece in pieces for point in piece)}):
             while waiting and waiting[0][0][0] <= time:
                 active.append(waiting.popleft())
-            here = [_at(piece, time) for piece in active]
-            breakpoints.append((time, mean + sum((value for value, _ in here), final), sum(slope for _, slope in here)))
-            final += sum(value for piece, (value, _) in zip(active, here, strict=True) if time >= piece[-1][0])
+            here = [_at(piece, time, self.derivatives) for piece in active]
+            value = mean + sum((d[0] for d in here), final)
+            breakpoints.append((time, value, *(sum((d[k] for d in here), 0.0) for k in orders)))
+            final += sum(d[0] for piece, d in zip(active, here, strict=True) if time >= piece[-1][0])
             active = [piece for piece in active if time < piece[-1][0]]
         return breakpoints
+
+    def _pieces(self) -> list[list[Breakpoint]]:
+        """The breakpoints of each part; from the last one on a part is constant."""
+        return [*(step.breakpoints() for step in self.steps), *(ramp.breakpoints() for ramp in self.ramps)]
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The classes of the parts are generic, and as such have no name by which they could be pickled.
         return type(self).model_validate, (self.model_dump(exclude_unset=True),)
+
+
+class Signal(TimeFunction[V], Generic[V]):
+    """The sum of all that is given; a bare number is a constant."""
+
+    chirp: Chirp[V] | None = None
+    samples: Samples[V] | None = None
+
+    def _pieces(self) -> list[list[Breakpoint]]:
+        parts: list[Chirp[V] | Samples[V] | None] = [self.chirp, self.samples]
+        return [*super()._pieces(), *(part.breakpoints() for part in parts if part is not None)]
 
     def core(self) -> _core.Signal:
         """The solver's signal; made once for equal signals."""
@@ -220,16 +243,27 @@ class Signal(Part, Generic[V]):
 
 @lru_cache(maxsize=256)
 def _core_signal(signal: Signal[Any]) -> _core.Signal:
-    return _core.Signal(signal.breakpoint_list(), signal.sine_list())
+    return _core.Signal([(t, value, slope) for t, value, slope in signal.breakpoint_list()], signal.sine_list())
 
 
-def _at(piece: list[Breakpoint], time: float) -> tuple[float, float]:
-    """Value and slope at `time` (right limit); 0 before the first breakpoint."""
+def _at(piece: list[Breakpoint], time: float, derivatives: int) -> list[float]:
+    """Value and so many derivatives at `time` (right limit); 0 before the first breakpoint."""
     k = bisect.bisect_right(piece, time, key=lambda point: point[0]) - 1
     if k < 0:
-        return 0.0, 0.0
-    begin, value, slope = piece[k]
-    return value + slope * (time - begin), slope
+        return [0.0] * (derivatives + 1)
+    begin, *given = piece[k]
+    return taylor([*given, *[0.0] * (derivatives + 1 - len(given))], time - begin)
+
+
+def taylor(derivatives: Sequence[N], time: N) -> list[N]:
+    """Value and derivatives of a polynomial a time [s] after the instant at which they are given; numbers or arrays."""
+    found = []
+    for order in range(len(derivatives)):
+        total = derivatives[-1]
+        for k in range(len(derivatives) - 2, order - 1, -1):
+            total = derivatives[k] + total * time / (k - order + 1)
+        found.append(total)
+    return found
 
 
 def _polyline(times: Any, values: list[float]) -> list[Breakpoint]:

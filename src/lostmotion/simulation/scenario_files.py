@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,14 @@ from typing import Any
 from ..data_sheets.components import gearbox_table
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
+from ..inputs.schema import follow, unit_in_schema
 from ..inputs.toml_files import RESULTS, read_toml
 from ..inputs.validation import did_you_mean, shown
 from ..model.gearbox import Gearbox
 from .keys import parse_override, set_values
 from .scenario import Scenario, from_tables
 from .series_files import read_series
-from .train_scenario import TrainScenario, is_train, train_from_tables
+from .train_scenario import TrainScenario, file_schema, is_train, train_from_tables
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -162,25 +164,40 @@ def _find_records(data: dict[str, Any], directory: Path) -> None:
             element[key] = str(directory / record)
 
 
-def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...]) -> None:
-    """Puts the points of `samples.file`, a CSV file beside the scenario, in its place."""
+def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...], kinds: tuple[str, ...] = ()) -> None:
+    """Puts the points of `samples.file`, a CSV file beside the scenario, in its place.
+
+    `kinds` are the keys with the kind of each table that says it, which its units may depend on.
+    """
     for key, value in data.items():
         if not isinstance(value, dict):
             continue
-        where = (*keys, key)
+        where, place = (*keys, key), (*kinds, key, *[str(value[k]) for k in ("kind",) if k in value])
         if key != "samples" or "file" not in value:
-            _read_series(value, path, where)
+            _read_series(value, path, where, place)
             continue
+        units = _units_of_series(place)
+        if not units or (len(units) > 1 and place != where):
+            continue  # there is no such key, or no such kind: refused when the scenario is made
         name = value.pop("file")
-        problem = f"{path}: key {'.'.join(where)}.file: {shown(name)}"
-        if value:
-            raise InputError(f"{problem} leaves no room for {', '.join(value)}; give the file alone")
+        problem = f"{path}: key {'.'.join(where)}.file"
+        if points := [key for key in ("times", "values") if key in value]:
+            raise InputError(f"{problem}: {shown(name)} leaves no room for {', '.join(points)}; give the file alone")
         if not isinstance(name, str):
-            raise InputError(f"{problem} must be the name of a CSV file with columns time [s] and value")
+            raise InputError(f"{problem}: {shown(name)} must be the name of a CSV file with columns time [s] and value")
+        if len(units) > 1:
+            raise InputError(f"{problem}: {shown(name)} may hold {' or '.join(units)}; give {'.'.join(keys)}.kind too")
         try:
-            value["times"], value["values"] = read_series(path.parent / name, "" if where[0] == "command" else "N*m")
+            value["times"], value["values"] = read_series(path.parent / name, units[0])
         except InputError as error:
-            raise InputError(f"{path}: key {'.'.join(where)}.file: {error}") from None
+            raise InputError(f"{problem}: {error}") from None
+
+
+@cache
+def _units_of_series(place: tuple[str, ...]) -> list[str]:
+    """The SI units that the values of a series at these keys of a scenario may have."""
+    _, nodes = follow(file_schema(), (*place, "values"))
+    return sorted({unit for node in nodes if (unit := unit_in_schema(node)) is not None})
 
 
 def _merge(base: dict[str, Any], changes: dict[str, Any], where: tuple[str, ...] = ()) -> dict[str, Any]:

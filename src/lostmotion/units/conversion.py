@@ -264,10 +264,11 @@ def _unknown(digits: str, text: str, symbol: str, unit: str) -> str:
 def _of_something_else(digits: str, units: Product, symbol: str, unit: str) -> str:
     """For a unit that does not fit the key: what it may have meant, else what is wanted."""
     wanted = _known(unit)
-    if unit == "rad/s" and (per_second := _ratio(units, {"second": -1})) is not None:
+    rate = {name: power for name, power in wanted.items() if name == "second"}
+    if wanted == {"radian": 1} | rate and rate and (ratio := _ratio(units, rate)) is not None:
         hertz = any(name.endswith("hertz") for name in units)
-        value = f"{float(Decimal(digits) * per_second):.7g}" if hertz else digits
-        both = (written({angle: 1} | ({"second": -1} if hertz else units)) for angle in ("revolution", "radian"))
+        value = f"{float(Decimal(digits) * ratio):.7g}" if hertz else digits
+        both = (written({angle: 1} | (rate if hertz else units)) for angle in ("revolution", "radian"))
         return "may mean turns or radians; write " + " or ".join(f'"{value} {text}"' for text in both)
     if unit == "Hz" and (turns := _ratio(units, {"revolution": 1, "second": -1})) is not None:
         plainly = f', or "{digits} Hz" for that many periods in a second' if "radian" in units else ""

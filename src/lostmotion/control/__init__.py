@@ -1,0 +1,1 @@
+"""What controls a drive: references, with their derivatives."""

@@ -1,0 +1,236 @@
+"""References that a controller follows: position, speed or torque over time, with exact derivatives for feedforward."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from functools import lru_cache
+from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..errors import InputError, need
+from ..inputs.part import Part
+from ..inputs.quantities import Acceleration, Angle, Jerk, NotNegative, Positive, Speed, Time, Torque
+from ..inputs.validation import shown
+from ..model.signals import Breakpoint, Samples, TimeFunction, taylor
+from .profiles import segments
+
+V = TypeVar("V")  # the value of the reference, with its unit
+
+SHORTEST = 1e-6  # share of a move that the rounding of its instants may be
+
+Piece = tuple[float, float, float, float, float]
+"""from a time [s] on: value, and its first, second and third derivative"""
+
+
+class Series(Samples[V], Generic[V]):
+    """A curve through the points given; before the first and after the last the value stays.
+
+    In a scenario file, `file = "points.csv"` may stand for times and values, as in a signal.
+    """
+
+    interpolation: Literal["linear", "cubic"] = "linear"
+    """straight lines, or a cubic spline: first and second derivative are continuous between the first and the last point"""
+
+    def breakpoints(self) -> list[Breakpoint]:
+        if self.interpolation == "linear":
+            return super().breakpoints()
+        need("scipy", "a cubic series", "control")
+        from scipy.interpolate import CubicSpline
+
+        values = [float(v) for v in self.values]  # type: ignore[arg-type]
+        try:
+            spline = CubicSpline(
+                self.times, values
+            )  # the third derivative is continuous at the second point and the last but one
+        except ValueError:
+            raise ValueError(
+                "has samples that overflow as a cubic spline; lay their times further apart, or check the values"
+            ) from None
+        factors = np.array([[1.0], [1.0], [2.0], [6.0]])  # of derivatives: value, first, second, third
+        curve = zip(self.times, *(factors * spline.c[::-1]).tolist(), strict=False)
+        return self._held([*curve, (self.times[-1], values[-1], 0.0)])
+
+
+class Reference(TimeFunction[V], Generic[V]):
+    """The sum of all that is given; a bare number is a constant."""
+
+    derivatives: ClassVar[int] = 3
+
+    samples: Series[V] | None = None
+
+    @model_validator(mode="after")
+    def _representable(self) -> Self:
+        self._check()
+        with np.errstate(all="ignore"):
+            finite = np.isfinite(self.pieces()).all()
+        if not finite:
+            raise ValueError("has a value or a derivative beyond the range of numbers; check its times and values")
+        return self
+
+    def _check(self) -> None:
+        """Refuses what does not fit together, with a `ValueError`."""
+
+    def _pieces(self) -> list[list[Breakpoint]]:
+        return [*super()._pieces(), *([] if self.samples is None else [self.samples.breakpoints()])]
+
+    def pieces(self) -> list[Piece]:
+        """All but the sines: (time [s], value, first, second, third derivative) of each piece, the first from 0 on.
+
+        Within a piece the value is ``value + rate s + second s**2/2 + third s**3/6``, s seconds after its time.
+        """
+        return [(t, value, rate, second, third) for t, value, rate, second, third in self.breakpoint_list()]
+
+    def at(self, time: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Value, and its first, second and third derivative over time; where they jump, the value after the jump.
+
+        Parameters
+        ----------
+        time
+            One instant or an array of them [s], from 0 on.
+
+        Raises
+        ------
+        InputError
+            A time is negative or no number.
+        """
+        try:
+            t = np.asarray(time, float)
+        except (TypeError, ValueError):
+            raise InputError(f"time: {shown(time)} must be a number of seconds, or an array of them") from None
+        if not np.all((t >= 0.0) & np.isfinite(t)):
+            raise InputError(f"time: {shown(time)} must be finite and not negative; a reference begins at 0")
+        begin, *given = _table(self)
+        k = np.searchsorted(begin, t, side="right") - 1
+        found = taylor([d[k] for d in given], t - begin[k])
+        for amplitude, frequency, phase in self.sine_list():
+            omega = 2.0 * math.pi * frequency
+            angle = omega * t + phase
+            for n, wave in enumerate((np.sin(angle), np.cos(angle), -np.sin(angle), -np.cos(angle))):
+                found[n] = found[n] + amplitude * omega**n * wave
+        value, rate, second, third = found
+        return value, rate, second, third
+
+    @property
+    def duration(self) -> float:
+        """From when on it is constant, but for its sines [s]."""
+        return max([0.0, *(piece[-1][0] for piece in self._pieces())])
+
+
+@lru_cache(maxsize=64)
+def _table(reference: Reference[Any]) -> np.ndarray:
+    return np.array(reference.pieces()).T
+
+
+class Move(Part):
+    """From rest at one position to rest at another, in the shortest time that its limits permit.
+
+    Without a limit of the jerk the speed is trapezoidal.
+    """
+
+    to: Angle
+    speed: Annotated[Speed, Positive] | None = None
+    """limit; left out, that of all moves"""
+    acceleration: Annotated[Acceleration, Positive] | None = None
+    """limit, also while it slows down; left out, that of all moves"""
+    jerk: Annotated[Jerk, Positive] | None = None
+    """limit; left out, that of all moves"""
+    dwell: Annotated[Time, NotNegative] | None = None
+    """rest after the move; left out, that of all moves"""
+
+
+class PositionReference(Reference[Angle]):
+    """A position [rad] over time: the sum of all that is given, or a list of moves."""
+
+    kind: Literal["position"] = "position"
+    start: Angle = 0.0
+    """position before the first move"""
+    begin: Annotated[Time, NotNegative] = 0.0
+    """of the first move"""
+    speed: Annotated[Speed, Positive] | None = None
+    """limit of all moves that have none of their own"""
+    acceleration: Annotated[Acceleration, Positive] | None = None
+    """limit of all moves that have none of their own"""
+    jerk: Annotated[Jerk, Positive] | None = None
+    """limit of all moves that have none of their own; without any, their speed is trapezoidal"""
+    dwell: Annotated[Time, NotNegative] = 0.0
+    """rest after each move that has none of its own"""
+    moves: tuple[Move, ...] = ()
+
+    def _check(self) -> None:
+        limits = [key for key in ("speed", "acceleration", "jerk") if getattr(self, key) is not None]
+        if self.steps and (limits or self.moves):
+            raise ValueError(
+                "has steps, jumps of position that exceed every limit of speed; give moves = [{ to = 1.0 }] in their place"
+            )
+        if not self.moves:
+            given = limits + [key for key in ("start", "begin", "dwell") if getattr(self, key) != 0.0]
+            if given:
+                raise ValueError(f"has {given[0]} but no moves; add moves = [{{ to = 1.0 }}], or leave it out")
+            return
+        if self.mean != 0.0:
+            raise ValueError(f"has mean = {self.mean:g} and moves between positions; give start in the place of mean")
+        for k, move in enumerate(self.moves):
+            lacking = [key for key in ("speed", "acceleration") if self._of(move, key) is None]
+            if lacking:
+                raise ValueError(f"lacks {lacking[0]} of moves[{k}]; give it there, or beside moves for all of them")
+        positions = [self.start, *(move.to for move in self.moves)]
+        for k, (begin, end) in enumerate(self.intervals()):
+            resolved = math.ulp(end) <= SHORTEST * (end - begin) < math.inf
+            if not resolved and positions[k] != positions[k + 1]:
+                raise ValueError(
+                    f"has moves[{k}] from {begin:g} s to {end:g} s, an interval that numbers cannot resolve; check its limits"
+                )
+
+    def _of(self, move: Move, key: str) -> Any:
+        """What is given for a move, or for all moves."""
+        own = getattr(move, key)
+        return getattr(self, key) if own is None else own
+
+    def _segments(self) -> np.ndarray:
+        """(time, position, speed, acceleration, jerk) at the beginning of each segment of each move."""
+        columns = ([self._of(move, key) for move in self.moves] for key in ("speed", "acceleration", "jerk", "dwell"))
+        speed, acceleration, jerk, dwell = columns
+        ends = np.array([move.to for move in self.moves])
+        origins = np.array([self.start, *ends[:-1]])
+        with np.errstate(over="ignore", invalid="ignore"):  # refused when the reference is made
+            found = segments(ends - origins, speed, acceleration, [math.inf if j is None else j for j in jerk])
+            found[0] += list(itertools.accumulate(found[0, -1, :-1] + dwell[:-1], initial=self.begin))
+            found[1] += origins
+        found[1, -1] = ends
+        return found
+
+    def _pieces(self) -> list[list[Breakpoint]]:
+        if not self.moves:
+            return super()._pieces()
+        points = self._segments().T.reshape(-1, 5).tolist()
+        lasting = [tuple(p) for p, q in itertools.pairwise(points) if p[0] < q[0]]
+        return [*super()._pieces(), [(0.0, self.start), *lasting, tuple(points[-1])]]
+
+    def intervals(self) -> list[tuple[float, float]]:
+        """(begin, end) of each move, without its dwell [s]."""
+        return [(times[0], times[-1]) for times in self._segments()[0].T.tolist()] if self.moves else []
+
+    @property
+    def duration(self) -> float:
+        """From when on it is constant, but for its sines [s]; with moves, the end of the last dwell at least."""
+        ends = [end + float(self._of(self.moves[-1], "dwell")) for _, end in self.intervals()[-1:]]
+        return max([super().duration, *ends])
+
+
+class SpeedReference(Reference[Speed]):
+    """A speed [rad/s] over time: the sum of all that is given."""
+
+    kind: Literal["speed"] = "speed"
+
+
+class TorqueReference(Reference[Torque]):
+    """A torque [N·m] over time: the sum of all that is given."""
+
+    kind: Literal["torque"] = "torque"
+
+
+ReferenceTable = Annotated[PositionReference | SpeedReference | TorqueReference, Field(discriminator="kind")]
+"""a reference, by its `kind`"""
