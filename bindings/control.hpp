@@ -110,27 +110,36 @@ inline std::vector<std::tuple<std::string, std::string, std::string>> axis_signa
 
 inline void bind_control(nb::module_& m) {
     using namespace control;
-    nb::class_<TickDelay>(m, "TickDelay").def_rw("ticks", &TickDelay::ticks);
-    nb::class_<Schedule>(m, "Schedule").def_rw("every", &Schedule::every).def_rw("phase", &Schedule::phase);
+    nb::class_<TickDelay>(m, "TickDelay").def(nb::init<>()).def_rw("ticks", &TickDelay::ticks);
+    nb::class_<Schedule>(m, "Schedule")
+        .def(nb::init<>())
+        .def_rw("every", &Schedule::every)
+        .def_rw("phase", &Schedule::phase);
     nb::class_<Encoder>(m, "Encoder")
+        .def(nb::init<>())
         .def_rw("resolution", &Encoder::resolution)
         .def_rw("error", &Encoder::error)
         .def_rw("periods", &Encoder::periods)
         .def_rw("phase", &Encoder::phase)
         .def_rw("delay", &Encoder::delay);
-    nb::class_<Sensor>(m, "Sensor").def_rw("encoder", &Sensor::encoder).def_rw("scale", &Sensor::scale);
+    nb::class_<Sensor>(m, "Sensor")
+        .def(nb::init<>())
+        .def_rw("encoder", &Sensor::encoder)
+        .def_rw("scale", &Sensor::scale);
     nb::class_<SpeedEstimate> estimate(m, "SpeedEstimate");
     nb::enum_<SpeedEstimate::Kind>(estimate, "Kind")
         .value("exact", SpeedEstimate::exact)
         .value("difference", SpeedEstimate::difference)
         .value("observer", SpeedEstimate::observer);
-    estimate.def_rw("kind", &SpeedEstimate::kind)
+    estimate.def(nb::init<>())
+        .def_rw("kind", &SpeedEstimate::kind)
         .def_rw("span", &SpeedEstimate::span)
         .def_rw("smoothing", &SpeedEstimate::smoothing)
         .def_rw("bandwidth", &SpeedEstimate::bandwidth)
         .def_rw("damping", &SpeedEstimate::damping)
         .def_rw("inertia", &SpeedEstimate::inertia);
     nb::class_<PositionLoop>(m, "PositionLoop")
+        .def(nb::init<>())
         .def_rw("gain", &PositionLoop::gain)
         .def_rw("integral_gain", &PositionLoop::integral_gain)
         .def_rw("speed_feedforward", &PositionLoop::speed_feedforward)
@@ -138,6 +147,7 @@ inline void bind_control(nb::module_& m) {
         .def_rw("inner", &PositionLoop::inner)
         .def_rw("outer", &PositionLoop::outer);
     nb::class_<SpeedLoop>(m, "SpeedLoop")
+        .def(nb::init<>())
         .def_rw("gain", &SpeedLoop::gain)
         .def_rw("reference_gain", &SpeedLoop::reference_gain)
         .def_rw("integral_gain", &SpeedLoop::integral_gain)
@@ -150,11 +160,13 @@ inline void bind_control(nb::module_& m) {
         .def_rw("rated_torque", &CurrentLoop::rated_torque)
         .def_rw("limit", &CurrentLoop::limit);
     nb::class_<TorqueFeedforward>(m, "TorqueFeedforward")
+        .def(nb::init<>())
         .def_rw("inertia", &TorqueFeedforward::inertia)
         .def_rw("viscous_friction", &TorqueFeedforward::viscous_friction)
         .def_rw("friction_torque", &TorqueFeedforward::friction_torque)
         .def_rw("load_torque", &TorqueFeedforward::load_torque);
     nb::class_<BacklashCompensation>(m, "BacklashCompensation")
+        .def(nb::init<>())
         .def_rw("backlash", &BacklashCompensation::backlash)
         .def_rw("rate", &BacklashCompensation::rate);
     nb::class_<DiscreteSystem>(m, "DiscreteSystem")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from .. import _core
 from ..errors import InputError
@@ -14,11 +15,13 @@ from ..model.parameters import MotorLaw
 from ..model.train import DriveTrain
 from .controller import Controller, whole_multiple
 from .filters import core_filter
-from .loops import CurrentLoop, FirstOrderCurrent
+from .law import Law
+from .loops import CurrentLoop, FirstOrderCurrent, VoltageCommand
 
 Bound = tuple[float, list[tuple[_core.Axis, int, int, int]]]
 """base tick [s]; of each axis the controller, its motor, and the shafts of the position's and of the speed's encoder"""
 OPEN_LOOP: Bound = (1.0, [])
+NO_LAWS: Mapping[str, Law] = MappingProxyType({})
 
 
 def turns(train: DriveTrain, start: str, end: str) -> float | None:
@@ -152,13 +155,20 @@ class _Place:
         return out
 
 
-def core_control(train: DriveTrain, controllers: Mapping[str, Controller], key: str = "controllers.{}.") -> Bound:
+def core_control(
+    train: DriveTrain,
+    controllers: Mapping[str, Controller],
+    key: str = "controllers.{}.",
+    laws: Mapping[str, Law] = NO_LAWS,
+) -> Bound:
     """The controllers of the motors of a train.
 
     Parameters
     ----------
     key
         Of the table of one controller in a scenario file, for messages.
+    laws
+        Of controllers with ``law = true``.
 
     Raises
     ------
@@ -175,21 +185,22 @@ def core_control(train: DriveTrain, controllers: Mapping[str, Controller], key: 
             ticks = whole_multiple(controller.sample_time, base, "sample_time")
             position, speed = (place.encoder_shaft(key) for key in ("position_encoder", "encoder"))
             shafts = list(train.shafts)
-            axes.append(
-                (place.axis(ticks), list(train.motors).index(name), shafts.index(position), shafts.index(speed))
-            )
+            axis = place.axis(ticks)
+            if name in laws:
+                laws[name].set(axis)
+            axes.append((axis, list(train.motors).index(name), shafts.index(position), shafts.index(speed)))
         except InputError as problem:
             raise InputError(f"key {key.format(name)}{problem}") from None
     return base, axes
 
 
-def driven(motor: Motor, controller: Controller) -> MotorLaw | None:
+def driven(controller: Controller) -> MotorLaw | None:
     """What a current loop makes of its motor; None where the motor stays what it is.
 
     One of first order is the law of (2) with k_N = 1: tau dM/dt = M* - M.
     """
     current = controller.current
-    if isinstance(current, CurrentLoop):
+    if isinstance(current, CurrentLoop | VoltageCommand):
         return None
     if isinstance(current, FirstOrderCurrent):
         changes = {

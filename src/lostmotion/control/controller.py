@@ -10,13 +10,13 @@ from pydantic import Field, model_validator
 
 from ..errors import InputError
 from ..inputs.part import Part
-from ..inputs.quantities import NotNegative, Positive, Time, Whole
+from ..inputs.quantities import NotNegative, Positive, Switch, Time, Whole
 from .encoder import Encoder
-from .loops import CurrentLoop, Feedforward, FirstOrderCurrent, IdealCurrent, PositionLoop, SpeedLoop
+from .loops import CurrentLoop, Feedforward, FirstOrderCurrent, IdealCurrent, PositionLoop, SpeedLoop, VoltageCommand
 from .references import PositionReference, SpeedReference, TorqueReference
 
 AnyReference = Annotated[PositionReference | SpeedReference | TorqueReference, Field(discriminator="kind")]
-AnyCurrent = Annotated[IdealCurrent | FirstOrderCurrent | CurrentLoop, Field(discriminator="kind")]
+AnyCurrent = Annotated[IdealCurrent | FirstOrderCurrent | CurrentLoop | VoltageCommand, Field(discriminator="kind")]
 MAX_TICKS = 1_000_000  # of the base tick in the sample time of a loop
 
 
@@ -45,25 +45,36 @@ class Controller(Part):
     speed: SpeedLoop | None = None
     current: AnyCurrent = IdealCurrent()
     feedforward: Feedforward = Feedforward()
+    law: Switch = False
+    """the loops are a function of one's own, which `simulate(..., law=function)` gives"""
     phase: Annotated[Time, NotNegative] = 0.0
     """by which the samples of the position loop come after those of the others"""
 
     @model_validator(mode="after")
     def _loops_fit_the_reference(self) -> Self:
         wanted = {"position": ("position", "speed"), "speed": ("speed",), "torque": ()}[self.reference.kind]
+        if self.law:
+            wanted = ()
+            if isinstance(self.current, CurrentLoop):
+                raise ValueError(
+                    'has law = true and a current loop of kind "pi"; with a law of one\'s own, take "ideal", "first_order" or "voltage"'
+                )
+        elif isinstance(self.current, VoltageCommand):
+            raise ValueError(
+                'has current.kind = "voltage", which needs law = true; take "pi", "first_order" or "ideal"'
+            )
         for loop in ("position", "speed"):
             present = getattr(self, loop) is not None
             if present and loop not in wanted:
-                raise ValueError(
-                    f"has a {loop} loop, but its reference is of the {self.reference.kind}; leave {loop} out, or give a reference of the {loop}"
-                )
+                why = "law = true" if self.law else f"a reference of the {self.reference.kind}"
+                raise ValueError(f"has the loop {loop}, which has no use with {why}; leave it out")
             if not present and loop in wanted:
                 raise ValueError(
                     f"lacks {loop}, the loop that follows a reference of the {self.reference.kind}; add its gain"
                 )
-        if self.encoder is None and (self.speed is not None):
+        if self.encoder is None and (self.law or self.speed is not None):
             raise ValueError("lacks encoder; give its lines, bits or resolution, or ideal = true")
-        if self.position_encoder is not None and self.position is None:
+        if self.position_encoder is not None and self.position is None and not self.law:
             raise ValueError("has a position_encoder but no position loop; leave it out")
         if self.blend_time is not None and self.position_encoder is None:
             raise ValueError("has a blend_time but no position_encoder to blend; leave it out")

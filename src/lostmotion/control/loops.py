@@ -160,6 +160,12 @@ class IdealCurrent(Part):
     kind: Literal["ideal"] = "ideal"
 
 
+class VoltageCommand(Part):
+    """No current loop: a law of one's own commands the voltage."""
+
+    kind: Literal["voltage"]
+
+
 class FirstOrderCurrent(Part):
     """The torque follows with a time constant, as a tuned current loop does."""
 

@@ -6,6 +6,7 @@ import os
 from typing import TYPE_CHECKING, Any, Literal
 
 from .. import _core
+from ..control.law import as_laws
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number
@@ -42,6 +43,7 @@ def simulate(
     solver: SolverName = "exact",
     relative_tolerance: Number | None = None,
     energy: bool = True,
+    law: Any = None,
 ) -> xarray.Dataset:
     """Simulate a drive, or a drive train.
 
@@ -64,6 +66,8 @@ def simulate(
         Of the adaptive solver, 1e-15 to 1e-3; default 1e-8. The exact solver has none.
     energy
         Whether to keep the energy ledger (it takes about as long as the motion).
+    law
+        The law of a controller with ``law = true``, a function or a `Law`; of several, by the names of their motors.
 
     Returns
     -------
@@ -92,7 +96,7 @@ def simulate(
         scenario = scenario_or_drive.replace(**new) if new else scenario_or_drive
     else:
         scenario = as_scenario(scenario_or_drive, **changes, **times)
-    return run(scenario, solver=solver, relative_tolerance=relative_tolerance, energy=energy).dataset()
+    return run(scenario, solver=solver, relative_tolerance=relative_tolerance, energy=energy, law=law).dataset()
 
 
 def run(
@@ -101,6 +105,7 @@ def run(
     solver: SolverName = "exact",
     relative_tolerance: float | None = None,
     energy: bool = True,
+    law: Any = None,
 ) -> RawResult:
     """As `simulate`, of a scenario, with the result as plain arrays."""
     if solver not in ("exact", "dormand-prince"):
@@ -129,10 +134,11 @@ def run(
         0.0 if exact else tolerance,
         MAX_SWITCHINGS,
     )
+    laws = as_laws(law, scenario.axes())
     if isinstance(scenario, TrainScenario):
-        return run_train(scenario, options, how, ledger=energy and exact)
+        return run_train(scenario, options, how, laws, ledger=energy and exact)
     _, *inputs = core_inputs(scenario)
-    result = _core.run(scenario.core(), *inputs, *options, scenario.control())
+    result = _core.run(scenario.core(), *inputs, *options, scenario.control(laws))
     return raw_result(scenario, result, how, ledger=energy and exact)
 
 

@@ -8,8 +8,9 @@ from typing import Annotated, Any, Self
 from pydantic import model_validator
 
 from .. import _core
-from ..control.axis import OPEN_LOOP, Bound, core_control, driven
+from ..control.axis import NO_LAWS, Bound, core_control, driven
 from ..control.controller import Controller
+from ..control.law import Law
 from ..data_sheets.components import Conditions, use_records
 from ..errors import InputError
 from ..inputs.part import Part
@@ -103,15 +104,17 @@ class Scenario(Part):
         self.control()
         return self
 
-    def control(self) -> Bound:
+    def axes(self) -> dict[str, Controller]:
+        """The controller by the name of its motor, if there is one."""
+        return {} if self.controller is None else {"motor": self.controller}
+
+    def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
         """The solver's controllers."""
-        if self.controller is None:
-            return OPEN_LOOP
-        return core_control(self.drive().train(), {"motor": self.controller}, "controller.")
+        return core_control(self.drive().train(), self.axes(), "controller.", laws)
 
     def core(self) -> _core.Drive:
         """The solver's drive, its motor as the current loop makes it."""
-        return self.drive().core(None if self.controller is None else driven(self.motor, self.controller))
+        return self.drive().core(None if self.controller is None else driven(self.controller))
 
     def drive(self) -> Drive:
         """The drive without its surroundings."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from .. import _core
-from ..control.axis import core_control
+from ..control.law import Law
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from .results import RawResult, installed_version
@@ -19,7 +20,9 @@ from .train_state import start_capacities, start_values
 from .train_variables import angle_through, angles_through_gears
 
 
-def run_train(scenario: TrainScenario, options: tuple[Any, ...], how: str, *, ledger: bool) -> RawResult:
+def run_train(
+    scenario: TrainScenario, options: tuple[Any, ...], how: str, laws: Mapping[str, Law], *, ledger: bool
+) -> RawResult:
     """A run of a drive train.
 
     Parameters
@@ -29,8 +32,7 @@ def run_train(scenario: TrainScenario, options: tuple[Any, ...], how: str, *, le
         many switchings are kept.
     """
     core, inputs, start, capacities = core_case(scenario)
-    control = core_control(scenario.train(), scenario.controllers)
-    result = _core.run_train(core, inputs, start, capacities, *options, control)
+    result = _core.run_train(core, inputs, start, capacities, *options, scenario.control(laws))
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     data = dict(zip((name for name, _, _ in core.channels()), result["values"], strict=True))
     shown = [name for name, _, _ in _core.axis_signals()]

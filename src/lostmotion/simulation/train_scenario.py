@@ -9,8 +9,9 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..control.axis import core_control, driven
+from ..control.axis import NO_LAWS, Bound, core_control, driven
 from ..control.controller import Controller
+from ..control.law import Law
 from ..data_sheets.components import Conditions
 from ..data_sheets.train_components import RECORDS, use_train_records
 from ..errors import InputError
@@ -88,21 +89,31 @@ class TrainScenario(TrainElements):
             except ValueError as problem:
                 raise InputError(f"key command.{name}: {problem}") from None
         start_values(train, self.initial)
-        self._check_controllers(train)
+        self._check_controllers()
         return self
 
-    def _check_controllers(self, train: DriveTrain) -> None:
+    def _check_controllers(self) -> None:
         for name in self.controllers:
             if name not in self.motors:
                 meant = did_you_mean(name, self.motors, f"the motors are {', '.join(self.motors) or 'none'}")
                 raise InputError(f"key controllers.{name}: is no motor of this train; {meant}")
             if name in self.command:
-                raise InputError(f"keys command.{name}, controllers.{name}: both turn the same motor; leave one of them out")
-        core_control(train, self.controllers)
+                raise InputError(
+                    f"keys command.{name}, controllers.{name}: both turn the same motor; leave one of them out"
+                )
+        self.control()
+
+    def axes(self) -> Mapping[str, Controller]:
+        """The controllers by the names of their motors."""
+        return self.controllers
+
+    def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
+        """The solver's controllers."""
+        return core_control(self.train(), self.controllers, laws=laws)
 
     def core(self) -> _core.Train:
         """The solver's train, its motors as the current loops make them."""
-        driven_by = {name: driven(self.motors[name], c) for name, c in self.controllers.items()}
+        driven_by = {name: driven(c) for name, c in self.controllers.items()}
         return self.train().core(self.loaded(), driven_by)
 
     def train(self) -> DriveTrain:

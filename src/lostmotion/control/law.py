@@ -1,0 +1,95 @@
+"""Controllers of one's own: a Python function, or a compiled one at full speed."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .. import _core
+from ..errors import InputError
+from ..inputs.validation import shown
+
+SIGNATURE = (
+    "int (double time, const double *measured, const double *reference, double *state, double *command, void *data)"
+)
+
+
+@dataclass(frozen=True)
+class Law:
+    """A function that is called at each sample time in the place of the loops.
+
+    In Python ``function(time, measured, reference, state) -> command``; compiled, a numba cfunc or a ctypes function
+    pointer of the C type `SIGNATURE`, which writes the command and returns 0 (anything else ends the run).
+
+    ``measured`` is (position of the reference's shaft [rad], speed of the motor [rad/s], torque of the motor [N·m]),
+    ``reference`` (value, first, second, third derivative); ``command`` is in the unit of `[command]`: 1 is rated torque,
+    or with ``current.kind = "voltage"`` rated voltage.
+    """
+
+    function: Any
+    states: int = 0
+    """how many numbers it keeps from call to call; they begin at 0, and belong to the state of the run"""
+    data: Any = None
+    """of a compiled function: a ctypes object or a contiguous numpy array, whose address it is given"""
+
+    def set(self, axis: _core.Axis) -> None:
+        """Makes it the law of an axis of the solver.
+
+        Raises
+        ------
+        InputError
+            It is no function.
+        """
+        if isinstance(self.states, bool) or not isinstance(self.states, int) or not 0 <= self.states <= 10_000:
+            raise InputError(f"law.states: {shown(self.states)} must be a whole number from 0 to 10000")
+        address = self._address()
+        if address is not None:
+            axis.set_compiled_law(address, _address_of(self.data), self.states)
+        elif callable(self.function):
+            if self.data is not None:
+                raise InputError("law.data: is for compiled functions; keep what a Python function needs in itself")
+            axis.set_python_law(self.function, self.states)
+        else:
+            raise InputError(
+                f"law: {shown(self.function)} must be a function (time, measured, reference, state) -> command"
+            )
+
+    def _address(self) -> int | None:
+        if isinstance(self.function, ctypes._CFuncPtr):
+            return ctypes.cast(self.function, ctypes.c_void_p).value
+        address = getattr(self.function, "address", None)
+        return address if isinstance(address, int) and not isinstance(address, bool) else None
+
+
+def _address_of(data: Any) -> int:
+    if data is None:
+        return 0
+    if hasattr(data, "ctypes"):  # a numpy array
+        if not data.flags["C_CONTIGUOUS"]:
+            raise InputError("law.data: the array must be contiguous; give numpy.ascontiguousarray(...)")
+        return int(data.ctypes.data)
+    return ctypes.addressof(data)
+
+
+def as_laws(law: Any, axes: Mapping[str, Any]) -> dict[str, Law]:
+    """Laws by the name of the controller: one alone is that of the only controller.
+
+    Raises
+    ------
+    InputError
+        A controller with ``law = true`` has none, or one without has one.
+    """
+    wanted = [name for name, controller in axes.items() if controller.law]
+    given = law if isinstance(law, Mapping) else {} if law is None else dict.fromkeys(wanted[:1] or [""], law)
+    laws = {name: one if isinstance(one, Law) else Law(one) for name, one in given.items()}
+    if not isinstance(law, Mapping) and len(wanted) > 1:
+        raise InputError(f"law: must be given by name for {', '.join(wanted)}, such as law={{{wanted[0]!r}: function}}")
+    if missing := [name for name in wanted if name not in laws]:
+        raise InputError(f"law: the controller {missing[0]} has law = true; give simulate(..., law=function)")
+    if extra := [name for name in laws if name not in wanted]:
+        raise InputError(
+            f"law: {extra[0] or 'the scenario'} has no controller with law = true; set it, or leave law out"
+        )
+    return laws
