@@ -136,7 +136,19 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
         _change_voltages(based, data)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+    _change_what_turns(based, data)
     return _merge(based, data)
+
+
+def _change_what_turns(based: dict[str, Any], data: Mapping[str, Any]) -> None:
+    """A controller over a base takes the place of the command of its motor, and the other way round."""
+    for new, old in (("controller", "command"), ("command", "controller")):
+        if new in data and old not in data:
+            based.pop(old, None)
+    for new, old in (("controllers", "command"), ("command", "controllers")):
+        if isinstance(data.get(new), dict) and isinstance(based.get(old), dict):
+            for motor in data[new]:
+                based[old].pop(motor, None)
 
 
 def _change_voltages(based: dict[str, Any], data: Mapping[str, Any]) -> None:
