@@ -15,7 +15,7 @@
 namespace lostmotion::binding {
 
 // A controller that is a Python function. What it raises ends the run and is raised again after it.
-class PythonLaw {
+class [[gnu::visibility("hidden")]] PythonLaw {
  public:
     PythonLaw(nb::callable function, int states) : function_(std::move(function)), states_(states) {}
 
@@ -46,7 +46,7 @@ class PythonLaw {
     std::exception_ptr raised_;
 };
 
-struct BoundAxis : control::Axis {
+struct [[gnu::visibility("hidden")]] BoundAxis : control::Axis {
     std::shared_ptr<PythonLaw> python_law;
 
     void set_python_law(nb::callable function, int states) {
@@ -62,6 +62,9 @@ struct BoundAxis : control::Axis {
         own_law.function = reinterpret_cast<control::OwnLawFunction>(function);
         own_law.data = reinterpret_cast<void*>(data);
         own_law.states = states;
+    }
+    void raise_again() const {
+        if (python_law) python_law->raise_again();
     }
     void set_reference(const std::vector<std::array<double, 5>>& pieces,
                        const std::vector<std::array<double, 3>>& sines) {
@@ -85,8 +88,7 @@ inline Control control_of(const BoundControl& bound) {
     return c;
 }
 inline void raise_again(const BoundControl& bound) {
-    for (const auto& [axis, motor, position_shaft, speed_shaft] : bound.second)
-        if (axis.python_law) axis.python_law->raise_again();
+    for (const auto& [axis, motor, position_shaft, speed_shaft] : bound.second) axis.raise_again();
 }
 
 // Of what the axes show in a run: the shape, and room for it.
@@ -210,6 +212,7 @@ inline void bind_control(nb::module_& m) {
         .def_rw("speed_filters", &BoundAxis::speed_filters)
         .def_rw("torque_filters", &BoundAxis::torque_filters)
         .def("set_reference", &BoundAxis::set_reference, "pieces"_a, "sines"_a)
+        .def("raise_again", &BoundAxis::raise_again)
         .def("set_python_law", &BoundAxis::set_python_law, "function"_a, "states"_a)
         .def("set_compiled_law", &BoundAxis::set_compiled_law, "function"_a, "data"_a, "states"_a);
     m.def("axis_signals", &axis_signals, nb::sig("def axis_signals() -> list[tuple[str, str, str]]"),

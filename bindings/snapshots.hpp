@@ -71,16 +71,29 @@ void to_course(const Numbers& v, CourseOf<D>& c, bool& steady) {
     steady = *next != 0.0;
 }
 
+// The next tick of the controllers, and what they remember.
+inline Numbers from_control(const ControlCourse& c) {
+    Numbers v{static_cast<double>(c.next)};
+    v.insert(v.end(), c.slots.begin(), c.slots.end());
+    return v;
+}
+inline ControlCourse to_control(const Numbers& v) {
+    if (v.empty()) throw nb::type_error("a state of another simulation");
+    return {static_cast<std::int64_t>(v[0]), {v.begin() + 1, v.end()}};
+}
+
 template <class System>
 nb::tuple get_state(const SimulationOf<System>& s) {
     const auto& n = s.snapshot();
     return nb::make_tuple(n.time, Numbers(n.x.begin(), n.x.end()), from_memory(n.memory), from_key(n.key),
-                          Numbers(n.input.begin(), n.input.end()), n.started, from_course(n.course, n.steady));
+                          Numbers(n.input.begin(), n.input.end()), n.started, from_course(n.course, n.steady),
+                          from_control(n.control));
 }
 
 template <class System>
 void set_state(SimulationOf<System>& s, double time, const Numbers& x, const Numbers& memory,
-               const std::vector<int>& key, const Numbers& input, bool started, const Numbers& course) {
+               const std::vector<int>& key, const Numbers& input, bool started, const Numbers& course,
+               const Numbers& control) {
     typename SimulationOf<System>::Snapshot to;
     to.time = time;
     check_size(x, to.x.size());
@@ -91,6 +104,8 @@ void set_state(SimulationOf<System>& s, double time, const Numbers& x, const Num
     std::copy(input.begin(), input.end(), to.input.begin());
     to.started = started;
     to_course(course, to.course, to.steady);
+    to.control = to_control(control);
+    if (started) check_size(to.control.slots, static_cast<std::size_t>(s.control_slots()));
     s.restore(to);
 }
 

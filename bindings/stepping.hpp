@@ -95,14 +95,15 @@ void bind_state(Class& c) {
     c.def(
          "get_state", [](const S& s) { return with_kernel(s, [](const auto& in) { return get_state(in); }); },
          nb::sig("def get_state(self) -> tuple[float, list[float], list[float], list[int], list[float], bool, "
-                 "list[float]]"))
+                 "list[float], list[float]]"))
         .def(
             "set_state",
             [](S& s, double time, const Numbers& x, const Numbers& memory, const std::vector<int>& regime,
-               const Numbers& input, bool started, const Numbers& course) {
-                with_kernel(s, [&](auto& in) { set_state(in, time, x, memory, regime, input, started, course); });
+               const Numbers& input, bool started, const Numbers& course, const Numbers& control) {
+                with_kernel(s,
+                            [&](auto& in) { set_state(in, time, x, memory, regime, input, started, course, control); });
             },
-            "time"_a, "state"_a, "memory"_a, "regime"_a, "input"_a, "started"_a, "course"_a)
+            "time"_a, "state"_a, "memory"_a, "regime"_a, "input"_a, "started"_a, "course"_a, "control"_a)
         .def("time", [](const S& s) { return s.time(); });
 }
 
@@ -111,8 +112,10 @@ inline void bind_stepping(nb::module_& m) {
     of_drive
         .def(
             "__init__",
-            [](Simulation* self, const SharedDrive& d, double step) { new (self) Simulation(d.drive, step); },
-            "drive"_a, "step"_a)
+            [](Simulation* self, const SharedDrive& d, double step, const BoundControl& control) {
+                new (self) Simulation(d.drive, step, control_of(control));
+            },
+            "drive"_a, "step"_a, "control"_a, nb::keep_alive<1, 4>())
         .def("advance", &advance, "interval"_a, "command_begin"_a, "command_end"_a, "load_begin"_a, "load_end"_a)
         .def("read",
              [](Simulation& s) {
@@ -134,10 +137,13 @@ inline void bind_stepping(nb::module_& m) {
     of_train
         .def(
             "__init__",
-            [](TrainSimulation* self, const TrainDescription& t, double step) {
-                new (self) TrainSimulation(t.train, step);
+            [](TrainSimulation* self, const TrainDescription& t, double step, const BoundControl& bound) {
+                const Control control = control_of(bound);
+                if (const std::string error = check_control(model::Assembly(t.train), control); !error.empty())
+                    throw nb::value_error(error.c_str());
+                new (self) TrainSimulation(t.train, step, control);
             },
-            "train"_a, "step"_a)
+            "train"_a, "step"_a, "control"_a, nb::keep_alive<1, 4>())
         .def("advance", &advance_train, "interval"_a, "begin"_a, "end"_a)
         .def("read", &read_train)
         .def(

@@ -95,7 +95,24 @@ class ClosedLoopRun {
 
     ClosedLoopRun(Solver& solver, const ClosedLoop<D>& loop) : solver_(solver), loop_(loop) {}
 
-    ControlCourse& course() { return course_; }
+    const ControlCourse& course() const { return course_; }
+    // Goes on from what the controllers were, at the time and state that the solver has.
+    void resume(const ControlCourse& course) {
+        course_ = course;
+        if (course_.slots.empty()) return;  // not begun
+        each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
+            solver_.set_ramp(p.input, a.command(slot), 0.0);
+            return true;
+        });
+    }
+    // What acts on the motors, among the inputs.
+    void write_commands(InputsOf<D>& inputs) {
+        if (course_.slots.empty()) return;
+        each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
+            inputs[p.input] = a.command(slot);
+            return true;
+        });
+    }
 
     // The controllers at the start, with the drive at a state, and their first tick.
     Status begin(const StateOf<D>& x, const typename D::Memory& memory) {
@@ -114,15 +131,17 @@ class ClosedLoopRun {
         while (true) {
             const double tick = static_cast<double>(course_.next) * loop_.tick;
             const bool last = !(tick < t_end);
-            Passing<Observer> passing{observer, last};
             record(last ? std::numeric_limits<double>::infinity() : tick);
-            const Status status = solver_.advance(last ? t_end : tick, passing);
-            if (status != Status::done || last) return status;
+            if (last || tick > solver_.time()) {
+                Passing<Observer> passing{observer, last};
+                const Status status = solver_.advance(last ? t_end : tick, passing);
+                if (status != Status::done || last) return status;
+            }
             if constexpr (requires { observer.flush(); })
                 if (!observer.flush()) return Status::interrupted;
             if (!run_tick(solver_.state(), solver_.memory())) return Status::controller;
             if (changed_)
-                if (const Status found = solver_.inputs_changed(); found != Status::done) return found;
+                if (const Status found = solver_.inputs_changed(observer); found != Status::done) return found;
         }
     }
 

@@ -5,7 +5,7 @@
 
 #include "../solver/adaptive_solver.hpp"
 #include "../solver/components.hpp"
-#include "closed_loop.hpp"
+#include "drive_control.hpp"
 #include "energy.hpp"
 #include "sampler.hpp"
 #include "workspace.hpp"
@@ -71,21 +71,6 @@ class Recorder {
     const RunOptions& options_;
     RunReport& report_;
 };
-
-// Controllers of the drive, whose shafts are 0, the motor's, and 1, the load's. The laws must stay.
-inline ClosedLoop<DriveDims> closed_loop_of(const Drive& drive, const Control& control,
-                                            const std::vector<control::Axis>& laws) {
-    const double i = drive.gearbox.ratio;
-    const LinearForm of_motor = LinearForm::unit(load_angle, i) + LinearForm::unit(twist, i),
-                     of_load = LinearForm::unit(load_angle);
-    ClosedLoop<DriveDims> loop{control.tick, laws, {}};
-    for (const ControlledAxis& axis : control.axes)
-        loop.places.push_back({command - first_input, axis.position_shaft == 0 ? of_motor : of_load,
-                               axis.speed_shaft == 0 ? of_motor : of_load,
-                               LinearForm::unit(axis.speed_shaft == 0 ? motor_speed : load_speed),
-                               drive.motor.torque<LinearForm>({motor_torque, motor_speed, command, one})});
-    return loop;
-}
 
 // out: channels x samples, channel by channel.
 inline RunReport run_exact(Workspace& workspace, const Signals& signals, const Start& start, const RunOptions& options,

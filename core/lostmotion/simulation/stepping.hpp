@@ -1,8 +1,11 @@
 // A motion step by step: for control loops, co-simulation and learning.
 #pragma once
 
+#include <optional>
+
 #include "../drive/contact.hpp"
 #include "../solver/exact_solver.hpp"
+#include "drive_control.hpp"
 #include "reader.hpp"
 
 namespace lostmotion {
@@ -31,6 +34,7 @@ class SimulationOf {
         bool started = false;
         bool steady = false;  // the inputs were constant in the last interval
         CourseOf<D> course;   // what is known of the motion in the present regime beside its state
+        ControlCourse control;
     };
 
     // scale: natural sizes of the states. step: the usual interval [s]; others are allowed, this one is fastest.
@@ -39,6 +43,16 @@ class SimulationOf {
         : solver_(system, ramped_inputs<D>(inputs), step, scale), inputs_(inputs) {}
     SimulationOf(const SimulationOf&) = delete;
     SimulationOf& operator=(const SimulationOf&) = delete;
+
+    // Controllers turn some of the motors from the start on: make_loop(laws) gives these in the system.
+    template <class MakeLoop>
+    void close_loop(const Control& control, MakeLoop&& make_loop) {
+        laws_ = control.laws();
+        loop_ = make_loop(laws_);
+        controllers_.emplace(solver_, loop_);
+    }
+    // How many numbers the controllers remember.
+    int control_slots() const { return loop_.slots(); }
 
     double time() const { return now_.time; }
     typename D::Contact stopped_at() const { return solver_.stopped_at(); }
@@ -49,21 +63,21 @@ class SimulationOf {
         solver_.interrupted_context = context;
     }
 
-    // Advances by `interval` [s] with each input running in a straight line from its first to its second value.
-    // On any status but done the state is left as it was.
-    Status advance(double interval, const Inputs& begin, const Inputs& end) {
-        solver_.resume(now_.time, now_.x, now_.memory, now_.key, now_.course);
-        for (int i = 0; i < inputs_; ++i) solver_.set_ramp(i, begin[i], (end[i] - begin[i]) / interval);
+    // Advances by `interval` [s] with each input running in a straight line from its first to its second value; those
+    // that a controller gives are not looked at. On any status but done the state is left as it was.
+    Status advance(double interval, Inputs begin, Inputs end) {
+        resume(begin, end, interval);
         const bool steady = begin == end, unchanged = now_.steady && steady && begin == now_.input;
+        NoObserver nothing;
         Status status = Status::done;
         if (!now_.started)
-            status = solver_.begin(now_.time, now_.x, now_.memory);
+            status = begin_motion();
         else if (!unchanged)
             status = solver_.inputs_changed();
-        NoObserver nothing;
-        if (status == Status::done) status = solver_.advance(now_.time + interval, nothing);
-        if (status != Status::done) return status;
-        now_ = {solver_.time(), solver_.state(), solver_.memory(), solver_.key(), end, true, steady, solver_.course()};
+        const double to = now_.time + interval;
+        if (status == Status::done)
+            status = controllers_ ? controllers_->advance(to, nothing, [](double) {}) : solver_.advance(to, nothing);
+        if (status == Status::done) keep(end, steady);
         return status;
     }
 
@@ -71,12 +85,10 @@ class SimulationOf {
     // must have one.
     Status find_regime() {
         if (now_.started) return Status::done;
-        solver_.resume(now_.time, now_.x, now_.memory, now_.key);
-        for (int i = 0; i < inputs_; ++i) solver_.set_ramp(i, now_.input[i], 0.0);
-        const Status status = solver_.begin(now_.time, now_.x, now_.memory);
-        if (status == Status::done)
-            now_ = {now_.time, solver_.state(), solver_.memory(), solver_.key(), now_.input,
-                    true,      false,           solver_.course()};
+        Inputs input = now_.input;
+        resume(input, input, 1.0);
+        const Status status = begin_motion();
+        if (status == Status::done) keep(input, false);
         return status;
     }
     const Regime& regime() {
@@ -85,9 +97,37 @@ class SimulationOf {
     }
 
  private:
+    // The solver at the present state, with the inputs running over the interval.
+    void resume(Inputs& begin, Inputs& end, double interval) {
+        solver_.resume(now_.time, now_.x, now_.memory, now_.key, now_.course);
+        for (int i = 0; i < inputs_; ++i) solver_.set_ramp(i, begin[i], (end[i] - begin[i]) / interval);
+        if (!controllers_) return;
+        controllers_->resume(now_.control);
+        controllers_->write_commands(begin);
+        controllers_->write_commands(end);
+    }
+    Status begin_motion() {
+        return controllers_ ? controllers_->begin(now_.x, now_.memory) : solver_.begin(now_.time, now_.x, now_.memory);
+    }
+    void keep(Inputs input, bool steady) {
+        if (controllers_) controllers_->write_commands(input);
+        now_ = {solver_.time(),
+                solver_.state(),
+                solver_.memory(),
+                solver_.key(),
+                input,
+                true,
+                steady,
+                solver_.course(),
+                controllers_ ? controllers_->course() : ControlCourse{}};
+    }
+
     ExactSolver<System> solver_;
     int inputs_;
     Snapshot now_;
+    std::vector<control::Axis> laws_;
+    ClosedLoop<D> loop_;
+    std::optional<ClosedLoopRun<ExactSolver<System>>> controllers_;
 };
 
 // What a simulation of a drive owns.
@@ -99,8 +139,11 @@ struct OwnDrive {
 
 class Simulation : private OwnDrive, public SimulationOf<SwitchedDrive> {
  public:
-    Simulation(const Drive& drive, double step)
-        : OwnDrive(drive), SimulationOf(own_system, own_drive.balanced_scale(), step) {}
+    Simulation(const Drive& drive, double step, const Control& control = {})
+        : OwnDrive(drive), SimulationOf(own_system, own_drive.balanced_scale(), step) {
+        if (control.present())
+            close_loop(control, [&](const auto& laws) { return closed_loop_of(own_drive, control, laws); });
+    }
 
     const Drive& drive() const { return own_drive; }
     using SimulationOf::advance;

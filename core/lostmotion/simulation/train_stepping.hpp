@@ -26,8 +26,12 @@ class TrainSimulationIn : private OwnTrain<D>, public SimulationOf<model::TrainS
     using Base = SimulationOf<model::TrainSystem<D>>;
 
  public:
-    TrainSimulationIn(const TrainRun& run, double step)
-        : Own(run), Base(Own::own_system, Own::own_system.balanced_scale(), step, run.assembly().layout().inputs) {}
+    TrainSimulationIn(const TrainRun& run, double step, const Control& control)
+        : Own(run), Base(Own::own_system, Own::own_system.balanced_scale(), step, run.assembly().layout().inputs) {
+        if (control.present())
+            Base::close_loop(control,
+                             [&](const auto& laws) { return closed_loop_of<D>(Own::model.assembly, control, laws); });
+    }
 
     bool too_many_guards() const { return Own::own_system.overflowed(); }
     TrainPoint point() {
@@ -43,10 +47,10 @@ class TrainSimulationIn : private OwnTrain<D>, public SimulationOf<model::TrainS
 
 class TrainSimulation {
  public:
-    // The train must have passed the check.
-    TrainSimulation(const model::Train& train, double step) : run_(train) {
+    // The train must have passed the check, and its controllers theirs.
+    TrainSimulation(const model::Train& train, double step, const Control& control = {}) : run_(train) {
         run_.in_kernel([&]<class D>(const typename TrainReader<D>::Model&) {
-            in_ = std::make_unique<TrainSimulationIn<D>>(run_, step);
+            in_ = std::make_unique<TrainSimulationIn<D>>(run_, step, control);
         });
     }
     const model::Assembly& assembly() const { return run_.assembly(); }

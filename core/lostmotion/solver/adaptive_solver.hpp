@@ -138,10 +138,15 @@ class AdaptiveSolver {
         if (!left_) left_ = input_before(time_, now_.x);
         signals_[input].breakpoints[0] = {time_, value, slope};
     }
-    Status inputs_changed() {
+    template <class Observer>
+    Status inputs_changed(Observer& observer) {
         input_.anchor(time_);
         see_inputs(system_, input_, time_, now_);
-        return status_of(system_.next(cache_, now_, nullptr, key_, *std::exchange(left_, std::nullopt)));
+        bool changed = false;
+        const Status status = follow_change<System, Cache, D>(system_, cache_, *std::exchange(left_, std::nullopt),
+                                                              now_, key_, observer, changed);
+        switchings_ += changed;
+        return status;
     }
 
     // observer.step(regime, memory, dense step, whether it is the last), observer.switching(...); the inputs at any

@@ -106,12 +106,22 @@ class ExactSolver {
     // From now on the input is value + slope * (t - now). Only for signals made with ramped_inputs().
     void set_ramp(int input, double value, double slope) { signals_[input].breakpoints[0] = {time_, value, slope}; }
     // The inputs have changed at this instant: finds the regime anew.
-    Status inputs_changed() {
+    template <class Observer>
+    Status inputs_changed(Observer& observer) {
         const Key before = key_;
         anchor_inputs();
-        const Status status = status_of(system_.next(cache_, now_, nullptr, key_, course_.input));
+        bool changed = false;
+        const Status status =
+            follow_change<System, Cache, D>(system_, cache_, course_.input, now_, key_, observer, changed);
+        switchings_ += changed;
         follow_inputs(before);
         return status;
+    }
+
+    Status inputs_changed() {
+        struct {
+        } nobody;
+        return inputs_changed(nobody);
     }
 
     // Runs to t_end. The observer gets every segment as it comes and, if it wants them, the switchings between.

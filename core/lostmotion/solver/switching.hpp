@@ -107,6 +107,32 @@ Status switch_regime(const System& system, Cache& cache, InputState<D>& input, d
     return Status::done;
 }
 
+// Finds the regime anew where the inputs have changed, from what they were up to here. Shows the switching to the
+// observer, if there is one and it wants to see it. changed: whether there is.
+template <class System, class Cache, class D, class Observer>
+Status follow_change(const System& system, Cache& cache, const InputsOf<D>& left, InstantOf<D>& now,
+                     typename System::Key& key, Observer& observer, bool& changed) {
+    const bool wanted = wants_switching<System>(observer);
+    SwitchingOf<System> s;
+    s.before = key;
+    if (wanted) s.torque_before = evaluate<D>(system.torque_at_load(cache.regime(key)), now.x, now.memory, left);
+    const Found found = system.next(cache, now, nullptr, key, left);
+    changed = !(key == s.before);
+    if (found != Found::yes || !changed) return status_of(found);
+    if constexpr (requires { observer.switching(s); }) {
+        if (wanted) {
+            s.time = now.time;
+            s.input_jump = true;
+            s.after = key;
+            s.x = now.x;
+            s.memory = now.memory;
+            s.torque_after = evaluate<D>(system.torque_at_load(cache.regime(key)), now.x, now.memory, now.input[0]);
+            observer.switching(s);
+        }
+    }
+    return Status::done;
+}
+
 // Counts switchings that crowd: true if more than a hundred lie within a few thousand roundings of the time.
 class Accumulation {
  public:

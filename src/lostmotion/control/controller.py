@@ -46,7 +46,7 @@ class Controller(Part):
     current: AnyCurrent = IdealCurrent()
     feedforward: Feedforward = Feedforward()
     law: Switch = False
-    """the loops are a function of one's own, which `simulate(..., law=function)` gives"""
+    """the loops are a function of your own, which `simulate(..., law=function)` gives"""
     phase: Annotated[Time, NotNegative] = 0.0
     """by which the samples of the position loop come after those of the others"""
 

@@ -1,4 +1,4 @@
-"""Controllers of one's own: a Python function, or a compiled one at full speed."""
+"""Controllers of your own: a Python function, or a compiled one at full speed."""
 
 from __future__ import annotations
 

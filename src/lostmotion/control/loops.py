@@ -161,7 +161,7 @@ class IdealCurrent(Part):
 
 
 class VoltageCommand(Part):
-    """No current loop: a law of one's own commands the voltage."""
+    """No current loop: a law of your own commands the voltage."""
 
     kind: Literal["voltage"]
 

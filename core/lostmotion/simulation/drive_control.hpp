@@ -1,0 +1,26 @@
+// Controllers of the drive.
+#pragma once
+
+#include <vector>
+
+#include "../drive/contact.hpp"
+#include "closed_loop.hpp"
+
+namespace lostmotion {
+
+// Those of a drive, whose shafts are 0, the motor's, and 1, the load's. The laws must stay.
+inline ClosedLoop<DriveDims> closed_loop_of(const Drive& drive, const Control& control,
+                                            const std::vector<control::Axis>& laws) {
+    const double i = drive.gearbox.ratio;
+    const LinearForm of_motor = LinearForm::unit(load_angle, i) + LinearForm::unit(twist, i),
+                     of_load = LinearForm::unit(load_angle);
+    ClosedLoop<DriveDims> loop{control.tick, laws, {}};
+    for (const ControlledAxis& axis : control.axes)
+        loop.places.push_back({command - first_input, axis.position_shaft == 0 ? of_motor : of_load,
+                               axis.speed_shaft == 0 ? of_motor : of_load,
+                               LinearForm::unit(axis.speed_shaft == 0 ? motor_speed : load_speed),
+                               drive.motor.torque<LinearForm>({motor_torque, motor_speed, command, one})});
+    return loop;
+}
+
+}  // namespace lostmotion
