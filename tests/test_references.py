@@ -4,6 +4,7 @@ import itertools
 import math
 import pickle
 import re
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import lostmotion as lm
+from conftest import ROOT
 from lostmotion.control.profiles import segment_durations, segments
 from lostmotion.control.references import ReferenceTable
 from lostmotion.inputs.part import Part
@@ -357,6 +359,21 @@ def test_a_series_of_a_reference_is_read_from_a_file_in_the_unit_of_its_kind(
             reference(**table)
         assert sentence in str(caught.value)
     scenario_files._units_of_series.cache_clear()
+
+
+def test_the_page_on_references_is_true(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (ROOT / "docs" / "references.md").read_text()
+    code, table = (re.search(rf"```{kind}\n(.*?)```", page, re.S)[1] for kind in ("python", "toml"))
+    names: dict[str, object] = {}
+    exec(code, names)
+    assert lm.PositionReference(**tomllib.loads(table)) == names["reference"]
+    # 0.85 s = D/v + v/a + a/j of the first move, half of which is done in the middle of it.
+    (begin, end), _ = names["reference"].intervals()
+    assert (begin, end) == pytest.approx((0.0, 0.85))
+    assert np.concatenate([names[x] for x in ("position", "speed", "acceleration", "jerk")]) == pytest.approx(
+        [0, 45 * DEG, 90 * DEG, 0, 180 * DEG, 0, 0, 0, 0, 7200 * DEG, 0, 0], abs=1e-9
+    )
+    assert capsys.readouterr().out
 
 
 # --- bad input ---
