@@ -129,14 +129,6 @@ def train_reference() -> str:
     return "\n".join(lines)
 
 
-def reference_keys() -> str:
-    """The keys of a position reference, and of what it is made of."""
-    schema = lm.PositionReference.model_json_schema()
-    lines: list[str] = []
-    write_table("reference", schema, schema, lines, set(), '[reference] kind = "position"')
-    return "\n".join(lines)
-
-
 def changes() -> list[str]:
     """What a change of one key does to a part that is otherwise given."""
     return [
@@ -308,7 +300,6 @@ def generate(out: Path = OUT) -> None:
         "commands": commands(),
         "gallery": gallery(out),
     }
-    (out / "reference-keys.inc").write_text(reference_keys(), encoding="utf-8")
     reference_figures.write(out)
     self_locking_figures.write(out)
     two_motors_figures.write(out)

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 import lostmotion as lm
 from conftest import ROOT
+from lostmotion.control.controller import AnyReference
 from lostmotion.control.profiles import segment_durations, segments
-from lostmotion.control.references import ReferenceTable
 from lostmotion.inputs.part import Part
 from lostmotion.model.signals import taylor
 from lostmotion.simulation import scenario_files
@@ -324,22 +324,18 @@ def test_references_survive_json_and_pickling(reference) -> None:
 
 
 class Tables(Part):
-    """A scenario with nothing but a reference."""
+    """A controller with nothing but a reference."""
 
-    reference: ReferenceTable
+    reference: AnyReference
 
 
-def test_a_series_of_a_reference_is_read_from_a_file_in_the_unit_of_its_kind(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(scenario_files, "file_schema", Tables.model_json_schema)
-    scenario_files._units_of_series.cache_clear()
+def test_a_series_of_a_reference_is_read_from_a_file_in_the_unit_of_its_kind(tmp_path: Path) -> None:
     (tmp_path / "points.csv").write_text("time [ms],value [deg]\n0,0\n500,90\n")
 
     def reference(**table: object) -> object:
-        data = {"reference": table}
+        data = {"controller": {"reference": table}}
         scenario_files._read_series(data, tmp_path / "s.toml", ())
-        return Tables(**data).reference
+        return Tables(**data["controller"]).reference
 
     found = reference(kind="position", samples={"file": "points.csv", "interpolation": "cubic"})
     assert isinstance(found, lm.PositionReference)
@@ -349,7 +345,7 @@ def test_a_series_of_a_reference_is_read_from_a_file_in_the_unit_of_its_kind(
     for table, sentence in (
         ({"kind": "speed", "samples": {"file": "points.csv"}}, "(deg); it must be a value in rad/s"),
         ({"kind": "torque", "samples": {"file": "points.csv"}}, "(deg); it must be a value in N*m"),
-        ({"samples": {"file": "points.csv"}}, "may hold N*m or rad or rad/s; give reference.kind too"),
+        ({"samples": {"file": "points.csv"}}, "may hold N*m or rad or rad/s; give controller.reference.kind too"),
         ({"kind": "position", "samples": {"file": 3}}, "reference.samples.file: 3 must be the name of a CSV file"),
         ({"kind": "position", "samples": {"file": "points.csv", "times": [1]}}, "leaves no room for times"),
         ({"kind": "speeed", "samples": {"file": "points.csv"}}, 'did you mean "speed"?'),
@@ -358,7 +354,6 @@ def test_a_series_of_a_reference_is_read_from_a_file_in_the_unit_of_its_kind(
         with pytest.raises(lm.InputError) as caught:
             reference(**table)
         assert sentence in str(caught.value)
-    scenario_files._units_of_series.cache_clear()
 
 
 def test_the_page_on_references_is_true(capsys: pytest.CaptureFixture[str]) -> None:
