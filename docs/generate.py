@@ -7,12 +7,14 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import reference_figures
 import self_locking_figures
 import two_motors_figures
 from typer.main import get_command
 
 import lostmotion as lm
 from lostmotion.cli import app
+from lostmotion.control import references
 from lostmotion.inputs.schema import options, unit_in_schema
 from lostmotion.model import signals
 from lostmotion.simulation.scenario import json_schema
@@ -25,7 +27,8 @@ OUT = Path(__file__).parent / "_generated"
 
 def purpose_of(table: Mapping[str, Any]) -> str:
     """First paragraph of the docstring of the part that a table is read into."""
-    generic = getattr(signals, table.get("title", "").split("[")[0], None)  # a generic class keeps its docstring
+    name = table.get("title", "").split("[")[0]
+    generic = getattr(signals, name, getattr(references, name, None))  # a generic class keeps its docstring
     text = table.get("description") or (generic.__doc__ if generic else "") or ""
     return text.split("\n\n")[0].replace("\n", " ").replace("``", "`")
 
@@ -297,6 +300,7 @@ def generate(out: Path = OUT) -> None:
         "commands": commands(),
         "gallery": gallery(out),
     }
+    reference_figures.write(out)
     self_locking_figures.write(out)
     two_motors_figures.write(out)
     for name, text in pages.items():

@@ -4,6 +4,7 @@ import itertools
 import math
 import pickle
 import re
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,8 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import lostmotion as lm
+from conftest import ROOT
+from lostmotion.control.controller import AnyReference
 from lostmotion.control.profiles import segment_durations, segments
-from lostmotion.control.references import ReferenceTable
 from lostmotion.inputs.part import Part
 from lostmotion.model.signals import taylor
 from lostmotion.simulation import scenario_files
@@ -322,22 +324,18 @@ def test_references_survive_json_and_pickling(reference) -> None:
 
 
 class Tables(Part):
-    """A scenario with nothing but a reference."""
+    """A controller with nothing but a reference."""
 
-    reference: ReferenceTable
+    reference: AnyReference
 
 
-def test_a_series_of_a_reference_is_read_from_a_file_in_the_unit_of_its_kind(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(scenario_files, "file_schema", Tables.model_json_schema)
-    scenario_files._units_of_series.cache_clear()
+def test_a_series_of_a_reference_is_read_from_a_file_in_the_unit_of_its_kind(tmp_path: Path) -> None:
     (tmp_path / "points.csv").write_text("time [ms],value [deg]\n0,0\n500,90\n")
 
     def reference(**table: object) -> object:
-        data = {"reference": table}
+        data = {"controller": {"reference": table}}
         scenario_files._read_series(data, tmp_path / "s.toml", ())
-        return Tables(**data).reference
+        return Tables(**data["controller"]).reference
 
     found = reference(kind="position", samples={"file": "points.csv", "interpolation": "cubic"})
     assert isinstance(found, lm.PositionReference)
@@ -347,7 +345,7 @@ def test_a_series_of_a_reference_is_read_from_a_file_in_the_unit_of_its_kind(
     for table, sentence in (
         ({"kind": "speed", "samples": {"file": "points.csv"}}, "(deg); it must be a value in rad/s"),
         ({"kind": "torque", "samples": {"file": "points.csv"}}, "(deg); it must be a value in N*m"),
-        ({"samples": {"file": "points.csv"}}, "may hold N*m or rad or rad/s; give reference.kind too"),
+        ({"samples": {"file": "points.csv"}}, "may hold N*m or rad or rad/s; give controller.reference.kind too"),
         ({"kind": "position", "samples": {"file": 3}}, "reference.samples.file: 3 must be the name of a CSV file"),
         ({"kind": "position", "samples": {"file": "points.csv", "times": [1]}}, "leaves no room for times"),
         ({"kind": "speeed", "samples": {"file": "points.csv"}}, 'did you mean "speed"?'),
@@ -356,7 +354,21 @@ def test_a_series_of_a_reference_is_read_from_a_file_in_the_unit_of_its_kind(
         with pytest.raises(lm.InputError) as caught:
             reference(**table)
         assert sentence in str(caught.value)
-    scenario_files._units_of_series.cache_clear()
+
+
+def test_the_page_on_references_is_true(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (ROOT / "docs" / "references.md").read_text()
+    code, table = (re.search(rf"```{kind}\n(.*?)```", page, re.S)[1] for kind in ("python", "toml"))
+    names: dict[str, object] = {}
+    exec(code, names)
+    assert lm.PositionReference(**tomllib.loads(table)) == names["reference"]
+    # 0.85 s = D/v + v/a + a/j of the first move, half of which is done in the middle of it.
+    (begin, end), _ = names["reference"].intervals()
+    assert (begin, end) == pytest.approx((0.0, 0.85))
+    assert np.concatenate([names[x] for x in ("position", "speed", "acceleration", "jerk")]) == pytest.approx(
+        [0, 45 * DEG, 90 * DEG, 0, 180 * DEG, 0, 0, 0, 0, 7200 * DEG, 0, 0], abs=1e-9
+    )
+    assert capsys.readouterr().out
 
 
 # --- bad input ---

@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from ..errors import InputError, need
 from ..inputs.part import Part
@@ -230,7 +230,3 @@ class TorqueReference(Reference[Torque]):
     """A torque [N·m] over time: the sum of all that is given."""
 
     kind: Literal["torque"] = "torque"
-
-
-ReferenceTable = Annotated[PositionReference | SpeedReference | TorqueReference, Field(discriminator="kind")]
-"""a reference, by its `kind`"""

@@ -1,0 +1,34 @@
+"""The figure of docs/references.md."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lostmotion as lm
+from lostmotion.reports import plots
+from lostmotion.reports.panels import Curve, Panel
+
+DARK: dict[str, Any] = {"color": "#0b3c5d", "linewidth": 1.5}
+LIGHT: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.2}
+DEG = 180.0 / math.pi
+
+
+def write(out: Path) -> None:
+    """One move with and without a limit of the jerk, into a directory."""
+    move = {"to": "90 deg", "speed": "180 deg/s", "acceleration": "720 deg/s^2"}
+    jerk_limited = lm.PositionReference(moves=[move], jerk="7200 deg/s^3")
+    trapezoidal = lm.PositionReference(moves=[move])
+    t = np.linspace(0.0, 0.95, 4001)
+    limited, plain = (tuple(DEG * x for x in reference.at(t)) for reference in (jerk_limited, trapezoidal))
+    labels = ("position [deg]", "speed [deg/s]", "acceleration [deg/s²]", "jerk [deg/s³]")
+    panels = []
+    for k, label in enumerate(labels):
+        curves = [Curve("jerk-limited", t, limited[k], DARK)]
+        if k < 3:  # the jerk of the other one is a pulse of no duration
+            curves.append(Curve("trapezoidal speed", t, plain[k], LIGHT))
+        panels.append(Panel("", "time [s]", label, tuple(curves)))
+    plots.draw(panels, 2, (9.0, 5.0)).savefig(out / "references-move.png", dpi=100, metadata={"Software": None})
