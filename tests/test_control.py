@@ -73,3 +73,81 @@ def test_a_linear_two_mass_drive_under_a_sampled_pi_is_the_linear_recursion() ->
     scale = np.abs(expected).max()
     assert np.abs(result["motor_speed"].to_numpy() - expected[0]).max() < 1e-12 * scale
     assert np.abs(result["load_speed"].to_numpy() - expected[1]).max() < 1e-12 * scale
+
+
+# --- step by step ---
+
+
+@pytest.fixture
+def axis() -> lm.Scenario:
+    s = lm.load("position-axis", {"simulation.duration": 0.4})
+    assert isinstance(s, lm.Scenario)
+    return s
+
+
+def test_steps_of_any_length_lead_where_the_run_leads(axis: lm.Scenario) -> None:
+    run = lm.simulate(axis)
+    rng = np.random.default_rng(5)
+    simulation = lm.Simulation(axis)
+    at = np.unique(np.concatenate([rng.uniform(0.0, 0.4, 150), np.arange(1, 40) * 1e-2, np.arange(1, 200) * T]))
+    for begin, end in zip([0.0, *at[:-1]], at, strict=True):
+        simulation.advance(end - begin)
+    simulation.advance(0.4 - at[-1])
+    for name in ("motor_speed", "load_speed", "twist", "load_angle"):
+        scale = float(np.abs(run[name]).max())
+        assert simulation[name] == pytest.approx(float(run[name][-1]), abs=1e-9 * scale)
+
+
+def test_a_state_within_a_tick_continues_bit_for_bit(axis: lm.Scenario) -> None:
+    one = lm.Simulation(axis)
+    one.advance(0.1)
+    one.advance(0.4 * T)
+    state = one.state
+    for _ in range(300):
+        one.advance(0.7 * T)
+    other = lm.Simulation(axis)
+    other.state = state
+    for _ in range(300):
+        other.advance(0.7 * T)
+    assert one.read() == other.read()
+    assert one.state.values == other.state.values
+
+
+def test_a_law_of_your_own_that_is_the_loop_moves_the_drive_as_the_loop_does() -> None:
+    tables: dict[str, Any] = {
+        "shafts": {"motor": {"inertia": 2e-3}, "load": {"inertia": 5e-3}},
+        "motors": {"m": torque_source(rated_torque=2.0)},
+        "gears": {"g": {"input": "motor", "output": "load", "ratio": 5.0, "stiffness": {"kind": "linear", "stiffness": 700.0}}},
+        "simulation": {"duration": 0.1, "sample_interval": 1e-3},
+    }  # fmt: skip
+    common = {"sample_time": T, "reference": {"kind": "speed", "mean": 3.0}, "encoder": {"lines": 2048}}
+    loop = lm.simulate(scenario(**tables, controllers={"m": common | {"speed": {"gain": 0.4, "integral_gain": 20.0}}}))
+
+    def law(time: float, measured: Any, reference: Any, state: Any) -> float:
+        torque = 0.4 * (5.0 * reference[0] - measured[1]) + state[0]
+        state[0] += T * 20.0 / 0.4 * (torque - state[0])
+        return torque / 2.0  # type: ignore[no-any-return]
+
+    own = lm.simulate(scenario(**tables, controllers={"m": common | {"law": True}}), law=lm.Law(law, states=1))
+    for name in ("motor_speed", "load_speed"):
+        assert own[name].to_numpy() == pytest.approx(loop[name].to_numpy(), abs=1e-9 * float(np.abs(loop[name]).max()))
+
+
+def test_what_a_law_raises_comes_through() -> None:
+    tables: dict[str, Any] = {
+        "shafts": {"motor": {"inertia": 2e-3}},
+        "motors": {"m": torque_source()},
+        "controllers": {"m": {"sample_time": T, "reference": {"kind": "torque"}, "encoder": {"ideal": True}, "law": True}},
+        "simulation": {"duration": 0.1, "sample_interval": 1e-3},
+    }  # fmt: skip
+
+    def broken(*given: Any) -> float:
+        raise ZeroDivisionError("in my law")
+
+    with pytest.raises(ZeroDivisionError, match="in my law"):
+        lm.simulate(scenario(**tables), law=broken)
+    simulation = lm.Simulation(scenario(**tables), law=broken)
+    with pytest.raises(ZeroDivisionError, match="in my law"):
+        simulation.advance(1e-3)
+    with pytest.raises(lm.SolverError, match="controller failed"):
+        lm.simulate(scenario(**tables), law=lambda *given: math.nan)

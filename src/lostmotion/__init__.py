@@ -13,6 +13,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     __version__: str
     from ._core import SolverError as SolverError
+    from .control.controller import Controller as Controller
+    from .control.encoder import Encoder as Encoder
+    from .control.filters import as_filter as as_filter
+    from .control.law import Law as Law
     from .control.references import Move as Move
     from .control.references import PositionReference as PositionReference
     from .control.references import SpeedReference as SpeedReference
@@ -109,6 +113,10 @@ if TYPE_CHECKING:
 # Where each public name lives; it is imported when first used, so that `import lostmotion` stays quick.
 _HOMES = {
     "_core": ("SolverError",),
+    "control.controller": ("Controller",),
+    "control.encoder": ("Encoder",),
+    "control.filters": ("as_filter",),
+    "control.law": ("Law",),
     "control.references": ("Move", "PositionReference", "SpeedReference", "TorqueReference"),
     "data_sheets.components": ("gearbox", "motor"),
     "data_sheets.gearbox_sheet": ("GearboxSheet",),

@@ -211,3 +211,8 @@ def driven(controller: Controller) -> MotorLaw | None:
         }
         return tuple(changes.items()), False
     return (), True
+
+
+def motor_laws(controllers: Mapping[str, Controller]) -> dict[str, MotorLaw | None]:
+    """What the current loops make of the motors, by name."""
+    return {name: driven(controller) for name, controller in controllers.items()}

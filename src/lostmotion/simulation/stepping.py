@@ -10,6 +10,9 @@ from typing import Any, overload
 import numpy as np
 
 from .. import _core
+from ..control.axis import OPEN_LOOP, motor_laws
+from ..control.controller import Controller
+from ..control.law import as_laws
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Time
@@ -42,6 +45,8 @@ class SimulationState:
     values: tuple[Any, ...] = field(repr=False)
     drive: Drive | DriveTrain = field(repr=False)
     """whose state it is"""
+    controllers: dict[str, Controller] = field(default_factory=dict, repr=False)
+    """that turn its motors"""
 
 
 class Simulation:
@@ -50,13 +55,16 @@ class Simulation:
     Parameters
     ----------
     drive
-        A drive or a train, or a scenario, which also gives the state at t = 0; its commands and load torques are not used.
+        A drive or a train, or a scenario, which also gives the state at t = 0, and controllers, which then turn their
+        motors by themselves; its commands and load torques are not used.
     step
         The usual interval [s]; any other is possible, this one is fastest.
     initial
         State at t = 0; default that of the scenario, or rest.
     loaded
         Names of the shafts of a train that a load torque may act on; default those of the scenario, of a train alone all.
+    law
+        As of `simulate`.
 
     Examples
     --------
@@ -76,6 +84,7 @@ class Simulation:
         step: Time = 1e-3,
         initial: Initial | TrainInitial | None = None,
         loaded: Sequence[str] | None = None,
+        law: Any = None,
     ) -> None:
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
             raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
@@ -87,25 +96,30 @@ class Simulation:
         self._channel = _CHANNEL
         self._derived: dict[str, Derived]
         self._initial: Initial | TrainInitial
+        scenario = drive if isinstance(drive, Scenario | TrainScenario) else None
+        self._controllers = dict(scenario.axes()) if scenario is not None else {}
+        laws = as_laws(law, self._controllers)
+        self._control = scenario.control(laws) if scenario is not None else OPEN_LOOP
         if isinstance(drive, DriveTrain | TrainScenario):
             self._of_train(drive, step, loaded)
         elif loaded is not None:
             raise InputError("loaded: is for trains; a drive has one load torque, on its load")
         else:
             self._drive = drive_of(drive)
-            self._core = _core.Simulation(self._drive.core(), step)
+            core = scenario.core() if isinstance(scenario, Scenario) else self._drive.core()
+            self._core = _core.Simulation(core, step, self._control)
             self._derived = {"efficiency": self._efficiency, "motor_power": self._motor_power}
             self._initial = drive.initial if isinstance(drive, Scenario) else Initial()
         self.reset(initial)
 
     def _of_train(self, what: DriveTrain | TrainScenario, step: float, loaded: Sequence[str] | None) -> None:
         train, shafts = loaded_train(what, loaded)
-        core = train.core(shafts)
+        core = train.core(shafts, motor_laws(self._controllers))
         self._drive = train
-        self._core = _core.TrainSimulation(core, step)
+        self._core = _core.TrainSimulation(core, step, self._control)
         self._input_places = {name: k for k, name in enumerate(core.input_names())}
         self._loaded = tuple(shafts)
-        self._required = {f"{name}_command" for name in train.commanded()}
+        self._required = {f"{name}_command" for name in train.commanded() if name not in self._controllers}
         self._variables = train_variables(train, shafts)
         self._channel = {name: k for k, (name, _, _) in enumerate(core.channels())}
         self._derived = self._derived_of(train)
@@ -152,7 +166,12 @@ class Simulation:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of what is given to `advance`."""
-        return ("command", "load_torque") if self._input_places is None else tuple(self._input_places)
+        if self._input_places is None:
+            return ("load_torque",) if self._controllers else ("command", "load_torque")
+        return tuple(name for name in self._input_places if name not in self._controlled())
+
+    def _controlled(self) -> set[str]:
+        return {f"{motor}_command" for motor in self._controllers}
 
     @property
     def time(self) -> float:
@@ -181,6 +200,10 @@ class Simulation:
         if self._input_places is not None:
             self._advance_train(interval, command, load_torque, inputs)
             return
+        if self._controllers and command is _GIVE:
+            command = 0.0
+        elif self._controllers:
+            raise InputError("command: the controller of the scenario turns the motor; leave it out")
         if inputs or command is _GIVE:
             wrong = f"an unexpected keyword argument '{next(iter(inputs))}'" if inputs else None
             raise TypeError(f"advance() got {wrong}" if wrong else "advance() missing a required argument: 'command'")
@@ -200,7 +223,7 @@ class Simulation:
             raise InputError(
                 f"command {shown(command)} and load_torque {shown(load_torque)} must be finite numbers (SI)"
             )
-        self._core.advance(interval, c0, c1, m0, m1)  # type: ignore[call-arg, arg-type]
+        self._step(interval, c0, c1, m0, m1)
 
     def _advance_train(self, interval: float, command: Any, load_torque: Any, inputs: dict[str, Ramp]) -> None:
         places = self._input_places or {}
@@ -208,6 +231,8 @@ class Simulation:
             raise InputError(f"a train takes its inputs by name: {', '.join(places)}")
         begin, end = [0.0] * len(places), [0.0] * len(places)
         for name, value in inputs.items():
+            if name in self._controlled():
+                raise InputError(f"{name}: a controller of the scenario turns this motor; leave it out")
             try:
                 first, last = value if isinstance(value, tuple) else (value, value)
                 finite = first - first == 0.0 and last - last == 0.0
@@ -226,7 +251,15 @@ class Simulation:
             raise InputError(f"interval {shown(interval)} must be a number (SI)") from None
         if not within or self.time + interval == self.time:
             raise self._no_interval(interval)
-        self._core.advance(interval, begin, end)  # type: ignore[call-arg, arg-type]
+        self._step(interval, begin, end)
+
+    def _step(self, *values: Any) -> None:
+        try:
+            self._core.advance(*values)
+        except _core.SolverError:
+            for axis, *_ in self._control[1]:
+                axis.raise_again()  # what a law of your own has raised
+            raise
 
     def _no_interval(self, interval: float) -> InputError:
         if not MIN_INTERVAL <= interval <= MAX_INTERVAL:
@@ -310,15 +343,16 @@ class Simulation:
     def state(self) -> SimulationState:
         """The whole state; set it to return to it, or to continue it in another simulation of the same drive."""
         time, *rest = self._core.get_state()
-        return SimulationState(time, tuple(rest), self._drive)
+        return SimulationState(time, tuple(rest), self._drive, self._controllers)
 
     @state.setter
     def state(self, state: SimulationState) -> None:
         try:
             same = state.drive is self._drive or state.drive == self._drive
+            same = same and state.controllers == self._controllers
             if same:
                 self._core.set_state(state.time, *state.values)
         except (AttributeError, TypeError):
             raise InputError(f"{shown(state)} is no state of a simulation; give what `state` returned") from None
         if not same:
-            raise InputError(f"{shown(state)} is the state of another drive, with other parameters")
+            raise InputError(f"{shown(state)} is the state of another drive, with other parameters or controllers")

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..control.axis import NO_LAWS, Bound, core_control, driven
+from ..control.axis import NO_LAWS, Bound, core_control, motor_laws
 from ..control.controller import Controller
 from ..control.law import Law
 from ..data_sheets.components import Conditions
@@ -113,8 +113,7 @@ class TrainScenario(TrainElements):
 
     def core(self) -> _core.Train:
         """The solver's train, its motors as the current loops make them."""
-        driven_by = {name: driven(c) for name, c in self.controllers.items()}
-        return self.train().core(self.loaded(), driven_by)
+        return self.train().core(self.loaded(), motor_laws(self.controllers))
 
     def train(self) -> DriveTrain:
         """The drive train without its surroundings."""
