@@ -59,7 +59,7 @@ class Drive(Part):
 @lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes
 def _core_drive(drive: Drive, law: MotorLaw | None) -> _core.Drive:
     changes, torque_source = law or ((), drive.motor.kind == "torque_source")
-    values = numbers(drive.motor, "motor") | numbers(drive.gearbox, "gearbox") | numbers(drive.load, "load")
+    values = numbers(drive.motor.as_dc(), "motor") | numbers(drive.gearbox, "gearbox") | numbers(drive.load, "load")
     stiffness, losses = drive.gearbox.stiffness, drive.gearbox.losses
     return _core.Drive(
         values | dict(changes),
