@@ -39,7 +39,7 @@ class MotorLimits(Part):
     """of the winding, at 25 °C"""
     torque_constant: Annotated[TorqueConstant, Positive] | None = None
     thermal_resistance: Annotated[ThermalResistance, Positive] | None = None
-    """winding to ambient"""
+    """winding to ambient, in place of its two parts"""
     thermal_resistance_winding_case: Annotated[ThermalResistance, Positive] | None = None
     thermal_resistance_case_ambient: Annotated[ThermalResistance, Positive] | None = None
     thermal_time_constant_winding: Annotated[Time, Positive] | None = None
@@ -51,6 +51,23 @@ class MotorLimits(Part):
     """of the amplifier of a torque source; of a DC motor `voltage_limit` says it"""
     max_current: Annotated[Current, Positive] | None = None
     """the smaller of those of motor and amplifier"""
+
+    @model_validator(mode="after")
+    def _one_resistance(self) -> Self:
+        if self.thermal_resistance is not None and self.thermal_parts is not None:
+            raise ValueError("has thermal_resistance and both of its parts, which say the same; leave it out")
+        return self
+
+    @property
+    def thermal_parts(self) -> tuple[float, float] | None:
+        """Thermal resistances from winding to case and from case to ambient [K/W]."""
+        parts = self.thermal_resistance_winding_case, self.thermal_resistance_case_ambient
+        return None if None in parts else parts  # type: ignore[return-value]
+
+    @property
+    def winding_to_ambient(self) -> float | None:
+        """Thermal resistance [K/W]."""
+        return self.thermal_resistance if self.thermal_parts is None else sum(self.thermal_parts)
 
 
 # Keys of `[motor]` that only a DC motor has.
@@ -101,7 +118,9 @@ class Motor(Part):
                 if getattr(self, key) is None:
                     raise ValueError(f'lacks {key}, which a motor of kind "dc" needs')
         else:
-            self._refuse(DC_KEYS, f"of no use to a {self.kind}")
+            self._refuse(
+                DC_KEYS, f"of no use to a {'torque_source' if self.kind == 'torque_source' else 'synchronous motor'}"
+            )
         if self.kind == "synchronous":
             for key in ("winding", "dc_voltage"):
                 if getattr(self, key) is None:
@@ -129,11 +148,10 @@ class Motor(Part):
         if self.kind == "dc":
             raise ValueError('has a winding, which only a motor of kind "synchronous" or "torque_source" can have')
         if self.limits is not None:
-            doubled = [key for key in SAID_BY_WINDING if getattr(self.limits, key) is not None]
-            doubled += ["max_voltage"] if self.limits.max_voltage is not None and self.dc_voltage is not None else []
-            if doubled:
-                says = "dc_voltage" if doubled == ["max_voltage"] else "the winding"
-                raise ValueError(f"has limits.{doubled[0]}, which {says} says; leave it out")
+            for key in (*SAID_BY_WINDING, "max_voltage"):
+                if getattr(self.limits, key) is not None:
+                    says = "dc_voltage" if key == "max_voltage" else "the winding"
+                    raise ValueError(f"has limits.{key}, which {says} says; leave it out")
         if self.kind == "synchronous":
             voltage = phase.resistance * self.rated_torque / phase.torque_constant
             if voltage >= self.phase_voltage:
@@ -179,6 +197,15 @@ class Motor(Part):
                 "dc_voltage": None,
             }
         )
+
+    def copper_loss(self) -> tuple[float, float] | None:
+        """Heat of the winding to a torque squared [W/(N·m)²], and the temperature [°C] that it holds at; None if it is not known."""
+        if self.winding is not None:
+            return self.winding.phase_values().copper_loss, self.winding.resistance_temperature
+        limits = self.limits
+        if limits is None or limits.resistance is None or limits.torque_constant is None:
+            return None
+        return limits.resistance / limits.torque_constant**2, 25.0
 
     @property
     def no_load_speed(self) -> float:
