@@ -139,7 +139,7 @@ def test_what_may_be_misread_is_refused_with_both_readings(changes, message) -> 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"rated_speed": "3000 rpm"}, "has rated_speed, of no use to a synchronous; leave it out"),
+        ({"rated_speed": "3000 rpm"}, "has rated_speed, of no use to a synchronous motor; leave it out"),
         ({"winding": None}, 'lacks winding, which a motor of kind "synchronous" needs'),
         ({"dc_voltage": None}, "lacks dc_voltage"),
         ({"dc_voltage": "9 V"}, r"stalls under its rated torque: that takes 9\.873 V of dc_voltage, and 9 V are given"),
