@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import lostmotion as lm
+from conftest import ROOT
 from lostmotion.model.synchronous_motor import Winding
 from lostmotion.studies.table import read_table
 
@@ -279,3 +280,13 @@ def test_a_study_varies_it_as_single_runs_do(tmp_path, key, values) -> None:
     assert ends == single
     if key == "motor.rated_torque":
         assert single[0] == pytest.approx(single[1], rel=1e-12)  # a mere scale
+
+
+def test_a_current_loop_takes_it_as_the_dc_motor_that_it_equals() -> None:
+    base = lm.load(ROOT / "scenarios" / "position-axis.toml", {"controller.current": {"kind": "pi"}})
+    ends = []
+    for m in (motor(rated_torque=0.5, rotor_inertia=8e-6), motor(rated_torque=0.5, rotor_inertia=8e-6).as_dc()):
+        result = lm.simulate(lm.Scenario(**{**base.model_dump(), "motor": m.model_dump()}), duration=0.05)
+        ends.append(result["motor_torque"].values)
+    assert abs(ends[0]).max() > 0.0
+    assert np.array_equal(*ends)
