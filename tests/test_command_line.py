@@ -145,6 +145,14 @@ def test_the_template_of_a_motor_sheet_can_be_used_as_it_is(tmp_path: Path, kind
         assert figure in ("note", "sources", "gaps") or f"{figure} = " in text
 
 
+def test_the_template_of_a_synchronous_motor_can_be_used_as_it_is(tmp_path: Path) -> None:
+    made = lostmotion("catalogue", "new", "--kind", "synchronous", "-o", "my-motor.toml", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert "Complete: it can be simulated." in lostmotion("catalogue", "my-motor.toml", cwd=tmp_path).stdout
+    (tmp_path / "drive.toml").write_text('base = "catalogue-robot-joint"\nmotor = "my-motor.toml"\n')
+    assert lostmotion("run", "drive.toml", cwd=tmp_path).returncode == 0
+
+
 def test_a_file_with_another_part_or_with_several_is_told_by_what_is_in_it(tmp_path: Path) -> None:
     assert lostmotion("catalogue", "new", "--kind", "motor", "-o", "my-motor.toml", cwd=tmp_path).returncode == 0
     done = lostmotion("rig", "my-motor.toml", cwd=tmp_path)

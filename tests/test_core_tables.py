@@ -16,8 +16,9 @@ from lostmotion.studies.in_core import core_can
 from lostmotion.studies.table import read_table
 from lostmotion.units.conversion import Unit
 
-# What the core has no use for as it stands in a file: ratings, texts, and the two voltages of which it takes the ratio.
-NOT_OF_THE_CORE = {"motor.rated_voltage", "motor.voltage_limit"}
+# What the core has no use for as it stands in a file: ratings, texts, the two voltages of which it takes the ratio, and what
+# makes a synchronous motor a DC motor.
+NOT_OF_THE_CORE = {"motor.rated_voltage", "motor.voltage_limit", "motor.dc_voltage"}
 OF_THE_CORE_ALONE = {"motor.command_limit"}
 
 
@@ -25,7 +26,7 @@ def plain_numbers(part: Any, prefix: str) -> dict[str, str]:
     """Units of all fields of a part that are single numbers, by dotted key, laws of compliance and losses included."""
     found = {}
     for name, field in part.model_fields.items():
-        if name == "limits":
+        if name in ("limits", "winding"):
             continue
         key = f"{prefix}{name}"
         units = [m.unit for m in (*field.metadata, *annotations_in(field.annotation)) if isinstance(m, Unit)]

@@ -37,6 +37,13 @@ WRONG += [-1, 0, float("nan"), 10**30, Path("none"), lambda: None, lm.Load(inert
 SCENARIO = lm.load("paper-2dof-nl-small", {"simulation.duration": 0.02, "command.frequency": "50 Hz"})
 TRAIN = lm.load("worm-lowering")
 RESULT = lm.simulate(SCENARIO)
+THERMAL = {"winding_case": 1.0, "case_ambient": 2.0}
+HEATED = SCENARIO.replace(
+    **{f"motor.limits.thermal_resistance_{key}": value for key, value in THERMAL.items()},
+    **{"motor.limits.thermal_time_constant_winding": 10.0, "motor.limits.thermal_time_constant_motor": 100.0},
+    **{"motor.limits.resistance": 0.3, "motor.limits.torque_constant": 0.06},
+)
+HEAT = lm.simulate(HEATED)
 RESPONSE = lm.frequency_response(SCENARIO, [1.0, 2.0, 4.0], [0.5, 1.0], threads=1)
 LINEAR = lm.linearize(SCENARIO, lm.Initial())
 SHEET = next(r for r in lm.catalogue() if r.name == "schaeffler-rt1-h-20-100")
@@ -65,6 +72,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "load_study": (lm.load_study, {"path": "none.toml"}),
     "measure": (lm.measure, {"gearbox": None, "sheet": None, "notes": (), "progress": dangle}),
     "motor": (lm.motor, {"name": "paper-motor", "voltage_limit": None}),
+    "motor_current": (lm.motor_current, {"result": HEAT, "motor": None}),
     "overrunning": (lm.overrunning, {"gear": SCENARIO.gearbox, "load_torque": 10.0, "input_speed": 100.0}),
     "self_locking": (lm.self_locking, {"train": SCENARIO.drive().train(), "gear": "gearbox", "load_torque": 10.0, "input_speed": 100.0}),
     "open_result": (lm.open_result, {"path": "none.csv"}),
@@ -77,6 +85,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "simulate": (lm.simulate, {"scenario_or_drive": SCENARIO, "command": 0.0, "load_torque": 0.0, "duration": 0.01, "sample_interval": 0.001, "initial": None, "solver": "exact", "relative_tolerance": None, "energy": True}),
     "study": (lm.study, {"what": STUDY, "directory": "study", "threads": 1, "executor": None, "progress": None}),
     "switchings_of": (lm.switchings_of, {"result": RESULT}),
+    "temperatures": (lm.temperatures, {"result": HEAT, "motor": None, "ambient": 25.0, "winding": 25.0, "case": 25.0, "repeated": False, "constant_resistance": False}),
     "to_control": (lm.to_control, {"response": RESPONSE, "amplitude": 1.0, "output": "load_speed"}),
     "Simulation": (lm.Simulation, {"drive": SCENARIO, "step": 1e-3, "initial": None, "loaded": None}),
     "Simulation of a train": (lm.Simulation, {"drive": TRAIN, "step": 1e-3, "initial": None, "loaded": ["worm"]}),

@@ -61,6 +61,8 @@ if TYPE_CHECKING:
     from .model.shaft import Shaft as Shaft
     from .model.signals import CommandSignal as CommandSignal
     from .model.signals import TorqueSignal as TorqueSignal
+    from .model.synchronous_motor import PhaseValues as PhaseValues
+    from .model.synchronous_motor import Winding as Winding
     from .model.torsion import Hysteresis as Hysteresis
     from .model.torsion import LinearStiffness as LinearStiffness
     from .model.torsion import Rigid as Rigid
@@ -101,6 +103,8 @@ if TYPE_CHECKING:
     from .simulation.variables import Variable as Variable
     from .sizing.drive_check import check_drive as check_drive
     from .sizing.finding import Finding as Finding
+    from .sizing.motor_run import motor_current as motor_current
+    from .sizing.motor_run import temperatures as temperatures
     from .studies.engine import study as study
     from .studies.file import load_study as load_study
     from .studies.study import Study as Study
@@ -136,6 +140,7 @@ _HOMES = {
     "model.self_locking": ("Overrunning", "SelfLocking", "overrunning", "self_locking"),
     "model.shaft": ("DragCurve", "FrictionCurve", "QuadraticDrag", "Shaft"),
     "model.signals": ("CommandSignal", "TorqueSignal"),
+    "model.synchronous_motor": ("PhaseValues", "Winding"),
     "model.torsion": ("Hysteresis", "LinearStiffness", "Rigid", "TorsionCurve"),
     "model.train": ("DriveTrain",),
     "reports.accessor": ("ResultAccessor",),
@@ -156,6 +161,7 @@ _HOMES = {
     "simulation.variables": ("VARIABLES", "Variable"),
     "sizing.drive_check": ("check_drive",),
     "sizing.finding": ("Finding",),
+    "sizing.motor_run": ("motor_current", "temperatures"),
     "studies.engine": ("study",),
     "studies.file": ("load_study",),
     "studies.study": ("Study",),

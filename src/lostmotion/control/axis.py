@@ -139,7 +139,7 @@ class _Place:
 
     def _current(self, loop: CurrentLoop) -> _core.CurrentLoop:
         """Of (2): relative torque for current, 1/k_N for the resistance, so that K = g/(k_N (1 - a))."""
-        m = self.motor
+        m = self.motor.as_dc()
         if m.electrical_time_constant is None or m.armature_voltage_constant is None or m.rated_speed is None:
             raise InputError(
                 'current.kind: "pi" needs a motor with a winding, and this one is a torque source; take "ideal" or "first_order"'

@@ -202,6 +202,8 @@ CLOSES = {
     "rotor_inertia": "rotor_inertia",
     "friction_torque": "friction_torque or no_load_current",
     "electrical_time_constant": "inductance",
+    "dc_voltage": "dc_voltage",
+    "rated_torque": "rated_torque",
 }
 
 
@@ -216,11 +218,15 @@ def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor"
     record = find(reference, "motor")
     assert isinstance(record, MotorSheet)
     missing = record.missing()
-    gaps = {key: changes[key] for key, gap in CLOSES.items() if key in changes and gap in missing}
+    gaps = {key: changes[key] for key, gap in CLOSES.items() if key in changes and missing.keys() & {key, gap}}
+    winding = changes.get("winding")
+    if record.kind == "brushless" and isinstance(winding, Mapping) and "pole_pairs" in winding:
+        gaps["pole_pairs"] = winding["pole_pairs"]
     try:
-        table = MotorSheet(**_given(record) | gaps).motor().model_dump()
+        sheet = MotorSheet(**_given(record) | gaps)
+        table = (sheet.synchronous() if changes.get("kind") == "synchronous" else sheet.motor()).model_dump()
     except ValueError as error:
-        keys = [f"{where}.{key}" for key, gap in CLOSES.items() if gap in missing and key not in changes]
+        keys = [f"{where}.{key}" for key, gap in CLOSES.items() if missing.keys() & {key, gap} and key not in changes]
         remedy = f"; give {' and '.join(keys)} beside `from`" if keys else ""
         raise InputError(f"{where} from {shown(reference)}: {error}{remedy}") from None
     if changes.get("kind") == "torque_source":

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
 
 from ..errors import InputError
 from ..inputs.quantities import (
@@ -21,16 +23,22 @@ from ..inputs.quantities import (
     Torque,
     TorqueConstant,
     Voltage,
+    Whole,
 )
-from ..model.motor import Motor, MotorLimits
+from ..model.motor import SAID_BY_WINDING, Motor, MotorLimits
+from ..model.synchronous_motor import Winding
 from .sheet import Record
+
+# What of a brushless motor with block commutation the winding of a synchronous one says in its own ways.
+BLOCK_KEYS = ("rated_voltage", "torque_constant", "resistance", "inductance", "pole_pairs")
 
 
 class MotorSheet(Record):
-    """Data sheet of a DC motor, or of a brushless one seen from its supply as a DC motor."""
+    """Data sheet of a DC motor, of a brushless one seen from its supply as a DC motor, or of a synchronous one."""
 
-    kind: Literal["dc_brushed", "brushless"] = "dc_brushed"
-    rated_voltage: Annotated[Voltage, Positive]
+    kind: Literal["dc_brushed", "brushless", "synchronous"] = "dc_brushed"
+    """brushless: constants with block commutation, from terminal to terminal; synchronous: those of `winding`"""
+    rated_voltage: Annotated[Voltage, Positive] | None = None
     rotor_inertia: Annotated[Inertia, Positive] | None = None
     rated_torque: Annotated[Torque, Positive] | None = None
     """at the shaft, continuous; with armature_voltage_constant that of the field"""
@@ -44,52 +52,73 @@ class MotorSheet(Record):
     resistance: Annotated[Resistance, Positive] | None = None
     """terminal, at 25 °C"""
     inductance: Annotated[Inductance, Positive] | None = None
+    pole_pairs: Annotated[Whole, Field(gt=0)] | None = None
+    """of a brushless motor"""
+    winding: Winding | None = None
+    """of a synchronous motor"""
+    dc_voltage: Annotated[Voltage, Positive] | None = None
+    """of the amplifier of a synchronous motor"""
     friction_torque: Annotated[Torque, NotNegative] | None = None
     armature_voltage_constant: Annotated[Number, Limit(gt=1.0)] | None = None
     """k_N, where it is known itself"""
     electrical_time_constant: Annotated[Time, Positive] | None = None
     max_speed: Annotated[Speed, Positive] | None = None
     thermal_resistance: Annotated[ThermalResistance, Positive] | None = None
-    """winding to ambient, both in series"""
+    """winding to ambient, in place of its two parts"""
+    thermal_resistance_winding_case: Annotated[ThermalResistance, Positive] | None = None
+    thermal_resistance_case_ambient: Annotated[ThermalResistance, Positive] | None = None
+    thermal_time_constant_winding: Annotated[Time, Positive] | None = None
+    thermal_time_constant_motor: Annotated[Time, Positive] | None = None
+    """of the case against the ambient"""
     max_winding_temperature: Temperature | None = None
+
+    @model_validator(mode="after")
+    def _fits_kind(self) -> Self:
+        if self.kind != "synchronous":
+            if self.winding is not None:
+                raise ValueError('has a winding, which only a motor of kind "synchronous" has')
+            if self.rated_voltage is None:
+                raise ValueError("lacks rated_voltage, at which its data hold")
+        elif idle := [key for key in BLOCK_KEYS if getattr(self, key) is not None]:
+            raise ValueError(f"has {idle[0]}; of a synchronous motor winding and dc_voltage say it")
+        return self
 
     def missing(self) -> dict[str, str]:
         """What a run needs and the record lacks."""
-        need = {
-            "rotor_inertia": self.rotor_inertia,
-            "torque_constant, resistance": self.armature_voltage_constant or (self.torque_constant and self.resistance),
-            "rated_torque or rated_current": self.rated_torque or self.rated_current,
-            "inductance": self.electrical_time_constant or self.inductance,
-            "friction_torque or no_load_current": self.friction_torque is not None or self.no_load_current,
-        }
+        if self.kind == "synchronous":
+            need = {
+                "rotor_inertia": self.rotor_inertia,
+                "winding": self.winding,
+                "rated_torque": self.rated_torque,
+                "dc_voltage": self.dc_voltage,
+                "friction_torque": self.friction_torque is not None,
+            }
+        else:
+            constants = self.torque_constant and self.resistance
+            need = {
+                "rotor_inertia": self.rotor_inertia,
+                "torque_constant, resistance": self.armature_voltage_constant or constants,
+                "rated_torque or rated_current": self.rated_torque or self.rated_current,
+                "inductance": self.electrical_time_constant or self.inductance,
+                "friction_torque or no_load_current": self.friction_torque is not None or self.no_load_current,
+            }
         return {key: f"see {self.where(key)}" for key, value in need.items() if not value}
 
     def motor(self) -> Motor:
-        """Parameters of eq. (2).
+        """Parameters of eq. (2), or of the synchronous motor.
 
         The rated point and the stall torque of the sheet are kept. So no-load speed is a result; manufacturers' data are
         often not consistent with each other, and `no_load_speed_of_model` says by how much.
         """
-        missing = self.missing()
-        if missing:
-            key, where = next(iter(missing.items()))
-            raise InputError(f"{self.name}: lacks {key}; {where}")
+        self._need_all()
+        if self.kind == "synchronous":
+            return self._synchronous(self.winding, self.dc_voltage, self.rated_torque, self.friction_torque)
         k_t, R = self.torque_constant, self.resistance
-        T_10 = self.friction_torque
-        if T_10 is None:
-            assert k_t is not None
-            assert self.no_load_current is not None
-            T_10 = k_t * self.no_load_current
-        k_N, M_DR = self.armature_voltage_constant, self.rated_torque
-        speed = self.rated_speed
+        M_DR, k_N, speed = self._field_torque(), self.armature_voltage_constant, self.rated_speed
+        assert self.rated_voltage is not None
         if k_N is None:
             assert k_t is not None
             assert R is not None
-            if M_DR is None:
-                assert self.rated_current is not None
-                M_DR = k_t * self.rated_current
-            else:
-                M_DR += T_10
             stall = self.stall_torque if self.stall_torque is not None else k_t * self.rated_voltage / R
             k_N = stall / M_DR
             if speed is None:
@@ -101,21 +130,81 @@ class MotorSheet(Record):
             tau = self.inductance / R
         return Motor(
             rotor_inertia=self.rotor_inertia,  # type: ignore[arg-type]  # not missing
-            friction_torque=T_10,
-            rated_torque=M_DR,  # type: ignore[arg-type]
+            friction_torque=self._friction(),
+            rated_torque=M_DR,
             rated_speed=speed,
             rated_voltage=self.rated_voltage,
             electrical_time_constant=tau,
             armature_voltage_constant=k_N,
-            limits=MotorLimits(
-                continuous_torque=M_DR,
-                max_speed=self.max_speed,
-                resistance=R,
-                torque_constant=k_t,
-                thermal_resistance=self.thermal_resistance,
-                max_winding_temperature=self.max_winding_temperature,
-            ),
+            limits=self._limits(M_DR, resistance=R, torque_constant=k_t),
         )
+
+    def synchronous(self) -> Motor:
+        """A brushless motor with field orientation in place of block commutation, its rated voltage as the dc voltage.
+
+        Resistance and inductance of a sheet are those between two terminals, its torque constant that of block commutation,
+        (3 sqrt(3)/pi) p psi; the voltage is taken to be sinusoidal.
+
+        Raises
+        ------
+        InputError
+            The record is one of a motor with brushes, or lacks something.
+        """
+        if self.kind == "dc_brushed":
+            raise InputError(f"{self.name}: has brushes, and cannot be of kind synchronous")
+        if self.kind == "synchronous":
+            return self.motor()
+        self._need_all()
+        for key in ("pole_pairs", "torque_constant", "resistance", "inductance"):
+            if getattr(self, key) is None:
+                raise InputError(f"{self.name}: lacks {key}, which a synchronous motor needs; see {self.where(key)}")
+        winding = Winding(
+            pole_pairs=self.pole_pairs,
+            resistance_line_to_line=self.resistance,
+            inductance_line_to_line=self.inductance,
+            torque_constant_block=self.torque_constant,
+        )
+        return self._synchronous(winding, self.rated_voltage, self._field_torque(), self._friction())
+
+    def _need_all(self) -> None:
+        if missing := self.missing():
+            key, where = next(iter(missing.items()))
+            raise InputError(f"{self.name}: lacks {key}; {where}")
+
+    def _friction(self) -> float:
+        """T_10 [N·m]."""
+        if self.friction_torque is not None:
+            return self.friction_torque
+        assert self.torque_constant is not None
+        assert self.no_load_current is not None
+        return self.torque_constant * self.no_load_current
+
+    def _field_torque(self) -> float:
+        """M_DR [N·m]: that of the shaft and the friction."""
+        if self.rated_torque is not None:
+            return self.rated_torque + (self._friction() if self.armature_voltage_constant is None else 0.0)
+        assert self.torque_constant is not None
+        assert self.rated_current is not None
+        return self.torque_constant * self.rated_current
+
+    def _synchronous(
+        self, winding: Winding | None, dc_voltage: float | None, torque: float | None, friction: float | None
+    ) -> Motor:
+        return Motor(
+            kind="synchronous",
+            rotor_inertia=self.rotor_inertia,  # type: ignore[arg-type]  # not missing
+            friction_torque=friction,  # type: ignore[arg-type]
+            rated_torque=torque,  # type: ignore[arg-type]
+            winding=winding,
+            dc_voltage=dc_voltage,
+            limits=self._limits(torque),
+        )
+
+    def _limits(self, torque: float | None, **constants: float | None) -> MotorLimits:
+        same = (
+            key for key in MotorLimits.model_fields if key in type(self).model_fields and key not in SAID_BY_WINDING
+        )
+        return MotorLimits(continuous_torque=torque, **{key: getattr(self, key) for key in same}, **constants)
 
     def no_load_speed_of_model(self) -> float:
         """[rad/s], where the speed-torque line of eq. (2) at rated voltage meets the friction torque."""

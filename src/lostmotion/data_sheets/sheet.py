@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..inputs.part import Part
+from ..model.synchronous_motor import Winding
 from .loss_data import LossData
 
 # Sheets written before may have these words.
@@ -70,8 +71,8 @@ class Record(Part):
         out = []
         for name in self.model_fields_set - plain:
             value = getattr(self, name)
-            if isinstance(value, LossData):
-                out += [f"losses.{k}" for k in sorted(value.model_fields_set)]
+            if isinstance(value, LossData | Winding):
+                out += [f"{name}.{k}" for k in sorted(value.model_fields_set)]
             else:
                 out.append(name)
         return sorted(out)

@@ -37,6 +37,8 @@ Current = Annotated[float, Unit("A")]
 Resistance = Annotated[float, Unit("ohm")]
 Inductance = Annotated[float, Unit("H")]
 TorqueConstant = Annotated[float, Unit("N*m/A")]
+VoltageConstant = Annotated[float, Unit("V*s/rad")]
+FluxLinkage = Annotated[float, Unit("V*s")]
 KinematicViscosity = Annotated[float, Unit("m^2/s")]
 ThermalResistance = Annotated[float, Unit("K/W")]
 

@@ -34,7 +34,7 @@ class Drive(Part):
     def _can_be_simulated(self) -> Self:
         if self.motor.rotor_inertia + self.gearbox.inertia <= 0.0:
             raise ValueError("has no inertia on the input shaft; give motor.rotor_inertia or gearbox.inertia")
-        if isinstance(self.gearbox.stiffness, Rigid) and _core_drive(self).min_rigid_inertia() <= 0.0:
+        if isinstance(self.gearbox.stiffness, Rigid) and _core_drive(self, None).min_rigid_inertia() <= 0.0:
             raise ValueError(
                 "jams: the gearbox is rigid and so lossy when overrunning that with this load inertia there are instants "
                 "with no motion or several (the paradox of rigid friction); give gearbox.stiffness a compliance"
@@ -59,7 +59,7 @@ class Drive(Part):
 @lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes
 def _core_drive(drive: Drive, law: MotorLaw | None) -> _core.Drive:
     changes, torque_source = law or ((), drive.motor.kind == "torque_source")
-    values = numbers(drive.motor, "motor") | numbers(drive.gearbox, "gearbox") | numbers(drive.load, "load")
+    values = numbers(drive.motor.as_dc(), "motor") | numbers(drive.gearbox, "gearbox") | numbers(drive.load, "load")
     stiffness, losses = drive.gearbox.stiffness, drive.gearbox.losses
     return _core.Drive(
         values | dict(changes),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import model_validator
@@ -26,6 +27,7 @@ from ..inputs.quantities import (
     argument,
 )
 from ..units.practical import practical
+from .synchronous_motor import PhaseValues, Winding
 
 
 class MotorLimits(Part):
@@ -37,15 +39,38 @@ class MotorLimits(Part):
     """of the winding, at 25 °C"""
     torque_constant: Annotated[TorqueConstant, Positive] | None = None
     thermal_resistance: Annotated[ThermalResistance, Positive] | None = None
-    """winding to ambient"""
+    """winding to ambient, in place of its two parts"""
+    thermal_resistance_winding_case: Annotated[ThermalResistance, Positive] | None = None
+    thermal_resistance_case_ambient: Annotated[ThermalResistance, Positive] | None = None
+    thermal_time_constant_winding: Annotated[Time, Positive] | None = None
+    """of the winding against a case of constant temperature"""
+    thermal_time_constant_motor: Annotated[Time, Positive] | None = None
+    """of the case against the ambient"""
     max_winding_temperature: Temperature | None = None
     max_voltage: Annotated[Voltage, Positive] | None = None
     """of the amplifier of a torque source; of a DC motor `voltage_limit` says it"""
     max_current: Annotated[Current, Positive] | None = None
     """the smaller of those of motor and amplifier"""
 
+    @model_validator(mode="after")
+    def _one_resistance(self) -> Self:
+        if self.thermal_resistance is not None and self.thermal_parts is not None:
+            raise ValueError("has thermal_resistance and both of its parts, which say the same; leave it out")
+        return self
 
-# Keys of `[motor]` that a torque source has no use for.
+    @property
+    def thermal_parts(self) -> tuple[float, float] | None:
+        """Thermal resistances from winding to case and from case to ambient [K/W]."""
+        parts = self.thermal_resistance_winding_case, self.thermal_resistance_case_ambient
+        return None if None in parts else parts  # type: ignore[return-value]
+
+    @property
+    def winding_to_ambient(self) -> float | None:
+        """Thermal resistance [K/W]."""
+        return self.thermal_resistance if self.thermal_parts is None else sum(self.thermal_parts)
+
+
+# Keys of `[motor]` that only a DC motor has.
 DC_KEYS = (
     "rated_speed",
     "rated_voltage",
@@ -53,13 +78,16 @@ DC_KEYS = (
     "armature_voltage_constant",
     "voltage_limit",
 )
+# Keys of `motor.limits` that the winding of a synchronous motor says.
+SAID_BY_WINDING = ("resistance", "torque_constant", "max_current")
 
 
 class Motor(Part):
-    """DC motor with servo amplifier (eq. 2), or a torque source in its place."""
+    """DC motor with servo amplifier (eq. 2), synchronous motor with ideal field orientation, or a torque source in its place."""
 
-    kind: Literal["dc", "torque_source"] = "dc"
-    """`torque_source`: the command times `rated_torque` acts on the rotor without delay"""
+    kind: Literal["dc", "torque_source", "synchronous"] = "dc"
+    """`torque_source`: the command times `rated_torque` acts on the rotor without delay; `synchronous`: command 1 is the largest
+    voltage that the amplifier can give, dc_voltage/sqrt(3), amplitude of a phase"""
     rotor_inertia: Annotated[Inertia, NotNegative]
     """J_M"""
     friction_torque: Annotated[Torque, NotNegative] = 0.0
@@ -77,6 +105,10 @@ class Motor(Part):
     """k_N, stall torque / rated torque at rated voltage"""
     voltage_limit: Annotated[Voltage, Positive] | None = None
     """largest voltage of the amplifier"""
+    winding: Winding | None = None
+    """of a synchronous motor; of a torque source that is one, for its current and its heat"""
+    dc_voltage: Annotated[Voltage, Positive] | None = None
+    """of the amplifier that feeds a synchronous motor"""
     limits: MotorLimits | None = None
 
     @model_validator(mode="after")
@@ -86,11 +118,19 @@ class Motor(Part):
                 if getattr(self, key) is None:
                     raise ValueError(f'lacks {key}, which a motor of kind "dc" needs')
         else:
-            idle = [key for key in DC_KEYS if getattr(self, key) is not None]
-            if idle:
-                raise ValueError(
-                    f"has {', '.join(idle)}, of no use to a torque_source; leave {'it' if len(idle) == 1 else 'them'} out"
-                )
+            self._refuse(
+                DC_KEYS, f"of no use to a {'torque_source' if self.kind == 'torque_source' else 'synchronous motor'}"
+            )
+        if self.kind == "synchronous":
+            for key in ("winding", "dc_voltage"):
+                if getattr(self, key) is None:
+                    raise ValueError(f'lacks {key}, which a motor of kind "synchronous" needs')
+            if "rated_torque" not in self.model_fields_set:
+                raise ValueError('lacks rated_torque, which a motor of kind "synchronous" needs')
+        if self.winding is not None:
+            self._check_synchronous(self.winding.phase_values())
+        elif self.dc_voltage is not None:
+            raise ValueError("has a dc_voltage, which only a winding needs; give motor.winding too, or leave it out")
         if self.voltage_limit is not None:
             if self.rated_voltage is None:
                 raise ValueError("has a voltage_limit, which also needs rated_voltage")
@@ -98,23 +138,88 @@ class Motor(Part):
                 raise ValueError("has voltage_limit and limits.max_voltage, which say the same of a DC motor; give one")
         return self
 
+    def _refuse(self, keys: tuple[str, ...], why: str) -> None:
+        idle = [key for key in keys if getattr(self, key) is not None]
+        if idle:
+            raise ValueError(f"has {', '.join(idle)}, {why}; leave {'it' if len(idle) == 1 else 'them'} out")
+
+    def _check_synchronous(self, phase: PhaseValues) -> None:
+        """What a motor with a winding cannot have beside it."""
+        if self.kind == "dc":
+            raise ValueError('has a winding, which only a motor of kind "synchronous" or "torque_source" can have')
+        if self.limits is not None:
+            for key in (*SAID_BY_WINDING, "max_voltage"):
+                if getattr(self.limits, key) is not None:
+                    says = "dc_voltage" if key == "max_voltage" else "the winding"
+                    raise ValueError(f"has limits.{key}, which {says} says; leave it out")
+        if self.kind == "synchronous":
+            voltage = phase.resistance * self.rated_torque / phase.torque_constant
+            if voltage >= self.phase_voltage:
+                raise ValueError(
+                    f"stalls under its rated torque: that takes {math.sqrt(3.0) * voltage:.4g} V of dc_voltage, and {self.dc_voltage:g} V are given"
+                )
+
     def __repr__(self) -> str:
-        if self.rated_speed is None:
+        if self.kind == "torque_source":
             rated = f"torque source, rated {self.rated_torque:.4g} N·m"
         else:
-            rated = f"dc, {self.rated_torque:.4g} N·m at {practical(self.rated_speed, 'rad/s', 4)}"
+            speed = self.as_dc().rated_speed
+            assert speed is not None
+            rated = f"{self.kind}, {self.rated_torque:.4g} N·m at {practical(speed, 'rad/s', 4)}"
         return f"{type(self).__name__}({rated}, rotor {self.rotor_inertia:.4g} kg·m²)"
+
+    @property
+    def phase_voltage(self) -> float:
+        """Largest amplitude of a phase that the amplifier can give [V]."""
+        assert self.dc_voltage is not None
+        return self.dc_voltage / math.sqrt(3.0)
+
+    def as_dc(self) -> Self:
+        """The DC motor of (2) that a synchronous motor with ideal field orientation is; any other motor as it is.
+
+        Command 1 is the voltage u_dc/sqrt(3) that the amplifier ends at. The voltage of the decoupling, which has no part in the
+        torque, is not limited: `motor_current` and the drive check show where it would be too much.
+        """
+        if self.kind != "synchronous":
+            return self
+        assert self.winding is not None
+        voltage = self.phase_voltage
+        tau_a, k_N, speed = self.winding.phase_values().direct_current(voltage, self.rated_torque)
+        return self.model_copy(
+            update={
+                "kind": "dc",
+                "rated_voltage": voltage,
+                "voltage_limit": voltage,
+                "rated_speed": speed,
+                "electrical_time_constant": tau_a,
+                "armature_voltage_constant": k_N,
+                "winding": None,
+                "dc_voltage": None,
+            }
+        )
+
+    def copper_loss(self) -> tuple[float, float] | None:
+        """Heat of the winding to a torque squared [W/(N·m)²], and the temperature [°C] that it holds at; None if it is not known."""
+        if self.winding is not None:
+            return self.winding.phase_values().copper_loss, self.winding.resistance_temperature
+        limits = self.limits
+        if limits is None or limits.resistance is None or limits.torque_constant is None:
+            return None
+        return limits.resistance / limits.torque_constant**2, 25.0
 
     @property
     def no_load_speed(self) -> float:
         """Speed [rad/s] at command 1 without any load or friction, by (2)."""
-        if self.rated_speed is None or self.armature_voltage_constant is None:
+        dc = self.as_dc()
+        if dc.rated_speed is None or dc.armature_voltage_constant is None:
             raise InputError("a torque source has no speed of its own")
-        return self.rated_speed * self.armature_voltage_constant / (self.armature_voltage_constant - 1.0)
+        return dc.rated_speed * dc.armature_voltage_constant / (dc.armature_voltage_constant - 1.0)
 
     @property
     def command_limit(self) -> float | None:
         """|E_C| that the amplifier can follow; None without a limit."""
+        if self.kind == "synchronous":
+            return 1.0
         if self.voltage_limit is None or self.rated_voltage is None:
             return None
         return self.voltage_limit / self.rated_voltage
@@ -131,6 +236,10 @@ class Motor(Part):
             The motor has no rated voltage, or at this voltage it does not reach its rated torque.
         """
         voltage = argument("voltage", voltage, "V")
+        if self.kind == "synchronous":
+            raise InputError(
+                "a synchronous motor has its voltage from dc_voltage; change that, as with model_copy(update={'dc_voltage': 560})"
+            )
         if self.rated_voltage is None or self.armature_voltage_constant is None:
             raise InputError("a motor needs a rated_voltage to be taken to another one; give it")
         share = voltage / self.rated_voltage
@@ -159,6 +268,6 @@ class ShaftMotor(Motor):
     def _limit_fits_kind(self) -> Self:
         if self.torque_limit is not None and self.kind != "torque_source":
             raise ValueError(
-                'has a torque_limit, which a motor of kind "dc" does not; give voltage_limit, or the kind "torque_source"'
+                f'has a torque_limit, which a motor of kind "{self.kind}" does not; give {"voltage_limit" if self.kind == "dc" else "dc_voltage"}, or the kind "torque_source"'
             )
         return self

@@ -122,7 +122,7 @@ class DriveTrain(TrainElements):
         for name, m in self.motors.items():
             limit = math.inf if m.torque_limit is None else m.torque_limit
             changes, torque_source = driven.get(name) or ((), m.kind == "torque_source")
-            train.add_motor(name, m.shaft, numbers(m, "motor") | dict(changes), torque_source, limit)
+            train.add_motor(name, m.shaft, numbers(m.as_dc(), "motor") | dict(changes), torque_source, limit)
         for name, g in self.gears.items():
             add_gear(train, name, g)
         for name, b in self.brakes.items():

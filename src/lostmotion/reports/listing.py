@@ -155,8 +155,9 @@ def template(kind: str | None = None) -> str:
     if kind is not None and kind not in ("gearbox", "motor", *gearboxes, *motors):
         raise InputError(f"--kind {kind}: must be one of gearbox, motor, {', '.join((*gearboxes, *motors))}")
     table = "motor" if kind == "motor" or kind in motors else "gearbox"
-    text = files("lostmotion").joinpath(f"data_sheets/{table}-template.toml").read_text(encoding="utf-8")
-    if kind in (None, "gearbox", "motor"):
+    name = "synchronous-motor" if kind == "synchronous" else table
+    text = files("lostmotion").joinpath(f"data_sheets/{name}-template.toml").read_text(encoding="utf-8")
+    if kind in (None, "gearbox", "motor", "synchronous"):
         return text
     default = "planetary" if table == "gearbox" else "brushless"
     return text.replace(f'kind = "{default}"', f'kind = "{kind}"')

@@ -7,6 +7,7 @@ from typing import Any
 from ..data_sheets.sheet import Record
 from ..inputs.schema import unit_in_schema
 from ..model.gearbox import Gearbox
+from ..model.synchronous_motor import Winding
 from ..units.practical import practical
 
 
@@ -32,6 +33,11 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
                 add(name, "scatter of the stiffness", f"±{100 * value.scatter:.0f} %")
         elif name == "losses":
             _add_losses(value, add)
+        elif isinstance(value, Winding):
+            units = Winding.model_json_schema()["properties"]
+            for key in Winding.model_fields:
+                if (datum := getattr(value, key)) is not None and key in value.model_fields_set:
+                    add(f"{name}.{key}", key.replace("_", " "), practical(datum, unit_in_schema(units[key]) or ""))
         else:
             add(name, label, practical(value, unit_in_schema(fields[name]) or ""))
     return out

@@ -351,7 +351,7 @@ def _why_several_regimes(drive: Drive) -> str:
         "a loss map": not isinstance(g.losses, ConstantEfficiency),
         "hysteresis": g.hysteresis is not None and g.hysteresis.efficiency < 1.0,
         "a torsion curve of several pieces": not isinstance(g.stiffness, Rigid) and len(g.stiffness.pieces()[1]) > 1,
-        "a voltage limit": m.voltage_limit is not None,
+        "a voltage limit": m.command_limit is not None,
     }
     return ", ".join(reason for reason, holds in reasons.items() if holds)
 
@@ -361,7 +361,7 @@ def _why_several_regimes_of(train: DriveTrain, core: _core.Train) -> str:
     gears, motors, shafts = train.gears.values(), train.motors.values(), train.shafts.values()
     rigid = {f"{name}_twist_contact" for name, g in train.gears.items() if isinstance(g.stiffness, Rigid)}
     dry = [name for name in core.contact_names() if name not in rigid]
-    limits = any(m.voltage_limit is not None or m.torque_limit is not None for m in motors)
+    limits = any(m.command_limit is not None or m.torque_limit is not None for m in motors)
     curves = any(not isinstance(g.stiffness, Rigid) and len(g.stiffness.pieces()[1]) > 1 for g in gears)
     reasons = {
         f"dry contacts: {', '.join(dry)}": bool(dry),
@@ -403,15 +403,15 @@ def rigid_constants(
     Raises
     ------
     InputError
-        The drive has no DC motor, or no constant efficiency.
+        The drive has a torque source, or no constant efficiency.
     """
     drive = drive_of(drive)
     for name, value in (("motor_time_constant", motor_time_constant), ("time_constant", time_constant)):
         if value is not None and not value > 0.0:
             raise InputError(f"{name}: {value:g} s must be greater than 0")
-    m, g, load = drive.motor, drive.gearbox, drive.load
+    m, g, load = drive.motor.as_dc(), drive.gearbox, drive.load
     if m.rated_speed is None or m.electrical_time_constant is None or m.armature_voltage_constant is None:
-        raise InputError("the closed form needs a DC motor")
+        raise InputError("the closed form needs a DC or a synchronous motor")
     if not isinstance(g.losses, ConstantEfficiency):
         raise InputError("the closed form needs gearbox.losses of kind constant_efficiency")
     reflect = 1.0 / (g.ratio**2 * g.losses.efficiency)

@@ -25,11 +25,11 @@ def start_values(train: DriveTrain, initial: Any) -> dict[str, float]:
     """
     stiff = [name for name, g in train.gears.items() if not isinstance(g.stiffness, Rigid)]
     lossy = [name for name in stiff if (h := train.gears[name].hysteresis) is not None and h.efficiency < 1.0]
-    electric = [name for name, m in train.motors.items() if m.kind == "dc"]
+    electric = [name for name, m in train.motors.items() if m.kind != "torque_source"]
     _check("speeds", initial.speeds, train.shafts, "shaft")
     _check("angles", initial.angles, train.shafts, "shaft")
     _check("twists", initial.twists, stiff, "gear with a stiffness")
-    _check("motor_torques", initial.motor_torques, electric, 'motor of kind "dc"')
+    _check("motor_torques", initial.motor_torques, electric, 'motor of kind "dc" or "synchronous"')
     _check("hysteresis_capacities", initial.hysteresis_capacities, lossy, "gear with hysteresis")
     if problem := train.core(()).check_start([initial.speeds.get(name, 0.0) for name in train.shafts]):
         raise InputError(f"key initial.speeds: {problem}")

@@ -72,6 +72,20 @@ class DutyCycle:
         work = self._integral(self.input_speed * np.abs(self.output_torque) ** 3)
         return float((work / turned) ** (1.0 / 3.0)) if turned > 0.0 else 0.0
 
+    @property
+    def held_longer(self) -> bool:
+        """Whether holding takes more torque than the motion, and nothing says for how long."""
+        square = self._integral(self.motor_torque**2)
+        return self.period is None and (self.holding_torque or 0.0) ** 2 * self.duration >= square
+
+    def repeated_torque(self) -> tuple[np.ndarray, np.ndarray]:
+        """Instants [s] and torque of the motor [N·m] of one cycle, the pause included."""
+        if self.period is None or self.period <= self.duration * (1.0 + 1e-9):
+            return self.time, self.motor_torque
+        held = self.holding_torque or 0.0
+        pause = [self.time[-1], self.time[0] + self.period]
+        return np.append(self.time, pause), np.append(self.motor_torque, [held, held])
+
     def rms_motor_torque(self) -> float:
         """Root mean square over the cycle [N·m].
 

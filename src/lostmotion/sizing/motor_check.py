@@ -10,9 +10,7 @@ from ..model.motor import Motor
 from ..units.practical import RPM
 from .duty_cycle import DutyCycle
 from .finding import Finding, Verdict, within
-
-COPPER = 0.00393  # relative rise of a winding's resistance [1/K]
-REFERENCE = 25.0  # temperature that the printed resistance holds for [°C]
+from .thermal import TwoBodies, steady_rise
 
 
 def largest_speed(m: Motor, speed: float, where: str = "motor") -> Finding:
@@ -33,29 +31,25 @@ def heat(m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor") -> li
     """Torque over the cycle and the temperature of the winding at this ambient temperature [°C]."""
     limits = m.limits
     torque = cycle.rms_motor_torque()
-    continuous = limits.continuous_torque if limits is not None else m.rated_torque if m.kind == "dc" else None
+    continuous = (
+        limits.continuous_torque if limits is not None else None if m.kind == "torque_source" else m.rated_torque
+    )
     name = "continuous torque of the motor"
     key = f"{where}.limits.continuous_torque"
     findings = [within("motor_torque", "motor torque, rms", torque, continuous, "N·m", name, key=key, cycle=cycle)]
-    if (
-        limits is None
-        or limits.resistance is None
-        or limits.torque_constant is None
-        or limits.thermal_resistance is None
-        or limits.max_winding_temperature is None
-    ):
+    if limits is None or limits.max_winding_temperature is None or m.copper_loss() is None:
         return findings
     permissible = limits.max_winding_temperature
+    rise = _rise(m, cycle, torque, ambient)
+    if rise is None:
+        return findings
     what = "winding temperature"
-    # dT = R_th R(T) I², R(T) = R (1 + a (ambient + dT - 25 °C))
-    cold = limits.thermal_resistance * limits.resistance * (torque / limits.torque_constant) ** 2
-    if cold * COPPER >= 1.0:
+    if math.isinf(rise):
         remark = "the current is far too large to last"
         return [
             *findings,
             Finding("winding_temperature", what, f"thermal runaway, {cycle}", "warning", remark, math.inf),
         ]
-    rise = cold * (1.0 + COPPER * (ambient - REFERENCE)) / (1.0 - COPPER * cold)
     value = f"{ambient + rise:.0f} of {permissible:.0f} °C in the long run at {ambient:.0f} °C ambient, {cycle}"
     use = rise / (permissible - ambient) if permissible > ambient else math.inf
     remark = f"reserve {permissible - ambient - rise:.0f} K"
@@ -63,9 +57,35 @@ def heat(m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor") -> li
     return [*findings, Finding("winding_temperature", what, value, verdict, remark, use)]
 
 
+def _rise(m: Motor, cycle: DutyCycle, torque: float, ambient: float) -> float | None:
+    """Of the winding over the ambient [K]: where the data suffice its peak in the repeated cycle, else that of the rms torque [N·m];
+    None if it is not known."""
+    copper, bodies = m.copper_loss(), TwoBodies.of(m, ambient)
+    resistance = None if m.limits is None else m.limits.winding_to_ambient
+    if copper is None or resistance is None:
+        return None
+    loss, reference = copper
+    steady = steady_rise(loss * torque**2, resistance, ambient, reference)
+    if bodies is None or cycle.held_longer:
+        return steady
+    time, torques = cycle.repeated_torque()
+    start = bodies.repeated(time, torques)
+    return math.inf if start is None else float(bodies.course(time, torques, start)[0].max()) - ambient
+
+
 def voltage(m: Motor, command: np.ndarray, torque: np.ndarray, speed: np.ndarray, where: str = "motor") -> Finding:
     """The largest that the command asks for, or that torque [N·m] and speed [rad/s] need."""
     limits = m.limits
+    if m.winding is not None:
+        phase = m.winding.phase_values()
+        if m.kind == "synchronous":
+            u_q = m.phase_voltage * np.clip(command, -1.0, 1.0)
+        else:
+            u_q = phase.resistance * torque / phase.torque_constant + phase.voltage_constant * speed
+        peak = float(phase.voltage(u_q, torque, speed).max())
+        limit = None if m.dc_voltage is None else m.phase_voltage
+        what = "voltage of a phase, largest amplitude"
+        return within("voltage", what, peak, limit, "V", "dc voltage / √3", key=f"{where}.dc_voltage")
     if m.kind == "dc":
         if m.rated_voltage is None:
             return Finding("voltage", "voltage, largest", "not known", "unknown", f"{where}.rated_voltage is missing")
@@ -86,6 +106,10 @@ def voltage(m: Motor, command: np.ndarray, torque: np.ndarray, speed: np.ndarray
 def current(m: Motor, torque: np.ndarray, where: str = "motor") -> Finding:
     """The largest of the run."""
     limits = m.limits
+    if m.winding is not None:
+        rms = float(abs(torque).max()) / m.winding.phase_values().torque_constant / math.sqrt(2.0)
+        name, key = "limit of motor and amplifier", f"{where}.winding.max_current_rms"
+        return within("current", "current, largest, rms", rms, m.winding.max_current, "A", name, key=key)
     if limits is None or limits.torque_constant is None:
         missing = f"{where}.limits.torque_constant is missing"
         return Finding("current", "current, largest", "not known", "unknown", missing)

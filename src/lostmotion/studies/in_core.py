@@ -37,6 +37,8 @@ def core_can(study: Study) -> bool:
         for key in v.all_keys:
             if key not in _fields() or base_value(s, key) is None or rigid:
                 return False
+            if key.startswith("motor.") and s.motor.kind == "synchronous":
+                return False  # numbers of the core follow from it
             if key == SLOPES and (not v.relative or s.gearbox.stiffness.preload > 0.0):  # type: ignore[union-attr]
                 return False
             if key.startswith(("command.", "load.torque.")):

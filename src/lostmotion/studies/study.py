@@ -128,8 +128,10 @@ class Study(Part):
         if "ideal_speed" not in expression.names or not isinstance(self.scenario, Scenario):
             return
         motor_varies = any(kind_of_record(key) == "motor" for v in self.vary for key in v.all_keys)
-        if self.scenario.motor.kind != "dc" and not motor_varies:
-            raise ValueError("ideal_speed needs a motor of kind dc; a torque source has no speed of its own")
+        if self.scenario.motor.kind == "torque_source" and not motor_varies:
+            raise ValueError(
+                "ideal_speed needs a motor of kind dc or synchronous; a torque source has no speed of its own"
+            )
 
     def _check_trajectories(self) -> None:
         known = [name for name, _ in self.vocabulary.variables]

@@ -1,0 +1,68 @@
+"""Figure of docs/motors.md: current and temperatures of a synchronous motor in a cycle that repeats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from two_motors_figures import DARK, DOTS, LIGHT, save
+
+import lostmotion as lm
+from lostmotion.reports.panels import Curve, Panel
+from lostmotion.sizing.thermal import TwoBodies
+
+CYCLE = 20.0  # s: one second of acceleration, 4 s of rest, one of braking, and so on
+
+
+def scenario() -> lm.Scenario:
+    """A flywheel on the motor `maxon-ec-i-52-606793` with field orientation, sped up and braked with 0.7 N·m."""
+    base = lm.load(
+        "step-to-standstill",
+        {"motor.from": "maxon-ec-i-52-606793", "motor.kind": "torque_source", "command": 0.0},
+    )
+    sine = lm.load("step-to-standstill", {"motor.from": "maxon-ec-i-52-606793", "motor.kind": "synchronous"}).motor
+    limits = base.motor.limits.model_copy(update={"resistance": None, "torque_constant": None})
+    motor = base.motor.model_copy(
+        update={"winding": sine.winding, "limits": limits, "rated_torque": 1.0, "dc_voltage": 24.0}
+    )
+    times, torque = (0.0, 5.0, 6.0, 10.0, 15.0, 16.0), (1.1, -1.1, 0.2, -1.1, 1.1, -0.2)
+    steps = np.diff(torque, prepend=0.0)
+    return base.replace(
+        motor=motor.model_dump(),
+        command={"steps": [{"height": float(h), "time": t} for h, t in zip(steps, times, strict=True)]},
+        simulation={"duration": CYCLE, "sample_interval": 0.02},
+    )
+
+
+def write(out: Path) -> None:
+    """The page's figure into a directory."""
+    result = lm.simulate(scenario())
+    current = lm.motor_current(result)
+    steady = lm.temperatures(result, repeated=True)
+    time = result["time"].values
+    curves = (
+        Curve("phase, amplitude", time, current["current"].values, LIGHT),
+        Curve("rms", time, current["current_rms"].values, DARK),
+    )
+    motor = lm.scenario_of(result).motor
+    bodies = TwoBodies.of(motor, 25.0)
+    long = np.concatenate([n * CYCLE + time[:-1] for n in range(360)])  # from cold, cycle by cycle
+    torque = np.tile(result["motor_torque"].values[:-1], 360)
+    hours = long[:: len(time) - 1] / 3600.0
+    winding, case = (T[:: len(time) - 1] for T in bodies.course(long, torque, (25.0, 25.0)))
+    ends = [float(steady[f"{name}_temperature"][-1]) for name in ("winding", "case")]
+    warming = (
+        Curve("winding", hours, winding, DARK),
+        Curve("case", hours, case, LIGHT),
+        *(Curve("repeated for ever", [0.0, hours[-1]], [end, end], DOTS, None if k == 0 else "_") for k, end in enumerate(ends)),
+    )  # fmt: skip
+    within = (
+        Curve("winding", time, steady["winding_temperature"].values, DARK),
+        Curve("case", time, steady["case_temperature"].values, LIGHT),
+    )
+    panels = [
+        Panel("one cycle", "time [s]", "current [A]", curves),
+        Panel("from cold, at the end of each cycle", "time [h]", "temperature [°C]", warming),
+        Panel("the cycle repeated for ever", "time [s]", "temperature [°C]", within),
+    ]
+    save(panels, 3, (13.0, 3.4), out, "motors-temperatures")

@@ -1,0 +1,185 @@
+"""What happened inside a motor in a run: current, voltage, temperatures."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..inputs.arguments import checked
+from ..inputs.quantities import Temperature
+from ..inputs.validation import did_you_mean
+from ..model.motor import Motor
+from ..model.task import Task
+from ..simulation.results import scenario_of
+from ..simulation.train_scenario import TrainScenario
+from .thermal import COPPER, need_two_bodies, rms
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@checked
+def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Dataset:
+    """Current and voltage of the motor of a run.
+
+    Parameters
+    ----------
+    result
+        Of `simulate`, or read from a file.
+    motor
+        Name of one of several motors of a drive train.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``time`` [s], of a motor with a winding: `current` [A], i_q, the amplitude of a phase with the sign of the torque;
+        `current_rms` [A]; `voltage` [V], the amplitude of a phase with that of the decoupling, which may exceed `voltage_limit`
+        since only u_q ends there. Of any other motor `current` alone, torque / torque constant.
+
+    Raises
+    ------
+    InputError
+        The motor has neither a winding nor `limits.torque_constant`, or `motor` names none.
+    """
+    m, where, (command, torque, speed) = _motor_of(result, motor)
+    attributes: dict[str, Any] = {}
+    if m.winding is None:
+        constant = None if m.limits is None else m.limits.torque_constant
+        if constant is None:
+            raise InputError(f"motor_current: the motor lacks {where}.limits.torque_constant; give it, or a winding")
+        found = {"current": (torque / constant, "A", "current of the armature")}
+    else:
+        phase = m.winding.phase_values()
+        current = torque / phase.torque_constant
+        if m.kind == "synchronous":
+            u_q = np.clip(command, -1.0, 1.0) * m.phase_voltage
+        else:  # a torque source gives what it takes, but for the voltage of L_q di_q/dt
+            u_q = phase.resistance * current + phase.voltage_constant * speed
+        found = {
+            "current": (current, "A", "current i_q, amplitude of a phase"),
+            "current_rms": (abs(current) / math.sqrt(2.0), "A", "current of a phase, rms"),
+            "voltage": (phase.voltage(u_q, torque, speed), "V", "voltage, amplitude of a phase"),
+        }
+        if m.dc_voltage is not None:
+            attributes["voltage_limit"] = m.phase_voltage
+    return _dataset(result, found, attributes)
+
+
+@checked
+def temperatures(
+    result: xarray.Dataset,
+    motor: str | None = None,
+    *,
+    ambient: Temperature | None = None,
+    winding: Temperature | None = None,
+    case: Temperature | None = None,
+    repeated: bool = False,
+    constant_resistance: bool = False,
+) -> xarray.Dataset:
+    """Temperatures of winding and case in a run, from the copper loss.
+
+    The motor needs the thermal resistances from winding to case and from case to ambient and both thermal time constants
+    (`limits`), and `winding`, or `limits.resistance` and `limits.torque_constant`. Losses in iron and friction are left out.
+
+    Parameters
+    ----------
+    result
+        Of `simulate`, or read from a file.
+    motor
+        Name of one of several motors of a drive train.
+    ambient
+        [°C]; left out, that of the task, or 25 °C.
+    winding, case
+        Temperatures [°C] at the beginning; left out, the ambient one.
+    repeated
+        The run is a cycle that has been repeated until the temperatures repeat too: in closed form.
+    constant_resistance
+        The resistance stays that of its reference temperature; else it rises by 0.393 % per kelvin, as that of copper.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``time`` [s] `winding_temperature` and `case_temperature` [°C] and `copper_loss` [W]; `rms_torque` [N·m], and where
+        the limits have a largest temperature `headroom` [K] below it. The attribute `error_bound` [K] says by how much the temperatures
+        can be wrong because the torque is known at the samples only, and straight between them.
+
+    Raises
+    ------
+    InputError
+        The motor lacks data, `motor` names none, or repeated motion has no end to its heat.
+    """
+    m, where, (_, torque, _) = _motor_of(result, motor)
+    if ambient is None:
+        scenario = scenario_of(result)
+        ambient = (Task() if isinstance(scenario, TrainScenario) else scenario.task).ambient_temperature
+    bodies = need_two_bodies(m, ambient, 0.0 if constant_resistance else COPPER, where)
+    time = result["time"].values
+    if len(time) < 2:
+        raise InputError("temperatures: the result has a single sample; shorten simulation.sample_interval")
+    start: tuple[float, float] | None = (ambient if winding is None else winding, ambient if case is None else case)
+    if repeated:
+        if (winding, case) != (None, None):
+            raise InputError(
+                "temperatures: a motion that has been repeated for ever has no beginning; leave winding and case out"
+            )
+        start = bodies.repeated(time, torque)
+    if start is None:
+        raise InputError(
+            "temperatures: repeated, the winding has no end to its heat: its loss grows faster than it is carried off"
+        )
+    of_winding, of_case = bodies.course(time, torque, start)
+    loss = bodies.loss * torque**2 * (1.0 + bodies.alpha * (of_winding - bodies.reference))
+    hottest = float(of_winding.max())
+    found: dict[str, tuple[Any, str, str]] = {
+        "winding_temperature": (of_winding, "degC", "temperature of the winding"),
+        "case_temperature": (of_case, "degC", "temperature of the case"),
+        "copper_loss": (loss, "W", "heat of the winding"),
+        "rms_torque": (rms(time, torque), "N*m", "motor torque, root mean square"),
+    }
+    if m.limits is not None and m.limits.max_winding_temperature is not None:
+        found["headroom"] = (
+            m.limits.max_winding_temperature - hottest,
+            "K",
+            "below the largest temperature of the winding",
+        )
+    return _dataset(result, found, {"ambient": ambient, "error_bound": bodies.error_bound(time, torque, hottest)})
+
+
+def _dataset(
+    result: xarray.Dataset, found: dict[str, tuple[Any, str, str]], attributes: dict[str, Any]
+) -> xarray.Dataset:
+    import xarray as xr
+
+    variables = {
+        name: (("time",) if np.ndim(value) else (), value, {"units": unit, "long_name": meaning})
+        for name, (value, unit, meaning) in found.items()
+    }
+    return xr.Dataset(variables, coords={"time": result["time"]}, attrs=attributes)
+
+
+def _motor_of(result: xarray.Dataset, name: str | None) -> tuple[Motor, str, list[np.ndarray]]:
+    """The motor, its table, and its command, torque [N·m] and speed [rad/s] over the run."""
+    scenario = scenario_of(result)
+    if not isinstance(scenario, TrainScenario):
+        if name is not None:
+            raise InputError(f"motor {name!r}: this drive has one motor; leave its name out")
+        return scenario.motor, "motor", _read(result, "command", "motor_torque", "motor_speed")
+    motors = scenario.motors
+    if name is None and len(motors) == 1:
+        name = next(iter(motors))
+    if name is None or name not in motors:
+        listed = f"the motors are {', '.join(motors)}" if motors else "this train has none"
+        hint = listed if name is None else did_you_mean(name, motors, listed)
+        raise InputError(f"motor {name!r}: {hint}" if name is not None else f"motor is missing; {hint}")
+    m = motors[name]
+    return m, f"motors.{name}", _read(result, f"{name}_command", f"{name}_torque", f"{m.shaft}_speed")
+
+
+def _read(result: xarray.Dataset, *names: str) -> list[np.ndarray]:
+    lacking = [name for name in names if name not in result]
+    if lacking:
+        raise InputError(f"the result lacks {', '.join(lacking)}; give a whole result of simulate or open_result")
+    return [result[name].values for name in names]

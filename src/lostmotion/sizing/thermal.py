@@ -1,0 +1,189 @@
+"""Winding and case of a motor as two bodies: their temperatures under a copper loss that follows the torque.
+
+    C_w dT_w/dt = P - (T_w - T_c)/R_wc,                     C_w = tau_w/R_wc
+    C_c dT_c/dt = (T_w - T_c)/R_wc - (T_c - T_a)/R_ca,      C_c = tau_m/R_ca
+    P = p M² (1 + alpha (T_w - T_r))
+
+with p M² the copper loss at the temperature T_r. Between two samples M is straight and M² is replaced by its mean: the energy is
+exact, and each step is the exact solution of a linear system.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..model.motor import Motor
+
+COPPER = 0.00393  # relative rise of a winding's resistance [1/K]
+SERIES = 0.1  # below it the divided difference of the exponential loses digits, and its series does not
+
+
+@dataclass(frozen=True)
+class TwoBodies:
+    """Winding and case."""
+
+    winding_case: float
+    """R_wc [K/W]"""
+    case_ambient: float
+    """R_ca [K/W]"""
+    winding_time: float
+    """tau_w [s], of the winding against a case of constant temperature"""
+    case_time: float
+    """tau_m [s], of the case against the ambient"""
+    loss: float
+    """p [W/(N·m)²]"""
+    reference: float
+    """T_r [°C]"""
+    ambient: float
+    """T_a [°C]"""
+    alpha: float = COPPER
+    """[1/K]"""
+
+    @classmethod
+    def of(cls, motor: Motor, ambient: float, alpha: float = COPPER) -> TwoBodies | None:
+        """Those of a motor; None if its data do not suffice (`needed` names what lacks)."""
+        if needed(motor):
+            return None
+        limits, copper = motor.limits, motor.copper_loss()
+        assert limits is not None
+        assert limits.thermal_parts is not None
+        assert limits.thermal_time_constant_winding is not None
+        assert limits.thermal_time_constant_motor is not None
+        assert copper is not None
+        times = limits.thermal_time_constant_winding, limits.thermal_time_constant_motor
+        return cls(*limits.thermal_parts, *times, *copper, ambient, alpha)
+
+    def steps(self, time: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of each interval the map x -> F x + g of the temperatures x = (T_w, T_c) - T_a: F (n, 2, 2) and g (n, 2)."""
+        h = np.diff(time)
+        heat = self.loss * mean_square(torque)
+        C_w, C_c = self.winding_time / self.winding_case, self.case_time / self.case_ambient
+        a11 = (self.alpha * heat - 1.0 / self.winding_case) / C_w
+        a12, a21 = 1.0 / (self.winding_case * C_w), 1.0 / (self.winding_case * C_c)
+        a22 = -(1.0 / self.winding_case + 1.0 / self.case_ambient) / C_c
+        A = np.empty((len(h), 2, 2))
+        A[:, 0, 0], A[:, 0, 1], A[:, 1, 0], A[:, 1, 1] = a11, a12, a21, a22
+        # The eigenvalues are real, since a12 a21 > 0; q(A) of a function q is q(l_1) + q[l_1, l_2] (A - l_1).
+        middle, half = 0.5 * (a11 + a22), np.sqrt((0.5 * (a11 - a22)) ** 2 + a12 * a21)
+        l_1, l_2 = middle + half, middle - half
+        unit = np.eye(2)
+        slope, integral = _divided(l_1, l_2, h), _integral(l_1, h)
+        whole = integral[:, None, None] * unit + slope[:, None, None] * (A - l_1[:, None, None] * unit)
+        constant = heat * (1.0 + self.alpha * (self.ambient - self.reference)) / C_w
+        return unit + A @ whole, whole[:, :, 0] * constant[:, None]
+
+    def course(self, time: np.ndarray, torque: np.ndarray, start: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+        """Temperatures of winding and case [°C] at the samples, from those at the first."""
+        F, g = self.steps(time, torque)
+        w, c = start[0] - self.ambient, start[1] - self.ambient
+        found = [(w, c)]
+        for ((f11, f12), (f21, f22)), (g1, g2) in zip(F.tolist(), g.tolist(), strict=True):
+            w, c = f11 * w + f12 * c + g1, f21 * w + f22 * c + g2
+            found.append((w, c))
+        x = np.array(found) + self.ambient
+        return x[:, 0], x[:, 1]
+
+    def repeated(self, time: np.ndarray, torque: np.ndarray) -> tuple[float, float] | None:
+        """Temperatures of winding and case [°C] at the beginning of a cycle that has been repeated for ever.
+
+        x = F x + g over the whole cycle, solved for x. None if the heat that grows with the temperature has no end.
+        """
+        F, g = _whole(*self.steps(time, torque))
+        if max(abs(np.linalg.eigvals(F))) >= 1.0:
+            return None
+        w, c = np.linalg.solve(np.eye(2) - F, g) + self.ambient
+        return float(w), float(c)
+
+    def error_bound(self, time: np.ndarray, torque: np.ndarray, hottest: float) -> float:
+        """Of the temperatures [K], through the mean of M² over each interval.
+
+        The heat of an interval h whose values lie within dP of each other leads or lags by at most h dP/4, and the
+        temperature that one joule leaves behind decays: h dP/(4 C_w), and as much again within an interval.
+        """
+        square = torque**2
+        low = np.where(torque[1:] * torque[:-1] < 0.0, 0.0, np.minimum(square[1:], square[:-1]))
+        spread = (np.maximum(square[1:], square[:-1]) - low) * np.diff(time)
+        factor = 1.0 + self.alpha * max(hottest - self.reference, 0.0)
+        return float(factor * self.loss * spread.max(initial=0.0) / (2.0 * self.winding_time / self.winding_case))
+
+
+def needed(motor: Motor) -> list[str]:
+    """Keys of `[motor]` that the two bodies need and the motor lacks."""
+    keys = (
+        "thermal_resistance_winding_case",
+        "thermal_resistance_case_ambient",
+        "thermal_time_constant_winding",
+        "thermal_time_constant_motor",
+    )
+    lacking = [f"limits.{key}" for key in keys if getattr(motor.limits, key, None) is None]
+    if motor.copper_loss() is None:
+        lacking += ["limits.resistance", "limits.torque_constant"]
+    return lacking
+
+
+def steady_rise(heat: float, resistance: float, ambient: float, reference: float) -> float:
+    """Rise of a winding over the ambient [K] under a constant current, whose heat is `heat` [W] at the reference temperature.
+
+    dT = R_th P (1 + alpha (T_a + dT - T_r)); infinite if the heat grows faster than it is carried off.
+    """
+    cold = resistance * heat
+    if cold * COPPER >= 1.0:
+        return math.inf
+    return cold * (1.0 + COPPER * (ambient - reference)) / (1.0 - COPPER * cold)
+
+
+def mean_square(torque: np.ndarray) -> np.ndarray:
+    """Mean of M² over each interval between samples, M being straight there."""
+    a, b = torque[:-1], torque[1:]
+    return np.asarray((a * a + a * b + b * b) / 3.0)
+
+
+def rms(time: np.ndarray, torque: np.ndarray) -> float:
+    """Root mean square over the time [N·m]."""
+    return float(np.sqrt(np.sum(mean_square(torque) * np.diff(time)) / (time[-1] - time[0])))
+
+
+def _whole(F: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All steps x -> F x + g in one, by joining neighbours."""
+    while len(F) > 1:
+        if len(F) % 2:
+            F, g = np.concatenate([F, np.eye(2)[None]]), np.concatenate([g, np.zeros((1, 2))])
+        first, second = F[0::2], F[1::2]
+        F, g = second @ first, (second @ g[0::2, :, None])[:, :, 0] + g[1::2]
+    return F[0], g[0]
+
+
+def _integral(rate: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """Of e^(rate s) from 0 to h."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(rate == 0.0, h, np.expm1(rate * h) / rate)
+
+
+def _divided(l_1: np.ndarray, l_2: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """Divided difference of `_integral` over two rates."""
+    plain = (_integral(l_1, h) - _integral(l_2, h)) / (l_1 - l_2)
+    series, power, total = np.zeros_like(h), h * h / 2.0, np.ones_like(h)
+    for k in range(2, 12):
+        series += power * total  # h^k/k! times the sum of l_1^i l_2^j with i + j = k - 2
+        power = power * h / (k + 1.0)
+        total = total * l_1 + l_2 ** (k - 1.0)
+    return np.where(np.maximum(np.abs(l_1), np.abs(l_2)) * h < SERIES, series, plain)
+
+
+def need_two_bodies(motor: Motor, ambient: float, alpha: float, where: str) -> TwoBodies:
+    """As `TwoBodies.of`.
+
+    Raises
+    ------
+    InputError
+        With the keys that lack.
+    """
+    bodies = TwoBodies.of(motor, ambient, alpha)
+    if bodies is None:
+        keys = ", ".join(f"{where}.{key}" for key in needed(motor))
+        raise InputError(f"temperatures: the motor lacks {keys}; data sheets print them, give them")
+    return bodies

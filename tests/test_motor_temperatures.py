@@ -1,0 +1,216 @@
+"""Temperatures of winding and case, and the current of a run: closed forms and another solver."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+import lostmotion as lm
+from lostmotion.data_sheets.components import motor_table
+from lostmotion.sizing.drive_check import check_drive
+from lostmotion.sizing.thermal import COPPER, TwoBodies
+
+THERMAL = {
+    "thermal_resistance_winding_case": "0.8 K/W",
+    "thermal_resistance_case_ambient": "2.4 K/W",
+    "thermal_time_constant_winding": "12 s",
+    "thermal_time_constant_motor": "300 s",
+    "max_winding_temperature": "155 degC",
+}
+R_WC, R_CA, C_W, C_C = 0.8, 2.4, 12.0 / 0.8, 300.0 / 2.4
+LOSS = 0.3 / 0.06**2  # resistance 0.3 ohm, torque constant 0.06 N·m/A
+NETWORK = np.array([[-1 / (R_WC * C_W), 1 / (R_WC * C_W)], [1 / (R_WC * C_C), -(1 / R_WC + 1 / R_CA) / C_C]])
+
+
+def run(command, duration: float = 60.0, interval: float = 0.05, **limits) -> lm.Scenario:
+    return lm.Scenario(
+        command=command,
+        motor={
+            "kind": "torque_source",
+            "rotor_inertia": 1e-4,
+            "rated_torque": 1.0,
+            "limits": {"resistance": 0.3, "torque_constant": 0.06, **THERMAL, **limits},
+        },
+        gearbox={
+            "ratio": 50.0,
+            "rated_input_speed": 300.0,
+            "rated_output_torque": 20.0,
+            "stiffness": {"kind": "rigid"},
+            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
+        },
+        load={"inertia": 5.0, "viscous_friction": 10.0},
+        task={"ambient_temperature": "40 degC"},
+        simulation={"duration": duration, "sample_interval": interval},
+    )
+
+
+def test_a_step_of_loss_into_two_bodies() -> None:
+    """x(t) = A^-1 (e^(A t) - 1) b, with constant resistance; the slow and the fast mode, and what the case is told."""
+    result = lm.simulate(run(0.5))
+    found = lm.temperatures(result, constant_resistance=True)
+    b = np.array([LOSS * 0.25 / C_W, 0.0])
+    inverse = np.linalg.inv(NETWORK)
+    expected = np.array([40.0 + inverse @ (expm(NETWORK * t) - np.eye(2)) @ b for t in result["time"].values])
+    assert found["winding_temperature"].values == pytest.approx(expected[:, 0], abs=1e-9)
+    assert found["case_temperature"].values == pytest.approx(expected[:, 1], abs=1e-9)
+    assert float(found["rms_torque"]) == pytest.approx(0.5, rel=1e-12)
+    assert found["copper_loss"].values == pytest.approx(LOSS * 0.25, rel=1e-12)
+    assert float(found["headroom"]) == pytest.approx(155.0 - expected[:, 0].max(), abs=1e-9)
+    assert found.attrs["error_bound"] == pytest.approx(0.0, abs=1e-12)  # the torque is constant
+
+
+@pytest.mark.parametrize("interval", [0.01, 0.1])
+def test_the_temperature_follows_the_full_equations_within_the_stated_error(interval: float) -> None:
+    """A sine of torque and copper that gets warm, integrated by another solver over the same straight lines."""
+    result = lm.simulate(run({"amplitude": 0.6, "frequency": 0.5}, duration=20.0, interval=interval))
+    found = lm.temperatures(result, winding="50 degC")
+    t, torque = result["time"].values, result["motor_torque"].values
+
+    def rates(now: float, x: np.ndarray) -> np.ndarray:
+        heat = LOSS * np.interp(now, t, torque) ** 2 * (1.0 + COPPER * (x[0] - 25.0))
+        return NETWORK @ (x - 40.0) + np.array([heat / C_W, 0.0])
+
+    full = solve_ivp(rates, (0.0, t[-1]), [50.0, 40.0], "DOP853", t, rtol=1e-11, atol=1e-11, max_step=interval)
+    error = np.abs(found["winding_temperature"].values - full.y[0]).max()
+    bound = found.attrs["error_bound"]
+    assert error <= bound
+    assert bound < 0.6 * interval  # K: it falls with the interval
+    assert np.abs(found["case_temperature"].values - full.y[1]).max() <= bound
+
+
+@pytest.mark.parametrize("pause", [0.0, 1e6])
+def test_steps_of_all_lengths_are_exact(pause: float) -> None:
+    """From a microsecond to days, with copper: against the matrix exponential of each step, in series and divided difference."""
+    bodies = TwoBodies(R_WC, R_CA, 12.0, 300.0, LOSS, 25.0, 40.0)
+    time = np.cumsum([0.0, 1e-6, 1e-3, 0.5, 1.3, 2.0, 40.0, 3000.0, pause + 1.0])
+    torque = np.full(len(time), 0.4)
+    A = NETWORK + np.array([[COPPER * LOSS * 0.16 / C_W, 0.0], [0.0, 0.0]])
+    b = np.array([LOSS * 0.16 * (1.0 + COPPER * 15.0) / C_W, 0.0])
+    augmented = np.zeros((3, 3))
+    augmented[:2, :2], augmented[:2, 2] = A, b
+    for (F, g), h in zip(zip(*bodies.steps(time, torque), strict=True), np.diff(time), strict=True):
+        expected = expm(augmented * h)
+        assert pytest.approx(expected[:2, :2], rel=1e-10, abs=1e-14) == F  # 1 + A times something: rounding of 1
+        assert g == pytest.approx(expected[:2, 2], rel=1e-9, abs=1e-15)
+
+
+def test_a_cycle_repeated_for_ever_ends_as_it_began_and_as_many_cycles_do() -> None:
+    result = lm.simulate(run({"amplitude": 0.5, "frequency": 0.1}, duration=20.0))
+    found = lm.temperatures(result, repeated=True)
+    for name in ("winding_temperature", "case_temperature"):
+        assert float(found[name][-1]) == pytest.approx(float(found[name][0]), abs=1e-9)
+    ends = (40.0, 40.0)
+    for _ in range(500):  # 10,000 s, 26 of the slowest time constant
+        one = lm.temperatures(result, winding=ends[0], case=ends[1])
+        ends = float(one["winding_temperature"][-1]), float(one["case_temperature"][-1])
+    assert ends[0] == pytest.approx(float(found["winding_temperature"][0]), abs=1e-6)
+    # A constant torque heats by R_th P/(1 - alpha R_th P) at 25 °C, with the heat of 40 °C here.
+    steady = lm.temperatures(lm.simulate(run(0.3, interval=1.0)), repeated=True)
+    cold = (R_WC + R_CA) * LOSS * 0.09
+    assert float(steady["winding_temperature"][0]) == pytest.approx(
+        40 + cold * (1 + COPPER * 15) / (1 - COPPER * cold), abs=1e-9
+    )
+
+
+def test_rms_torque_is_that_of_straight_lines_between_samples() -> None:
+    result = lm.simulate(run({"ramps": [{"rise": 0.9, "duration": 60.0}]}, interval=30.0))
+    assert float(lm.temperatures(result)["rms_torque"]) == pytest.approx(0.9 / math.sqrt(3.0), rel=1e-12)
+
+
+def test_the_drive_check_takes_the_peak_of_the_repeated_cycle() -> None:
+    """A sine of 0.02 Hz heats and cools the winding within each period: the peak lies above that of the mean loss."""
+    scenario = run({"amplitude": 0.4, "frequency": 0.02}, duration=50.0)
+    parts = {f"motor.limits.{key}": None for key in THERMAL if key.startswith("thermal")}
+    mean_only = scenario.replace(**parts, **{"motor.limits.thermal_resistance": 3.2})
+    uses = [next(f.use for f in check_drive(s) if f.rule == "winding_temperature") for s in (scenario, mean_only)]
+    result = lm.simulate(scenario, sample_interval=0.025)
+    peak = float(lm.temperatures(result, repeated=True)["winding_temperature"].max())
+    assert uses[0] == pytest.approx((peak - 40.0) / 115.0, rel=1e-3)  # the check samples as finely
+    assert uses[0] > 1.05 * uses[1]
+
+
+def test_current_and_voltage_of_a_synchronous_motor() -> None:
+    """i = M/(1.5 p psi); |u|² = u_q² + (p w L_q i)², the second by the decoupling."""
+    motor = lm.Motor(**motor_table("siemens-1ft7044-ak7", {"dc_voltage": "600 V", "friction_torque": 0.0}))
+    scenario = run(0.9, duration=0.5, interval=1e-3)
+    result = lm.simulate(lm.Scenario(**{**scenario.model_dump(), "motor": motor, "command": 1.3}))
+    found = lm.motor_current(result)
+    torque, speed = result["motor_torque"].values, result["motor_speed"].values
+    assert found["current_rms"].values == pytest.approx(abs(torque) / 0.88, rel=1e-12)
+    assert found["current"].values == pytest.approx(torque / 0.88 * math.sqrt(2.0), rel=1e-12)
+    u_q, u_d = 600.0 / math.sqrt(3.0), 3.0 * speed * 4.2e-3 * found["current"].values
+    assert found["voltage"].values == pytest.approx(np.hypot(u_q, u_d), rel=1e-12)
+    assert found.attrs["voltage_limit"] == u_q
+    check = {f.rule: f for f in check_drive(lm.scenario_of(result))}
+    assert check["current"].use == pytest.approx(float(found["current_rms"].max()) / 30.0, rel=0.02)  # finer samples
+    assert check["voltage"].verdict == "warning"
+    heat = motor.copper_loss()[0] * torque**2
+    assert heat == pytest.approx(3.0 * 0.61 * found["current_rms"].values ** 2, rel=1e-12)
+    source = lm.simulate(scenario)
+    assert lm.motor_current(source)["current"].values == pytest.approx(source["motor_torque"].values / 0.06)
+
+
+def test_a_brushless_motor_of_the_catalogue_with_field_orientation() -> None:
+    """The same magnets, K_M = (3 sqrt(3)/pi) p psi: with a sine 9/pi² of the heat to the same torque, since all three phases
+    carry it, and 3/pi of the no-load speed, since a phase ends at u_dc/sqrt(3)."""
+    block = lm.motor("maxon-ec-i-52-606793")
+    sine = lm.Motor(**motor_table("maxon-ec-i-52-606793", {"kind": "synchronous"}))
+    phase = sine.winding.phase_values()
+    assert phase.pole_pairs == 8
+    assert pytest.approx(3.0 * math.sqrt(3.0) / math.pi * phase.voltage_constant, rel=1e-14) == 0.068
+    assert sine.copper_loss()[0] / block.copper_loss()[0] == pytest.approx(9.0 / math.pi**2, rel=1e-14)
+    assert sine.no_load_speed == pytest.approx(3.0 / math.pi * 24.0 / 0.068, rel=1e-14)
+    assert sine.limits.winding_to_ambient == pytest.approx(4.55, rel=1e-15)
+
+
+def test_synchronous_records_follow_from_their_sheets() -> None:
+    """Printed constants that were not used: T_el = L/R, T_mech = 3 R J/k_T² (Siemens, configuration manual, table 4-8)."""
+    motor = lm.Motor(**motor_table("siemens-1ft7044-ak7", {"dc_voltage": 600, "friction_torque": 0.0}))
+    phase = motor.winding.phase_values()
+    assert motor.as_dc().electrical_time_constant == pytest.approx(7e-3, rel=0.02)
+    assert 3.0 * phase.resistance * motor.rotor_inertia / 0.88**2 == pytest.approx(1.3e-3, rel=0.02)
+    # Rated point: 2 N·m at 6000 rpm within 380 V rms between the lines, sqrt(2/3) of which is an amplitude of a phase.
+    u_q = phase.resistance * 2.0 / phase.torque_constant + phase.voltage_constant * 628.3
+    assert phase.voltage(u_q, 2.0, 628.3) < 380.0 * math.sqrt(2.0 / 3.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda r: lm.temperatures(lm.simulate(run(0.1, thermal_time_constant_motor=None))), r"lacks motor\.limits\.thermal_time_constant_motor; data"),
+        (lambda r: lm.temperatures(lm.simulate(run(0.1, resistance=None))), r"lacks motor\.limits\.resistance, motor\.limits\.torque_constant"),
+        (lambda r: lm.temperatures(r, "m1"), "motor 'm1': this drive has one motor"),
+        (lambda r: lm.temperatures(r, ambient="3 V"), "ambient"),
+        (lambda r: lm.temperatures(r, repeated=True, winding=30.0), "has no beginning; leave winding and case out"),
+        (lambda r: lm.temperatures(lm.simulate(run(3.0, duration=2.0)), repeated=True), "no end to its heat"),
+        (lambda r: lm.temperatures(r.drop_vars("motor_torque")), "the result lacks motor_torque"),
+        (lambda r: lm.temperatures(r.drop_attrs()), "carries no scenario"),
+        (lambda r: lm.motor_current(lm.simulate(run(0.1, torque_constant=None))), r"lacks motor\.limits\.torque_constant; give it, or a winding"),
+        (lambda r: run(0.1, thermal_resistance=3.2), "has thermal_resistance and both of its parts"),
+    ],
+)  # fmt: skip
+def test_what_lacks_or_contradicts_is_named(call, message) -> None:
+    with pytest.raises(lm.InputError, match=message):
+        call(lm.simulate(run(0.1, duration=2.0)))
+
+
+def test_a_motor_of_a_train_is_chosen_by_name() -> None:
+    single = run(0.5)
+    scenario = lm.TrainScenario(
+        shafts={"a": {}, "b": {"inertia": 5.0, "viscous_friction": 10.0}},
+        motors={name: {"shaft": "a", **single.motor.model_dump()} for name in ("one", "two")},
+        gears={"g": {"input": "a", "output": "b", **single.gearbox.model_dump(exclude={"limits"})}},
+        command={"one": 0.5, "two": 0.1},
+        simulation={"duration": 60.0, "sample_interval": 0.05},
+    )
+    result = lm.simulate(scenario)
+    of_one = lm.temperatures(result, "one", ambient=40.0)
+    expected = lm.temperatures(lm.simulate(single))
+    assert of_one["winding_temperature"].values == pytest.approx(expected["winding_temperature"].values, rel=1e-12)
+    assert float(lm.motor_current(result, "two")["current"][0]) == pytest.approx(0.1 / 0.06)
+    with pytest.raises(lm.InputError, match="motor is missing; the motors are one, two"):
+        lm.temperatures(result)
+    with pytest.raises(lm.InputError, match="motor 'onw': did you mean one"):
+        lm.motor_current(result, "onw")
