@@ -35,8 +35,7 @@ class SimulationOf {
 
     // scale: natural sizes of the states. step: the usual interval [s]; others are allowed, this one is fastest.
     // inputs: how many the system has.
-    SimulationOf(const System& system, const StateOf<D>& scale, double step, int inputs = D::inputs)
-        : solver_(system, ramped_inputs<D>(inputs), step, scale), inputs_(inputs) {}
+    SimulationOf(const System& system, const StateOf<D>& scale, double step, int inputs = D::inputs);
     SimulationOf(const SimulationOf&) = delete;
     SimulationOf& operator=(const SimulationOf&) = delete;
 
@@ -51,44 +50,55 @@ class SimulationOf {
 
     // Advances by `interval` [s] with each input running in a straight line from its first to its second value.
     // On any status but done the state is left as it was.
-    Status advance(double interval, const Inputs& begin, const Inputs& end) {
-        solver_.resume(now_.time, now_.x, now_.memory, now_.key, now_.course);
-        for (int i = 0; i < inputs_; ++i) solver_.set_ramp(i, begin[i], (end[i] - begin[i]) / interval);
-        const bool steady = begin == end, unchanged = now_.steady && steady && begin == now_.input;
-        Status status = Status::done;
-        if (!now_.started)
-            status = solver_.begin(now_.time, now_.x, now_.memory);
-        else if (!unchanged)
-            status = solver_.inputs_changed();
-        NoObserver nothing;
-        if (status == Status::done) status = solver_.advance(now_.time + interval, nothing);
-        if (status != Status::done) return status;
-        now_ = {solver_.time(), solver_.state(), solver_.memory(), solver_.key(), end, true, steady, solver_.course()};
-        return status;
-    }
-
+    Status advance(double interval, const Inputs& begin, const Inputs& end);
     // The regime at the present instant, with the inputs at their last values. A state that nothing has advanced yet
     // must have one.
-    Status find_regime() {
-        if (now_.started) return Status::done;
-        solver_.resume(now_.time, now_.x, now_.memory, now_.key);
-        for (int i = 0; i < inputs_; ++i) solver_.set_ramp(i, now_.input[i], 0.0);
-        const Status status = solver_.begin(now_.time, now_.x, now_.memory);
-        if (status == Status::done)
-            now_ = {now_.time, solver_.state(), solver_.memory(), solver_.key(), now_.input,
-                    true,      false,           solver_.course()};
-        return status;
-    }
-    const Regime& regime() {
-        find_regime();
-        return solver_.regime(now_.key);
-    }
+    Status find_regime();
+    const Regime& regime();
 
  private:
     ExactSolver<System> solver_;
     int inputs_;
     Snapshot now_;
 };
+
+template <class System>
+SimulationOf<System>::SimulationOf(const System& system, const StateOf<D>& scale, double step, int inputs)
+    : solver_(system, ramped_inputs<D>(inputs), step, scale), inputs_(inputs) {}
+
+template <class System>
+Status SimulationOf<System>::advance(double interval, const Inputs& begin, const Inputs& end) {
+    solver_.resume(now_.time, now_.x, now_.memory, now_.key, now_.course);
+    for (int i = 0; i < inputs_; ++i) solver_.set_ramp(i, begin[i], (end[i] - begin[i]) / interval);
+    const bool steady = begin == end, unchanged = now_.steady && steady && begin == now_.input;
+    Status status = Status::done;
+    if (!now_.started)
+        status = solver_.begin(now_.time, now_.x, now_.memory);
+    else if (!unchanged)
+        status = solver_.inputs_changed();
+    NoObserver nothing;
+    if (status == Status::done) status = solver_.advance(now_.time + interval, nothing);
+    if (status != Status::done) return status;
+    now_ = {solver_.time(), solver_.state(), solver_.memory(), solver_.key(), end, true, steady, solver_.course()};
+    return status;
+}
+
+template <class System>
+Status SimulationOf<System>::find_regime() {
+    if (now_.started) return Status::done;
+    solver_.resume(now_.time, now_.x, now_.memory, now_.key);
+    for (int i = 0; i < inputs_; ++i) solver_.set_ramp(i, now_.input[i], 0.0);
+    const Status status = solver_.begin(now_.time, now_.x, now_.memory);
+    if (status == Status::done)
+        now_ = {now_.time, solver_.state(), solver_.memory(), solver_.key(), now_.input, true, false, solver_.course()};
+    return status;
+}
+
+template <class System>
+auto SimulationOf<System>::regime() -> const Regime& {
+    find_regime();
+    return solver_.regime(now_.key);
+}
 
 // What a simulation of a drive owns.
 struct OwnDrive {
