@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "lostmotion/simulation/stepping.hpp"
 #include "support.hpp"
 
 namespace lostmotion {
@@ -145,31 +144,8 @@ struct Splitting {
     double amplification = 0.0;  // what becomes of a relative change of the inputs by 1e-14
 };
 
-// A run in one go against the same run that event_checks at its contacts anew at an instant.
-inline Splitting split_run(const Drive& drive, const Signals& signals, double duration, double at) {
-    Splitting out;
-    const double interval = duration / 200.0;
-    const Samples whole = run(drive, signals, duration, interval);
-    out.status = whole.report.status;
-    out.time = whole.report.time;
-    if (out.status != Status::done) return out;
-    const SwitchedDrive system(drive);
-    ExactSolver<SwitchedDrive> solver(system, signals, interval, drive.balanced_scale());
-    struct {
-        bool segment(const Segment<SwitchedDrive>&) { return true; }
-    } nothing;
-    out.split = solver.begin(0.0, {}, {});
-    if (out.split == Status::done) out.split = solver.advance(at, nothing);
-    if (out.split == Status::done) out.split = solver.inputs_changed();
-    if (out.split == Status::done) out.split = solver.advance(duration, nothing);
-    if (out.split != Status::done) return out;
-    out.gap = difference_at_end(drive, whole, solver.state());
-    if (out.gap > 1e-10) {
-        const Samples other = run(drive, perturbed(signals), duration, interval);
-        out.amplification = other.report.status == Status::done ? difference_at_end(drive, whole, other.report.x) : 1.0;
-    }
-    return out;
-}
+// A run in one go against the same run that looks at its contacts anew at an instant.
+Splitting split_run(const Drive& drive, const Signals& signals, double duration, double at);
 
 // Rounding, as far as the motion amplifies it.
 inline bool same_beyond_rounding(const Splitting& s) {

@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <string>
 
-#include "lostmotion/simulation/train_run.hpp"
 #include "random_trains.hpp"
+#include "train_kernels.hpp"
 #include "train_steps.hpp"
 
 namespace lostmotion::model {

@@ -7,8 +7,12 @@
 #include <vector>
 
 #include "lostmotion/simulation/run.hpp"
+#include "lostmotion/simulation/stepping.hpp"
 
 namespace lostmotion {
+
+// The solvers of drives take long to compile: once, in drive_runs.cpp.
+extern template class SimulationOf<SwitchedDrive>;
 
 inline constexpr double pi = std::numbers::pi;
 
@@ -79,19 +83,9 @@ struct Samples {
     double operator()(Channel c, std::size_t k) const { return data[c * count + k]; }
 };
 
-inline Samples run(const Drive& drive, const Signals& signals, double duration, double interval = 1e-3,
-                   const Start& start = {}, double adaptive_tolerance = 0.0) {
-    Samples s;
-    RunOptions options;
-    options.duration = duration;
-    options.sample_interval = interval;
-    options.samples = s.count = static_cast<std::size_t>(std::floor(duration / interval * (1.0 + 1e-12))) + 1;
-    s.data.resize(n_channels * s.count);
-    s.report = adaptive_tolerance > 0.0
-                   ? run_adaptive(drive, signals, start, options, adaptive_tolerance, s.data.data())
-                   : run_exact(drive, signals, start, options, s.data.data());
-    return s;
-}
+// By the exact solver, or by the adaptive one to a tolerance.
+Samples run(const Drive& drive, const Signals& signals, double duration, double interval = 1e-3,
+            const Start& start = {}, double adaptive_tolerance = 0.0);
 
 // Random drives that mix all parts and signals. Sizes are drawn by the logarithm, over what real drives have.
 class RandomDrives {

@@ -2,7 +2,6 @@
 #include <doctest/doctest.h>
 
 #include "lostmotion/analysis/explain.hpp"
-#include "lostmotion/simulation/stepping.hpp"
 #include "support.hpp"
 
 using namespace lostmotion;
@@ -207,20 +206,15 @@ TEST_SUITE("contacts") {
 
     TEST_CASE("what a stuck contact holds lies within its capacity") {
         const Drive drive = sticky_paper_drive();
-        const SwitchedDrive system(drive);
-        const Signals signals{sine(0.025, 1.0), Signal{}};
-        ExactSolver<SwitchedDrive> solver(system, signals, 1e-3, drive.balanced_scale());
-        struct {
-            bool segment(const Segment<SwitchedDrive>&) { return true; }
-        } nothing;
-        REQUIRE(solver.begin(0.0, {}, {}) == Status::done);
+        constexpr double step = 0.005;
+        Simulation simulation(drive, step);
+        const auto command = [](int k) { return 0.025 * std::sin(2.0 * pi * step * k); };
         int stuck = 0;
         for (int k = 1; k <= 400; ++k) {
-            REQUIRE(solver.advance(0.005 * k, nothing) == Status::done);
-            InputState<DriveDims> input(signals, solver.basis());
-            input.anchor(solver.time());
+            REQUIRE(simulation.advance(step, command(k - 1), command(k), 0.0, 0.0) == Status::done);
+            const auto& now = simulation.snapshot();
             const ContactReport c =
-                explain_contact(drive, solver.regime(), input_contact, solver.state(), solver.memory(), input.values());
+                explain_contact(drive, simulation.regime(), input_contact, now.x, now.memory, now.input);
             if (c.mode != 0) continue;
             ++stuck;
             CHECK(c.torque <= c.capacity_forward * (1.0 + 1e-12));

@@ -1,7 +1,6 @@
 // Step by step: splitting, restoring, agreement with whole runs.
 #include <doctest/doctest.h>
 
-#include "lostmotion/simulation/stepping.hpp"
 #include "support.hpp"
 
 using namespace lostmotion;

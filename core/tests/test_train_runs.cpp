@@ -1,7 +1,6 @@
 // Whole runs of trains: the exact solver against the drive's, the adaptive solver and the ledger.
 #include <doctest/doctest.h>
 
-#include "lostmotion/simulation/run.hpp"
 #include "random_train_runs.hpp"
 
 TEST_SUITE_BEGIN("train_runs");
@@ -14,21 +13,17 @@ TEST_CASE("the classic drive as a train has the same samples, to the last bit") 
     for (int n = 0; n < 200; ++n) {
         const Drive d = random.drive();
         const Signals signals = random.signals(d, 0.3);
-        RunOptions options;
-        options.duration = 0.3;
-        options.samples = 301;
-        options.energy = false;
-        std::vector<double> expected(n_channels * options.samples);
-        const RunReport classic = run_exact(d, signals, {}, options, expected.data());
-        if (classic.status != Status::done) continue;
+        const Samples classic = lostmotion::run(d, signals, 0.3);
+        if (classic.report.status != Status::done) continue;
         const Recorded train(train_of(d), {signals[0], signals[1]}, 0.3, 1e-3);
+        REQUIRE(train.samples == classic.count);
         CAPTURE(n);
         REQUIRE(train.report.status == Status::done);
         ++compared;
         const auto same = [&](Channel classic_channel, const char* name) {
-            const double *a = &expected[classic_channel * options.samples], *b = train.channel(name);
+            const double *a = &classic.data[classic_channel * classic.count], *b = train.channel(name);
             CAPTURE(name);
-            CHECK(std::equal(a, a + options.samples, b));
+            CHECK(std::equal(a, a + classic.count, b));
         };
         same(ch_motor_speed, "motor_speed");
         same(ch_load_speed, "load_speed");

@@ -4,8 +4,8 @@
 #include <cstring>
 
 #include "lostmotion/analysis/train_explain.hpp"
-#include "lostmotion/simulation/train_stepping.hpp"
 #include "random_trains.hpp"
+#include "train_kernels.hpp"
 
 TEST_SUITE_BEGIN("train_stepping");
 

@@ -1,7 +1,6 @@
 // Trains against time stepping, which shares no code with the model.
 #include <doctest/doctest.h>
 
-#include "lostmotion/simulation/run.hpp"
 #include "random_train_runs.hpp"
 #include "train_steps.hpp"
 

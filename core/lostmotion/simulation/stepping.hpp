@@ -39,8 +39,7 @@ class SimulationOf {
 
     // scale: natural sizes of the states. step: the usual interval [s]; others are allowed, this one is fastest.
     // inputs: how many the system has.
-    SimulationOf(const System& system, const StateOf<D>& scale, double step, int inputs = D::inputs)
-        : solver_(system, ramped_inputs<D>(inputs), step, scale), inputs_(inputs) {}
+    SimulationOf(const System& system, const StateOf<D>& scale, double step, int inputs = D::inputs);
     SimulationOf(const SimulationOf&) = delete;
     SimulationOf& operator=(const SimulationOf&) = delete;
 
@@ -65,62 +64,17 @@ class SimulationOf {
 
     // Advances by `interval` [s] with each input running in a straight line from its first to its second value; those
     // that a controller gives are not looked at. On any status but done the state is left as it was.
-    Status advance(double interval, Inputs begin, Inputs end) {
-        resume(begin, end, interval);
-        const bool steady = begin == end, unchanged = now_.steady && steady && begin == now_.input;
-        NoObserver nothing;
-        Status status = Status::done;
-        if (!now_.started)
-            status = begin_motion();
-        else if (!unchanged)
-            status = solver_.inputs_changed();
-        const double to = now_.time + interval;
-        if (status == Status::done)
-            status = controllers_ ? controllers_->advance(to, nothing, [](double) {}) : solver_.advance(to, nothing);
-        if (status == Status::done) keep(end, steady);
-        return status;
-    }
-
+    Status advance(double interval, Inputs begin, Inputs end);
     // The regime at the present instant, with the inputs at their last values. A state that nothing has advanced yet
     // must have one.
-    Status find_regime() {
-        if (now_.started) return Status::done;
-        Inputs input = now_.input;
-        resume(input, input, 1.0);
-        const Status status = begin_motion();
-        if (status == Status::done) keep(input, false);
-        return status;
-    }
-    const Regime& regime() {
-        find_regime();
-        return solver_.regime(now_.key);
-    }
+    Status find_regime();
+    const Regime& regime();
 
  private:
     // The solver at the present state, with the inputs running over the interval.
-    void resume(Inputs& begin, Inputs& end, double interval) {
-        solver_.resume(now_.time, now_.x, now_.memory, now_.key, now_.course);
-        for (int i = 0; i < inputs_; ++i) solver_.set_ramp(i, begin[i], (end[i] - begin[i]) / interval);
-        if (!controllers_) return;
-        controllers_->resume(now_.control);
-        controllers_->write_commands(begin);
-        controllers_->write_commands(end);
-    }
-    Status begin_motion() {
-        return controllers_ ? controllers_->begin(now_.x, now_.memory) : solver_.begin(now_.time, now_.x, now_.memory);
-    }
-    void keep(Inputs input, bool steady) {
-        if (controllers_) controllers_->write_commands(input);
-        now_ = {solver_.time(),
-                solver_.state(),
-                solver_.memory(),
-                solver_.key(),
-                input,
-                true,
-                steady,
-                solver_.course(),
-                controllers_ ? controllers_->course() : ControlCourse{}};
-    }
+    void resume(Inputs& begin, Inputs& end, double interval);
+    Status begin_motion();
+    void keep(Inputs input, bool steady);
 
     ExactSolver<System> solver_;
     int inputs_;
@@ -129,6 +83,72 @@ class SimulationOf {
     ClosedLoop<D> loop_;
     std::optional<ClosedLoopRun<ExactSolver<System>>> controllers_;
 };
+
+template <class System>
+SimulationOf<System>::SimulationOf(const System& system, const StateOf<D>& scale, double step, int inputs)
+    : solver_(system, ramped_inputs<D>(inputs), step, scale), inputs_(inputs) {}
+
+template <class System>
+Status SimulationOf<System>::advance(double interval, Inputs begin, Inputs end) {
+    resume(begin, end, interval);
+    const bool steady = begin == end, unchanged = now_.steady && steady && begin == now_.input;
+    NoObserver nothing;
+    Status status = Status::done;
+    if (!now_.started)
+        status = begin_motion();
+    else if (!unchanged)
+        status = solver_.inputs_changed();
+    const double to = now_.time + interval;
+    if (status == Status::done)
+        status = controllers_ ? controllers_->advance(to, nothing, [](double) {}) : solver_.advance(to, nothing);
+    if (status == Status::done) keep(end, steady);
+    return status;
+}
+
+template <class System>
+Status SimulationOf<System>::find_regime() {
+    if (now_.started) return Status::done;
+    Inputs input = now_.input;
+    resume(input, input, 1.0);
+    const Status status = begin_motion();
+    if (status == Status::done) keep(input, false);
+    return status;
+}
+
+template <class System>
+void SimulationOf<System>::resume(Inputs& begin, Inputs& end, double interval) {
+    solver_.resume(now_.time, now_.x, now_.memory, now_.key, now_.course);
+    for (int i = 0; i < inputs_; ++i) solver_.set_ramp(i, begin[i], (end[i] - begin[i]) / interval);
+    if (!controllers_) return;
+    controllers_->resume(now_.control);
+    controllers_->write_commands(begin);
+    controllers_->write_commands(end);
+}
+
+template <class System>
+Status SimulationOf<System>::begin_motion() {
+    return controllers_ ? controllers_->begin(now_.x, now_.memory) : solver_.begin(now_.time, now_.x, now_.memory);
+}
+
+template <class System>
+void SimulationOf<System>::keep(Inputs input, bool steady) {
+    if (controllers_) controllers_->write_commands(input);
+    now_ = {solver_.time(),
+            solver_.state(),
+            solver_.memory(),
+            solver_.key(),
+            input,
+            true,
+            steady,
+            solver_.course(),
+            controllers_ ? controllers_->course() : ControlCourse{}};
+}
+
+template <class System>
+auto SimulationOf<System>::regime() -> const Regime& {
+    find_regime();
+    return solver_.regime(now_.key);
+}
 
 // What a simulation of a drive owns.
 struct OwnDrive {

@@ -306,6 +306,32 @@ TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std:
     return report;
 }
 
+// By the exact solver to options.duration, without a record. point: what is there.
+template <class D>
+TrainReport reach_train_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
+                           std::span<const double> start, std::span<const double> memory, const TrainOptions& options,
+                           TrainPoint& point) {
+    TrainReport report;
+    report.message = check_start(model.assembly, start);
+    if (!report.message.empty()) return report;
+    const model::TrainSystem<D> system(model.assembly);
+    const SignalsOf<D> signals = model::packed_signals<D>(inputs);
+    const auto [x, m] = model::packed_start<D>(model.assembly.layout(), start, memory);
+    ExactSolver<model::TrainSystem<D>> solver(system, signals, options.sample_interval, system.balanced_scale());
+    solver.interrupted = options.interrupted;
+    solver.interrupted_context = options.interrupted_context;
+    NoObserver nothing;
+    report.status = solver.begin(0.0, x, m);
+    if (report.status == Status::done && options.duration > 0.0)
+        report.status = solver.advance(options.duration, nothing);
+    report.ended(system, solver);
+    if (report.status != Status::done) return report;
+    InputState<D> input(signals, solver.basis());
+    input.anchor(solver.time());
+    point = point_of<D>(model, solver.regime(), solver.time(), solver.state(), solver.memory(), input.values());
+    return report;
+}
+
 // A train that has been checked and composed, in the narrowest kernel that holds it.
 class TrainRun {
  public:
@@ -369,41 +395,15 @@ class TrainRun {
         return options.tolerance > 0.0 ? in_kernel(model::Assembly(assembly_->train(), true), in) : in_kernel(in);
     }
 
-    // By the exact solver to options.duration, without a record: what is there.
     TrainReport reach(const std::vector<Signal>& inputs, const TrainStart& start, const TrainOptions& options,
                       TrainPoint& point) const {
         const auto [x, memory] = in_layout(start);
         return in_kernel([&, &x = x, &memory = memory]<class D>(const typename TrainReader<D>::Model& model) {
-            return reach_in<D>(model, inputs, x, memory, options, point);
+            return reach_train_in<D>(model, inputs, x, memory, options, point);
         });
     }
 
  private:
-    template <class D>
-    static TrainReport reach_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
-                                std::span<const double> start, std::span<const double> memory,
-                                const TrainOptions& options, TrainPoint& point) {
-        TrainReport report;
-        report.message = check_start(model.assembly, start);
-        if (!report.message.empty()) return report;
-        const model::TrainSystem<D> system(model.assembly);
-        const SignalsOf<D> signals = model::packed_signals<D>(inputs);
-        const auto [x, m] = model::packed_start<D>(model.assembly.layout(), start, memory);
-        ExactSolver<model::TrainSystem<D>> solver(system, signals, options.sample_interval, system.balanced_scale());
-        solver.interrupted = options.interrupted;
-        solver.interrupted_context = options.interrupted_context;
-        NoObserver nothing;
-        report.status = solver.begin(0.0, x, m);
-        if (report.status == Status::done && options.duration > 0.0)
-            report.status = solver.advance(options.duration, nothing);
-        report.ended(system, solver);
-        if (report.status != Status::done) return report;
-        InputState<D> input(signals, solver.basis());
-        input.anchor(solver.time());
-        point = point_of<D>(model, solver.regime(), solver.time(), solver.state(), solver.memory(), input.values());
-        return report;
-    }
-
     std::string error_;
     std::unique_ptr<model::Assembly> assembly_;
     std::vector<TrainChannel> channels_;

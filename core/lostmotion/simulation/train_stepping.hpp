@@ -26,24 +26,33 @@ class TrainSimulationIn : private OwnTrain<D>, public SimulationOf<model::TrainS
     using Base = SimulationOf<model::TrainSystem<D>>;
 
  public:
-    TrainSimulationIn(const TrainRun& run, double step, const Control& control)
-        : Own(run), Base(Own::own_system, Own::own_system.balanced_scale(), step, run.assembly().layout().inputs) {
-        if (control.present())
-            Base::close_loop(control,
-                             [&](const auto& laws) { return closed_loop_of<D>(Own::model.assembly, control, laws); });
-    }
+    TrainSimulationIn(const TrainRun& run, double step, const Control& control);
 
     bool too_many_guards() const { return Own::own_system.overflowed(); }
-    TrainPoint point() {
-        const auto& now = Base::snapshot();
-        const auto& r = Base::regime();
-        return point_of<D>(Own::model, r, now.time, now.x, now.memory, now.input);
-    }
-    std::vector<double> values() {
-        const auto& r = Base::regime();
-        return TrainReader<D>(Own::model, r, Base::snapshot().memory)(Base::snapshot().x, Base::snapshot().input);
-    }
+    TrainPoint point();
+    std::vector<double> values();
 };
+
+template <class D>
+TrainSimulationIn<D>::TrainSimulationIn(const TrainRun& run, double step, const Control& control)
+    : Own(run), Base(Own::own_system, Own::own_system.balanced_scale(), step, run.assembly().layout().inputs) {
+    if (control.present())
+        Base::close_loop(control,
+                         [&](const auto& laws) { return closed_loop_of<D>(Own::model.assembly, control, laws); });
+}
+
+template <class D>
+TrainPoint TrainSimulationIn<D>::point() {
+    const auto& now = Base::snapshot();
+    const auto& r = Base::regime();
+    return point_of<D>(Own::model, r, now.time, now.x, now.memory, now.input);
+}
+
+template <class D>
+std::vector<double> TrainSimulationIn<D>::values() {
+    const auto& r = Base::regime();
+    return TrainReader<D>(Own::model, r, Base::snapshot().memory)(Base::snapshot().x, Base::snapshot().input);
+}
 
 class TrainSimulation {
  public:

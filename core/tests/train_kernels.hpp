@@ -1,0 +1,23 @@
+// What solves trains takes minutes to compile: once for all tests, each kernel in a file of its own.
+#pragma once
+
+#include "lostmotion/simulation/train_stepping.hpp"
+
+namespace lostmotion {
+
+// TEMPLATE: `extern template` to declare, `template` to compile.
+#define LOSTMOTION_TRAIN_KERNEL(TEMPLATE, D)                                                                      \
+    TEMPLATE TrainReport run_train_in<D>(const typename TrainReader<D>::Model&, const std::vector<Signal>&,       \
+                                         std::span<const double>, std::span<const double>, const TrainOptions&,   \
+                                         double*);                                                                \
+    TEMPLATE TrainReport reach_train_in<D>(const typename TrainReader<D>::Model&, const std::vector<Signal>&,     \
+                                           std::span<const double>, std::span<const double>, const TrainOptions&, \
+                                           TrainPoint&);                                                          \
+    TEMPLATE class SimulationOf<model::TrainSystem<D>>;                                                           \
+    TEMPLATE class TrainSimulationIn<D>;
+
+LOSTMOTION_TRAIN_KERNEL(extern template, model::Narrow)
+LOSTMOTION_TRAIN_KERNEL(extern template, model::Middle)
+LOSTMOTION_TRAIN_KERNEL(extern template, model::Wide)
+
+}  // namespace lostmotion

@@ -1,0 +1,5 @@
+#include "train_kernels.hpp"
+
+namespace lostmotion {
+LOSTMOTION_TRAIN_KERNEL(template, model::Narrow)
+}  // namespace lostmotion
