@@ -413,7 +413,8 @@ class SwitchedDrive {
         for (; near != 0; near &= near - 1) {
             const int k = std::countr_zero(near);
             const bool by_value_alone = event != nullptr && event->by_value_alone(entry.regime.guards[k]);
-            const int sign = flow.sign(entry.regime.guards[k].form, value[k], size[k], by_value_alone);
+            // The form out of the table, which is at hand.
+            const int sign = flow.sign(guards.form(k), value[k], size[k], by_value_alone);
             if (sign >= 0) continue;
             if ((entry.contacts >> k & 1) == 0) return {&entry.regime.guards[k], overcome};
             overcome = true;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -25,12 +24,18 @@ struct RegimeKey {
     std::int32_t cell = 0;       // slipping: triangle; stuck: load interval for starting forward ...
     std::int32_t cell_back = 0;  // ... and backward
 
-    std::array<std::uint64_t, 2> words() const { return std::bit_cast<std::array<std::uint64_t, 2>>(*this); }
-    friend bool operator==(const RegimeKey& a, const RegimeKey& b) { return a.words() == b.words(); }
+    // Eight bytes of it. Loaded as one vector, a key that has just been written would wait for its stores.
+    std::uint64_t half(std::size_t k) const {
+        std::uint64_t bits;
+        __builtin_memcpy(&bits, reinterpret_cast<const char*>(this) + k * sizeof bits, sizeof bits);
+        return bits;
+    }
+    friend bool operator==(const RegimeKey& a, const RegimeKey& b) {
+        return ((a.half(0) ^ b.half(0)) | (a.half(1) ^ b.half(1))) == 0;
+    }
 
     std::size_t hash() const {
-        const auto [a, b] = words();
-        const std::uint64_t mixed = (a * 0x9e3779b97f4a7c15u) ^ (b * 0xc2b2ae3d27d4eb4fu);
+        const std::uint64_t mixed = (half(0) * 0x9e3779b97f4a7c15u) ^ (half(1) * 0xc2b2ae3d27d4eb4fu);
         return mixed ^ (mixed >> 32);
     }
 };

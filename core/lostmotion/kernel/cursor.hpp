@@ -88,8 +88,9 @@ class Cursor {
         }
     }
     // To the nearest of the instants that whole doubling levels, but not the shortest, lead to from where another is;
-    // the longest first. Returns what is left of h >= 0, a base interval forward or backward at most.
-    [[gnu::always_inline]] double advance_by_levels(const Cursor& from, double h) {
+    // the longest first. Returns what is left of h >= 0, a base interval forward or backward at most. Not inlined: the
+    // code of an event must not outgrow the instruction cache by more than it does.
+    [[gnu::noinline]] double advance_by_levels(const Cursor& from, double h) {
         Propagator<D>& p = *(propagator_ = from.propagator_);
         constant_ = from.constant_;
         carries_rate_ = from.carries_rate_;

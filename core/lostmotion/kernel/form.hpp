@@ -59,36 +59,36 @@ struct LanesOf {
     CoupledOf<D> coupled{};
     std::array<double, D::angles> angle{};
 
-    static LanesOf load(const double* from) {
+    [[gnu::always_inline]] static LanesOf load(const double* from) {
         LanesOf x{CoupledOf<D>::load(from), {}};
         for (int j = 0; j < D::angles; ++j) x.angle[j] = from[D::coupled + j];
         return x;
     }
-    void store(double* to) const {
+    [[gnu::always_inline]] void store(double* to) const {
         coupled.store(to);
         for (int j = 0; j < D::angles; ++j) to[D::coupled + j] = angle[j];
     }
-    friend LanesOf operator+(LanesOf a, const LanesOf& b) {
+    [[gnu::always_inline]] friend LanesOf operator+(LanesOf a, const LanesOf& b) {
         a.coupled = a.coupled + b.coupled;
         for (int j = 0; j < D::angles; ++j) a.angle[j] += b.angle[j];
         return a;
     }
-    friend LanesOf operator*(double a, LanesOf b) {
+    [[gnu::always_inline]] friend LanesOf operator*(double a, LanesOf b) {
         b.coupled = a * b.coupled;
         for (int j = 0; j < D::angles; ++j) b.angle[j] *= a;
         return b;
     }
 };
 template <class D>
-LanesOf<D> load(const StateOf<D>& x) {
+[[gnu::always_inline]] inline LanesOf<D> load(const StateOf<D>& x) {
     return LanesOf<D>::load(x.data());
 }
 template <class D>
-CoupledOf<D> load(const ColumnOf<D>& x) {
+[[gnu::always_inline]] inline CoupledOf<D> load(const ColumnOf<D>& x) {
     return CoupledOf<D>::load(x.data());
 }
 template <class D>
-CoupledOf<D> coupled(const StateOf<D>& x) {
+[[gnu::always_inline]] inline CoupledOf<D> coupled(const StateOf<D>& x) {
     return CoupledOf<D>::load(x.data());
 }
 template <class D>

@@ -26,13 +26,13 @@ inline constexpr int vec_width = 2;
 using Vec = VecOf<vec_width>::Type;
 
 template <class V = Vec>
-V load(const double* from) {
+[[gnu::always_inline]] inline V load(const double* from) {
     V v;
     __builtin_memcpy(&v, from, sizeof v);
     return v;
 }
 template <class V>
-void store(V v, double* to) {
+[[gnu::always_inline]] inline void store(V v, double* to) {
     __builtin_memcpy(to, &v, sizeof v);
 }
 // The sum of n terms, term(0), term(1), ..., in pairs and four at a time, so that few additions wait for one another.
@@ -58,27 +58,27 @@ struct Pack {
     using Part = VecOf<width>::Type;
     Part part[parts];
 
-    static Pack of(const std::array<double, n>& numbers) {
+    [[gnu::always_inline]] static Pack of(const std::array<double, n>& numbers) {
         Pack v;
         for (int k = 0; k < n; ++k) v.part[k / width][k % width] = numbers[k];
         return v;
     }
-    static Pack load(const double* from) {
+    [[gnu::always_inline]] static Pack load(const double* from) {
         Pack v;
         for (int p = 0; p < parts; ++p) v.part[p] = lostmotion::load<Part>(from + p * width);
         return v;
     }
-    void store(double* to) const {
+    [[gnu::always_inline]] void store(double* to) const {
         for (int p = 0; p < parts; ++p) lostmotion::store(part[p], to + p * width);
     }
-    double operator[](int k) const { return part[k / width][k % width]; }
+    [[gnu::always_inline]] double operator[](int k) const { return part[k / width][k % width]; }
     void set(int k, double number) { part[k / width][k % width] = number; }
     // In pairs, four at a time: in the same order in every build.
-    double sum() const {
+    [[gnu::always_inline]] double sum() const {
         return sum_in_fours<n>([this](auto k) { return (*this)[k]; });
     }
     // The k-th four of the numbers.
-    Pack<4> four(int k) const {
+    [[gnu::always_inline]] Pack<4> four(int k) const {
         static_assert(n % 4 == 0);
         if constexpr (n == 4) {
             return *this;
@@ -89,13 +89,13 @@ struct Pack {
             return out;
         }
     }
-    void set_four(int k, const Pack<4>& numbers) {
+    [[gnu::always_inline]] void set_four(int k, const Pack<4>& numbers) {
         __builtin_memcpy(reinterpret_cast<char*>(this) + sizeof numbers * static_cast<std::size_t>(k), &numbers,
                          sizeof numbers);
     }
     // The k-th number in every place.
     template <int k>
-    Pack spread() const {
+    [[gnu::always_inline]] Pack spread() const {
         const Part v = part[k / width];
         constexpr int at = k % width;
         Pack all;
@@ -110,21 +110,21 @@ struct Pack {
         return all;
     }
     // The two numbers of each pair exchanged.
-    Pack swapped() const {
+    [[gnu::always_inline]] Pack swapped() const {
         static_assert(width == 2);
         Pack out;
         for (int p = 0; p < parts; ++p) out.part[p] = __builtin_shufflevector(part[p], part[p], 1, 0);
         return out;
     }
-    friend Pack operator+(Pack a, const Pack& b) {
+    [[gnu::always_inline]] friend Pack operator+(Pack a, const Pack& b) {
         for (int p = 0; p < parts; ++p) a.part[p] += b.part[p];
         return a;
     }
-    friend Pack operator*(double a, Pack b) {
+    [[gnu::always_inline]] friend Pack operator*(double a, Pack b) {
         for (int p = 0; p < parts; ++p) b.part[p] *= a;
         return b;
     }
-    friend Pack operator*(Pack a, const Pack& b) {
+    [[gnu::always_inline]] friend Pack operator*(Pack a, const Pack& b) {
         for (int p = 0; p < parts; ++p) a.part[p] *= b.part[p];
         return a;
     }
@@ -155,11 +155,11 @@ template <int n>
 
 inline Vec min_of(Vec a, Vec b) { return a < b ? a : b; }
 template <class V>
-V absolute(V a) {
+[[gnu::always_inline]] inline V absolute(V a) {
     return a < -a ? -a : a;
 }
 template <int n>
-Pack<n> absolute(Pack<n> a) {
+[[gnu::always_inline]] inline Pack<n> absolute(Pack<n> a) {
     for (auto& part : a.part) part = absolute(part);
     return a;
 }

@@ -33,6 +33,10 @@ class PowerIntegral {
  private:
     static constexpr int orders = 5;  // value and four derivatives
     using Powers = std::array<Flows, orders>;
+    // Of as many flows as a vector holds, from the f-th on.
+    static std::array<Vec, orders> at(const Powers& p, int f) {
+        return {load(&p[0][f]), load(&p[1][f]), load(&p[2][f]), load(&p[3][f]), load(&p[4][f])};
+    }
 
  public:
     // Every power is a product of two linear forms; all are evaluated at once, as columns.
@@ -65,13 +69,13 @@ class PowerIntegral {
                     right.rates(x, u[k], b[k]);
                 }
             }
-            for (int f = 0; f < count(); ++f) {
-                out[0][f] = a[0][f] * b[0][f];
-                out[1][f] = a[1][f] * b[0][f] + a[0][f] * b[1][f];
-                out[2][f] = a[2][f] * b[0][f] + 2.0 * a[1][f] * b[1][f] + a[0][f] * b[2][f];
-                out[3][f] = a[3][f] * b[0][f] + 3.0 * (a[2][f] * b[1][f] + a[1][f] * b[2][f]) + a[0][f] * b[3][f];
-                out[4][f] = a[4][f] * b[0][f] + 4.0 * (a[3][f] * b[1][f] + a[1][f] * b[3][f]) +
-                            6.0 * a[2][f] * b[2][f] + a[0][f] * b[4][f];
+            for (int f = 0; f < count(); f += vec_width) {
+                const auto l = at(a, f), r = at(b, f);
+                store(l[0] * r[0], &out[0][f]);
+                store(l[1] * r[0] + l[0] * r[1], &out[1][f]);
+                store(l[2] * r[0] + 2.0 * l[1] * r[1] + l[0] * r[2], &out[2][f]);
+                store(l[3] * r[0] + 3.0 * (l[2] * r[1] + l[1] * r[2]) + l[0] * r[3], &out[3][f]);
+                store(l[4] * r[0] + 4.0 * (l[3] * r[1] + l[1] * r[3]) + 6.0 * l[2] * r[2] + l[0] * r[4], &out[4][f]);
             }
         }
 
@@ -137,15 +141,18 @@ class PowerIntegral {
     // Returns the error of the panel in units of what is allowed; beyond 1 (unless it is the shortest) nothing is
     // added.
     double add_panel(int n, const Powers& a, const Powers& b, double h, bool shortest) {
-        Flows sums;
+        Flows sums, apart;
         double difference = 0.0;
-        for (int f = 0; f < n; ++f) {
-            const double s0 = a[0][f] + b[0][f], s1 = h * (a[1][f] - b[1][f]), s2 = h * h * (a[2][f] + b[2][f]),
-                         s3 = h * h * h * (a[3][f] - b[3][f]), s4 = h * h * h * h * (a[4][f] + b[4][f]);
-            sums[f] = h * (s0 / 2.0 + s1 / 9.0 + s2 / 72.0 + s3 / 1008.0 + s4 / 30240.0);
-            const double lower = h * (s0 / 2.0 + 3.0 * s1 / 28.0 + s2 / 84.0 + s3 / 1680.0);
-            difference += std::fabs(sums[f] - lower);
+        for (int f = 0; f < n; f += vec_width) {
+            const auto p = at(a, f), q = at(b, f);
+            const Vec s0 = p[0] + q[0], s1 = h * (p[1] - q[1]), s2 = h * h * (p[2] + q[2]),
+                      s3 = h * h * h * (p[3] - q[3]), s4 = h * h * h * h * (p[4] + q[4]);
+            const Vec sum = h * (s0 / 2.0 + s1 / 9.0 + s2 / 72.0 + s3 / 1008.0 + s4 / 30240.0);
+            const Vec lower = h * (s0 / 2.0 + 3.0 * s1 / 28.0 + s2 / 84.0 + s3 / 1680.0);
+            store(sum, &sums[f]);
+            store(absolute(sum - lower), &apart[f]);
         }
+        for (int f = 0; f < n; ++f) difference += apart[f];
         return add(n, sums, difference, panel_tolerance, h, shortest);
     }
 

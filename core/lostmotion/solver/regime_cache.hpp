@@ -160,15 +160,7 @@ class RegimeCache {
     const Regime& regime(Key key) { return entry(key).regime; }
 
     Entry& entry(Key key) {  // by value: two words in registers
-        if (last_ != nullptr && key == last_->regime.key) return *last_;
-        std::size_t k = slot(key);
-        if (slots_[k] == nullptr) {
-            if (2 * (used_ + 1) > slots_.size()) k = grow(key);
-            if (used_ == entries_.size()) entries_.push_back(std::make_unique<Entry>());
-            slots_[k] = entries_[used_++].get();
-            slots_[k]->set(system_, key);
-        }
-        return *(last_ = slots_[k]);
+        return last_ != nullptr && key == last_->regime.key ? *last_ : find(key);
     }
     // What lies beyond a guard of another regime; its key is asked for the first time only.
     template <class Key>
@@ -199,6 +191,16 @@ class RegimeCache {
  private:
     static constexpr std::size_t max_kept = 4000;  // from run to run; each takes about 12 kilobytes
 
+    [[gnu::noinline]] Entry& find(Key key) {
+        std::size_t k = slot(key);
+        if (slots_[k] == nullptr) {
+            if (2 * (used_ + 1) > slots_.size()) k = grow(key);
+            if (used_ == entries_.size()) entries_.push_back(std::make_unique<Entry>());
+            slots_[k] = entries_[used_++].get();
+            slots_[k]->set(system_, key);
+        }
+        return *(last_ = slots_[k]);
+    }
     // Where the regime is, or where it has to go.
     std::size_t slot(Key key) const {
         const std::size_t mask = slots_.size() - 1;
