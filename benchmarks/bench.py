@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import baseline
+import closed_loops
 import costs
 import one_run
 import studies
@@ -34,6 +35,7 @@ def outputs(build: Path) -> dict[str, list[list[str]]]:
         *(f"bench_run_{name}" for name in builds),
         f"bench_costs_{builds[0]}",
         f"bench_trains_{builds[0]}",
+        f"bench_control_{builds[0]}",
         "peer_cvode",
     ]
     return {
@@ -81,6 +83,7 @@ def main() -> None:
     one_run.section(report, scenario, programs)
     baseline.section(report, build, _instruction_set.builds())
     trains.section(report, programs)
+    closed_loops.section(report, programs)
     costs.section(report, scenario, build, programs)
     studies.section(report, scenario)
     start_up_section(report)
