@@ -213,7 +213,8 @@ inline void bind_control(nb::module_& m) {
         .def_rw("torque_filters", &BoundAxis::torque_filters)
         .def("set_reference", &BoundAxis::set_reference, "pieces"_a, "sines"_a)
         .def("raise_again", &BoundAxis::raise_again)
-        .def("set_python_law", &BoundAxis::set_python_law, "function"_a, "states"_a)
+        .def("set_python_law", &BoundAxis::set_python_law, "function"_a, "states"_a,
+             nb::sig("def set_python_law(self, function: collections.abc.Callable[..., float], states: int) -> None"))
         .def("set_compiled_law", &BoundAxis::set_compiled_law, "function"_a, "data"_a, "states"_a);
     m.def("axis_signals", &axis_signals, nb::sig("def axis_signals() -> list[tuple[str, str, str]]"),
           "Name, unit, meaning of what each axis shows.");

@@ -119,7 +119,7 @@ inline auto ExactSolver<System>::bound_fourth(const GuardTable& guards, const Ma
     guards.rate_magnitudes(bound, input_bound_, bounds_.fourth);
 }
 
-// Encloses all guards over a event check of length h. Returns, as bits, those that are not certain to be positive
+// Encloses all guards over an event check of length h. Returns, as bits, those that are not certain to be positive
 // all through it.
 template <class System>
 inline auto ExactSolver<System>::enclose(int rows, const Ends& here, const Ends& there, double h) -> Guards {

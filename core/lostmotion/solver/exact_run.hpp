@@ -212,7 +212,7 @@ class ExactSolver {
 
     enum class Verdict { clear, crossing, uncertain };
 
-    // Guards at one end of a event check.
+    // Guards at one end of an event check.
     struct Ends {
         typename GuardTable::Values value, slope;
     };
@@ -279,7 +279,7 @@ class ExactSolver {
     long event_checks_ = 0;
     std::size_t switchings_ = 0;
     PhaseRotations& rotations_;
-    // Where the present segment begins, the two ends of a event check, and one that is tried out. They change their
+    // Where the present segment begins, the two ends of an event check, and one that is tried out. They change their
     // roles, not their contents.
     std::array<Cursor, 4> cursors_;
     Cursor *begin_ = &cursors_[0], *here_ = &cursors_[1], *there_ = &cursors_[2], *trial_ = &cursors_[3];

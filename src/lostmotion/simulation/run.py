@@ -137,8 +137,9 @@ def run(
     laws = as_laws(law, scenario.axes())
     if isinstance(scenario, TrainScenario):
         return run_train(scenario, options, how, laws, ledger=energy and exact)
-    _, *inputs = core_inputs(scenario)
-    result = _core.run(scenario.core(), *inputs, *options, scenario.control(laws))
+    _, command, load_torque, state, capacity = core_inputs(scenario)
+    control = scenario.control(laws)
+    result = _core.run(scenario.core(), command, load_torque, state, capacity, *(*options, control))
     return raw_result(scenario, result, how, ledger=energy and exact)
 
 

@@ -32,7 +32,7 @@ def run_train(
         many switchings are kept.
     """
     core, inputs, start, capacities = core_case(scenario)
-    result = _core.run_train(core, inputs, start, capacities, *options, scenario.control(laws))
+    result = _core.run_train(core, inputs, start, capacities, *(*options, scenario.control(laws)))
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     data = dict(zip((name for name, _, _ in core.channels()), result["values"], strict=True))
     shown = [name for name, _, _ in _core.axis_signals()]
