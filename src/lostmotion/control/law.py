@@ -11,7 +11,7 @@ from .. import _core
 from ..errors import InputError
 from ..inputs.validation import shown
 
-C_FUNCTION = ctypes.CFUNCTYPE(None).__mro__[1]
+C_FUNCTION: Any = ctypes.CFUNCTYPE(None).__mro__[1]
 """the class of all function pointers"""
 SIGNATURE = (
     "int (double time, const double *measured, const double *reference, double *state, double *command, void *data)"
@@ -59,10 +59,9 @@ class Law:
             )
 
     def _address(self) -> int | None:
-        function: Any = self.function
-        if isinstance(function, C_FUNCTION):
-            return ctypes.cast(function, ctypes.c_void_p).value
-        address = getattr(function, "address", None)
+        if isinstance(self.function, C_FUNCTION):
+            return ctypes.cast(self.function, ctypes.c_void_p).value
+        address = getattr(self.function, "address", None)
         return address if isinstance(address, int) and not isinstance(address, bool) else None
 
 
