@@ -40,6 +40,43 @@ def test_the_current_loop_overshoots_by_one_part_in_27() -> None:
     assert torque.max() == pytest.approx(28.0 / 27.0, abs=1e-9)
 
 
+def oscillation(gain: float, kind: str, ticks: int) -> np.ndarray:
+    """Speed over ticks of a rigid drive at its first speed 1, under a proportional loop of `gain` J/T to speed 0."""
+    J = 3e-4
+    axis = scenario(
+        shafts={"motor": {}},
+        motors={"m": {"shaft": "motor", "rotor_inertia": J, "rated_torque": 0.5, "rated_speed": 300.0,
+                      "electrical_time_constant": 1.3e-3, "armature_voltage_constant": 4.0}},
+        controllers={"m": {
+            "sample_time": T, "reference": {"kind": "speed"}, "encoder": {"ideal": True},
+            "speed": {"gain": gain * J / T, "estimate": {"kind": kind}}, "current": {"kind": "ideal"},
+        }},
+        initial={"speeds": {"motor": 1.0}},
+        simulation={"duration": ticks * T, "sample_interval": T},
+    )  # fmt: skip
+    return lm.simulate(axis, energy=False)["motor_speed"].to_numpy()[:ticks]
+
+
+LIMITS = [("difference", 2.0 * (math.sqrt(2.0) - 1.0), 8), ("exact", 1.0, 6)]
+
+
+@pytest.mark.parametrize(("kind", "limit", "period"), LIMITS)
+def test_stability_ends_at_the_gain_and_the_frequency_of_theory(kind: str, limit: float, period: int) -> None:
+    """w[k+2] = w[k+1] - K m[k], m the mean of w[k] and w[k-1] with the difference, w[k] with the true speed."""
+    window = 100 * period
+    at_limit = oscillation(limit, kind, 4 * window)
+    assert at_limit[-window:] == pytest.approx(at_limit[window : 2 * window], abs=1e-9)
+    spectrum = np.abs(np.fft.rfft(at_limit[-window:]))
+    assert int(spectrum.argmax()) == window // period  # f_s/8, f_s/6
+    for gain, grows in ((0.999 * limit, False), (1.001 * limit, True)):
+        speed = oscillation(gain, kind, 4 * window)
+        early, late = (float(np.sqrt(np.mean(part**2))) for part in (speed[:window], speed[-window:]))
+        assert (late > early) == grows
+        share = [0.0, 1.0] if kind == "exact" else [0.5, 0.5]  # of w[k-1] and w[k]
+        z = np.abs(np.roots([1.0, -1.0, gain * share[1], gain * share[0]])).max()
+        assert late / early == pytest.approx(z ** (3 * window), rel=0.01)
+
+
 def test_a_linear_two_mass_drive_under_a_sampled_pi_is_the_linear_recursion() -> None:
     J_M, J_L, k, d = 2e-3, 5e-3, 700.0, 0.02
     k_p, k_i, weight, share = 1.1, 45.0, 0.6, 1.0

@@ -130,7 +130,7 @@ class _Place:
                 try:
                     filters.append(core_filter(f, time))
                 except InputError as problem:
-                    raise InputError(f"speed.{key}.{k}: {problem}") from None
+                    raise InputError(f"speed.{key}[{k}]: {problem}") from None
             setattr(out, "speed_filters" if key == "reference_filters" else key, filters)
         out.feedforward = c.feedforward.core()
         if c.feedforward.backlash > 0.0:

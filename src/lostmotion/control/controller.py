@@ -80,7 +80,6 @@ class Controller(Part):
             raise ValueError("has a blend_time but no position_encoder to blend; leave it out")
         if self.feedforward != Feedforward() and self.speed is None:
             raise ValueError("has a feedforward, which the speed loop adds, but no speed loop; leave it out")
-        list(self.schedules())
         return self
 
     def schedules(self) -> Iterator[tuple[str, float, int]]:
