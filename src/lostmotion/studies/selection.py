@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .select import SHARES, USE, Selection
 from .study import Study
 from .table import unit_of
@@ -89,6 +91,8 @@ def _candidate(
     if row["error"]:
         return Candidate(row["run"], name, (NOT_RUN,), row["error"], "", values)
     violated, why = row.get("violated", "").split(), [row["why"]] if row.get("why") else []
+    if study.axis is not None and math.isnan(row["cycles"]):  # refused before any run
+        return Candidate(row["run"], name, tuple(violated), row["why"], row["not judged"], values)
     for column, (low, high) in bounds.items():
         if not low <= row[column] <= high:
             violated.append(column)
@@ -131,9 +135,10 @@ def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
 
 def pareto_front(ranked: list[Candidate], select: Selection) -> list[Candidate]:
     """Those that fit and of which none that fits is better in one objective without being worse in another."""
-    fitting = [(c, _rank(c, select)) for c in ranked if c.fits]
+    fitting = [c for c in ranked if c.fits]
+    ranks = np.array([_rank(c, select) for c in fitting]).reshape(len(fitting), -1)
+    return [c for c, rank in zip(fitting, ranks, strict=True) if not _dominated(rank, ranks)]
 
-    def dominated(rank: tuple[float, ...]) -> bool:
-        return any(all(o <= r for o, r in zip(other, rank, strict=True)) and other != rank for _, other in fitting)
 
-    return [c for c, rank in fitting if not dominated(rank)]
+def _dominated(rank: np.ndarray, others: np.ndarray) -> bool:
+    return bool(((others <= rank).all(axis=1) & (others < rank).any(axis=1)).any())
