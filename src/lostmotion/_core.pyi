@@ -1,9 +1,10 @@
-import enum
 from collections.abc import Callable, Mapping, Sequence
+import enum
 from typing import Any, Final, overload
 
 import numpy
 import numpy.typing
+
 
 class SolverError(RuntimeError):
     """The motion has no continuation; the message names time and contact."""
@@ -456,7 +457,7 @@ class Axis:
 
     def raise_again(self) -> None: ...
 
-    def set_python_law(self, function: Callable, states: int) -> None: ...
+    def set_python_law(self, function: Callable[..., float], states: int) -> None: ...
 
     def set_compiled_law(self, function: int, data: int, states: int) -> None: ...
 
