@@ -215,6 +215,18 @@ TEST_SUITE("dying_out") {
         const Samples s = run(d, {sine(1.0275, 1.0), Signal{}}, 1.0, 1e-2);
         CHECK(std::fabs(s.report.energy.residual()) < 1e-10 * s.report.energy.turned_over);
     }
+    TEST_CASE("the ledger closes however fast the motor's torque follows its voltage") {
+        RandomDrives random(23);
+        for (int n = 0; n < 120; ++n) {
+            Drive d = random.drive();
+            if (d.rigid() && d.min_rigid_inertia() <= 0.0) continue;
+            d.motor.electrical_time_constant = std::pow(10.0, -4 - n % 7);
+            const Samples s = run(d, random.signals(d, 0.4), 0.4, 1e-2);
+            if (s.report.status != Status::done) continue;
+            CAPTURE(n);
+            CHECK(std::fabs(s.report.energy.residual()) <= 1e-10 * s.report.energy.turned_over);
+        }
+    }
     TEST_CASE("adaptive solver: a sample at a jump has the inputs and the modes after it") {
         Drive d = hysteretic_drive();
         const Signals signals{lines({{0.0, 0.05, 0.0}, {0.1, 0.9, 0.0}, {0.2, -0.9, 0.0}}),
