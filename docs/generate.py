@@ -10,6 +10,7 @@ from typing import Any
 import motors_figures
 import reference_figures
 import self_locking_figures
+import servo_figures
 import two_motors_figures
 from typer.main import get_command
 
@@ -303,6 +304,7 @@ def generate(out: Path = OUT) -> None:
     }
     reference_figures.write(out)
     self_locking_figures.write(out)
+    servo_figures.write(out)
     two_motors_figures.write(out)
     motors_figures.write(out)
     for name, text in pages.items():

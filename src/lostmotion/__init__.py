@@ -79,6 +79,11 @@ if TYPE_CHECKING:
     from .response.linear import rigid_constants as rigid_constants
     from .response.shooting import periodic_motion as periodic_motion
     from .response.shooting import periodic_motions as periodic_motions
+    from .servo.commission import ServoReport as ServoReport
+    from .servo.commission import commission as commission
+    from .servo.motion import LimitCycle as LimitCycle
+    from .servo.tuning import Tuning as Tuning
+    from .servo.tuning import tune as tune
     from .simulation.explanation import ContactState as ContactState
     from .simulation.explanation import Explanation as Explanation
     from .simulation.explanation import MotorState as MotorState
@@ -161,6 +166,9 @@ _HOMES = {
     "simulation.switchings": ("switchings_of",),
     "simulation.train_scenario": ("ShaftTable", "TrainInitial", "TrainScenario"),
     "simulation.variables": ("VARIABLES", "Variable"),
+    "servo.commission": ("ServoReport", "commission"),
+    "servo.motion": ("LimitCycle",),
+    "servo.tuning": ("Tuning", "tune"),
     "sizing.drive_check": ("check_drive",),
     "sizing.finding": ("Finding",),
     "sizing.motor_run": ("motor_current", "temperatures"),

@@ -242,7 +242,7 @@ def _ramp(value: float, rate: float) -> _core.Signal:
 def _model_now(simulation: Simulation) -> LinearModel:
     rows = simulation._core.linearize()
     if isinstance(simulation.drive, DriveTrain):
-        return _train_model(simulation.drive, list(simulation.loaded), *rows)
+        return train_model(simulation.drive, list(simulation.loaded), *rows)
     return _drive_model(*rows)
 
 
@@ -253,7 +253,7 @@ def _model_of_run(what: Any, time: float) -> LinearModel:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     if isinstance(what, Scenario):
         return _drive_model(*_core.linearize_at(*core_inputs(what), time))
-    return _train_model(what.train(), what.loaded(), *_core.linearize_train_at(*core_case(what), time))
+    return train_model(what.train(), what.loaded(), *_core.linearize_train_at(*core_case(what), time))
 
 
 def _model_of_train(
@@ -284,7 +284,7 @@ def _model_of_train(
         for name in names
     ]
     rows = _core.linearize_train_at(core, ramps, start_values(train, state), start_capacities(state), 0.0)
-    return _train_model(train, loaded, *rows)
+    return train_model(train, loaded, *rows)
 
 
 def _drive_model(
@@ -307,7 +307,7 @@ def _drive_model(
     return LinearModel(A, B, C, D, rates[:, -1], offset, contacts, point, units)
 
 
-def _train_model(
+def train_model(
     train: DriveTrain,
     loaded: Sequence[str],
     states: dict[str, float],
@@ -317,6 +317,7 @@ def _train_model(
     rows: np.ndarray,
     contacts: dict[str, int],
 ) -> LinearModel:
+    """The linear model of a train, from what the solver says of one of its regimes."""
     n, m = len(states), len(inputs)
     of = dict(zip(outputs, rows, strict=True))
     nothing = np.zeros(n + m + 1)

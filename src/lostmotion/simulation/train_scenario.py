@@ -254,7 +254,8 @@ def in_long_form(scenario: Scenario) -> TrainScenario:
         shafts={"motor": ShaftTable(), "load": ShaftTable(**load, torque=scenario.load.torque)},
         motors=train.motors,
         gears=train.gears,
-        command={"motor": scenario.command},
+        command={} if scenario.controller is not None else {"motor": scenario.command},
+        controllers=scenario.axes(),
         initial=initial,
         simulation=scenario.simulation,
     )

@@ -1,0 +1,233 @@
+"""The sheet of an axis: all that is looked at when it is commissioned."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..inputs.arguments import checked
+from ..inputs.quantities import Angle
+from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainScenario
+from ..units.practical import practical
+from .margins import Bandwidth, Margins, bandwidth_of, frequencies, margins
+from .motion import (
+    Following,
+    LimitCycle,
+    Settling,
+    StepResponse,
+    default_window,
+    following,
+    limit_cycle,
+    settling,
+    step_response,
+)
+from .regimes import Axis, Regime, axis_of, regimes
+from .sampled import SampledLoop
+
+
+@dataclass(frozen=True)
+class LoopSheet:
+    """One loop in one regime: exact, linear, at the samples of the loop."""
+
+    loop: str
+    regime: str
+    sample_time: float
+    """[s]"""
+    margins: Margins
+    bandwidth: Bandwidth
+    """from reference to measured value, nothing fed forward"""
+    with_feedforward: Bandwidth | None
+    """of the outermost loop, where something is fed forward"""
+    frequency: np.ndarray
+    """[Hz]"""
+    open_loop: np.ndarray
+    """L(exp(j w T))"""
+    closed_loop: np.ndarray
+    """as of bandwidth"""
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """|M_Z/phi| over frequency in one regime, all loops closed."""
+
+    regime: str
+    shaft: str
+    """of load torque and angle"""
+    frequency: np.ndarray
+    """[Hz]"""
+    stiffness: np.ndarray
+    """[N·m/rad]"""
+
+    @property
+    def least(self) -> tuple[float, float]:
+        """Least stiffness [N·m/rad] and its frequency [Hz]."""
+        k = int(np.argmin(self.stiffness))
+        return float(self.stiffness[k]), float(self.frequency[k])
+
+
+@dataclass(frozen=True)
+class ServoReport:
+    """The sheet of one axis."""
+
+    scenario: Scenario | TrainScenario
+    motor: str
+    regimes: Mapping[str, str]
+    """meaning by name"""
+    loops: tuple[LoopSheet, ...]
+    steps: tuple[StepResponse, ...]
+    following: Following
+    window: float
+    """that settling is asked for [rad]"""
+    settling: tuple[Settling, ...]
+    stiffness: tuple[Stiffness, ...]
+    limit_cycle: LimitCycle | None
+    """None without a position loop"""
+
+    @property
+    def stable(self) -> bool:
+        """Whether each loop is stable in each regime."""
+        return all(row.margins.stable for row in self.loops)
+
+    def motion_rows(self) -> list[tuple[str, str]]:
+        """Following, settling, stiffness and rest, as (what, value)."""
+        f = self.following
+        rows = [
+            ("following error over the run, peak", _shown(f.peak, f.unit)),
+            ("following error over the run, rms", _shown(f.rms, f.unit)),
+        ]
+        for s in self.settling:
+            inside = f"{1e3 * s.time:.4g} ms" if not math.isnan(s.time) else "not before the next move or the end"
+            rows.append(
+                (f"settled within {_shown(self.window, 'rad')} after the move to {math.degrees(s.to):.5g} deg", inside)
+            )
+        for k in self.stiffness:
+            least, at = k.least
+            rows.append((f"least stiffness against load, {k.regime}", f"{least:.4g} N·m/rad at {at:.3g} Hz"))
+        return [*rows, ("at rest", self.rest())]
+
+    def rest(self) -> str:
+        """What the axis does at rest, in one line."""
+        cycle = self.limit_cycle
+        if cycle is None:
+            return "not looked at: there is no position loop that could hold a place"
+        whole = cycle.whole
+        if not whole.cycles:
+            return f"no limit cycle (watched for {whole.watched:.3g} s after a small step)"
+        frequency = "irregular" if math.isnan(whole.frequency) else f"{whole.frequency:.4g} Hz"
+        text = f"limit cycle: ±{_shown(whole.motor_amplitude, 'rad')} at the motor, ±{_shown(whole.amplitude, 'rad')} at the load, {frequency}"
+        by = " or ".join(cycle.causes) or "none of backlash, dry friction and encoder resolution alone"
+        return f"{text}; goes without {by}"
+
+
+@checked
+def commission(
+    scenario: Scenario | TrainScenario,
+    *,
+    motor: str | None = None,
+    window: Angle | None = None,
+    progress: Callable[[], None] = lambda: None,
+) -> ServoReport:
+    """Look at an axis as one does at its commissioning.
+
+    Margins, bandwidths and stiffness are those of the exact linear sampled loop in each regime of the plant (piece of the
+    torsion curve, twist or load stuck): plant by the matrix exponential over a base tick, sample times and delays as they
+    are, a loop with several sample times as the time-invariant system over that of its outermost loop. A loop is cut where its
+    measured value enters its controller, the loops within it closed, those around it open. Limits, quantisation and dead zones
+    do not count there; they do in the runs: steps, following, settling and rest are exact simulations of the scenario.
+
+    Parameters
+    ----------
+    scenario
+        With a controller.
+    motor
+        Whose controller; may be left out where there is one.
+    window
+        Within which the position has settled [rad]; left out, four encoder steps at the reference's shaft, at least a
+        thousandth of the reference's range.
+    progress
+        Called `work(scenario)` times.
+
+    Raises
+    ------
+    InputError
+        There is no controller, its sample times do not nest, or the window is not above 0.
+    SolverError
+        A run has no continuation.
+    """
+    axis = axis_of(scenario, motor)
+    if window is not None and not window > 0.0:
+        raise InputError(f"window: {window:g} rad must be above 0")
+    points = regimes(axis)
+    loops, steps = [], []
+    for name in axis.loops:
+        for regime in points:
+            loops.append(_loop_sheet(axis, regime, name))
+        steps.append(step_response(axis, name))
+        progress()
+    followed = following(axis)
+    wide = default_window(axis) if window is None else window
+    progress()
+    stiffness = tuple(_stiffness(axis, regime) for regime in points) if axis.loops[-1] == "position" else ()
+    cycle = limit_cycle(axis)
+    progress()
+    return ServoReport(
+        scenario=scenario,
+        motor=axis.motor,
+        regimes={regime.name: regime.meaning for regime in points},
+        loops=tuple(loops),
+        steps=tuple(steps),
+        following=followed,
+        window=wide,
+        settling=tuple(settling(axis, followed, wide)),
+        stiffness=stiffness,
+        limit_cycle=cycle,
+    )
+
+
+def work(scenario: Scenario | TrainScenario, motor: str | None = None) -> int:
+    """How often `commission` reports progress."""
+    return len(axis_of(scenario, motor).loops) + 2
+
+
+def _loop_sheet(axis: Axis, regime: Regime, loop: str) -> LoopSheet:
+    cut, closed = (SampledLoop(axis, regime, loop, is_cut) for is_cut in (True, False))
+    f = frequencies(cut, closed)
+
+    def response(x: object) -> np.ndarray:
+        return closed.response(x, feedforward=False)
+
+    fed = None
+    c = axis.controller
+    ahead = (
+        c.position.feedforward if c.position is not None else 0.0,
+        c.feedforward.inertia,
+        c.feedforward.viscous_friction,
+    )
+    if loop == c.reference.kind and any(ahead):
+        fed = bandwidth_of(f, closed.response)
+    return LoopSheet(
+        loop,
+        regime.name,
+        closed.sample_time,
+        margins(cut, closed),
+        bandwidth_of(f, response),
+        fed,
+        f,
+        cut.open_loop(f),
+        response(f),
+    )
+
+
+def _stiffness(axis: Axis, regime: Regime) -> Stiffness:
+    closed = SampledLoop(axis, regime, axis.loops[-1], False)
+    f = frequencies(closed)
+    return Stiffness(regime.name, axis.shaft, f, 1.0 / np.abs(closed.compliance(f, axis.shaft, axis.shaft)))
+
+
+def _shown(value: float, unit: str) -> str:
+    return f"{value:.4g} N·m" if unit == "N·m" else practical(value, unit)

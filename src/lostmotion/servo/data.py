@@ -1,0 +1,99 @@
+"""What the rules of tuning need of an axis: its inertias, stiffness and lags."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..control.axis import turns
+from ..control.controller import Controller
+from ..control.loops import CurrentLoop, Difference, FirstOrderCurrent, Observer
+from ..control.tuning import TwoInertias
+from ..errors import InputError
+from ..model.gear import Gear
+from ..model.torsion import Rigid
+from .regimes import Axis
+
+
+def inertias(axis: Axis, beyond: str | None = None) -> tuple[float, float]:
+    """Inertia [kg·m²] at the motor: on its side of a gear, and beyond it. Without a gear all is on its side."""
+    train = axis.train
+    open_train = (
+        train.model_copy(update={"gears": {n: g for n, g in train.gears.items() if n != beyond}}) if beyond else train
+    )
+    near = far = 0.0
+    for name, shaft in train.shafts.items():
+        i = turns(train, axis.motor_shaft, name)
+        if i is None:
+            continue
+        J = shaft.inertia + sum(g.inertia for g in train.gears.values() if g.input == name)
+        J = (J + sum(m.rotor_inertia for m in train.motors.values() if m.shaft == name)) / i**2
+        if turns(open_train, axis.motor_shaft, name) is None:
+            far += J
+        else:
+            near += J
+    return near, far
+
+
+def secant(gear: Gear) -> float:
+    """Stiffness of a gear up to its rated torque, without its gap [N·m/rad]; without a rated torque that of its last piece."""
+    assert not isinstance(gear.stiffness, Rigid)
+    breaks, slopes = gear.stiffness.pieces()
+    if gear.rated_output_torque is None:
+        return slopes[-1]
+    left, twist, before = gear.rated_output_torque, 0.0, 0.0
+    for slope, end in zip(slopes, [*breaks, math.inf], strict=True):
+        width, before = end - before, end
+        if slope == 0.0:
+            continue
+        if slope * width >= left:
+            return gear.rated_output_torque / (twist + left / slope)
+        twist, left = twist + width, left - slope * width
+    return slopes[-1]
+
+
+def two_inertias(axis: Axis) -> TwoInertias:
+    """Motor, load, and the main gear between them, with its secant stiffness up to rated torque.
+
+    Raises
+    ------
+    InputError
+        All gears are rigid.
+    """
+    main = axis.main_gear()
+    if main is None:
+        raise InputError(
+            "rule: all gears are rigid, and this rule is for two inertias with a spring; take symmetrical_optimum"
+        )
+    near, far = inertias(axis, main)
+    gear = axis.scenario.gears[main]
+    i = turns(axis.train, axis.motor_shaft, gear.output) or 1.0
+    return TwoInertias(near, far, secant(gear) / i**2)
+
+
+def lag_sum(controller: Controller) -> float:
+    """Sum of all lags in the speed loop [s], each as its delay at low frequency.
+
+    Delay and hold of the output (1.5 sample times with the usual delay of one), current loop, estimate of the speed, encoder, and
+    filters of the torque. Lag of the current loop g/(z (z - 1)) when closed: T/g, its delay included.
+    """
+    c, speed = controller, controller.speed
+    if speed is None:
+        raise InputError("the controller has no speed loop, whose lags are asked for; add one")
+    T = c.loop_time("speed")
+    by_output = c.delay * c.sample_time
+    lag = c.loop_time("current") / c.current.gain if isinstance(c.current, CurrentLoop) else by_output
+    if isinstance(c.current, FirstOrderCurrent):
+        lag += c.current.time_constant
+    lag += 0.5 * T + (0.0 if c.encoder is None else c.encoder.delay * c.sample_time)
+    e = speed.estimate
+    if isinstance(e, Difference):
+        lag += 0.5 * e.span * T + (T / math.expm1(T / e.time_constant) if e.time_constant > 0.0 else 0.0)
+    elif isinstance(e, Observer) and e.inertia is None:
+        lag += e.damping / (math.pi * e.bandwidth)
+    for f in speed.torque_filters:
+        numerator, denominator = (np.asarray(x, float) for x in f.discrete(T))
+        slopes = [float(np.polyval(np.polyder(p), 1.0) / p.sum()) for p in (denominator, numerator)]
+        lag += T * (slopes[0] - slopes[1])  # of the phase at z = 1
+    return lag

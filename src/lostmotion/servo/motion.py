@@ -1,0 +1,381 @@
+"""Exact runs of an axis: steps, following error, settling, and what it does at rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..control.loops import CurrentLoop, Feedforward
+from ..control.references import PositionReference
+from ..inputs.part import Part
+from ..model.torsion import TorsionCurve
+from ..simulation.run import run
+from ..simulation.train_scenario import TrainScenario
+from .data import inertias
+from .regimes import Axis, speed_of
+
+if TYPE_CHECKING:
+    import xarray
+
+HALVINGS = 12  # of a step, until no limit acts on it
+STEP_SHARE = 0.02  # of the longest move, the first size of a position step
+AT_REST = 1e-9  # of a turn: what a shaft that stands may move by rounding
+DECAY = 0.5  # of the amplitude over the time that is looked at, below which a swing dies out
+PART = 0.5  # of the amplitude, below which leaving something out takes a limit cycle away
+MAX_POINTS = 4000  # of a step response
+MAX_WATCHED = 100_000  # points
+LONGER = 3  # times that an axis is watched, longer each time, until its limit cycle has a frequency
+REST = 40.0  # time constants of the position loop for which an axis is watched at rest
+
+
+@dataclass(frozen=True)
+class StepResponse:
+    """Step of one loop's reference, from rest, with the loops around it left out; by exact simulation."""
+
+    loop: str
+    size: float
+    unit: str
+    """of reference and value: N·m, rad/s at the motor, rad at the reference's shaft"""
+    limited: bool
+    """whether a limit of torque, speed or voltage acted even on the smallest step that was tried"""
+    time: np.ndarray
+    value: np.ndarray
+    """of the motor's torque, of the motor's speed, of the position at the reference's shaft"""
+
+    @property
+    def rise_time(self) -> float:
+        """From 10 to 90 % [s]; NaN if it does not get there."""
+        share = self.value / self.size
+        reached = [np.flatnonzero(share >= level) for level in (0.1, 0.9)]
+        return float(self.time[reached[1][0]] - self.time[reached[0][0]]) if all(map(len, reached)) else math.nan
+
+    @property
+    def overshoot(self) -> float:
+        """By which it exceeds the step, as a share of it."""
+        return max(float((self.value / self.size).max()) - 1.0, 0.0)
+
+    @property
+    def settling_time(self) -> float:
+        """Until it stays within 2 % of the step [s]; NaN if it does not."""
+        return settled(self.time, self.value - self.size, 0.02 * abs(self.size))
+
+
+def settled(time: np.ndarray, error: np.ndarray, window: float) -> float:
+    """From the first instant until an error stays within a window to the last [s]; NaN if it is outside at the last."""
+    outside = np.flatnonzero(np.abs(error) > window)
+    if len(outside) == 0:
+        return 0.0
+    return float(time[outside[-1] + 1] - time[0]) if outside[-1] + 1 < len(time) else math.nan
+
+
+def ran(axis: Axis, **simulation: float) -> xarray.Dataset:
+    """The run of an axis, at once or with other times."""
+    scenario = axis.scenario
+    if simulation:
+        scenario = changed(scenario, simulation=scenario.simulation.model_copy(update=simulation))
+    return run(scenario, energy=False).dataset()
+
+
+def changed(scenario: TrainScenario, **fields: Any) -> TrainScenario:
+    """The scenario with other fields."""
+    return scenario.model_copy(update=fields)
+
+
+def with_controller(axis: Axis, **fields: Any) -> Axis:
+    """The axis with another controller."""
+    controller = axis.controller.model_copy(update=fields)
+    scenario = axis.scenario
+    return Axis(changed(scenario, controllers={**scenario.controllers, axis.motor: controller}), axis.motor)
+
+
+# --- steps ---
+
+
+def step_response(axis: Axis, loop: str) -> StepResponse:
+    """Of one loop. The step is halved until no limit acts on it."""
+    size, limited = _first_size(axis, loop), True
+    for _ in range(HALVINGS):
+        data = _step(axis, loop, size)
+        if not (limited := _is_limited(axis, loop, data)):
+            break
+        size *= 0.5
+    name = {"current": f"{axis.motor}_torque", "speed": f"{axis.motor_shaft}_speed", "position": f"{axis.shaft}_angle"}[
+        loop
+    ]
+    value = data[name].values
+    unit = {"current": "N·m", "speed": "rad/s", "position": "rad"}[loop]
+    return StepResponse(loop, size, unit, limited, data["time"].values, value - value[0])
+
+
+def _first_size(axis: Axis, loop: str) -> float:
+    if loop == "current":
+        return 0.5 * axis.scenario.motors[axis.motor].rated_torque
+    if loop == "speed":
+        return speed_of(axis) * abs(axis.ratio)
+    reference = axis.controller.reference
+    value = reference.at(np.linspace(0.0, axis.scenario.simulation.duration, 2001))[0]
+    return STEP_SHARE * float(np.ptp(value)) or 0.01
+
+
+def step_duration(axis: Axis, loop: str) -> float:
+    """Time that shows the whole step [s]."""
+    c = axis.controller
+    if loop == "current":
+        return 60.0 * c.loop_time("current")
+    total = sum(inertias(axis))
+    assert c.speed is not None
+    times = [12.0 * total / c.speed.gain, 60.0 * c.loop_time("speed")]
+    if c.speed.k_i:
+        times.append(6.0 * c.speed.gain / c.speed.k_i)
+    if loop == "position" and c.position is not None:
+        times.append(12.0 / c.position.gain)
+    return max(times)
+
+
+def _step(axis: Axis, loop: str, size: float) -> xarray.Dataset:
+    kind = {"current": "torque"}.get(loop, loop)
+    start = axis.scenario.initial.angles.get(axis.shaft, 0.0) if loop == "position" else 0.0
+    shown = size / axis.ratio if loop == "speed" else size
+    fields: dict[str, Any] = {"reference": {"kind": kind, "mean": start + shown}}
+    if loop != "position":
+        fields |= {"position": None, "position_encoder": None, "blend_time": None, "phase": 0.0}
+    if loop == "current":
+        fields |= {"speed": None, "feedforward": Feedforward()}
+    elif loop != axis.controller.reference.kind:
+        fields |= {"feedforward": Feedforward()}
+    duration = step_duration(axis, loop)
+    ticks = max(1, math.ceil(duration / MAX_POINTS / axis.controller.sample_time))
+    interval = axis.controller.sample_time * (ticks if loop != "current" else 0.125)
+    return ran(with_controller(axis, **fields), duration=duration, sample_interval=interval)
+
+
+def _is_limited(axis: Axis, loop: str, data: xarray.Dataset) -> bool:
+    c, motor = axis.controller, axis.scenario.motors[axis.motor]
+    within = 1.0 - 1e-9
+    found = []
+    if c.speed is not None and c.speed.torque_limit is not None and loop != "current":
+        found.append((f"{axis.motor}_torque_reference", c.speed.torque_limit))
+    if c.position is not None and c.position.speed_limit is not None and loop == "position":
+        found.append((f"{axis.motor}_speed_reference", c.position.speed_limit * abs(axis.ratio)))
+    if motor.command_limit is not None and isinstance(c.current, CurrentLoop):
+        found.append((f"{axis.motor}_command", motor.command_limit))
+    if motor.torque_limit is not None:
+        found.append((f"{axis.motor}_torque", motor.torque_limit))
+    return any(float(np.abs(data[name].values).max()) >= within * limit for name, limit in found)
+
+
+# --- following and settling ---
+
+
+@dataclass(frozen=True)
+class Following:
+    """Error of the outermost loop over the scenario's own run: reference less the true value at its shaft."""
+
+    unit: str
+    time: np.ndarray
+    reference: np.ndarray
+    error: np.ndarray
+    peak: float
+    rms: float
+
+
+@dataclass(frozen=True)
+class Settling:
+    """After one move."""
+
+    end: float
+    """of the move [s]"""
+    to: float
+    """position [rad]"""
+    time: float
+    """until the error stays within the window until the next move [s]; NaN if it does not"""
+
+
+def following(axis: Axis) -> Following:
+    """Over the run of the scenario."""
+    data = ran(axis)
+    time, reference = data["time"].values, axis.controller.reference
+    wanted = reference.at(time)[0]
+    name = {"position": f"{axis.shaft}_angle", "speed": f"{axis.shaft}_speed", "torque": f"{axis.motor}_torque"}[
+        reference.kind
+    ]
+    error = wanted - data[name].values
+    unit = {"position": "rad", "speed": "rad/s", "torque": "N·m"}[reference.kind]
+    rms = math.sqrt(float(np.mean(error**2)))
+    return Following(unit, time, wanted, error, float(np.abs(error).max()), rms)
+
+
+def default_window(axis: Axis) -> float:
+    """Four steps of the position encoder at the reference's shaft, and not less than a thousandth of the longest move [rad]."""
+    c = axis.controller
+    encoder = c.position_encoder or c.encoder
+    step = 0.0 if encoder is None else encoder.step
+    if c.position_encoder is None:
+        step /= abs(axis.ratio)
+    return max(4.0 * step, 1e-3 * 50.0 * _first_size(axis, "position"))
+
+
+def settling(axis: Axis, followed: Following, window: float) -> list[Settling]:
+    """After each move of the reference that ends within the run."""
+    reference = axis.controller.reference
+    if not isinstance(reference, PositionReference) or not reference.moves:
+        return []
+    spans = [span for span in reference.intervals() if span[1] < followed.time[-1]]
+    out = []
+    for k, (_, end) in enumerate(spans):
+        until = spans[k + 1][0] if k + 1 < len(spans) else math.inf
+        during = (followed.time >= end) & (followed.time <= until)
+        time = settled(followed.time[during], followed.error[during], window) if during.any() else math.nan
+        out.append(Settling(end, reference.moves[k].to, time))
+    return out
+
+
+# --- at rest ---
+
+
+@dataclass(frozen=True)
+class AtRest:
+    """What an axis does while its reference stands, watched after a small step."""
+
+    watched: float
+    """time at the end that is looked at [s]"""
+    motor_amplitude: float
+    """half of what the motor's angle swings by [rad]"""
+    amplitude: float
+    """the same of the reference's shaft [rad]"""
+    frequency: float
+    """[Hz]; NaN where there is no limit cycle"""
+    cycles: bool
+    """whether it swings on: neither at rest nor dying out"""
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """The axis at rest, and with each possible cause of a limit cycle left out."""
+
+    whole: AtRest
+    without: Mapping[str, AtRest]
+    """by what is left out: backlash, dry friction, encoder resolution"""
+
+    @property
+    def causes(self) -> list[str]:
+        """Without which there is no limit cycle, or less than half of it."""
+        if not self.whole.cycles:
+            return []
+        low = PART * self.whole.motor_amplitude
+        return [name for name, rest in self.without.items() if not rest.cycles or rest.motor_amplitude < low]
+
+
+def limit_cycle(axis: Axis) -> LimitCycle | None:
+    """Of an axis with a position loop; None for others."""
+    if axis.controller.position is None:
+        return None
+    whole = at_rest(axis)
+    if not whole.cycles:
+        return LimitCycle(whole, {})
+    kinds = {"backlash": _without_backlash, "dry friction": _without_friction, "encoder resolution": _without_steps}
+    others = {name: change(axis) for name, change in kinds.items()}
+    return LimitCycle(whole, {name: at_rest(other) for name, other in others.items() if other is not None})
+
+
+def at_rest(axis: Axis) -> AtRest:
+    """After a small step of the position, over the second half of a long time."""
+    c = axis.controller
+    assert c.position is not None
+    start = axis.scenario.initial.angles.get(axis.shaft, 0.0)
+    held = with_controller(axis, reference={"kind": "position", "mean": start + _first_size(axis, "position")})
+    duration = max(REST / c.position.gain, 4.0 * step_duration(axis, "position"))
+    for _ in range(LONGER):
+        found = _watched(held, duration)
+        if not found.cycles or not math.isnan(found.frequency):
+            break
+        duration *= 4.0  # a slow one
+    return found
+
+
+def _watched(axis: Axis, duration: float) -> AtRest:
+    c = axis.controller
+    interval = c.sample_time * max(1, math.ceil(duration / MAX_WATCHED / c.sample_time))
+    data = ran(axis, duration=duration, sample_interval=interval)
+    half = len(data["time"]) // 2
+    time = data["time"].values[half:]
+    angle, load = data[f"{axis.motor_shaft}_angle"].values[half:], data[f"{axis.shaft}_angle"].values[half:]
+    first, last = np.array_split(angle, 2)
+    swing = float(np.ptp(angle))
+    cycles = float(np.ptp(last)) > max(DECAY * float(np.ptp(first)), 2.0 * math.pi * AT_REST)
+    frequency = _frequency(time, angle) if cycles else math.nan
+    return AtRest(float(time[-1] - time[0]), 0.5 * swing, 0.5 * float(np.ptp(load)), frequency, cycles)
+
+
+def _frequency(time: np.ndarray, angle: np.ndarray) -> float:
+    """By the crossings of the middle with a hysteresis of a quarter of the swing, so that ripple does not count."""
+    middle, quarter = 0.5 * (angle.max() + angle.min()), 0.25 * np.ptp(angle)
+    side = np.where(angle > middle + quarter, 1, np.where(angle < middle - quarter, -1, 0))
+    known = np.flatnonzero(side)
+    rises = known[1:][(side[known][1:] > 0) & (side[known][:-1] < 0)]
+    return float((len(rises) - 1) / (time[rises[-1]] - time[rises[0]])) if len(rises) > 1 else math.nan
+
+
+def _changed_all(axis: Axis, table: str, change: Any) -> Axis | None:
+    """With all elements of a table changed; None where that changes nothing."""
+    elements = getattr(axis.scenario, table)
+    new: dict[str, Part] = {name: change(element) for name, element in elements.items()}
+    return None if new == dict(elements) else Axis(changed(axis.scenario, **{table: new}), axis.motor)
+
+
+def _without_backlash(axis: Axis) -> Axis | None:
+    def change(gear: Any) -> Any:
+        stiffness = gear.stiffness
+        if not isinstance(stiffness, TorsionCurve) or stiffness.pieces()[1][0] > 0.0:
+            return gear
+        breaks, slopes = stiffness.pieces()
+        gap = breaks[0]
+        closed = TorsionCurve(slopes=tuple(slopes[1:]), breaks=tuple(b - gap for b in breaks[1:]))
+        return gear.model_copy(update={"stiffness": closed})
+
+    return _changed_all(axis, "gears", change)
+
+
+def _without_friction(axis: Axis) -> Axis | None:
+    none = {
+        "friction_torque": 0.0,
+        "breakaway_torque": None,
+        "stribeck_speed": None,
+        "friction_curve": None,
+        "friction_error": None,
+    }
+
+    def change(part: Any) -> Any:
+        update = {
+            key: value for key, value in none.items() if key in type(part).model_fields and getattr(part, key) != value
+        }
+        return part.model_copy(update=update) if update else part
+
+    def smooth(gear: Any) -> Any:
+        return gear.model_copy(update={"hysteresis": None}) if gear.hysteresis is not None else gear
+
+    out, found = axis, False
+    for table, how in (("shafts", change), ("motors", change), ("gears", smooth)):
+        new = _changed_all(out, table, how)
+        out, found = (out, found) if new is None else (new, True)
+    return out if found else None
+
+
+def _without_steps(axis: Axis) -> Axis | None:
+    fields = {}
+    for key in ("encoder", "position_encoder"):
+        encoder = getattr(axis.controller, key)
+        if encoder is not None and encoder.step > 0.0:
+            none = {
+                "lines": None,
+                "bits": None,
+                "resolution": None,
+                "ideal": True,
+                "error_periods": encoder.error_periods or encoder.lines,
+            }
+            fields[key] = encoder.model_copy(update=none)
+    return with_controller(axis, **fields) if fields else None

@@ -1,0 +1,236 @@
+"""The linear regimes of an axis that decide on its loops: pieces of the torsion curve, and what sticks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import _core
+from ..control.axis import turns
+from ..control.controller import Controller
+from ..errors import InputError, need
+from ..inputs.validation import shown
+from ..model.gear import Gear
+from ..model.torsion import Rigid
+from ..response.linear import LinearModel, train_model
+from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form
+from ..simulation.train_state import start_capacities, start_values
+
+if TYPE_CHECKING:
+    from ..model.train import DriveTrain
+
+SLIP = (
+    1e-6  # relative difference of the speeds at both ends of a gear with hysteresis, so that its twist does not stick
+)
+BEYOND = 1.5  # times the last breakpoint: a twist in the last piece of a torsion curve
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One motor under a controller, in a scenario of the long form."""
+
+    scenario: TrainScenario
+    motor: str
+
+    @cached_property
+    def train(self) -> DriveTrain:
+        return self.scenario.train()
+
+    @property
+    def controller(self) -> Controller:
+        return self.scenario.controllers[self.motor]
+
+    @property
+    def motor_shaft(self) -> str:
+        return self.scenario.motors[self.motor].shaft
+
+    @property
+    def shaft(self) -> str:
+        """That position and speed of the reference are of."""
+        return self.controller.shaft or list(self.scenario.shafts)[-1]
+
+    @cached_property
+    def ratio(self) -> float:
+        """Turns of the motor for one of that shaft."""
+        return turns(self.train, self.motor_shaft, self.shaft) or 1.0
+
+    @property
+    def loops(self) -> tuple[str, ...]:
+        """Names of the loops that are closed, the innermost first."""
+        c = self.controller
+        present = {"current": c.current.kind == "pi", "speed": c.speed is not None, "position": c.position is not None}
+        return tuple(name for name, there in present.items() if there)
+
+    def main_gear(self) -> str | None:
+        """The gear with the least stiffness, seen from the motor; None if all are rigid."""
+        train, found = self.train, {}
+        for name, gear in train.gears.items():
+            i = turns(train, self.motor_shaft, gear.output)
+            if i is not None and not isinstance(gear.stiffness, Rigid):
+                found[name] = gear.stiffness.pieces()[1][-1] / i**2
+        return min(found, key=lambda name: found[name]) if found else None
+
+
+def axis_of(scenario: Scenario | TrainScenario, motor: str | None = None) -> Axis:
+    """The axis of a scenario.
+
+    Parameters
+    ----------
+    motor
+        Whose controller is looked at; may be left out where there is one.
+
+    Raises
+    ------
+    InputError
+        There is no controller, there are several, or its loops are a function (law = true).
+    """
+    names = list(scenario.axes())
+    if not names:
+        raise InputError(
+            "the scenario has no controller; add a [controller] table with reference, speed loop and encoder"
+        )
+    if motor is None and len(names) > 1:
+        raise InputError(f"motor: there are several controllers; name one of {', '.join(names)}")
+    name = names[0] if motor is None else motor
+    if name not in names:
+        raise InputError(f"motor: {shown(motor)} has no controller; those that have are {', '.join(names)}")
+    if scenario.axes()[name].law:
+        raise InputError(
+            f"the controller of {name} has law = true, a function whose loops are not known; give it loops"
+        )
+    axis = _loaded(Axis(scenario if isinstance(scenario, TrainScenario) else in_long_form(scenario), name))
+    if not axis.loops:
+        raise InputError(f'the controller of {name} closes no loop; give it a speed loop, or current.kind = "pi"')
+    return axis
+
+
+def _loaded(axis: Axis) -> Axis:
+    """The axis with its reference's shaft open to a load torque, against which it has a stiffness."""
+    shafts = axis.scenario.shafts
+    if shafts[axis.shaft].torque is not None:
+        return axis
+    open_to_load = shafts[axis.shaft].model_copy(update={"torque": 0.0})
+    return Axis(axis.scenario.model_copy(update={"shafts": {**shafts, axis.shaft: open_to_load}}), axis.motor)
+
+
+@dataclass(frozen=True)
+class Regime:
+    """A linear regime of the plant, with the name of what decides on it."""
+
+    name: str
+    meaning: str
+    model: LinearModel
+    over_tick: np.ndarray
+    """Phi and Gamma of x[k+1] = Phi x[k] + Gamma u[k], u the command of the motor held over a base tick: (n, n + 1)"""
+
+    @classmethod
+    def of(cls, axis: Axis, name: str, meaning: str, model: LinearModel) -> Regime:
+        """With its transition over a base tick of the axis, by the matrix exponential."""
+        need("scipy", "The analysis of a loop", "control")
+        from scipy.linalg import expm
+
+        n = len(model.states)
+        block = np.zeros((n + 1, n + 1))
+        block[:n, :n], block[:n, n] = model.A, model.B[:, model.inputs.index(f"{axis.motor}_command")]
+        return cls(name, meaning, model, expm(block * axis.controller.sample_time)[:n])
+
+
+def regimes(axis: Axis) -> list[Regime]:
+    """The regimes that an axis is commissioned in: each characteristic piece of its main gear, and what may stick in it."""
+    found: list[Regime] = []
+    for name, meaning, state, wanted in _points(axis):
+        model = _model(axis, state)
+        if all(model.contacts.get(contact) == mode for contact, mode in wanted.items()):
+            found.append(Regime.of(axis, name, meaning, model))
+    return found
+
+
+def _model(axis: Axis, state: TrainInitial) -> LinearModel:
+    scenario = axis.scenario
+    core = scenario.core()
+    values, capacities = start_values(axis.train, state), start_capacities(state)
+    ramps = [_core.Signal([(0.0, 0.0, 0.0)], []) for _ in core.input_names()]
+    rows = _core.linearize_train_at(core, ramps, values, capacities, 0.0)
+    return train_model(axis.train, scenario.loaded(), *rows)
+
+
+def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]]]:
+    """Name, meaning, state, and the modes of contacts without which the regime is not there."""
+    train, v = axis.train, speed_of(axis)
+    main = axis.main_gear()
+    moving = f"moving forward at {v:.4g} rad/s"
+    if main is None:
+        yield "rigid", f"all gears rigid, {moving}", TrainInitial(speeds=_speeds(axis, v, SLIP)), {}
+        return
+    breaks, slopes = train.gears[main].stiffness.pieces()  # type: ignore[union-attr]
+    twists = {name: _last(gear) for name, gear in train.gears.items() if not isinstance(gear.stiffness, Rigid)}
+    first = 1 if slopes[0] == 0.0 and len(slopes) > 1 else 0
+    edges = [0.0, *breaks, BEYOND * _last(train.gears[main])]
+    pieces = {"gap": 0} if first else {}
+    pieces |= (
+        {"first stiffness": first, "last stiffness": len(slopes) - 1}
+        if len(slopes) > first + 1
+        else {"stiffness": first}
+    )
+    for name, k in pieces.items():
+        what = f"{main} with {slopes[k]:.5g} N·m/rad" if slopes[k] else f"{main} within its gap"
+        state = TrainInitial(speeds=_speeds(axis, v, SLIP), twists=twists | {main: 0.5 * (edges[k] + edges[k + 1])})
+        yield name, f"{what}, {moving}", state, {}
+    within = 0.5 * (edges[first] + edges[first + 1])
+    at = twists | {main: within}
+    hysteresis = train.gears[main].hysteresis
+    if hysteresis is not None and hysteresis.efficiency < 1.0:
+        holding = 1e3 * (train.gears[main].rated_output_torque or slopes[-1] * edges[-1])  # more than it ever has to
+        state = TrainInitial(speeds=_speeds(axis, v, 0.0), twists=at, hysteresis_capacities={main: holding})
+        yield "twist stuck", f"hysteresis holds the twist of {main}, {moving}", state, {f"{main}_twist_contact": 0}
+    output = train.gears[main].output
+    if train.shafts[output].friction_torque > 0.0:
+        held = {shaft: w for shaft, w in _speeds(axis, v, SLIP).items() if shaft not in (output, axis.shaft)}
+        near = edges[first] + min(
+            0.5 * (edges[first + 1] - edges[first]), 0.5 * train.shafts[output].friction_torque / slopes[first]
+        )
+        state = TrainInitial(speeds=held, twists=twists | {main: near})
+        yield "load stuck", f"{output} sticks, the motor turns", state, {f"{output}_contact": 0}
+
+
+def _last(gear: Gear) -> float:
+    """A twist at the beginning of the last piece of a gear [rad]; of a linear one that of a small torque."""
+    breaks, slopes = gear.stiffness.pieces()  # type: ignore[union-attr]
+    return breaks[-1] if breaks else 1e-3 * (gear.rated_output_torque or 1.0) / slopes[-1]
+
+
+def speed_of(axis: Axis) -> float:
+    """Half the largest speed of the reference [rad/s] at its shaft; without one, a tenth of the motor's rated speed."""
+    reference = axis.controller.reference
+    t = np.linspace(0.0, axis.scenario.simulation.duration, 2001)
+    value, rate, *_ = reference.at(t)
+    speeds = {"position": rate, "speed": value, "torque": 0.0 * value}[reference.kind]
+    top = 0.5 * float(np.abs(speeds).max())
+    if top > 0.0:
+        return top
+    motor = axis.scenario.motors[axis.motor].as_dc()
+    return 0.1 * (motor.rated_speed or 100.0) / abs(axis.ratio)
+
+
+def _speeds(axis: Axis, v: float, slip: float) -> dict[str, float]:
+    """Speeds of all shafts that turn with that of the reference at v; across a gear with hysteresis they differ by `slip`."""
+    train = axis.train
+    found, waiting = {axis.shaft: v}, [axis.shaft]
+    joints = [
+        (g.input, g.output, g.ratio * (1.0 + (0.0 if isinstance(g.stiffness, Rigid) else slip)))
+        for g in train.gears.values()
+    ]
+    joints += [(c.input, c.output, 1.0) for table in (train.clutches, train.freewheels) for c in table.values()]
+    while waiting:
+        here = waiting.pop()
+        for start, end, i in joints:
+            for a, b, factor in ((end, start, i), (start, end, 1.0 / i)):
+                if a == here and b not in found:
+                    found[b] = found[a] * factor
+                    waiting.append(b)
+    return found

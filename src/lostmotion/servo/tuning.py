@@ -1,0 +1,349 @@
+"""Gains of an axis: by a named rule, by margins of its exact sampled loops, or by a search for a stated goal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..control.filters import LowPass
+from ..control.tuning import (
+    SpeedGains,
+    identical_damping,
+    identical_radius,
+    identical_real_part,
+    position_gain,
+    symmetrical_optimum,
+)
+from ..errors import InputError, need
+from ..inputs.arguments import checked
+from ..inputs.quantities import Angle, Number
+from ..inputs.validation import shown
+from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainScenario
+from .data import inertias, lag_sum, two_inertias
+from .margins import STABLE, bandwidth_of, frequencies, margins
+from .motion import with_controller
+from .regimes import Axis, Regime, axis_of, regimes
+from .sampled import SampledLoop
+
+RULES = ("symmetrical_optimum", "identical_damping", "identical_radius", "identical_real_part", "margins", "search")
+GOALS = ("bandwidth", "stiffness")
+GAIN_MARGIN = 2.0  # that the rule `margins` keeps beside the phase margin
+ZERO = 4.0  # K_p/J over the zero K_i/K_p of the PI controller, by `margins`
+SPAN = (1e-3, 1.0)  # of J/T_lag: the gains of the speed loop that are tried
+TRIED = 40
+WORST_PEAK = 1.7  # of the sensitivity, that a search permits in the speed loop by default
+EVALUATIONS = 80
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Gains of an axis, and the scenario with them."""
+
+    rule: str
+    why: str
+    """what they were made of, in one line"""
+    scenario: Scenario | TrainScenario
+    gain: float
+    """K_p of the speed loop, torque of the motor per speed of the motor [N·m·s/rad]"""
+    integral_gain: float
+    """K_i [N·m/rad]"""
+    position_gain: float | None
+    """K_v [1/s]; None without a position loop"""
+    filter_time: float
+    """time constant of the filter of the speed reference [s]; 0: none"""
+    torque_constant: float | None
+    """of the motor [N·m/A], where its data say it; of a winding per ampere of amplitude of a phase"""
+
+    @property
+    def integral_time(self) -> float:
+        """T_i = K_p/K_i [s]; infinite without an integrator."""
+        return self.gain / self.integral_gain if self.integral_gain else math.inf
+
+    def conventions(self) -> list[tuple[str, str, str]]:
+        """The same gains as manufacturers of drives write them: (what, value with unit, where it is written so)."""
+        rows = [("speed loop, gain", f"{self.gain:.5g} N·m/(rad/s)", "torque at the motor per speed of the motor")]
+        rows.append(("", f"{self.gain * math.pi / 30.0:.5g} N·m/rpm", "the same per revolution in a minute"))
+        if self.torque_constant is not None:
+            amps = self.gain / self.torque_constant
+            rows.append(("", f"{amps:.5g} A/(rad/s)", f"with {self.torque_constant:.4g} N·m/A"))
+            rows.append(("", f"{1e3 * amps * math.pi / 30.0:.5g} mA/rpm", "the same per revolution in a minute"))
+        if self.integral_gain:
+            rows.append(("speed loop, integral time", f"{1e3 * self.integral_time:.5g} ms", "K_p/K_i, reset time T_N"))
+            rows.append(("", f"{1.0 / self.integral_time:.5g} 1/s", "its inverse"))
+            rows.append(("", f"{self.integral_gain:.5g} N·m/rad", "parallel form, K_i"))
+        if self.filter_time:
+            rows.append(("filter of the speed reference", f"{1e3 * self.filter_time:.5g} ms", "time constant"))
+        if self.position_gain is not None:
+            rows.append(("position loop, gain", f"{self.position_gain:.5g} 1/s", "K_v"))
+            rows.append(("", f"{0.06 * self.position_gain:.5g} (m/min)/mm", "K_v of linear axes: 1/s times 0.06"))
+        return rows
+
+    def __str__(self) -> str:
+        """The gains with units, in the words of a scenario and of manufacturers."""
+        rows = [f"{what or '':<30} {value:<24} {where}" for what, value, where in self.conventions()]
+        return "\n".join([f"rule {self.rule}: {self.why}", *rows])
+
+
+@checked
+def tune(
+    scenario: Scenario | TrainScenario,
+    *,
+    rule: str = "identical_damping",
+    damping: Number = 0.7,
+    phase_margin: Angle = math.pi / 3.0,
+    goal: str = "bandwidth",
+    sensitivity_peak: Number = WORST_PEAK,
+    motor: str | None = None,
+) -> Tuning:
+    """Gains of the speed and the position loop of an axis.
+
+    Parameters
+    ----------
+    scenario
+        With a controller whose loops, sample times, filters and encoders are those that are to be tuned; its gains do not count.
+    rule
+        ``"symmetrical_optimum"`` of the total inertia and the sum of the lags; of two inertias and the spring between them
+        ``"identical_damping"``, ``"identical_radius"`` or ``"identical_real_part"`` of their poles; ``"margins"``, the greatest gain
+        that keeps a phase margin and a gain margin of 2 in all regimes of the exact sampled loop; ``"search"``, an optimum of the
+        exact sampled response. Each but the last sets K_v to a quarter of the speed loop's bandwidth, the lowest of all
+        regimes.
+    damping
+        zeta of the poles, for identical_damping and identical_real_part.
+    phase_margin
+        [rad], for margins.
+    goal
+        For search: ``"bandwidth"`` of the outermost loop, the lowest of all regimes, or ``"stiffness"``, the least over frequency of
+        the load torque that turns the motor by 1 rad.
+    sensitivity_peak
+        For search: of the speed loop in each regime, not to be exceeded; that of the position loop the same.
+    motor
+        Whose controller; may be left out where there is one.
+
+    Raises
+    ------
+    InputError
+        The rule is unknown, or cannot be kept by any gains.
+    """
+    if rule not in RULES:
+        raise InputError(f"rule: {shown(rule)} is not known; take one of {', '.join(RULES)}")
+    if goal not in GOALS:
+        raise InputError(f"goal: {shown(goal)} is not known; take {' or '.join(GOALS)}")
+    if not damping > 0.0:
+        raise InputError(f"damping: {damping:g} must be above 0; 0.7 is usual")
+    if not 0.0 < phase_margin < 0.5 * math.pi:
+        raise InputError(f"phase_margin: {phase_margin:g} rad must lie between 0 and 90 degrees")
+    if not sensitivity_peak > 1.0:
+        raise InputError(f"sensitivity_peak: {sensitivity_peak:g} must be above 1; 1.7 is usual")
+    axis = axis_of(scenario, motor)
+    if axis.controller.speed is None:
+        raise InputError("the controller has no speed loop to tune; add one, with any gain")
+    by: dict[str, Callable[[], tuple[SpeedGains, str]]] = {
+        "symmetrical_optimum": lambda: _by_lags(axis),
+        "identical_damping": lambda: _by_poles(axis, lambda d: identical_damping(d, damping), f"damping {damping:g}"),
+        "identical_radius": lambda: _by_poles(axis, identical_radius, "poles at the anti-resonance"),
+        "identical_real_part": lambda: _by_poles(
+            axis, lambda d: identical_real_part(d, damping), f"damping {damping:g}"
+        ),
+        "margins": lambda: _by_margins(axis, phase_margin),
+    }
+    if rule == "search":
+        gains, why, K_v = _by_search(axis, goal, sensitivity_peak)
+    else:
+        gains, why = by[rule]()
+        K_v = (
+            None
+            if axis.controller.position is None
+            else position_gain(_lowest_bandwidth(_with(axis, gains, None), "speed"))
+        )
+    return _tuning(scenario, axis, rule, why, gains, K_v)
+
+
+# --- rules ---
+
+
+def _by_lags(axis: Axis) -> tuple[SpeedGains, str]:
+    J, lag = sum(inertias(axis)), lag_sum(axis.controller)
+    return symmetrical_optimum(J, lag), f"total inertia {J:.4g} kg·m² at the motor, sum of the lags {1e3 * lag:.4g} ms"
+
+
+def _by_poles(axis: Axis, rule: Callable[[Any], SpeedGains], what: str) -> tuple[SpeedGains, str]:
+    d = two_inertias(axis)
+    hertz = d.antiresonance / (2.0 * math.pi)
+    return rule(
+        d
+    ), f"{what}, inertia ratio {d.inertia_ratio:.4g}, anti-resonance {hertz:.4g} Hz, secant stiffness to rated torque"
+
+
+def _by_margins(axis: Axis, phase_margin: float) -> tuple[SpeedGains, str]:
+    """The greatest gain below the first one that breaks a margin, with the integral time ZERO J/K_p."""
+    from scipy.optimize import brentq
+
+    J, points = sum(inertias(axis)), regimes(axis)
+
+    def gains(K_p: float) -> SpeedGains:
+        return SpeedGains(K_p, K_p * K_p / (ZERO * J))
+
+    def spare(K_p: float) -> float:
+        """Least of what is left of the margins, negative where one is not kept."""
+        left = []
+        tuned = _with(axis, gains(K_p), None)
+        for regime in points:
+            cut, closed = _loops(tuned, regime, "speed")
+            m = margins(cut, closed)
+            phase = math.pi if math.isnan(m.phase_margin) else m.phase_margin
+            gain = math.inf if math.isnan(m.gain_margin) else m.gain_margin
+            left += [phase / phase_margin - 1.0, min(gain / GAIN_MARGIN, 4.0) - 1.0] if m.stable else [-1.0]
+        return min(left)
+
+    tried = J / lag_sum(axis.controller) * np.geomspace(*SPAN, TRIED)
+    kept = None
+    for K_p in tried:
+        if spare(float(K_p)) > 0.0:
+            kept = float(K_p)
+        elif kept is not None:
+            kept = float(brentq(spare, kept, float(K_p), xtol=1e-6 * kept, rtol=1e-6))
+            break
+    if kept is None:
+        raise InputError(
+            f"phase_margin: no gain from {tried[0]:.3g} to {tried[-1]:.3g} N·m·s/rad keeps {math.degrees(phase_margin):.4g} degrees and "
+            f"a gain margin of {GAIN_MARGIN:g} in all regimes; ask for less, or take filters or delays out of the loop"
+        )
+    degrees = math.degrees(phase_margin)
+    return gains(
+        kept
+    ), f"phase margin {degrees:.4g} degrees and gain margin {GAIN_MARGIN:g} kept in {len(points)} regimes"
+
+
+def _by_search(axis: Axis, goal: str, peak: float) -> tuple[SpeedGains, str, float | None]:
+    """COBYLA over the logarithms of K_p, T_i and K_v, from gains by margins."""
+    need("scipy", "The search for gains", "control")
+    from scipy.optimize import minimize
+
+    points = regimes(axis)
+    cautious, _ = _by_margins(axis, math.radians(65.0))
+    start = np.log([cautious.gain, cautious.gain / cautious.integral_gain])
+    if axis.controller.position is not None:
+        start = np.append(start, math.log(position_gain(_lowest_bandwidth(_with(axis, cautious, None), "speed"))))
+    known: dict[tuple[float, ...], tuple[float, float]] = {}
+
+    def tuned(x: np.ndarray) -> tuple[SpeedGains, float | None]:
+        K_p, T_i, *K_v = np.exp(x)
+        return SpeedGains(float(K_p), float(K_p / T_i)), float(K_v[0]) if K_v else None
+
+    def judged(x: np.ndarray) -> tuple[float, float]:
+        """Logarithm of the goal, and what is left of the peak of sensitivity."""
+        key = tuple(x.tolist())
+        if key not in known:
+            known[key] = _judge(_with(axis, *tuned(x)), points, goal, peak)
+        return known[key]
+
+    constraint: Any = {"type": "ineq", "fun": lambda x: judged(x)[1]}
+    options: Any = {"maxiter": EVALUATIONS, "rhobeg": 0.7, "tol": 1e-3}
+    find: Any = minimize  # its stubs know only functions without constraints
+    find(
+        lambda x: -judged(x)[0],
+        start,
+        method="COBYLA",
+        constraints=[constraint],
+        options=options,
+    )
+    kept = [x for x, (_, spare) in known.items() if spare >= -1e-3]
+    if not kept:
+        raise InputError(f"sensitivity_peak: no gains were found that keep {peak:g} in all regimes; permit more")
+    best = max(kept, key=lambda x: known[x][0])
+    gains, K_v = tuned(np.array(best))
+    return (
+        gains,
+        f"greatest {goal} with a peak of sensitivity of at most {peak:g} in {len(points)} regimes, {len(known)} tried",
+        K_v,
+    )
+
+
+def _judge(axis: Axis, points: list[Regime], goal: str, peak: float) -> tuple[float, float]:
+    values, spare = [], []
+    outer = axis.loops[-1]
+    for regime in points:
+        for loop in axis.loops[axis.loops.index("speed") :]:
+            cut, closed = _loops(axis, regime, loop)
+            largest = np.abs(np.linalg.eigvals(closed.transition)).max()
+            f = frequencies(cut, closed)
+            spare.append(
+                1.0 - float((1.0 / np.abs(1.0 + cut.open_loop(f))).max()) / peak
+                if largest < STABLE
+                else -float(largest)
+            )
+            if loop != outer:
+                continue
+            if goal == "bandwidth":
+                values.append(bandwidth_of(f, lambda x, c=closed: c.response(x, feedforward=False)).three_decibels)  # type: ignore[misc]
+            else:
+                values.append(1.0 / float(np.abs(closed.compliance(f, axis.motor_shaft, axis.shaft)).max()))
+    least = min(values)
+    return (math.log(least) if least > 0.0 else -50.0), min(spare)
+
+
+def _loops(axis: Axis, regime: Regime, loop: str) -> tuple[SampledLoop, SampledLoop]:
+    return SampledLoop(axis, regime, loop, True), SampledLoop(axis, regime, loop, False)
+
+
+def _lowest_bandwidth(axis: Axis, loop: str) -> float:
+    """The lower of that at -3 dB and at -90 degrees, the lowest of all regimes [Hz].
+
+    Raises
+    ------
+    InputError
+        The loop is unstable in a regime.
+    """
+    found = []
+    for regime in regimes(axis):
+        closed = SampledLoop(axis, regime, loop, False)
+        if np.abs(np.linalg.eigvals(closed.transition)).max() >= STABLE:
+            raise InputError(
+                f"rule: its gains are unstable in the regime {regime.name}, where the exact sampled loop has delays and compliance that "
+                'the rule does not know; take rule = "margins"'
+            )
+        b = bandwidth_of(frequencies(closed), lambda x, c=closed: c.response(x, feedforward=False))  # type: ignore[misc]
+        found += [x for x in (b.three_decibels, b.ninety_degrees) if not math.isnan(x)]
+    return min(found, default=0.5 / axis.controller.loop_time(loop))
+
+
+# --- into the scenario ---
+
+
+def _fields(axis: Axis, gains: SpeedGains, K_v: float | None) -> dict[str, Any]:
+    speed, position = axis.controller.speed, axis.controller.position
+    assert speed is not None
+    update: dict[str, Any] = {"gain": gains.gain, "integral_gain": gains.integral_gain, "integral_time": None}
+    if gains.filter_time:
+        corner = LowPass(kind="low_pass", frequency=1.0 / (2.0 * math.pi * gains.filter_time))
+        update["reference_filters"] = (corner,)
+    fields: dict[str, Any] = {"speed": speed.model_copy(update=update)}
+    if position is not None and K_v is not None:
+        fields["position"] = position.model_copy(update={"gain": K_v})
+    return fields
+
+
+def _with(axis: Axis, gains: SpeedGains, K_v: float | None) -> Axis:
+    return with_controller(axis, **_fields(axis, gains, K_v))
+
+
+def _tuning(
+    scenario: Scenario | TrainScenario, axis: Axis, rule: str, why: str, gains: SpeedGains, K_v: float | None
+) -> Tuning:
+    fields = _fields(axis, gains, K_v)
+    controller = axis.controller.model_copy(update=fields)
+    changed: Scenario | TrainScenario
+    if isinstance(scenario, TrainScenario):
+        changed = scenario.model_copy(update={"controllers": {**scenario.controllers, axis.motor: controller}})
+    else:
+        changed = scenario.model_copy(update={"controller": controller})
+    motor = axis.scenario.motors[axis.motor]
+    constant = None if motor.limits is None else motor.limits.torque_constant
+    if motor.winding is not None:
+        constant = motor.winding.phase_values().torque_constant
+    return Tuning(rule, why, changed, gains.gain, gains.integral_gain, K_v, gains.filter_time, constant)

@@ -1,0 +1,446 @@
+"""Margins, bandwidths and tuning of closed loops: against python-control, closed forms, and runs of the simulator."""
+
+import math
+import re
+import subprocess
+import sys
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from conftest import ROOT
+from lostmotion.control.tuning import (
+    TwoInertias,
+    identical_damping,
+    identical_radius,
+    identical_real_part,
+    symmetrical_optimum,
+)
+from lostmotion.servo.data import lag_sum, two_inertias
+from lostmotion.servo.margins import bandwidth_of, frequencies, margins
+from lostmotion.servo.regimes import Axis, axis_of, regimes
+from lostmotion.servo.sampled import SampledLoop
+
+T = 125e-6
+J_M, J_L, k, C_M, C_L = 2e-3, 5e-3, 700.0, 0.01, 0.02  # inertias, stiffness, viscous frictions
+
+
+def two_mass(speed: dict[str, Any], **more: Any) -> lm.TrainScenario:
+    """A linear two-mass drive under torque control of the motor."""
+    axis = {"sample_time": T, "reference": {"kind": "speed", "mean": 3.0}, "encoder": {"ideal": True}, "speed": speed}
+    return lm.TrainScenario(
+        shafts={"motor": {"inertia": J_M, "viscous_friction": C_M}, "load": {"inertia": J_L, "viscous_friction": C_L, "torque": 0.0}},
+        motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 2.0}},
+        gears={"coupling": {"input": "motor", "output": "load", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": k}}},
+        controllers={"m": axis | more},
+        simulation={"duration": 0.1, "sample_interval": T},
+    )  # fmt: skip
+
+
+def sampled(scenario: Any, loop: str, cut: bool) -> SampledLoop:
+    axis = axis_of(scenario)
+    (regime,) = regimes(axis)
+    return SampledLoop(axis, regime, loop, cut)
+
+
+def motor_speed_over_torque() -> Any:
+    """The same drive in python-control, from its differential equations: motor angle over motor torque."""
+    A = np.array([[-C_M / J_M, 0, -k / J_M, 0], [0, -C_L / J_L, k / J_L, 0], [1, -1, 0, 0], [1, 0, 0, 0]], float)
+    return control.ss(A, [[1.0 / J_M], [0], [0], [0]], [[0, 0, 0, 1.0]], 0)
+
+
+# --- margins ---
+
+
+def margins_by_python_control(loop: Any, sample_time: float) -> tuple[float, float, float, float]:
+    """Gain margin, phase margin [deg] and their frequencies, on a dense grid between whose points it interpolates."""
+    w = np.geomspace(1e-3, 1.0, 40_000, endpoint=False) * math.pi / sample_time
+    gain, phase, _, at_gain, at_phase, _ = control.stability_margins(control.frd(loop, w))
+    return gain, phase, at_gain, at_phase
+
+
+def test_margins_of_the_sampled_speed_loop_are_those_of_python_control() -> None:
+    """Held plant, one period of delay, difference with a filter, PI: each block as a transfer function in z."""
+    k_p, k_i, tau = 1.1, 45.0, 2e-4
+    scenario = two_mass({"gain": k_p, "integral_gain": k_i, "estimate": {"kind": "difference", "time_constant": tau}})
+    found = margins(sampled(scenario, "speed", True), sampled(scenario, "speed", False))
+    z = control.tf([1, 0], [1], T)
+    a = math.exp(-T / tau)
+    estimate = (z - 1) / (T * z) * (1 - a) * z / (z - a)
+    loop = control.c2d(motor_speed_over_torque(), T, "zoh") * (1 / z) * estimate * (k_p + k_i * T / (z - 1))
+    gain, phase, at_gain, at_phase = margins_by_python_control(loop, T)
+    assert found.stable
+    assert found.gain_margin == pytest.approx(gain, rel=1e-6)
+    assert found.gain_margin_frequency == pytest.approx(at_gain / (2.0 * math.pi), rel=1e-6)
+    assert math.degrees(found.phase_margin) == pytest.approx(phase, rel=1e-6)
+    assert found.crossover == pytest.approx(at_phase / (2.0 * math.pi), rel=1e-6)
+    w = 2.0 * math.pi * np.geomspace(1.0, 3900.0, 200_000)
+    L = np.ravel(loop(np.exp(1j * w * T)))
+    assert found.sensitivity_peak == pytest.approx(np.abs(1.0 / (1.0 + L)).max(), rel=1e-6)
+
+
+def test_margins_of_a_position_loop_that_is_slower_are_those_of_python_control() -> None:
+    """The closed speed loop in state space over 8 ticks with its reference held, resampled: A^8 and the sum of A^j B."""
+    k_p, K_v, n = 1.1, 40.0, 8
+    position = {"reference": {"kind": "position", "mean": 0.1}, "position": {"gain": K_v, "sample_time": n * T}}
+    scenario = two_mass({"gain": k_p, "estimate": {"kind": "exact"}}, shaft="motor", **position)
+    found = margins(sampled(scenario, "position", True), sampled(scenario, "position", False))
+    plant = motor_speed_over_torque()
+    plant = control.c2d(control.ss(plant.A, plant.B, [[1.0, 0, 0, 0], [0, 0, 0, 1.0]], 0), T, "zoh")
+    A = np.block(
+        [[plant.A, plant.B], [np.array([[-k_p, 0, 0, 0]]), np.zeros((1, 1))]]
+    )  # the last state: torque to come
+    B = np.array([0, 0, 0, 0, k_p])
+    slow = sum(np.linalg.matrix_power(A, j) @ B for j in range(n))
+    loop = K_v * control.ss(np.linalg.matrix_power(A, n), slow[:, None], [[0, 0, 0, 1.0, 0]], 0, n * T)
+    gain, phase, at_gain, at_phase = margins_by_python_control(loop, n * T)
+    assert found.gain_margin == pytest.approx(gain, rel=1e-5)
+    assert found.gain_margin_frequency == pytest.approx(at_gain / (2.0 * math.pi), rel=1e-5)
+    assert math.degrees(found.phase_margin) == pytest.approx(phase, rel=1e-5)
+    assert found.crossover == pytest.approx(at_phase / (2.0 * math.pi), rel=1e-5)
+
+
+def current_axis() -> lm.TrainScenario:
+    return lm.TrainScenario(
+        shafts={"motor": {"inertia": 1e6}},  # stands
+        motors={"m": {"shaft": "motor", "rotor_inertia": 0.0, "rated_torque": 0.5, "rated_speed": 300.0,
+                      "electrical_time_constant": 1.3e-3, "armature_voltage_constant": 4.0}},
+        controllers={"m": {"sample_time": T, "reference": {"kind": "torque", "mean": 0.5}, "current": {"kind": "pi"}}},
+        simulation={"duration": 40 * T, "sample_interval": T},
+    )  # fmt: skip
+
+
+def test_the_current_loop_has_its_closed_form_margins() -> None:
+    """L = g/(z (z - 1)), g = 1/3: |L| = 1 where |z - 1| = g, w T = 2 asin(g/2), and the phase is -90 - 1.5 w T."""
+    cut, closed = (sampled(current_axis(), "current", c) for c in (True, False))
+    found, band = margins(cut, closed), bandwidth_of(frequencies(closed), closed.response)
+    x = 2.0 * math.asin(1.0 / 6.0)
+    assert found.crossover == pytest.approx(x / (2.0 * math.pi * T), rel=1e-7)
+    assert found.phase_margin == pytest.approx(0.5 * math.pi - 1.5 * x, rel=1e-7)
+    assert math.degrees(found.phase_margin) == pytest.approx(61.2, abs=0.05)
+    # The phase -90 - 1.5 w T is -180 at w T = 60 degrees, where |L| = g/(2 sin 30) = g.
+    assert found.gain_margin == pytest.approx(3.0, rel=1e-7)
+    assert band.three_decibels * T == pytest.approx(0.124, abs=5e-4)
+    assert band.ninety_degrees * T == pytest.approx(0.0791, abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("estimate", "limit", "share"),
+    [("difference", 2.0 * (math.sqrt(2.0) - 1.0), 8.0), ("exact", 1.0, 6.0)],
+)
+def test_the_proportional_speed_loop_of_a_rigid_drive_is_stable_up_to_its_closed_form_limit(
+    estimate: str, limit: float, share: float
+) -> None:
+    J, K_p = 3e-3, 0.5 * limit * 3e-3 / T
+    scenario = lm.TrainScenario(
+        shafts={"motor": {"inertia": J}},
+        motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 2.0}},
+        controllers={"m": {"sample_time": T, "reference": {"kind": "speed", "mean": 3.0}, "encoder": {"ideal": True},
+                           "speed": {"gain": K_p, "estimate": {"kind": estimate}}}},
+        simulation={"duration": 0.1, "sample_interval": T},
+    )  # fmt: skip
+    found = margins(sampled(scenario, "speed", True), sampled(scenario, "speed", False))
+    assert found.gain_margin == pytest.approx(2.0, rel=1e-7)
+    assert found.gain_margin_frequency * T == pytest.approx(1.0 / share, rel=1e-7)
+    for factor, stable in ((1.999, True), (2.001, False)):
+        loop = sampled(scenario.replace(**{"controllers.m.speed.gain": factor * K_p}), "speed", False)
+        assert bool(np.abs(np.linalg.eigvals(loop.transition)).max() < 1.0 + 1e-9) is stable
+
+
+# --- against the simulator ---
+
+
+def test_the_closed_loop_answers_a_sine_as_the_simulator_does() -> None:
+    """Gain and phase of a run after its transient, by least squares over whole periods; feedforward, weight and filters are in."""
+    f = 20.0
+    speed = {
+        "gain": 1.1, "integral_gain": 45.0, "reference_weight": 0.7,
+        "estimate": {"kind": "observer", "bandwidth": 300.0, "inertia": 7e-3},
+        "reference_filters": [{"kind": "low_pass", "frequency": 200.0}],
+        "torque_filters": [{"kind": "notch", "frequency": 110.0, "depth": 0.1, "width": 0.6}],
+    }  # fmt: skip
+    wave = {"reference": {"kind": "position", "amplitude": 0.02, "frequency": f}}
+    more: dict[str, Any] = {
+        "position": {
+            "gain": 30.0,
+            "integral_gain": 300.0,
+            "feedforward": 0.9,
+            "sample_time": 4 * T,
+            "reference_delay": 2e-3,
+        },
+        "feedforward": {"inertia": 5e-3, "viscous_friction": 0.02},
+        "position_encoder": {"ideal": True, "shaft": "load", "delay": 3},
+        "blend_time": 5e-3,
+    }
+    scenario = two_mass(speed, **wave, **more)
+    run = lm.simulate(scenario, duration=3.0, sample_interval=4 * T)
+    last = run["time"].to_numpy() >= 2.0 - 0.1 * T
+    t, y = run["time"].to_numpy()[last][:-1], run["m_measured_position"].to_numpy()[last][:-1]
+    basis = np.column_stack([np.sin(2 * np.pi * f * t), np.cos(2 * np.pi * f * t), np.ones_like(t)])
+    (a, b, _), *_ = np.linalg.lstsq(basis, y, rcond=None)
+    expected = complex(a, b) / 0.02
+    assert abs(expected) > 0.3
+    found = sampled(scenario, "position", False).response(f)[0]
+    assert abs(found - expected) < 1e-9 * abs(expected)
+
+
+def test_stiffness_is_that_of_a_run_under_a_sine_of_load_torque() -> None:
+    f = 30.0
+    scenario = two_mass(
+        {"gain": 1.1, "integral_gain": 45.0},
+        reference={"kind": "position", "mean": 0.0},
+        position={"gain": 30.0, "sample_time": 4 * T},
+    )
+    loaded = scenario.replace(**{"shafts.load.torque": {"amplitude": 0.5, "frequency": f}})
+    run = lm.simulate(loaded, duration=2.0, sample_interval=4 * T)
+    last = run["time"].to_numpy() >= 1.0 - 0.1 * T
+    t, y = run["time"].to_numpy()[last][:-1], run["load_angle"].to_numpy()[last][:-1]
+    basis = np.column_stack([np.sin(2 * np.pi * f * t), np.cos(2 * np.pi * f * t), np.ones_like(t)])
+    (a, b, _), *_ = np.linalg.lstsq(basis, y, rcond=None)
+    found = sampled(scenario, "position", False).compliance(f, "load", "load")[0]
+    assert abs(found - complex(a, b) / 0.5) < 1e-8 * abs(found)
+
+
+def test_the_bandwidth_of_the_sheet_is_where_a_run_has_lost_three_decibels() -> None:
+    scenario = two_mass({"gain": 1.1, "integral_gain": 45.0})
+    closed = sampled(scenario, "speed", False)
+    band = bandwidth_of(frequencies(closed), closed.response)
+    f = band.three_decibels
+    wave = scenario.replace(**{"controllers.m.reference": {"kind": "speed", "amplitude": 1.0, "frequency": f}})
+    run = lm.simulate(wave, duration=0.8, sample_interval=T / 2)
+    t, y = (run[name].to_numpy()[6401::2] for name in ("time", "m_measured_speed"))  # in the middle of each tick
+    basis = np.column_stack([np.sin(2 * np.pi * f * t), np.cos(2 * np.pi * f * t)])
+    (a, b), *_ = np.linalg.lstsq(basis, y, rcond=None)
+    assert math.hypot(a, b) == pytest.approx(math.sqrt(0.5), rel=1e-9)
+
+
+# --- rules ---
+
+PAPER = TwoInertias(1.47e-5, 16.8 * 1.47e-5, (2.0 * math.pi * 14.8) ** 2 * 16.8 * 1.47e-5)
+
+
+def poles(drive: TwoInertias, gains: Any) -> np.ndarray:
+    """Of s^4 + (K_p/J_M) s^3 + ((1 + R) w_a^2 + K_i/J_M) s^2 + (K_p/J_M) w_a^2 s + (K_i/J_M) w_a^2."""
+    p, i, w2 = gains.gain / drive.motor_inertia, gains.integral_gain / drive.motor_inertia, drive.antiresonance**2
+    return np.roots([1.0, p, (1.0 + drive.inertia_ratio) * w2 + i, p * w2, i * w2])
+
+
+def test_identical_damping_of_the_papers_drive() -> None:
+    gains = identical_damping(PAPER, 0.7)
+    assert gains.gain == pytest.approx(
+        8.29e-3, rel=5e-3
+    )  # the figures of the paper's drive, with three and four digits
+    assert gains.integral_gain == pytest.approx(0.1266, rel=5e-3)
+    found = poles(PAPER, gains)
+    assert -found.real / np.abs(found) == pytest.approx(np.full(4, 0.7), rel=1e-9)
+
+
+def test_identical_radius_and_identical_real_part_are_that() -> None:
+    drive = TwoInertias(2e-3, 3e-3, 700.0)
+    found = poles(drive, identical_radius(drive))
+    assert np.abs(found) == pytest.approx(np.full(4, drive.antiresonance), rel=1e-6)
+    assert -found.real / np.abs(found) == pytest.approx(np.full(4, 0.5 * math.sqrt(1.5)), rel=1e-6)
+    found = poles(drive, identical_real_part(drive, 0.5))
+    assert np.ptp(found.real) < 1e-9 * np.abs(found).max()
+    assert (-found.real / np.abs(found)).min() == pytest.approx(0.5, rel=1e-9)
+
+
+def test_the_symmetrical_optimum_has_its_phase_margin() -> None:
+    """L = K_p (1 + 1/(T_i s))/(J s (1 + T s)) with a = 2: crossover 1/(2 T), atan 2 - atan 1/2 of phase left."""
+    J, lag = 3e-3, 4e-4
+    gains = symmetrical_optimum(J, lag)
+    s = control.tf("s")
+    loop = (gains.gain + gains.integral_gain / s) / (J * s * (1 + lag * s))
+    _, phase, _, _, at, _ = control.stability_margins(loop)
+    assert at == pytest.approx(0.5 / lag, rel=1e-9)
+    assert math.radians(phase) == pytest.approx(math.atan(2.0) - math.atan(0.5), rel=1e-9)
+    assert gains.filter_time == 4.0 * lag
+
+
+@pytest.mark.parametrize(
+    ("rule", "text"),
+    [
+        (lambda d: identical_damping(d, 0.7), "at least 1.96, and it is 1; take damping = 0.5 or less"),
+        (lambda d: identical_real_part(d, 0.7), "from 1.96 to 2.748, and it is 1"),
+    ],
+)
+def test_what_a_rule_cannot_do_is_refused(rule: Any, text: str) -> None:
+    with pytest.raises(lm.InputError, match=text):
+        rule(TwoInertias(1.0, 1.0, 1.0))
+
+
+def test_the_sum_of_the_lags_is_the_slope_of_the_phase() -> None:
+    """Of the open loop over that of a double integrator without lags, at low frequency."""
+    speed = {
+        "gain": 1e-2,
+        "estimate": {"kind": "difference", "span": 3, "time_constant": 1.5e-3},
+        "torque_filters": [{"kind": "low_pass", "frequency": 300.0}, {"kind": "low_pass", "frequency": 500.0, "damping": 0.7}, {"kind": "notch", "frequency": 400.0, "depth": 0.1}],
+    }  # fmt: skip
+    scenario = two_mass(speed, current={"kind": "first_order", "time_constant": 4e-4})
+    rigid = scenario.replace(
+        **{
+            "gears.coupling.stiffness": {"kind": "rigid"},
+            "shafts.motor.viscous_friction": 0.0,
+            "shafts.load.viscous_friction": 0.0,
+        }
+    )
+    f = 0.1
+    L = sampled(rigid, "speed", True).open_loop(f)[0]
+    lag = -(np.angle(L) + 0.5 * math.pi) / (2.0 * math.pi * f)
+    assert lag_sum(axis_of(rigid).controller) == pytest.approx(lag, rel=1e-5)
+
+
+# --- the shipped axis ---
+
+
+@pytest.fixture(scope="module")
+def position_axis() -> Any:
+    return lm.load(ROOT / "scenarios" / "position-axis.toml")
+
+
+def test_tuning_gives_a_scenario_that_carries_the_gains(position_axis: Any) -> None:
+    tuned = lm.tune(position_axis, rule="identical_damping", damping=0.7)
+    d = two_inertias(axis_of(position_axis))
+    assert d.inertia_ratio == pytest.approx(16.8, abs=0.01)
+    assert d.antiresonance / (2.0 * math.pi) == pytest.approx(14.8, abs=0.1)
+    assert (tuned.gain, tuned.integral_gain) == pytest.approx((8.29e-3, 0.1266), rel=0.02)
+    speed = tuned.scenario.controller.speed
+    assert (speed.gain, speed.k_i, tuned.scenario.controller.position.gain) == (
+        tuned.gain,
+        tuned.integral_gain,
+        tuned.position_gain,
+    )
+    assert {**position_axis.model_dump(), "controller": 0} == {**tuned.scenario.model_dump(), "controller": 0}
+    rows = {value.split()[1]: float(value.split()[0]) for _, value, _ in tuned.conventions()}
+    assert rows["ms"] == pytest.approx(1e3 * tuned.gain / tuned.integral_gain, rel=1e-4)
+    assert rows["(m/min)/mm"] == pytest.approx(
+        0.06 * rows["1/s"] if rows["1/s"] == tuned.position_gain else 0.06 * tuned.position_gain, rel=1e-4
+    )
+
+
+def test_tuning_by_margins_keeps_them_and_one_of_them_exactly(position_axis: Any) -> None:
+    tuned = lm.tune(position_axis, rule="margins", phase_margin="55 deg")
+    axis = axis_of(tuned.scenario)
+    rows = [margins(SampledLoop(axis, r, "speed", True), SampledLoop(axis, r, "speed", False)) for r in regimes(axis)]
+    assert all(m.stable for m in rows)
+    phase, gain = min(math.degrees(m.phase_margin) for m in rows), min(m.gain_margin for m in rows)
+    assert phase >= 55.0 * (1 - 1e-4)
+    assert gain >= 2.0 * (1 - 1e-4)
+    assert min(phase / 55.0, gain / 2.0) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_tuning_refuses_what_it_cannot_do(position_axis: Any) -> None:
+    with pytest.raises(lm.InputError, match='rule: "best" is not known; take one of symm'):
+        lm.tune(position_axis, rule="best")
+    with pytest.raises(
+        lm.InputError, match="identical radius needs an inertia ratio of load to motor of at most 4, and it is 16"
+    ):
+        lm.tune(position_axis, rule="identical_radius")
+    with pytest.raises(lm.InputError, match="the scenario has no controller; add a"):
+        lm.tune(lm.load("paper-2dof-nl-large"))
+
+
+def test_the_sheet_of_the_shipped_axis(position_axis: Any) -> None:
+    report = lm.commission(position_axis)
+    assert list(report.regimes) == ["first stiffness", "last stiffness", "twist stuck"]
+    assert {(row.loop, row.regime) for row in report.loops} == {
+        (a, b) for a in ("current", "speed", "position") for b in report.regimes
+    }
+    assert report.stable
+    held = next(row for row in report.loops if (row.loop, row.regime) == ("current", "twist stuck"))
+    assert math.degrees(held.margins.phase_margin) == pytest.approx(
+        61.2, abs=0.3
+    )  # the inertia is large, the back-e.m.f. compensated
+    assert [s.limited for s in report.steps] == [False] * 3
+    run = lm.simulate(position_axis)
+    error = position_axis.controller.reference.at(run["time"].to_numpy())[0] - run["load_angle"].to_numpy()
+    assert report.following.peak == np.abs(error).max()
+    assert len(report.settling) == 2
+    assert report.limit_cycle is not None
+    assert not report.limit_cycle.whole.cycles
+
+
+def hunting(backlash: float, **changes: Any) -> lm.TrainScenario:
+    """A position loop on the load's encoder with an integrator, through a gap."""
+    base = two_mass(
+        {"gain": 1.1, "integral_gain": 45.0, "estimate": {"kind": "exact"}},
+        reference={"kind": "position", "mean": 0.0},
+        position={"gain": 30.0, "integral_gain": 200.0},
+        position_encoder={"ideal": True, "shaft": "load"},
+    )
+    curve = {"kind": "curve", "slopes": [k], "backlash": backlash}
+    return base.replace(**{"gears.coupling.stiffness": curve, "shafts.load.viscous_friction": 0.5, **changes})
+
+
+def test_backlash_is_found_as_the_cause_of_a_limit_cycle() -> None:
+    report = lm.commission(hunting(0.01))
+    assert list(report.regimes) == ["gap", "stiffness"]
+    cycle = report.limit_cycle
+    assert cycle is not None
+    assert cycle.whole.cycles
+    assert cycle.causes == ["backlash"]
+    # All is proportional to the gap: twice the gap, twice the amplitude, the same frequency.
+    double = lm.commission(hunting(0.02)).limit_cycle
+    assert double is not None
+    assert double.whole.frequency == pytest.approx(cycle.whole.frequency, rel=0.02)
+    assert double.whole.motor_amplitude == pytest.approx(2.0 * cycle.whole.motor_amplitude, rel=0.02)
+
+
+def test_loops_whose_sample_times_do_not_nest_are_refused() -> None:
+    scenario = two_mass(
+        {"gain": 1.1, "sample_time": 2 * T},
+        reference={"kind": "position", "mean": 0.0},
+        position={"gain": 30.0, "sample_time": 3 * T},
+    )
+    with pytest.raises(
+        lm.InputError, match=r"position\.sample_time: 3 ticks are no whole multiple of the 2 of the loop speed"
+    ):
+        sampled(scenario, "position", True)
+
+
+def test_an_axis_is_named_where_there_are_several() -> None:
+    assert isinstance(axis_of(two_mass({"gain": 1.0})), Axis)
+    with pytest.raises(lm.InputError, match='motor: "x" has no controller; those that have are m'):
+        axis_of(two_mass({"gain": 1.0}), "x")
+
+
+# --- the command ---
+
+
+def lostmotion(*words: str, cwd: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "lostmotion", *words], cwd=cwd, capture_output=True, text=True, check=False
+    )
+
+
+def test_the_command_writes_one_page_that_needs_nothing_else(tmp_path: Any) -> None:
+    done = lostmotion(
+        "servo", str(ROOT / "scenarios" / "position-axis.toml"), "--window", "5 arcmin", "-o", "sheet", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert "at rest: no limit cycle" in done.stdout
+    page = (tmp_path / "sheet" / "servo.html").read_text()
+    assert page.count("data:image/png;base64,") == 3
+    assert not re.search(r'(src|href)="(?!data:)', page)
+    rows = (tmp_path / "sheet" / "margins.csv").read_text().splitlines()
+    assert len(rows) == 1 + 9
+    assert "phase margin [deg]" in rows[0]
+    shown = next(line for line in done.stdout.splitlines() if line.startswith("current") and "twist stuck" in line)
+    assert "61." in shown
+
+
+def test_the_command_says_what_is_unstable_and_fails(tmp_path: Any) -> None:
+    scenario = str(ROOT / "scenarios" / "position-axis.toml")
+    done = lostmotion("servo", scenario, "--set", "controller.position.gain=2000 1/s", cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.startswith("lostmotion: unstable: position (first stiffness)")
+    assert (tmp_path / "servo" / "servo.html").exists()
+    done = lostmotion("servo", scenario, "--tune", "identical_radius", cwd=tmp_path)
+    assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
+    assert "at most 4, and it is 16.8" in done.stderr
+    done = lostmotion("servo", "paper-2dof-nl-large", cwd=tmp_path)
+    assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
+    assert "has no controller" in done.stderr
