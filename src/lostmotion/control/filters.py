@@ -135,16 +135,17 @@ def as_filter(system: Any) -> TransferFunction:
         raise InputError(
             "system: has no sample time dt above 0; discretise it first, such as by scipy.signal.cont2discrete or control.c2d"
         )
-    if hasattr(system, "to_tf"):  # scipy
-        tf = system.to_tf()
-        numerator, denominator = np.atleast_1d(tf.num), np.atleast_1d(tf.den)
-    else:
+    if hasattr(system, "ninputs"):  # python-control
         import control
 
         tf = control.tf(system)
         if (tf.ninputs, tf.noutputs) != (1, 1):
             raise InputError(f"system: has {tf.ninputs} inputs and {tf.noutputs} outputs; give one of each")
         numerator, denominator = tf.num[0][0], tf.den[0][0]
+    else:  # scipy, whose state space has a row for each output
+        tf = system.to_tf()
+        numerator, denominator = np.squeeze(tf.num), np.atleast_1d(tf.den)
+    numerator = np.atleast_1d(numerator)
     if np.ndim(numerator) != 1:
         raise InputError("system: has several inputs or outputs; give one of each")
     return TransferFunction(

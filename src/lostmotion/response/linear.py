@@ -22,7 +22,7 @@ from ..simulation.run import core_inputs, start_state
 from ..simulation.scenario import Initial, Scenario, drive_of
 from ..simulation.stepping import Simulation
 from ..simulation.train_results import core_case
-from ..simulation.train_scenario import TrainInitial, TrainScenario, loaded_train
+from ..simulation.train_scenario import TrainInitial, TrainScenario, loaded_train, need_open_loop
 from ..simulation.train_state import start_capacities, start_values
 from ..simulation.train_variables import angle_through, angles_through_gears, train_variables
 from ..simulation.variables import CONTACTS, STATES, VARIABLES
@@ -251,6 +251,7 @@ def _model_of_run(what: Any, time: float) -> LinearModel:
         raise InputError("time: a drive alone has no run; give a scenario, or a state")
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
+    need_open_loop(what, "linearize at a time")
     if isinstance(what, Scenario):
         return _drive_model(*_core.linearize_at(*core_inputs(what), time))
     return train_model(what.train(), what.loaded(), *_core.linearize_train_at(*core_case(what), time))

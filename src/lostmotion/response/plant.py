@@ -17,7 +17,7 @@ from ..model.signals import CommandSignal, TorqueSignal
 from ..simulation.results import add_derived
 from ..simulation.scenario import Initial, Scenario, mean_inputs
 from ..simulation.train_results import add_derived_of_train
-from ..simulation.train_scenario import TrainInitial, TrainScenario
+from ..simulation.train_scenario import TrainInitial, TrainScenario, need_open_loop
 from ..simulation.train_state import start_values
 from ..simulation.train_variables import train_variables
 from ..simulation.variables import CHANNELS, STATES, VARIABLES, Variable
@@ -110,6 +110,8 @@ class Plant:
 
 def plant_of(what: Drive | Scenario | TrainScenario) -> Plant:
     """The plant of a drive without inputs, or of a scenario with its own."""
+    if isinstance(what, Scenario | TrainScenario):
+        need_open_loop(what, "response")
     if isinstance(what, TrainScenario):
         return _plant_of_train(what)
     scenario = what if isinstance(what, Scenario) else None

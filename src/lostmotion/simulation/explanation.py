@@ -18,7 +18,7 @@ from .run import core_inputs
 from .scenario import Scenario
 from .stepping import Simulation
 from .train_results import core_case
-from .train_scenario import TrainScenario
+from .train_scenario import TrainScenario, need_open_loop
 from .variables import CHANNEL_NAMES
 
 
@@ -177,6 +177,7 @@ def explain(what: Scenario | Simulation | TrainScenario, time: Time | None = Non
         raise InputError(f"time is missing; give one between 0 and the duration, {what.simulation.duration} s")
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
+    need_open_loop(what, "explain")
     if isinstance(what, TrainScenario):
         case = core_case(what)
         return _of_train(what.train(), case[0], time, *_core.explain_train_at(*case, time))

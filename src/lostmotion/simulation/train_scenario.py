@@ -190,6 +190,22 @@ def loaded_train(what: DriveTrain | TrainScenario, loaded: Sequence[str] | None 
     return train, shafts
 
 
+def need_open_loop(scenario: Scenario | TrainScenario, function: str) -> None:
+    """Refuses a scenario with controllers, for what follows given commands alone.
+
+    Raises
+    ------
+    InputError
+    """
+    if scenario.axes():
+        table, none = ("controllers", "{}") if isinstance(scenario, TrainScenario) else ("controller", "None")
+        has = f"a {table}" if table == "controller" else table
+        raise InputError(
+            f"{function}: the scenario has {has}, and this takes a drive whose commands are given; for the drive without, give "
+            f"scenario.replace({table}={none}), or in a file [command] over its base"
+        )
+
+
 def is_train(tables: Mapping[str, Any]) -> bool:
     """Whether the tables of a scenario are in the long form."""
     return any(table in tables for table in ("shafts", *TrainElements.model_fields))

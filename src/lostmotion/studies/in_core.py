@@ -30,7 +30,7 @@ def _fields() -> dict[str, int]:
 def core_can(study: Study) -> bool:
     """Whether all that varies is a plain number of the core, and the runs are all that is wanted."""
     s = study.scenario
-    if checks_drives(study) or not isinstance(s, Scenario):
+    if checks_drives(study) or not isinstance(s, Scenario) or s.controller is not None:
         return False
     rigid = isinstance(s.gearbox.stiffness, Rigid)
     for v in study.vary:

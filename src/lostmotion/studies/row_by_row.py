@@ -12,7 +12,7 @@ from ..simulation.results import ENERGY
 from ..simulation.run import simulate
 from ..simulation.scenario import Scenario
 from ..simulation.train_results import add_derived_of_train, core_case
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.train_scenario import TrainScenario, need_open_loop
 from .check import COLUMNS, check_columns
 from .functions import REDUCTIONS
 from .runs import Runs, spread
@@ -57,6 +57,7 @@ def run_drives(study: Study, parameters: np.ndarray) -> Runs:
 
 def run_trains(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     """Drive trains: made here, run in the core on several threads, the GIL released."""
+    need_open_loop(study.scenario, "study")
     n, table = len(parameters), study.scenario.simulation
     sampled, reduced = channels(study), reductions(study)
     entries = study.vocabulary.energies if asks_for(study, "energy") else ()
