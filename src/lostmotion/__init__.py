@@ -107,7 +107,9 @@ if TYPE_CHECKING:
     from .sizing.motor_run import temperatures as temperatures
     from .studies.engine import study as study
     from .studies.file import load_study as load_study
+    from .studies.select_drive import select as select
     from .studies.study import Study as Study
+    from .studies.task_file import load_task as load_task
     from .test_rig.comparison import Comparison as Comparison
     from .test_rig.loop import Loop as Loop
     from .test_rig.measurement import RigReport as RigReport
@@ -164,7 +166,9 @@ _HOMES = {
     "sizing.motor_run": ("motor_current", "temperatures"),
     "studies.engine": ("study",),
     "studies.file": ("load_study",),
+    "studies.select_drive": ("select",),
     "studies.study": ("Study",),
+    "studies.task_file": ("load_task",),
     "test_rig.comparison": ("Comparison",),
     "test_rig.loop": ("Loop",),
     "test_rig.measurement": ("RigReport", "measure"),

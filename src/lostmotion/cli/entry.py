@@ -9,7 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from . import catalogue, drive, reproduce, response, rig, run, scenarios, study
+from . import catalogue, drive, reproduce, response, rig, run, scenarios, select, study
 from .terminal import fail
 
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # of the parser that typer brings along
@@ -85,6 +85,7 @@ for command in (
     catalogue.catalogue,
     scenarios.scenarios,
     study.study,
+    select.select,
 ):
     app.command()(command)
 drive_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Check a drive against its task.")

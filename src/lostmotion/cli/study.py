@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,24 +12,33 @@ from .targets import try_directory, writing
 from .terminal import busy, fail, progress
 from .workers import workers
 
+if TYPE_CHECKING:
+    from ..studies.study import Study
+
+
+OutputOption = Annotated[
+    Path | None, typer.Option("-o", "--output", metavar="DIR", help="Directory; by default the file's name.")
+]
+ThreadsOption = Annotated[
+    int | None, typer.Option("--threads", metavar="N", parser=count, help="In the core; all cores by default.")
+]
+ProcessesOption = Annotated[
+    int | None, typer.Option("--processes", metavar="N", parser=count, help="Worker processes in place of threads.")
+]
+SchedulerOption = Annotated[
+    str | None, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler of a cluster.")
+]
+
 
 def study(
     what: Annotated[str, typer.Argument(metavar="STUDY.toml | show", help="Study file; or `show` and a directory.")],
     shown: Annotated[
         Path | None, typer.Argument(metavar="[DIR]", help="With `show`: the directory of a study.")
     ] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Directory; by default the file's name.")
-    ] = None,
-    threads: Annotated[
-        int | None, typer.Option("--threads", metavar="N", parser=count, help="In the core; all cores by default.")
-    ] = None,
-    processes: Annotated[
-        int | None, typer.Option("--processes", metavar="N", parser=count, help="Worker processes in place of threads.")
-    ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler of a cluster.")
-    ] = None,
+    output: OutputOption = None,
+    threads: ThreadsOption = None,
+    processes: ProcessesOption = None,
+    scheduler: SchedulerOption = None,
     best: Annotated[
         str | None,
         typer.Option(
@@ -55,23 +64,31 @@ def study(
         return
     if shown is not None:
         raise InputError(f"study {what} {shown}: too many names; the directory is given by -o")
-    from contextlib import ExitStack
-
-    from ..studies.engine import study as work
     from ..studies.file import load_study
 
     loaded = load_study(what)
     directory = output or Path(Path(what).stem)
+    compute(loaded, directory, threads, processes, scheduler, "Runs")
+    print_outcome(directory, loaded.total)
+
+
+def compute(
+    loaded: Study, directory: Path, threads: int | None, processes: int | None, scheduler: str | None, unit: str
+) -> None:
+    """Runs a study with a progress bar, or resumes it."""
+    from contextlib import ExitStack
+
+    from ..studies.engine import study as work
+
     try_directory(directory)
     with ExitStack() as stack:
         executor = stack.enter_context(workers(processes, scheduler)) if processes or scheduler else None
-        report = stack.enter_context(progress(loaded.total, "Runs"))
+        report = stack.enter_context(progress(loaded.total, unit))
         try:
             with writing(directory, "; what is written stays"):
                 work(loaded, directory, threads=threads, executor=executor, progress=report)
         except KeyboardInterrupt:
             fail(f"interrupted; what is in {directory} stays, and the same command resumes it", 130)
-    _print_outcome(directory, loaded.total)
 
 
 def _show(directory: Path, best: str | None) -> None:
@@ -83,7 +100,8 @@ def _show(directory: Path, best: str | None) -> None:
     print("\n".join([*lines, *found]))
 
 
-def _print_outcome(directory: Path, total: int) -> None:
+def print_outcome(directory: Path, total: int) -> None:
+    """Where the runs are, and whether some have failed."""
     from ..studies.table import failures
 
     print(f"{total} runs are in {directory}; `lostmotion study show {directory}` shows them")

@@ -81,7 +81,7 @@ class Reference(TimeFunction[V], Generic[V]):
 
         Within a piece the value is ``value + rate s + second s**2/2 + third s**3/6``, s seconds after its time.
         """
-        return [(t, value, rate, second, third) for t, value, rate, second, third in self.breakpoint_list()]
+        return _pieces_of(self)
 
     def at(self, time: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Value, and its first, second and third derivative over time; where they jump, the value after the jump.
@@ -117,6 +117,11 @@ class Reference(TimeFunction[V], Generic[V]):
     def duration(self) -> float:
         """From when on it is constant, but for its sines [s]."""
         return max([0.0, *(piece[-1][0] for piece in self._pieces())])
+
+
+@lru_cache(maxsize=64)
+def _pieces_of(reference: Reference[Any]) -> list[Piece]:
+    return [(t, value, rate, second, third) for t, value, rate, second, third in reference.breakpoint_list()]
 
 
 @lru_cache(maxsize=64)

@@ -107,7 +107,7 @@ def best_lines(directory: Path, text: str) -> list[str]:
     if direction not in ("least", "largest"):
         raise InputError(f"--best {text}: the direction must be least or largest, as in {name}:largest")
     rows = best_runs(table, name, largest=direction == "largest").to_pylist()
-    plain = ["run", *(v.title for v in study_of(directory).vary), *study_of(directory).keep, "switchings"]
+    plain = ["run", *(v.title for v in study_of(directory).vary), *study_of(directory).kept_units, "switchings"]
     shown = [", ".join(f"{c} {_short(row[c])}" for c in plain) for row in rows]
     return [f"{direction.capitalize()} {labelled(table, name)}:", *(f"  {line}" for line in shown)]
 
@@ -195,11 +195,19 @@ def scatter(table: pa.Table, study: Study, max_columns: int = 6) -> Figure:
     return figure
 
 
+def _show_task(study: Study, table: pa.Table, view: Path) -> list[str]:
+    """Of a task: its ranking alone, since what varies are names."""
+    view.mkdir(exist_ok=True)
+    return [study.title, *show_selection(table, study, view), f"selection.csv, limits.csv and pareto.png are in {view}"]
+
+
 def show(directory: Path) -> list[str]:
     """Writes figures and statistics.csv into a directory beside that of the data; returns what to print."""
     need("pyarrow", "Showing a study", "study")
     need("scipy", "Showing a study", "study")
     study, table = study_of(directory), read_table(directory)
+    if study.axis is not None:
+        return _show_task(study, table, figures_of(directory))
     rows = statistics(table, study)
     header = ["", "mean", "std. dev.", "min", "5 %", "50 %", "95 %", "max"]
     failed = [e for e in table["error"].to_pylist() if e]

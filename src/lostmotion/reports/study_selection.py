@@ -52,7 +52,7 @@ def show_selection(table: pa.Table, study: Study, view: Path) -> list[str]:
 def _selection_csv(table: pa.Table, study: Study, ranked: list[Candidate], front: list[Candidate]) -> str:
     """One row a run: rank, what varies, whether and why it fits, and all its numbers."""
     uses = [f"{USE}{rule}" for rule in SHARES if f"{USE}{rule}" in table.column_names]
-    names = [*(v.title for v in study.vary), *study.keep, *uses]
+    names = [*(v.title for v in study.vary), *study.kept_units, *uses]
     rows, on_front = [], {c.run for c in front}
     by_run = {row["run"]: row for row in table.to_pylist()}
     for rank, c in enumerate(ranked, 1):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from .. import _core
 from ..model.gearbox import Gearbox
+from ..model.motor import Motor
 from ..model.torsion import Rigid
 from ..simulation.scenario import Scenario
 from ..test_rig.rig import TestRig
@@ -28,17 +29,21 @@ def load_torques(result: xarray.Dataset) -> list[float]:
 
 def inertia(scenario: Scenario) -> Finding:
     """That of the load with that of the motor side."""
-    g = scenario.gearbox
-    ratio = scenario.load.inertia / (g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia))
-    far = ratio > INERTIA_RATIO
-    remark = f"above {INERTIA_RATIO:g} the load is hard to control from the motor side" if far else ""
+    return inertia_ratio(scenario.motor, scenario.gearbox, scenario.load.inertia)
+
+
+def inertia_ratio(motor: Motor, gearbox: Gearbox, load_inertia: float, largest: float = INERTIA_RATIO) -> Finding:
+    """The same, of parts, with the largest permissible ratio."""
+    ratio = load_inertia / (gearbox.ratio**2 * (motor.rotor_inertia + gearbox.inertia))
+    far = ratio > largest
+    remark = f"above {largest:g} the load is hard to control from the motor side" if far else ""
     return Finding(
         "inertia_ratio",
         "inertia of the load / of the motor side",
         f"{ratio:.3g}",
         "warning" if far else "ok",
         remark,
-        ratio / INERTIA_RATIO,
+        ratio / largest,
     )
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from ..sizing.drive_check import check_drive
-from ..sizing.finding import RULES
+from ..sizing.finding import RULES, Finding
 from .select import SHARES, USE
 
 TEXTS = ("violated", "why", "not judged")
@@ -24,8 +25,12 @@ def check_columns(scenario: Scenario | TrainScenario) -> dict[str, float | str]:
     InputError, SolverError
         As `check_drive`.
     """
-    row = dict(COLUMNS)
-    findings = check_drive(scenario)
+    return columns_of(check_drive(scenario))
+
+
+def columns_of(findings: Iterable[Finding]) -> dict[str, float | str]:
+    """Findings as columns; of those of one rule the one that uses most of its limit."""
+    row, findings = dict(COLUMNS), list(findings)
     for finding in findings:
         column = f"{USE}{finding.rule}"
         if finding.use is not None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..simulation.results import installed_version
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
+from .axis_rows import run_axes
 from .columns import tabulate, units_of
 from .file import from_json
 from .in_core import core_can, run_in_core
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 SLOW_RUNS = 20  # in a piece of those that are made one by one
+AXES = 100  # in a piece of a task, most of which the rules refuse
 MAX_NUMBERS = 2**23  # of samples that are held at once: 64 megabytes
 
 
@@ -39,6 +41,8 @@ def pieces(study: Study, first: int, last: int) -> list[tuple[int, int]]:
     Most chunks that the core can make are one piece.
     """
     size = last - first if core_can(study) else SLOW_RUNS
+    if study.axis is not None:
+        size = AXES
     if held := _arrays(study):
         size = min(size, max(1, MAX_NUMBERS // (held * study.scenario.simulation.samples)))
     return [(a, min(a + size, last)) for a in range(first, last, size)]
@@ -68,6 +72,8 @@ def _units(text: str) -> dict[str, str]:
 def run_piece(study: Study, first: int, last: int, threads: int) -> Runs:
     """Simulates the runs; nearly all the time goes here, most of it with the GIL released."""
     parameters = study.parameters(first, last)
+    if study.axis is not None:
+        return run_axes(study, parameters, threads)
     if isinstance(study.scenario, TrainScenario):
         return run_trains(study, parameters, threads)
     return run_in_core(study, parameters, threads) if core_can(study) else run_drives(study, parameters)

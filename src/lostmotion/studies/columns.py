@@ -37,7 +37,7 @@ def tabulate(study: Study, units: dict[str, str], first: int, last: int, runs: R
         name: e.values(names, last - first) for name, e in study.expressions.items() if name not in runs.kept
     }
     bad = np.array([e != "" for e in runs.errors])
-    for name in study.keep:
+    for name in study.kept_units:
         columns[name] = pa.array(np.where(bad, np.nan, kept_values[name]))
     if study.trajectories is not None:
         for name in study.trajectories.variables:
@@ -52,7 +52,7 @@ def tabulate(study: Study, units: dict[str, str], first: int, last: int, runs: R
 
 def units_of(study: Study) -> dict[str, str]:
     """Units of the columns; empty where an expression's cannot be determined."""
-    units = {v.title: v.unit for v in study.vary if v.names is None} | {n: e.unit for n, e in study.expressions.items()}
+    units = {v.title: v.unit for v in study.vary if v.names is None} | study.kept_units
     units |= {f"{USE}{rule}": "1" for rule in SHARES}
     of = dict(study.vocabulary.variables)
     return units | {f"{n} over time": of[n] for n in (study.trajectories.variables if study.trajectories else ())}

@@ -39,14 +39,14 @@ def load_study(path: str | Path) -> Study:
     scenario = load(where, changes)
     written = {} if where.suffix in FORMATS else read_tables(where, changes)  # a result has all values written out
     for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:
-        _find_sheets(entry, path.parent)
+        find_sheets(entry, path.parent)
     try:
         return Study(scenario=scenario, written=written, **data)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
-def _find_sheets(entry: Any, directory: Path) -> None:
+def find_sheets(entry: Any, directory: Path) -> None:
     """Files of data sheets (.toml) among the values are relative to the study file."""
     if not isinstance(entry, dict) or not isinstance(entry.get("key"), str):
         return

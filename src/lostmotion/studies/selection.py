@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ..units.practical import practical
 from .select import SHARES, USE, Selection
 from .study import Study
 from .table import unit_of
@@ -89,12 +92,14 @@ def _candidate(
     if row["error"]:
         return Candidate(row["run"], name, (NOT_RUN,), row["error"], "", values)
     violated, why = row.get("violated", "").split(), [row["why"]] if row.get("why") else []
+    if study.axis is not None and math.isnan(row["cycles"]):  # refused before any run
+        return Candidate(row["run"], name, tuple(violated), row["why"], row["not judged"], values)
     for column, (low, high) in bounds.items():
         if not low <= row[column] <= high:
             violated.append(column)
-            why.append(
-                f"{column} {row[column]:.6g} is {f'above {high:.6g}' if row[column] > high else f'below {low:.6g}'}"
-            )
+            unit = study.kept_units.get(column, "") if study.axis is not None else ""
+            found, limit = (practical(x, unit, 6) for x in (row[column], high if row[column] > high else low))
+            why.append(f"{column} {found} is {'above' if row[column] > high else 'below'} {limit}")
     for column, value in values.items():
         if math.isnan(value):
             violated.append(column)
@@ -131,9 +136,10 @@ def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
 
 def pareto_front(ranked: list[Candidate], select: Selection) -> list[Candidate]:
     """Those that fit and of which none that fits is better in one objective without being worse in another."""
-    fitting = [(c, _rank(c, select)) for c in ranked if c.fits]
+    fitting = [c for c in ranked if c.fits]
+    ranks = np.array([_rank(c, select) for c in fitting]).reshape(len(fitting), len(select.objectives))
+    return [c for c, rank in zip(fitting, ranks, strict=True) if not _dominated(rank, ranks)]
 
-    def dominated(rank: tuple[float, ...]) -> bool:
-        return any(all(o <= r for o, r in zip(other, rank, strict=True)) and other != rank for _, other in fitting)
 
-    return [c for c, rank in fitting if not dominated(rank)]
+def _dominated(rank: np.ndarray, others: np.ndarray) -> bool:
+    return bool(((others <= rank).all(axis=1) & (others < rank).any(axis=1)).any())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -12,6 +13,8 @@ from pydantic import Field, PrivateAttr, model_validator
 from ..inputs.part import Part
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, is_train
+from .axis import FEWEST, AxisTask, axis_scenario
+from .axis_columns import COLUMNS as AXIS_COLUMNS
 from .design import unit_cube
 from .expressions import Expression, read_expression
 from .records import is_condition, kind_of_record, name_key, names_a_record, owner_of, with_records
@@ -51,14 +54,17 @@ class Study(Part):
     """of a random design; of saltelli the base samples, a power of two"""
     seed: Annotated[int, Field(ge=0)] = 0
     vary: tuple[Vary, ...] = Field(min_length=1)
-    keep: dict[str, str] = Field(min_length=1)
+    keep: dict[str, str] = Field(default={})
     """column = expression of the result variables, such as peak(load_speed) or energy.gear_losses"""
     trajectories: Trajectories | None = None
     select: Selection | None = None
     """which runs fit the task, and which of these are best"""
+    axis: AxisTask | None = None
+    """each run is a cycle of this task, under gains by rule; it keeps the columns of `axis_columns.COLUMNS`"""
 
     _bases: dict[tuple[Any, ...], Scenario | TrainScenario] = PrivateAttr(default_factory=dict)
     _vocabulary: Vocabulary | None = PrivateAttr(default=None)
+    _kept: dict[Any, Any] = PrivateAttr(default_factory=dict)
 
     @model_validator(mode="before")
     @classmethod
@@ -80,9 +86,25 @@ class Study(Part):
             except ValueError as error:
                 raise ValueError(f"keep.{name}: {error}") from None
         self._check_trajectories()
+        if self.axis is not None:
+            self._check_axis(self.axis)
+        elif not self.keep:
+            raise ValueError(
+                'lacks keep, what is kept of each run; add a column such as peak_load_speed = "peak(load_speed)"'
+            )
         if self.select is not None:
             self._check_selection(self.select)
         return self
+
+    def _check_axis(self, task: AxisTask) -> None:
+        if self.keep or self.trajectories is not None:
+            raise ValueError("has keep or trajectories, but a task keeps columns of its own; leave them out")
+        if not isinstance(self.scenario, Scenario):
+            raise ValueError("is the task of a drive train, but only a drive can be selected; write the short form")
+        for key in (key for v in self.vary for key in v.all_keys):
+            if key.split(".", maxsplit=1)[0] not in ("gearbox", "motor"):
+                raise ValueError(f"varies {key}, but of a task motor and gearbox vary; change it in the task")
+        task.check(self.scenario)
 
     def _check_names(self) -> None:
         titles = [v.title for v in self.vary]
@@ -175,7 +197,7 @@ class Study(Part):
 
     def _check_selection(self, select: Selection) -> None:
         numbers = {v.title: v.unit for v in self.vary if v.names is None}
-        units = numbers | {name: e.unit for name, e in self.expressions.items()}
+        units = numbers | self.kept_units
         if select.drive_check:
             units |= {f"{USE}{rule}": "1" for rule in SHARES}
         for column in select.named():
@@ -196,14 +218,55 @@ class Study(Part):
         return self._vocabulary
 
     def scenario_at(self, row: np.ndarray) -> Scenario | TrainScenario:
-        """The scenario of one run, by its row of `parameters`.
+        """The scenario of one run, by its row of `parameters`; of a task under gains by rule.
 
         Raises
         ------
         InputError
             There is no such scenario.
         """
-        values = {key: (v, v.value(number)) for v, number in zip(self.vary, row, strict=True) for key in v.all_keys}
+        return self.scenario_with(dict(enumerate(row))) if self.axis is None else self.axis_at(row, FEWEST)
+
+    def axis_at(self, row: np.ndarray, cycles: int) -> Scenario:
+        """The scenario of one pair of a task over so many cycles.
+
+        Raises
+        ------
+        InputError
+            There is no such scenario.
+        """
+        motor, gearbox = self.part("motor", row), self.part("gearbox", row)
+        assert self.axis is not None
+        assert isinstance(self.scenario, Scenario)
+        return axis_scenario(self.scenario, motor, gearbox, self.axis.cycle, cycles)
+
+    def part_key(self, kind: str, row: np.ndarray) -> tuple[Any, ...]:
+        """What of a row decides on its ``"gearbox"`` or its ``"motor"``."""
+        return (kind, *((k, float(row[k])) for k, v in enumerate(self.vary) if v.all_keys[0].split(".")[0] == kind))
+
+    def part(self, kind: str, row: np.ndarray) -> Any:
+        """The ``"gearbox"`` or the ``"motor"`` of a row of a task, made once.
+
+        Raises
+        ------
+        InputError
+            There is none.
+        """
+        key = self.part_key(kind, row)
+        if key not in self.kept:
+            self.kept[key] = getattr(self.scenario_with(dict(key[1:])), kind)
+        return self.kept[key]
+
+    def scenario_with(self, numbers: Mapping[int, float]) -> Scenario | TrainScenario:
+        """The base with some of the parameters, by their places in `vary`.
+
+        Raises
+        ------
+        InputError
+            There is no such scenario.
+        """
+        varied = [(self.vary[k], number) for k, number in numbers.items()]
+        values = {key: (v, v.value(number)) for v, number in varied for key in v.all_keys}
         records = {key: value for key, (_, value) in values.items() if kind_of_record(key) or is_condition(key)}
         base = self._with_records(records) if records else self.scenario
         changes = {
@@ -235,6 +298,18 @@ class Study(Part):
                 self._bases.clear()
             self._bases[key] = found
         return found
+
+    @property
+    def kept(self) -> dict[Any, Any]:
+        """What its runs have in common, made once."""
+        return self._kept
+
+    @property
+    def kept_units(self) -> dict[str, str]:
+        """The columns of numbers that it keeps, each with its unit."""
+        if self.axis is not None:
+            return {name: unit for name, (unit, _) in AXIS_COLUMNS.items()}
+        return {name: e.unit for name, e in self.expressions.items()}
 
     @property
     def expressions(self) -> dict[str, Expression]:

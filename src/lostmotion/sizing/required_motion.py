@@ -1,0 +1,144 @@
+"""What a periodic motion asks of a motor and a gearbox, before any run: all compliance left out, the reference followed exactly."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..control.references import PositionReference
+from ..model.gearbox import Gearbox
+from ..model.losses import ConstantEfficiency
+from ..model.motor import Motor
+from ..model.signals import TimeFunction
+from ..simulation.scenario import LoadTable
+from .duty_cycle import DutyCycle
+from .finding import Finding
+from .gearbox_check import input_speeds, loads
+from .motion_check import inertia_ratio
+from .motor_check import continuous_torque, current, heat, largest_speed, voltage
+
+POINTS = 1000  # of a cycle at least
+WITHIN = 1e-9  # of an interval: so close to its ends, values are those on this side of a jump
+
+
+@dataclass(frozen=True)
+class RequiredMotion:
+    """A cycle at the load: two samples at each instant at which something jumps."""
+
+    time: np.ndarray
+    """[s]"""
+    speed: np.ndarray
+    """[rad/s]"""
+    acceleration: np.ndarray
+    """[rad/s²]"""
+    torque: np.ndarray
+    """that the gearbox gives [N·m]"""
+    cycle: float
+    """[s]"""
+
+
+def required_motion(reference: PositionReference, load: LoadTable, cycle: float) -> RequiredMotion:
+    """The motion of a load that follows its reference over one cycle [s]: J acceleration + friction + load torque."""
+    breakpoints = {t for t, *_ in (*reference.pieces(), *load.torque.breakpoint_list()) if 0.0 < t < cycle}
+    edges = np.array([0.0, *sorted(breakpoints), cycle])
+    frequencies = [f for signal in (reference, load.torque) for _, f, _ in signal.sine_list()]
+    finest = cycle / max(POINTS, 100.0 * cycle * max(frequencies, default=0.0))
+    times = []
+    for a, b in itertools.pairwise(edges.tolist()):
+        inside = np.linspace(a, b, max(3, int((b - a) / finest) + 2))
+        inside[0], inside[-1] = a + WITHIN * (b - a), b - WITHIN * (b - a)
+        times.append(inside)
+    time = np.concatenate(times)
+    _, speed, acceleration, _ = reference.at(time)
+    speed = np.where(np.abs(speed) <= 1e-12 * np.abs(speed).max(), 0.0, speed)
+    friction = load.viscous_friction * speed + load.friction_torque * np.sign(speed)
+    torque = load.inertia * acceleration + friction + values_at(load.torque, time)
+    return RequiredMotion(time, speed, acceleration, torque, cycle)
+
+
+def values_at(signal: TimeFunction[Any], time: np.ndarray) -> np.ndarray:
+    """Values of a signal of straight lines and sines over time."""
+    begin, value, slope = np.array(signal.breakpoint_list()).T
+    k = np.searchsorted(begin, time, side="right") - 1
+    out = value[k] + slope[k] * (time - begin[k])
+    for amplitude, frequency, phase in signal.sine_list():
+        out = out + amplitude * np.sin(2.0 * np.pi * frequency * time + phase)
+    return np.asarray(out)
+
+
+@dataclass(frozen=True)
+class InputDemand:
+    """What the input shaft of a gearbox has to do in a required motion."""
+
+    motion: RequiredMotion
+    gearbox: Gearbox
+    speed: np.ndarray
+    """[rad/s]"""
+    acceleration: np.ndarray
+    """[rad/s²]"""
+    torque: np.ndarray
+    """with losses and inertia of the gearbox [N·m]"""
+
+    def cycle(self, motor_torque: np.ndarray) -> DutyCycle:
+        """With the torque of the motor [N·m], the duty cycle that the rules are for."""
+        m = self.motion
+        return DutyCycle(m.time, np.abs(self.speed), m.torque, motor_torque, None, m.cycle)
+
+    def motor_torque(self, motor: Motor) -> np.ndarray:
+        """[N·m]"""
+        own = motor.rotor_inertia * self.acceleration + motor.friction_torque * np.sign(self.speed)
+        return np.asarray(self.torque + own)
+
+
+def input_demand(motion: RequiredMotion, g: Gearbox) -> InputDemand:
+    """That of a gearbox, its losses as the solver takes them: T_1 = (T_2 + s m_2B T_2R)/i, s the direction of the motion."""
+    speed, acceleration = g.ratio * motion.speed, g.ratio * motion.acceleration
+    s = np.sign(speed)
+    if isinstance(g.losses, ConstantEfficiency):
+        through = motion.torque / (g.ratio * g.losses.efficiency)
+    else:
+        law, R = g.losses.core(), g.rated_output_torque
+        points = zip((s * motion.torque / R).tolist(), (np.abs(speed) / g.rated_input_speed).tolist(), strict=True)
+        lost = np.array([law(mu, v) for mu, v in points])
+        through = (motion.torque + s * lost * R) / g.ratio
+    return InputDemand(motion, g, speed, acceleration, through + g.inertia * acceleration + g.viscous_friction * speed)
+
+
+def check_gearbox(demand: InputDemand) -> list[Finding]:
+    """The rules that do not depend on the motor: torque and speed of the gearbox."""
+    cycle = demand.cycle(np.zeros_like(demand.speed))
+    return [
+        *loads(demand.gearbox, float(np.abs(demand.motion.torque).max()), cycle),
+        *input_speeds(demand.gearbox, cycle),
+    ]
+
+
+def check_motor(
+    demand: InputDemand, motor: Motor, load_inertia: float, ambient: float, largest: float
+) -> list[Finding]:
+    """The rules for a motor at this gearbox; `largest` is the largest permissible ratio of the inertias."""
+    torque = demand.motor_torque(motor)
+    cycle = demand.cycle(torque)
+    found = [
+        largest_speed(motor, cycle.peak_input_speed),
+        continuous_torque(motor, cycle),
+        voltage(motor, command(motor, torque, demand.speed), torque, demand.speed),
+        current(motor, torque),
+        inertia_ratio(motor, demand.gearbox, load_inertia, largest),
+    ]
+    refused = any(finding.verdict == "warning" for finding in found)  # the heat of such a pair is not worth its time
+    return found if refused else [*found, *heat(motor, cycle, ambient)[1:]]
+
+
+def command(motor: Motor, torque: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """E_C of (2) under which a motor gives a torque [N·m] at a speed [rad/s], its inductance left out; of a torque source its
+    relative torque."""
+    motor = motor.as_dc()
+    share = torque / motor.rated_torque
+    if motor.armature_voltage_constant is None or motor.rated_speed is None:
+        return share
+    k_N = motor.armature_voltage_constant
+    return np.asarray((share + (k_N - 1.0) * speed / motor.rated_speed) / k_N)

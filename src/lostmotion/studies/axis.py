@@ -1,0 +1,235 @@
+"""What an axis has to do, and the scenario of one motor and gearbox that does it: tuned by rule, its cycle repeated."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..control.controller import Controller
+from ..control.gains import gains_by_rule
+from ..control.loops import CurrentLoop, Feedforward, FirstOrderCurrent
+from ..control.references import Move, PositionReference
+from ..inputs.quantities import Angle, Number, Positive, Time, Whole
+from ..model.gearbox import Gearbox
+from ..model.motor import Motor
+from ..model.signals import TimeFunction, TorqueSignal
+from ..model.task import Task
+from ..model.torsion import Rigid
+from ..simulation.scenario import Initial, Scenario, SimulationTable
+from ..sizing.motion_check import INERTIA_RATIO
+from .select import Bound
+
+CURRENT_LAG = (
+    3.0  # sample times: what a current loop g/(z (z - 1)) with g = 1/3 lags behind at low frequency, beyond its delay
+)
+REPEATS = 0.01  # relative difference of two cycles, within which the motion repeats
+FEWEST = 2  # cycles
+WHOLE = 1e-9  # relative, within which periods fit into a cycle
+
+# What a task asks for, and the column that it limits.
+REQUIREMENTS = {
+    "max_tracking_error": "tracking_error_peak",
+    "max_reversal_error": "reversal_error",
+    "max_settling_time": "settling_time",
+}
+
+
+class AxisTask(Task):
+    """What an axis has to do, beside the motion of its reference."""
+
+    cycle: Annotated[Time, Positive]
+    """after which the motion repeats, pause included"""
+    max_cycles: Annotated[Whole, Field(ge=FEWEST, le=1000)] = 4
+    """that are run at most, until two of them agree within 1 %"""
+    max_inertia_ratio: Annotated[Number, Positive] = INERTIA_RATIO
+    """of the load to the motor side"""
+    max_tracking_error: Annotated[Angle, Positive] | None = None
+    """of the load, largest over the cycle"""
+    max_reversal_error: Annotated[Angle, Positive] | None = None
+    """of the load: mean position at rest after motion in one direction, less that after the other"""
+    settling_window: Annotated[Angle, Positive] | None = None
+    """half of it: how near the load must stay to where a move ends"""
+    max_settling_time: Annotated[Time, Positive] | None = None
+    """from the end of the reference's move until the load stays in the window"""
+
+    @model_validator(mode="after")
+    def _window_and_time(self) -> Self:
+        if self.max_settling_time is not None and self.settling_window is None:
+            raise ValueError("has max_settling_time but no settling_window; add how near the load must stay")
+        return self
+
+    def limits(self) -> dict[str, Bound]:
+        """Columns and their permissible values."""
+        asked = {column: getattr(self, key) for key, column in REQUIREMENTS.items()}
+        return {column: Bound(max=value) for column, value in asked.items() if value is not None}
+
+    def check(self, scenario: Scenario) -> None:
+        """Sees that the motion of a scenario can be repeated, and that it has what the task asks for.
+
+        Raises
+        ------
+        ValueError
+            It cannot, or has not.
+        """
+        reference = reference_of(scenario)
+        repeated(reference, self.cycle, FEWEST)
+        repeated_torque(scenario.load.torque, self.cycle, FEWEST)
+        for key in ("max_reversal_error", "settling_window"):
+            if getattr(self, key) is not None and not reference.moves:
+                raise ValueError(
+                    f"task.{key}: is of the rest between moves, and controller.reference has no moves; leave it out"
+                )
+
+
+def reference_of(scenario: Scenario) -> PositionReference:
+    """The positions that the axis follows.
+
+    Raises
+    ------
+    ValueError
+        It follows something else.
+    """
+    reference = None if scenario.controller is None else scenario.controller.reference
+    if not isinstance(reference, PositionReference):
+        raise ValueError('lacks controller.reference of kind "position", the motion of one cycle; add it')
+    return reference
+
+
+def _periodic(signal: TimeFunction[Any], cycle: float, key: str) -> None:
+    """Sees that a signal is made of what can be repeated."""
+    for name in ("steps", "ramps", "chirp"):
+        if getattr(signal, name, None):
+            raise ValueError(f"{key}.{name}: acts once and cannot be repeated; write the cycle as {key}.samples")
+    for _, frequency, _ in signal.sine_list():
+        turns = cycle * frequency
+        if round(turns) < 1 or not math.isclose(turns, round(turns), rel_tol=WHOLE):
+            raise ValueError(
+                f"{key}: a sine of {frequency:g} Hz has {turns:.6g} periods in the cycle of {cycle:g} s; take a whole number"
+            )
+
+
+def _tiled(samples: Any, cycle: float, count: int, step: float, key: str) -> dict[str, Any]:
+    """Points of a cycle, again and again, each time further by `step`."""
+    times, values = np.array(samples.times), np.array(samples.values)
+    if times[-1] > cycle * (1.0 + WHOLE):
+        raise ValueError(f"{key}.samples: end at {times[-1]:g} s, after the cycle of {cycle:g} s; lengthen task.cycle")
+    again = slice(1 if times[0] == 0.0 and math.isclose(times[-1], cycle, rel_tol=WHOLE) else 0, None)
+    all_times = [*times, *(t + k * cycle for k in range(1, count) for t in times[again])]
+    all_values = [*values, *(v + k * step for k in range(1, count) for v in values[again])]
+    points: dict[str, Any] = samples.model_dump()
+    return points | {"times": all_times, "values": all_values}
+
+
+@lru_cache(maxsize=32)  # the same for every pair of a task
+def repeated(reference: PositionReference, cycle: float, count: int) -> PositionReference:
+    """The reference of so many cycles; one that ends elsewhere than it began goes on from there.
+
+    Raises
+    ------
+    ValueError
+        It cannot be repeated, or does not fit into the cycle.
+    """
+    key = "controller.reference"
+    _periodic(reference, cycle, key)
+    if reference.samples is not None:
+        values = reference.samples.values
+        tiled = _tiled(reference.samples, cycle, count, values[-1] - values[0], key)
+        reference = reference.model_copy(update={"samples": tiled})
+    if not reference.moves:
+        return reference
+    begin, end = reference.intervals()[0][0], reference.intervals()[-1][1]
+    if end > cycle * (1.0 + WHOLE):
+        raise ValueError(f"{key}.moves: end at {end:.6g} s, after the cycle of {cycle:g} s; lengthen task.cycle")
+    dwells = [reference.dwell if move.dwell is None else move.dwell for move in reference.moves]
+    dwells[-1] = max(cycle - end, 0.0) + begin
+    step = reference.moves[-1].to - reference.start
+    moves = [
+        Move(**move.model_dump() | {"to": move.to + k * step, "dwell": dwell})
+        for k in range(count)
+        for move, dwell in zip(reference.moves, dwells, strict=True)
+    ]
+    return reference.model_copy(update={"moves": tuple(moves)})
+
+
+@lru_cache(maxsize=32)
+def repeated_torque(torque: TorqueSignal, cycle: float, count: int) -> TorqueSignal:
+    """The load torque of so many cycles.
+
+    Raises
+    ------
+    ValueError
+        It cannot be repeated, or does not fit into the cycle.
+    """
+    _periodic(torque, cycle, "load.torque")
+    if torque.samples is None:
+        return torque
+    return torque.model_copy(update={"samples": _tiled(torque.samples, cycle, count, 0.0, "load.torque")})
+
+
+def axis_scenario(base: Scenario, motor: Motor, gearbox: Gearbox, cycle: float, count: int) -> Scenario:
+    """The base with a motor, a gearbox and gains by rule for them, over so many cycles, from rest where the reference begins.
+
+    Raises
+    ------
+    InputError
+        The parts do not fit together.
+    """
+    reference = reference_of(base)
+    controller = tuned(base, motor, gearbox)
+    every = cycle / math.ceil(cycle / base.simulation.sample_interval * (1.0 - WHOLE))
+    return base.model_copy(
+        update={
+            "motor": motor,
+            "gearbox": gearbox,
+            "controller": controller.model_copy(update={"reference": repeated(reference, cycle, count)}),
+            "load": base.load.model_copy(update={"torque": repeated_torque(base.load.torque, cycle, count)}),
+            "simulation": SimulationTable(duration=count * cycle, sample_interval=every),
+            "initial": Initial(load_angle=float(reference.at(0.0)[0])),
+        }
+    )
+
+
+def tuned(base: Scenario, motor: Motor, g: Gearbox) -> Controller:
+    """The controller of the base with gains by rule for a motor, a gearbox and its load, and with the torque of their inertia fed
+    forward."""
+    controller = base.controller
+    assert controller is not None
+    assert controller.position is not None
+    assert controller.speed is not None
+    J_M, J_L = motor.rotor_inertia + g.inertia, base.load.inertia / g.ratio**2
+    stiffness = math.inf if isinstance(g.stiffness, Rigid) else max(g.stiffness.pieces()[1]) / g.ratio**2
+    gains = gains_by_rule(J_M, J_L, stiffness, _lag(controller), *map(controller.loop_time, ("speed", "position")))
+    feedforward = controller.feedforward
+    if feedforward == Feedforward():
+        feedforward = Feedforward(inertia=J_M + J_L)
+    speed = {"gain": gains.speed, "integral_gain": gains.speed_integral, "integral_time": None}
+    if controller.speed.torque_limit is None:
+        speed["torque_limit"] = torque_limit(motor)
+    return controller.model_copy(
+        update={
+            "position": controller.position.model_copy(update={"gain": gains.position}),
+            "speed": controller.speed.model_copy(update=speed),
+            "feedforward": feedforward,
+        }
+    )
+
+
+def torque_limit(motor: Motor) -> float | None:
+    """By the largest current [N·m]; None where that is not given."""
+    if motor.winding is not None:
+        rms = motor.winding.max_current
+        return None if rms is None else math.sqrt(2.0) * rms * motor.winding.phase_values().torque_constant
+    limits = motor.limits
+    if limits is None or limits.max_current is None or limits.torque_constant is None:
+        return None
+    return limits.max_current * limits.torque_constant
+
+
+def _lag(controller: Controller) -> float:
+    if isinstance(controller.current, FirstOrderCurrent):
+        return controller.current.time_constant
+    return CURRENT_LAG * controller.loop_time("current") if isinstance(controller.current, CurrentLoop) else 0.0

@@ -1,0 +1,157 @@
+"""What one cycle of an axis took: the columns of its row."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..model.motor import Motor
+from ..simulation.results import RawResult
+from ..simulation.scenario import Scenario
+from ..sizing.duty_cycle import DutyCycle
+from ..sizing.motor_run import current_voltage_power
+from ..sizing.thermal import TwoBodies, steady_rise
+from .axis import AxisTask, reference_of
+
+COLUMNS = {
+    "current_peak": ("A", "largest current of the motor; of a synchronous one amplitude of a phase"),
+    "current_rms": ("A", "rms current of the motor"),
+    "voltage_peak": ("V", "largest voltage of the motor; of a synchronous one amplitude of a phase"),
+    "voltage_rms": ("V", "rms voltage of the motor"),
+    "motor_torque_peak": ("N*m", "largest torque of the motor"),
+    "motor_torque_rms": ("N*m", "rms torque of the motor"),
+    "winding_temperature": ("degC", "highest temperature of the winding after many cycles"),
+    "case_temperature": ("degC", "highest temperature of the motor's case after many cycles"),
+    "output_torque_peak": ("N*m", "largest torque at the gearbox output"),
+    "output_torque_mean": ("N*m", "cubic mean of that torque, weighted with speed: what its life depends on"),
+    "input_speed_peak": ("rad/s", "largest speed of the gearbox input"),
+    "input_speed_mean": ("rad/s", "mean speed of the gearbox input"),
+    "inertia_ratio": ("1", "inertia of the load / of the motor side"),
+    "tracking_error_peak": ("rad", "largest distance of the load from its reference"),
+    "tracking_error_rms": ("rad", "rms distance of the load from its reference"),
+    "reversal_error": ("rad", "load at rest after forward moves less that after backward ones, magnitude"),
+    "settling_time": ("s", "longest time after a move until the load stays in the window"),
+    "energy": ("J", "electrical energy taken per cycle"),
+    "energy_returned": ("J", "electrical energy given back per cycle"),
+    "position_gain": ("1/s", "gain of the position loop"),
+    "speed_gain": ("N*m*s/rad", "gain of the speed loop"),
+    "integral_gain": ("N*m/rad", "integral gain of the speed loop"),
+    "cycles": ("1", "cycles run; the values are of the last"),
+    "change": ("1", "relative difference of the last two cycles"),
+}
+"""each with its unit and meaning"""
+
+
+def rms(values: np.ndarray) -> float:
+    """Over a cycle, whose last sample is the first of the next."""
+    return float(np.sqrt(np.mean(values[:-1] ** 2)))
+
+
+def last_cycle(result: RawResult, count: int, back: int = 1) -> slice:
+    """The samples of the last of so many cycles, both ends included; `back` = 2 for the one before."""
+    each = (len(result.time) - 1) // count
+    return slice((count - back) * each, (count - back + 1) * each + 1)
+
+
+def change(result: RawResult, count: int) -> float:
+    """By how much the last two cycles differ in rms torque and rms twist, and in the mean distance from the reference."""
+    last, before = last_cycle(result, count), last_cycle(result, count, 2)
+    found = 0.0
+    for name in ("motor_torque", "twist", "load_speed"):
+        a, b = rms(result[name][last]), rms(result[name][before])
+        found = max(found, abs(a - b) / max(a, b, math.ulp(0.0)))
+    return found
+
+
+def duty_cycle_of(result: RawResult, cycle: slice, period: float) -> DutyCycle:
+    """The duty cycle that the rules of the drive check are for."""
+    values = (result[name][cycle] for name in ("motor_speed", "output_torque", "motor_torque"))
+    speed, output, torque = values
+    return DutyCycle(result.time[cycle], np.abs(speed), output, torque, None, period)
+
+
+def temperatures_of(motor: Motor, duty: DutyCycle, ambient: float) -> tuple[float, float]:
+    """Highest temperatures of winding and case [°C] in the cycle repeated for ever, as far as the data of the motor tell: without its
+    time constants the winding alone, by the rms torque; NaN where nothing is known."""
+    bodies, copper = TwoBodies.of(motor, ambient), motor.copper_loss()
+    if bodies is not None:
+        start = bodies.repeated(duty.time, duty.motor_torque)
+        if start is None:
+            return math.inf, math.inf
+        winding, case = bodies.course(duty.time, duty.motor_torque, start)
+        return float(winding.max()), float(case.max())
+    resistance = None if motor.limits is None else motor.limits.winding_to_ambient
+    if copper is None or resistance is None:
+        return math.nan, math.nan
+    loss, reference = copper
+    return ambient + steady_rise(loss * rms(duty.motor_torque) ** 2, resistance, ambient, reference), math.nan
+
+
+def row_of(scenario: Scenario, task: AxisTask, result: RawResult, count: int) -> dict[str, float]:
+    """The columns of one run."""
+    here = last_cycle(result, count)
+    time = result.time[here]
+    duty = duty_cycle_of(result, here, task.cycle)
+    electrical = (result[name][here] for name in ("command", "motor_torque", "motor_speed"))
+    current, voltage, power = current_voltage_power(scenario.motor, *electrical)
+    winding, case = temperatures_of(scenario.motor, duty, task.ambient_temperature)
+    power = power[:-1]
+    step = time[1] - time[0]
+    g, torque = scenario.gearbox, result["motor_torque"][here]
+    controller = scenario.controller
+    assert controller is not None
+    assert controller.position is not None
+    assert controller.speed is not None
+    error = result["load_angle"] - reference_of(scenario).at(result.time)[0]
+    return {
+        "current_peak": float(np.abs(current).max()),
+        "current_rms": rms(current),
+        "voltage_peak": float(np.abs(voltage).max()),
+        "voltage_rms": rms(voltage),
+        "motor_torque_peak": float(np.abs(torque).max()),
+        "motor_torque_rms": rms(torque),
+        "winding_temperature": winding,
+        "case_temperature": case,
+        "output_torque_peak": float(np.abs(duty.output_torque).max()),
+        "output_torque_mean": duty.mean_output_torque(),
+        "input_speed_peak": duty.peak_input_speed,
+        "input_speed_mean": duty.mean_input_speed(),
+        "inertia_ratio": scenario.load.inertia / (g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia)),
+        "tracking_error_peak": float(np.abs(error[here]).max()),
+        "tracking_error_rms": rms(error[here]),
+        **_at_rest(scenario, task, time, error[here], count),
+        "energy": float(step * np.maximum(power, 0.0).sum()),
+        "energy_returned": float(-step * np.minimum(power, 0.0).sum()),
+        "position_gain": controller.position.gain,
+        "speed_gain": controller.speed.gain,
+        "integral_gain": controller.speed.k_i,
+        "cycles": float(count),
+        "change": change(result, count),
+    }
+
+
+def _at_rest(scenario: Scenario, task: AxisTask, time: np.ndarray, error: np.ndarray, count: int) -> dict[str, float]:
+    """Settling time and reversal error, from the rests after the moves of the last cycle."""
+    reference = reference_of(scenario)
+    window = task.settling_window
+    ends: dict[float, list[float]] = {1.0: [], -1.0: []}
+    settling = [0.0] if reference.moves and window is not None else [math.nan]
+    moves = len(reference.moves) // count
+    positions = [reference.start, *(move.to for move in reference.moves)]
+    intervals = reference.intervals()
+    for k in range(len(positions) - 1 - moves, len(positions) - 1):
+        end = intervals[k][1]
+        following = intervals[k + 1][0] if k + 1 < len(intervals) else time[-1]
+        rest = (time >= end) & (time <= following)
+        if not rest.any() or positions[k + 1] == positions[k]:
+            continue
+        ends[math.copysign(1.0, positions[k + 1] - positions[k])].append(float(error[rest][-1]))
+        if window is not None:
+            outside = np.flatnonzero(np.abs(error[rest]) > window)
+            if len(outside):
+                stays = outside[-1] + 1 < int(rest.sum())
+                settling.append(float(time[rest][outside[-1] + 1] - end) if stays else math.inf)
+    both = ends[1.0] and ends[-1.0]
+    reversal = abs(float(np.mean(ends[1.0]) - np.mean(ends[-1.0]))) if both else math.nan
+    return {"reversal_error": reversal, "settling_time": max(settling)}
