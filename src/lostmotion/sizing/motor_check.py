@@ -27,8 +27,8 @@ def largest_speed(m: Motor, speed: float, where: str = "motor") -> Finding:
     )
 
 
-def heat(m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor") -> list[Finding]:
-    """Torque over the cycle and the temperature of the winding at this ambient temperature [°C]."""
+def continuous_torque(m: Motor, cycle: DutyCycle, where: str = "motor") -> Finding:
+    """The rms torque over the cycle."""
     limits = m.limits
     torque = cycle.rms_motor_torque()
     continuous = (
@@ -36,7 +36,14 @@ def heat(m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor") -> li
     )
     name = "continuous torque of the motor"
     key = f"{where}.limits.continuous_torque"
-    findings = [within("motor_torque", "motor torque, rms", torque, continuous, "N·m", name, key=key, cycle=cycle)]
+    return within("motor_torque", "motor torque, rms", torque, continuous, "N·m", name, key=key, cycle=cycle)
+
+
+def heat(m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor") -> list[Finding]:
+    """Torque over the cycle and the temperature of the winding at this ambient temperature [°C]."""
+    limits = m.limits
+    torque = cycle.rms_motor_torque()
+    findings = [continuous_torque(m, cycle, where)]
     if limits is None or limits.max_winding_temperature is None or m.copper_loss() is None:
         return findings
     permissible = limits.max_winding_temperature

@@ -68,6 +68,31 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
     return _dataset(result, found, attributes)
 
 
+def current_voltage_power(
+    m: Motor, command: np.ndarray, torque: np.ndarray, speed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Current [A], voltage [V] and electrical power [W] of a motor at command, torque [N·m] and speed [rad/s]; NaN where its data
+    do not tell. Of a motor with a winding current and voltage are amplitudes of a phase."""
+    unknown = np.full_like(torque, np.nan)
+    if m.winding is not None:
+        phase = m.winding.phase_values()
+        i = torque / phase.torque_constant
+        if m.kind == "synchronous":
+            u_q = m.phase_voltage * np.clip(command, -1.0, 1.0)
+        else:
+            u_q = phase.resistance * i + phase.voltage_constant * speed
+        return i, np.asarray(phase.voltage(u_q, torque, speed)), 1.5 * u_q * i
+    limits = m.limits
+    k = None if limits is None else limits.torque_constant
+    R = None if limits is None else limits.resistance
+    current = unknown if k is None else torque / k
+    if m.kind == "dc" and m.rated_voltage is not None:
+        voltage = m.rated_voltage * command
+    else:
+        voltage = unknown if k is None or R is None else R * current + k * speed
+    return current, voltage, voltage * current
+
+
 @checked
 def temperatures(
     result: xarray.Dataset,

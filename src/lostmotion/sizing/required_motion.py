@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,10 +18,10 @@ from .duty_cycle import DutyCycle
 from .finding import Finding
 from .gearbox_check import input_speeds, loads
 from .motion_check import inertia_ratio
-from .motor_check import current, heat, largest_speed, voltage
+from .motor_check import continuous_torque, current, heat, largest_speed, voltage
 
 POINTS = 1000  # of a cycle at least
-WITHIN = 1e-9  # of an interval: so close to its end, values are those before a jump
+WITHIN = 1e-9  # of an interval: so close to its ends, values are those on this side of a jump
 
 
 @dataclass(frozen=True)
@@ -46,9 +47,9 @@ def required_motion(reference: PositionReference, load: LoadTable, cycle: float)
     frequencies = [f for signal in (reference, load.torque) for _, f, _ in signal.sine_list()]
     finest = cycle / max(POINTS, 100.0 * cycle * max(frequencies, default=0.0))
     times = []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in itertools.pairwise(edges.tolist()):
         inside = np.linspace(a, b, max(3, int((b - a) / finest) + 2))
-        inside[-1] = b - WITHIN * (b - a)
+        inside[0], inside[-1] = a + WITHIN * (b - a), b - WITHIN * (b - a)
         times.append(inside)
     time = np.concatenate(times)
     _, speed, acceleration, _ = reference.at(time)
@@ -88,8 +89,8 @@ class InputDemand:
 
     def motor_torque(self, motor: Motor) -> np.ndarray:
         """[N·m]"""
-        own: np.ndarray = motor.rotor_inertia * self.acceleration + motor.friction_torque * np.sign(self.speed)
-        return self.torque + own
+        own = motor.rotor_inertia * self.acceleration + motor.friction_torque * np.sign(self.speed)
+        return np.asarray(self.torque + own)
 
 
 def input_demand(motion: RequiredMotion, g: Gearbox) -> InputDemand:
@@ -121,18 +122,21 @@ def check_motor(
     """The rules for a motor at this gearbox; `largest` is the largest permissible ratio of the inertias."""
     torque = demand.motor_torque(motor)
     cycle = demand.cycle(torque)
-    return [
+    found = [
         largest_speed(motor, cycle.peak_input_speed),
-        *heat(motor, cycle, ambient),
+        continuous_torque(motor, cycle),
         voltage(motor, command(motor, torque, demand.speed), torque, demand.speed),
         current(motor, torque),
         inertia_ratio(motor, demand.gearbox, load_inertia, largest),
     ]
+    refused = any(finding.verdict == "warning" for finding in found)  # the heat of such a pair is not worth its time
+    return found if refused else [*found, *heat(motor, cycle, ambient)[1:]]
 
 
 def command(motor: Motor, torque: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """E_C of (2) under which a motor gives a torque [N·m] at a speed [rad/s], its inductance left out; of a torque source its
     relative torque."""
+    motor = motor.as_dc()
     share = torque / motor.rated_torque
     if motor.armature_voltage_constant is None or motor.rated_speed is None:
         return share

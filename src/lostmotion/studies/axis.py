@@ -120,7 +120,8 @@ def _tiled(samples: Any, cycle: float, count: int, step: float, key: str) -> dic
     again = slice(1 if times[0] == 0.0 and math.isclose(times[-1], cycle, rel_tol=WHOLE) else 0, None)
     all_times = [*times, *(t + k * cycle for k in range(1, count) for t in times[again])]
     all_values = [*values, *(v + k * step for k in range(1, count) for v in values[again])]
-    return samples.model_dump() | {"times": all_times, "values": all_values}
+    points: dict[str, Any] = samples.model_dump()
+    return points | {"times": all_times, "values": all_values}
 
 
 @lru_cache(maxsize=32)  # the same for every pair of a task
@@ -219,6 +220,9 @@ def tuned(base: Scenario, motor: Motor, g: Gearbox) -> Controller:
 
 def torque_limit(motor: Motor) -> float | None:
     """By the largest current [N·m]; None where that is not given."""
+    if motor.winding is not None:
+        rms = motor.winding.max_current
+        return None if rms is None else math.sqrt(2.0) * rms * motor.winding.phase_values().torque_constant
     limits = motor.limits
     if limits is None or limits.max_current is None or limits.torque_constant is None:
         return None

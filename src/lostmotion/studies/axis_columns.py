@@ -7,20 +7,22 @@ import math
 import numpy as np
 
 from ..model.motor import Motor
-from ..simulation.run import RawResult
+from ..simulation.results import RawResult
 from ..simulation.scenario import Scenario
 from ..sizing.duty_cycle import DutyCycle
-from ..sizing.motor_check import winding_temperature
+from ..sizing.motor_run import current_voltage_power
+from ..sizing.thermal import TwoBodies, steady_rise
 from .axis import AxisTask, reference_of
 
 COLUMNS = {
-    "current_peak": ("A", "largest current of the motor"),
+    "current_peak": ("A", "largest current of the motor; of a synchronous one amplitude of a phase"),
     "current_rms": ("A", "rms current of the motor"),
-    "voltage_peak": ("V", "largest voltage of the motor"),
+    "voltage_peak": ("V", "largest voltage of the motor; of a synchronous one amplitude of a phase"),
     "voltage_rms": ("V", "rms voltage of the motor"),
     "motor_torque_peak": ("N*m", "largest torque of the motor"),
     "motor_torque_rms": ("N*m", "rms torque of the motor"),
-    "winding_temperature": ("degC", "temperature of the winding after many cycles"),
+    "winding_temperature": ("degC", "highest temperature of the winding after many cycles"),
+    "case_temperature": ("degC", "highest temperature of the motor's case after many cycles"),
     "output_torque_peak": ("N*m", "largest torque at the gearbox output"),
     "output_torque_mean": ("N*m", "cubic mean of that torque, weighted with speed: what its life depends on"),
     "input_speed_peak": ("rad/s", "largest speed of the gearbox input"),
@@ -69,17 +71,21 @@ def duty_cycle_of(result: RawResult, cycle: slice, period: float) -> DutyCycle:
     return DutyCycle(result.time[cycle], np.abs(speed), output, torque, None, period)
 
 
-def electrical(motor: Motor, result: RawResult, cycle: slice) -> tuple[np.ndarray, np.ndarray]:
-    """Current [A] and voltage [V] of a motor; NaN where its data do not tell."""
-    torque, speed = result["motor_torque"][cycle], result["motor_speed"][cycle]
-    limits = motor.limits
-    unknown = np.full_like(torque, np.nan)
-    k = None if limits is None else limits.torque_constant
-    current = unknown if k is None else torque / k
-    if motor.kind == "dc" and motor.rated_voltage is not None:
-        return current, motor.rated_voltage * result["command"][cycle]
-    R = None if limits is None else limits.resistance
-    return current, unknown if k is None or R is None else R * current + k * speed
+def temperatures_of(motor: Motor, duty: DutyCycle, ambient: float) -> tuple[float, float]:
+    """Highest temperatures of winding and case [°C] in the cycle repeated for ever, as far as the data of the motor tell: without its
+    time constants the winding alone, by the rms torque; NaN where nothing is known."""
+    bodies, copper = TwoBodies.of(motor, ambient), motor.copper_loss()
+    if bodies is not None:
+        start = bodies.repeated(duty.time, duty.motor_torque)
+        if start is None:
+            return math.inf, math.inf
+        winding, case = bodies.course(duty.time, duty.motor_torque, start)
+        return float(winding.max()), float(case.max())
+    resistance = None if motor.limits is None else motor.limits.winding_to_ambient
+    if copper is None or resistance is None:
+        return math.nan, math.nan
+    loss, reference = copper
+    return ambient + steady_rise(loss * rms(duty.motor_torque) ** 2, resistance, ambient, reference), math.nan
 
 
 def row_of(scenario: Scenario, task: AxisTask, result: RawResult, count: int) -> dict[str, float]:
@@ -87,8 +93,10 @@ def row_of(scenario: Scenario, task: AxisTask, result: RawResult, count: int) ->
     here = last_cycle(result, count)
     time = result.time[here]
     duty = duty_cycle_of(result, here, task.cycle)
-    current, voltage = electrical(scenario.motor, result, here)
-    power = (voltage * current)[:-1]
+    electrical = (result[name][here] for name in ("command", "motor_torque", "motor_speed"))
+    current, voltage, power = current_voltage_power(scenario.motor, *electrical)
+    winding, case = temperatures_of(scenario.motor, duty, task.ambient_temperature)
+    power = power[:-1]
     step = time[1] - time[0]
     g, torque = scenario.gearbox, result["motor_torque"][here]
     controller = scenario.controller
@@ -103,7 +111,8 @@ def row_of(scenario: Scenario, task: AxisTask, result: RawResult, count: int) ->
         "voltage_rms": rms(voltage),
         "motor_torque_peak": float(np.abs(torque).max()),
         "motor_torque_rms": rms(torque),
-        "winding_temperature": winding_temperature(scenario.motor, rms(torque), task.ambient_temperature),
+        "winding_temperature": winding,
+        "case_temperature": case,
         "output_torque_peak": float(np.abs(duty.output_torque).max()),
         "output_torque_mean": duty.mean_output_torque(),
         "input_speed_peak": duty.peak_input_speed,

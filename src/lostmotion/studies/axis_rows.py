@@ -13,7 +13,8 @@ import numpy as np
 from ..errors import InputError
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
-from ..simulation.run import RawResult, run
+from ..simulation.results import RawResult
+from ..simulation.run import run
 from ..simulation.scenario import Scenario
 from ..sizing.finding import Finding
 from ..sizing.gearbox_check import input_speeds, loads, lost_motion
@@ -54,9 +55,10 @@ class Axes:
 
     def motion(self) -> RequiredMotion:
         """One cycle at the load of the base scenario."""
-        return self._once(
-            ("motion",), lambda: required_motion(reference_of(self._base), self._base.load, self.task.cycle)
-        )  # type: ignore[no-any-return]
+        base = self._base
+        found = self._once(("motion",), lambda: required_motion(reference_of(base), base.load, self.task.cycle))
+        assert isinstance(found, RequiredMotion)
+        return found
 
     @property
     def _base(self) -> Scenario:

@@ -40,10 +40,9 @@ def pieces(study: Study, first: int, last: int) -> list[tuple[int, int]]:
 
     Most chunks that the core can make are one piece.
     """
+    size = last - first if core_can(study) else SLOW_RUNS
     if study.axis is not None:
         size = AXES
-    else:
-        size = last - first if core_can(study) else SLOW_RUNS
     if held := _arrays(study):
         size = min(size, max(1, MAX_NUMBERS // (held * study.scenario.simulation.samples)))
     return [(a, min(a + size, last)) for a in range(first, last, size)]

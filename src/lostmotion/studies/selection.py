@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..units.practical import practical
 from .select import SHARES, USE, Selection
 from .study import Study
 from .table import unit_of
@@ -96,9 +97,9 @@ def _candidate(
     for column, (low, high) in bounds.items():
         if not low <= row[column] <= high:
             violated.append(column)
-            why.append(
-                f"{column} {row[column]:.6g} is {f'above {high:.6g}' if row[column] > high else f'below {low:.6g}'}"
-            )
+            unit = study.kept_units.get(column, "") if study.axis is not None else ""
+            found, limit = (practical(x, unit, 6) for x in (row[column], high if row[column] > high else low))
+            why.append(f"{column} {found} is {'above' if row[column] > high else 'below'} {limit}")
     for column, value in values.items():
         if math.isnan(value):
             violated.append(column)
@@ -136,7 +137,7 @@ def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
 def pareto_front(ranked: list[Candidate], select: Selection) -> list[Candidate]:
     """Those that fit and of which none that fits is better in one objective without being worse in another."""
     fitting = [c for c in ranked if c.fits]
-    ranks = np.array([_rank(c, select) for c in fitting]).reshape(len(fitting), -1)
+    ranks = np.array([_rank(c, select) for c in fitting]).reshape(len(fitting), len(select.objectives))
     return [c for c, rank in zip(fitting, ranks, strict=True) if not _dominated(rank, ranks)]
 
 

@@ -235,10 +235,10 @@ class Study(Part):
         InputError
             There is no such scenario.
         """
-        parts = [self.part(kind, row) for kind in ("motor", "gearbox")]
+        motor, gearbox = self.part("motor", row), self.part("gearbox", row)
         assert self.axis is not None
         assert isinstance(self.scenario, Scenario)
-        return axis_scenario(self.scenario, *parts, self.axis.cycle, cycles)
+        return axis_scenario(self.scenario, motor, gearbox, self.axis.cycle, cycles)
 
     def part_key(self, kind: str, row: np.ndarray) -> tuple[Any, ...]:
         """What of a row decides on its ``"gearbox"`` or its ``"motor"``."""

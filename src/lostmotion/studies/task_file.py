@@ -89,7 +89,7 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         title=written["title"],
         scenario=from_tables(written),
         written=written,
-        vary=vary,
+        vary=tuple(vary),
         axis=task,
         select=chosen,
     )
