@@ -9,7 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from . import catalogue, drive, reproduce, response, rig, run, scenarios, select, study
+from . import catalogue, drive, reproduce, response, rig, run, scenarios, select, servo, study
 from .terminal import fail
 
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # of the parser that typer brings along
