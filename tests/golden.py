@@ -53,7 +53,7 @@ def compute() -> Groups:
     for path in sorted((ROOT / "scenarios").glob("*.toml")):
         scenario, name = lm.load(path), path.stem
         groups |= {f"{name}.{what}": values for what, values in of_run(scenario).items()}
-        if isinstance(scenario, lm.TrainScenario):
+        if isinstance(scenario, lm.TrainScenario) or scenario.controller is not None:
             continue
         s = scenario.command
         if not (s.steps or s.ramps or scenario.load.torque.ramps):
