@@ -25,10 +25,14 @@ class [[gnu::visibility("hidden")]] PythonLaw {
         const nb::gil_scoped_acquire hold;
         try {
             const Array slots(state, {static_cast<std::size_t>(self.states_)}, nb::handle());
-            *command =
-                nb::cast<double>(self.function_(time, nb::make_tuple(measured[0], measured[1], measured[2]),
-                                                nb::make_tuple(reference[0], reference[1], reference[2], reference[3]),
-                                                nb::cast(slots, nb::rv_policy::reference)));
+            const nb::object given =
+                self.function_(time, nb::make_tuple(measured[0], measured[1], measured[2]),
+                               nb::make_tuple(reference[0], reference[1], reference[2], reference[3]),
+                               nb::cast(slots, nb::rv_policy::reference));
+            if (!nb::try_cast<double>(given, *command))
+                throw nb::type_error(
+                    ("law: returned " + std::string(nb::repr(given).c_str()) + "; it must return the command, a number")
+                        .c_str());
             return 0;
         } catch (...) {
             self.raised_ = std::current_exception();

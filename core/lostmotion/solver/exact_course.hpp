@@ -2,6 +2,7 @@
 #pragma once
 
 #include <bit>
+#include <utility>
 
 #include "exact_run.hpp"
 
@@ -37,6 +38,7 @@ inline auto ExactSolver<System>::rest_unforced(const Entry& e, const State& rate
 // After a change of the inputs: if the regime goes on, the rate jumps by no more than what they bring.
 template <class System>
 inline auto ExactSolver<System>::follow_inputs(const Key& before) -> void {
+    const InputsOf<D> left = std::exchange(course_.input, now_.input[0]);
     if (!course_.rate_known || !(key_ == before)) {
         course_.forget();
         return;
@@ -44,7 +46,7 @@ inline auto ExactSolver<System>::follow_inputs(const Key& before) -> void {
     Entry& e = cache_.entry(key_);
     Lanes rate = load(course_.rate);
     for (int i = 0; i < D::inputs; ++i)
-        rate.coupled = rate.coupled + (now_.input[0][i] - course_.input[i]) * load(e.rates.input_column[i]);
+        rate.coupled = rate.coupled + (now_.input[0][i] - left[i]) * load(e.rates.input_column[i]);
     const Coupled before_jump = bound_ahead(e, coupled(course_.rate)), after_jump = bound_ahead(e, rate.coupled);
     for (int t = 0; t < e.n_twists; ++t) {
         auto& twist = course_.twist[t];
