@@ -131,9 +131,6 @@ def test_a_law_keeps_its_state_and_gets_its_data() -> None:
     assert float(a["m_torque"][-1]) > 0.0
 
 
-NOT_YET = pytest.mark.xfail(reason="the binding says std::bad_cast", raises=RuntimeError, strict=True)
-
-
 def failing(time: float, *_: Any) -> float:
     if time > 0.01:
         raise KeyError("of the law's own")
@@ -146,8 +143,8 @@ def failing(time: float, *_: Any) -> float:
         (failing, KeyError, "of the law's own"),
         (lambda *_: math.nan, (lm.InputError, lm.SolverError), "number"),
         (lambda *_: math.inf, (lm.InputError, lm.SolverError), "number"),
-        pytest.param(lambda *_: "0.3", (lm.InputError, TypeError), "number", marks=NOT_YET),
-        pytest.param(lambda *_: None, (lm.InputError, TypeError), "number", marks=NOT_YET),
+        (lambda *_: "0.3", (lm.InputError, TypeError), "number"),
+        (lambda *_: None, (lm.InputError, TypeError), "number"),
         (lambda time: 0.0, TypeError, "argument"),
     ],
 )
@@ -245,7 +242,6 @@ def test_a_study_of_a_controlled_drive_runs_its_controller(axis: lm.Scenario, tm
         assert row["peak"] == float(np.abs(run["load_speed"].to_numpy()).max()) > 0.5
 
 
-@pytest.mark.xfail(reason="exact_course.hpp: a jump of an input at a tick is added to the rate twice", strict=True)
 def test_a_load_step_at_a_tick_acts_once() -> None:
     T, step = 250e-6, {"steps": [{"time": 0.0251, "height": 0.3}]}
     tables: dict[str, Any] = {"shafts.motor.torque": step, "simulation.sample_interval": T}

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ._core import SolverError as SolverError
     from .control.controller import Controller as Controller
     from .control.encoder import Encoder as Encoder
+    from .control.filters import TransferFunction as TransferFunction
     from .control.filters import as_filter as as_filter
     from .control.law import Law as Law
     from .control.references import Move as Move
@@ -126,7 +127,7 @@ _HOMES = {
     "_core": ("SolverError",),
     "control.controller": ("Controller",),
     "control.encoder": ("Encoder",),
-    "control.filters": ("as_filter",),
+    "control.filters": ("TransferFunction", "as_filter"),
     "control.law": ("Law",),
     "control.references": ("Move", "PositionReference", "SpeedReference", "TorqueReference"),
     "data_sheets.components": ("gearbox", "motor"),
