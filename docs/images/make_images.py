@@ -44,16 +44,17 @@ def tutorial() -> None:
     rig.savefig(HERE / "rig.png", dpi=80, metadata={"Software": None})
 
 
-def selection() -> None:
-    study = lm.load_study(HERE.parents[1] / "examples" / "select-gearbox.toml")
+def selection(study: lm.Study, name: str) -> None:
     with tempfile.TemporaryDirectory() as directory:
         table = read_table(lm.study(study, Path(directory) / "selection"))
     ranked = candidates(table, study)
     figure = pareto_figure(table, ranked, pareto_front(ranked, study.select), study.select)
-    figure.savefig(HERE / "selection.png", dpi=110, metadata={"Software": None})
+    figure.savefig(HERE / name, dpi=110, metadata={"Software": None})
 
 
 if __name__ == "__main__":
     why()
     tutorial()
-    selection()
+    examples = HERE.parents[1] / "examples"
+    selection(lm.load_study(examples / "select-gearbox.toml"), "selection.png")
+    selection(lm.load_task(examples / "select-axis.toml"), "select-axis.png")

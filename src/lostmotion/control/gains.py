@@ -1,9 +1,11 @@
-"""Gains of a servo cascade by rules: identical damping of both pole pairs, else the symmetrical optimum."""
+"""Gains of a servo cascade by the rule that suits a drive: identical damping of both pole pairs, else the symmetrical optimum."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+
+from .tuning import TwoInertias, identical_damping, symmetrical_optimum
 
 DAMPING = 0.7
 DELAYS = 1.5  # sample times: one until a result acts, and half of one since it is held
@@ -42,17 +44,15 @@ def gains_by_rule(
     sample_time, position_time
         Of speed and position loop [s].
     """
-    total = motor_inertia + load_inertia
     delay = lag + DELAYS * sample_time
-    optimum = total / (2.0 * delay)
-    R = load_inertia / motor_inertia
-    if math.isfinite(stiffness) and R >= 4.0 * DAMPING**2:
-        w_a = math.sqrt(stiffness / load_inertia)
-        both = w_a * math.sqrt(R + 4.0 - 4.0 * DAMPING**2)  # w_1 + w_2, with w_1 w_2 = w_a^2
-        gain = 2.0 * DAMPING * motor_inertia * both
-        if gain <= optimum:
+    optimum = symmetrical_optimum(motor_inertia + load_inertia, delay)
+    drive = TwoInertias(motor_inertia, load_inertia, stiffness)
+    if math.isfinite(stiffness) and drive.inertia_ratio >= 4.0 * DAMPING**2:
+        alike = identical_damping(drive, DAMPING)
+        if alike.gain <= optimum.gain:
+            w_a, both = drive.antiresonance, alike.gain / (2.0 * DAMPING * motor_inertia)  # w_1 w_2 = w_a^2, w_1 + w_2
             slow = 2.0 * w_a**2 / (both + math.sqrt(both**2 - 4.0 * w_a**2))
             wait = 2.0 * DAMPING / slow + DELAYS * position_time
-            return Gains("identical damping", gain, motor_inertia * w_a**2, 0.5 / wait)
-    wait = 4.0 * delay + DELAYS * position_time
-    return Gains("symmetrical optimum", optimum, optimum / (4.0 * delay), 0.5 / wait)
+            return Gains("identical damping", alike.gain, alike.integral_gain, 0.5 / wait)
+    wait = optimum.filter_time + DELAYS * position_time
+    return Gains("symmetrical optimum", optimum.gain, optimum.integral_gain, 0.5 / wait)

@@ -27,8 +27,11 @@ def largest_speed(m: Motor, speed: float, where: str = "motor") -> Finding:
     )
 
 
-def continuous_torque(m: Motor, cycle: DutyCycle, where: str = "motor") -> Finding:
-    """The rms torque over the cycle."""
+def heat(
+    m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor", *, rise: float | None = None
+) -> list[Finding]:
+    """Torque over the cycle and the temperature of the winding at this ambient temperature [°C]; `rise` [K] over it, where that is
+    known already."""
     limits = m.limits
     torque = cycle.rms_motor_torque()
     continuous = (
@@ -36,18 +39,12 @@ def continuous_torque(m: Motor, cycle: DutyCycle, where: str = "motor") -> Findi
     )
     name = "continuous torque of the motor"
     key = f"{where}.limits.continuous_torque"
-    return within("motor_torque", "motor torque, rms", torque, continuous, "N·m", name, key=key, cycle=cycle)
-
-
-def heat(m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor") -> list[Finding]:
-    """Torque over the cycle and the temperature of the winding at this ambient temperature [°C]."""
-    limits = m.limits
-    torque = cycle.rms_motor_torque()
-    findings = [continuous_torque(m, cycle, where)]
+    findings = [within("motor_torque", "motor torque, rms", torque, continuous, "N·m", name, key=key, cycle=cycle)]
     if limits is None or limits.max_winding_temperature is None or m.copper_loss() is None:
         return findings
     permissible = limits.max_winding_temperature
-    rise = _rise(m, cycle, torque, ambient)
+    if rise is None:
+        rise = _rise(m, cycle, torque, ambient)
     if rise is None:
         return findings
     what = "winding temperature"
@@ -67,17 +64,22 @@ def heat(m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor") -> li
 def _rise(m: Motor, cycle: DutyCycle, torque: float, ambient: float) -> float | None:
     """Of the winding over the ambient [K]: where the data suffice its peak in the repeated cycle, else that of the rms torque [N·m];
     None if it is not known."""
-    copper, bodies = m.copper_loss(), TwoBodies.of(m, ambient)
-    resistance = None if m.limits is None else m.limits.winding_to_ambient
-    if copper is None or resistance is None:
-        return None
-    loss, reference = copper
-    steady = steady_rise(loss * torque**2, resistance, ambient, reference)
-    if bodies is None or cycle.held_longer:
+    steady, bodies = rms_rise(m, torque, ambient), TwoBodies.of(m, ambient)
+    if steady is None or bodies is None or cycle.held_longer:
         return steady
     time, torques = cycle.repeated_torque()
     start = bodies.repeated(time, torques)
     return math.inf if start is None else float(bodies.course(time, torques, start)[0].max()) - ambient
+
+
+def rms_rise(m: Motor, torque: float, ambient: float) -> float | None:
+    """Of the winding over the ambient [K] in the long run under an rms torque [N·m]; None if it is not known."""
+    copper = m.copper_loss()
+    resistance = None if m.limits is None else m.limits.winding_to_ambient
+    if copper is None or resistance is None:
+        return None
+    loss, reference = copper
+    return steady_rise(loss * torque**2, resistance, ambient, reference)
 
 
 def voltage(m: Motor, command: np.ndarray, torque: np.ndarray, speed: np.ndarray, where: str = "motor") -> Finding:

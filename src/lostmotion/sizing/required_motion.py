@@ -18,7 +18,7 @@ from .duty_cycle import DutyCycle
 from .finding import Finding
 from .gearbox_check import input_speeds, loads
 from .motion_check import inertia_ratio
-from .motor_check import continuous_torque, current, heat, largest_speed, voltage
+from .motor_check import current, heat, largest_speed, rms_rise, voltage
 
 POINTS = 1000  # of a cycle at least
 WITHIN = 1e-9  # of an interval: so close to its ends, values are those on this side of a jump
@@ -122,15 +122,14 @@ def check_motor(
     """The rules for a motor at this gearbox; `largest` is the largest permissible ratio of the inertias."""
     torque = demand.motor_torque(motor)
     cycle = demand.cycle(torque)
-    found = [
+    rise = rms_rise(motor, cycle.rms_motor_torque(), ambient)
+    return [
         largest_speed(motor, cycle.peak_input_speed),
-        continuous_torque(motor, cycle),
+        *heat(motor, cycle, ambient, rise=rise),
         voltage(motor, command(motor, torque, demand.speed), torque, demand.speed),
         current(motor, torque),
         inertia_ratio(motor, demand.gearbox, load_inertia, largest),
     ]
-    refused = any(finding.verdict == "warning" for finding in found)  # the heat of such a pair is not worth its time
-    return found if refused else [*found, *heat(motor, cycle, ambient)[1:]]
 
 
 def command(motor: Motor, torque: np.ndarray, speed: np.ndarray) -> np.ndarray:

@@ -10,8 +10,9 @@ from ..model.motor import Motor
 from ..simulation.results import RawResult
 from ..simulation.scenario import Scenario
 from ..sizing.duty_cycle import DutyCycle
+from ..sizing.motor_check import rms_rise
 from ..sizing.motor_run import current_voltage_power
-from ..sizing.thermal import TwoBodies, steady_rise
+from ..sizing.thermal import TwoBodies
 from .axis import AxisTask, reference_of
 
 COLUMNS = {
@@ -74,18 +75,15 @@ def duty_cycle_of(result: RawResult, cycle: slice, period: float) -> DutyCycle:
 def temperatures_of(motor: Motor, duty: DutyCycle, ambient: float) -> tuple[float, float]:
     """Highest temperatures of winding and case [°C] in the cycle repeated for ever, as far as the data of the motor tell: without its
     time constants the winding alone, by the rms torque; NaN where nothing is known."""
-    bodies, copper = TwoBodies.of(motor, ambient), motor.copper_loss()
+    bodies = TwoBodies.of(motor, ambient)
     if bodies is not None:
         start = bodies.repeated(duty.time, duty.motor_torque)
         if start is None:
             return math.inf, math.inf
         winding, case = bodies.course(duty.time, duty.motor_torque, start)
         return float(winding.max()), float(case.max())
-    resistance = None if motor.limits is None else motor.limits.winding_to_ambient
-    if copper is None or resistance is None:
-        return math.nan, math.nan
-    loss, reference = copper
-    return ambient + steady_rise(loss * rms(duty.motor_torque) ** 2, resistance, ambient, reference), math.nan
+    rise = rms_rise(motor, rms(duty.motor_torque), ambient)
+    return math.nan if rise is None else ambient + rise, math.nan
 
 
 def row_of(scenario: Scenario, task: AxisTask, result: RawResult, count: int) -> dict[str, float]:

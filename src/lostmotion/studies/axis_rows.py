@@ -117,8 +117,9 @@ class Axes:
             It cannot be run.
         """
         scenario, result, count = self.until_it_repeats(row)
-        found = self._after_run(scenario, result, count)
-        return columns_of(found) | row_of(scenario, self.task, result, count), int(result.attrs["switching_count"])
+        row = row_of(scenario, self.task, result, count)
+        found = self._after_run(scenario, result, count, row["winding_temperature"])
+        return columns_of(found) | row, int(result.attrs["switching_count"])
 
     def until_it_repeats(self, row: np.ndarray) -> tuple[Scenario, RawResult, int]:
         """Runs twice as many cycles again and again, until the last two agree, or there are as many as the task permits."""
@@ -130,8 +131,8 @@ class Axes:
                 return scenario, result, count
             count = min(2 * count, self.task.max_cycles)
 
-    def _after_run(self, scenario: Scenario, result: RawResult, count: int) -> list[Finding]:
-        """The same rules, of the cycle that was run."""
+    def _after_run(self, scenario: Scenario, result: RawResult, count: int, winding: float) -> list[Finding]:
+        """The same rules, of the cycle that was run, and the temperature of its winding [°C]."""
         here, task = last_cycle(result, count), self.task
         duty, g, m = duty_cycle_of(result, here, task.cycle), scenario.gearbox, scenario.motor
         command, torque, speed = (result[name][here] for name in ("command", "motor_torque", "motor_speed"))
@@ -139,7 +140,12 @@ class Axes:
             *loads(g, float(np.abs(duty.output_torque).max()), duty),
             *input_speeds(g, duty),
             largest_speed(m, duty.peak_input_speed),
-            *heat(m, duty, task.ambient_temperature),
+            *heat(
+                m,
+                duty,
+                task.ambient_temperature,
+                rise=None if math.isnan(winding) else winding - task.ambient_temperature,
+            ),
             voltage(m, command, torque, speed),
             current(m, torque),
             inertia_ratio(m, g, scenario.load.inertia, task.max_inertia_ratio),
