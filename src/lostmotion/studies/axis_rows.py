@@ -117,9 +117,9 @@ class Axes:
             It cannot be run.
         """
         scenario, result, count = self.until_it_repeats(row)
-        row = row_of(scenario, self.task, result, count)
-        found = self._after_run(scenario, result, count, row["winding_temperature"])
-        return columns_of(found) | row, int(result.attrs["switching_count"])
+        columns = row_of(scenario, self.task, result, count)
+        found = self._after_run(scenario, result, count, columns["winding_temperature"])
+        return columns_of(found) | columns, int(result.attrs["switching_count"])
 
     def until_it_repeats(self, row: np.ndarray) -> tuple[Scenario, RawResult, int]:
         """Runs twice as many cycles again and again, until the last two agree, or there are as many as the task permits."""
