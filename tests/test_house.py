@@ -193,5 +193,16 @@ def test_examples_run(path: Path, tmp_path: Path) -> None:
 
 def test_help_names_every_command() -> None:
     done = subprocess.run([sys.executable, "-m", "lostmotion", "--help"], capture_output=True, text=True, check=True)
-    for command in ("reproduce", "run", "response", "rig", "catalogue", "scenarios", "drive", "servo", "study", "schema"):
+    for command in (
+        "reproduce",
+        "run",
+        "response",
+        "rig",
+        "catalogue",
+        "scenarios",
+        "drive",
+        "servo",
+        "study",
+        "schema",
+    ):
         assert f"  {command} " in done.stdout
