@@ -132,7 +132,7 @@ Tally trains(const char* what, long count, unsigned seed, Check check) {
         check(random, sum, ("seed " + std::to_string(seed) + " train " + std::to_string(n)).c_str());
     t.cases = count;
     t.wrong = sum.failed();
-    t.ambiguous = sum.open;
+    if constexpr (requires { sum.open; }) t.ambiguous = sum.open;
     t.ill_conditioned = sum.undecided;
     return t;
 }

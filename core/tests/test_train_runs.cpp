@@ -43,10 +43,8 @@ TEST_CASE("exact and adaptive solver agree on a thousand random trains of all el
         compare_solvers(random, 6, 0.5, tally);
     }
     MESSAGE(tally.compared << " trains compared, largest difference " << tally.worst << "; " << tally.undecided
-                           << " that the adaptive solver does not settle, " << tally.open
-                           << " whose break-away rigid bodies leave open, " << tally.jammed << " that jam");
+                           << " that the adaptive solver does not settle, " << tally.jammed << " that jam");
     CHECK(tally.compared > 950);
-    CHECK(tally.open < 10);
     CHECK(tally.wrong == 0);
 }
 
@@ -59,13 +57,71 @@ TEST_CASE("the laws that every run obeys hold on a thousand random trains of all
     }
     MESSAGE(tally.runs << " trains; energies balance to " << tally.residual << " of what is turned over");
     CHECK(tally.runs > 980);
-    CHECK(tally.open < 20);
     CHECK(tally.residual < 1e-9);
     CHECK(tally.gained == 0);
     CHECK(tally.mirrored > 400);
     CHECK(tally.unlike_mirror == 0);
     CHECK(tally.unlike_sampled == 0);
     CHECK(tally.unlike_split == 0);
+}
+
+namespace {
+
+double value_at(const Signal& s, double time) {
+    const Breakpoint& b = s.breakpoints[s.segment(time)];
+    double value = b.value + b.slope * (time - b.time);
+    for (const Sine& w : s.sines) value += w.amplitude * std::sin(2.0 * pi * w.frequency * time + w.phase);
+    return value;
+}
+
+}  // namespace
+
+// All is at rest: a clutch holds shaft 1, whose bearing takes 1 N m more. What the clutch takes is all that acts on
+// shaft 1, followed with a play of that: two motors, one of which has a state, a load, and a brake whose capacity comes
+// and goes. Turning points of any sum of these count. Between instants dt apart one is missed by less than
+// 800 N m/s2 dt^2/8.
+TEST_CASE("the torque between two shafts at rest is a play of all that drives it") {
+    Train t;
+    t.shafts = {shaft(1.0), shaft(1.0)};
+    t.shafts[0].friction.torque = 100.0;
+    t.shafts[1].friction.torque = 1.0;
+    t.shafts[1].loaded = true;
+    t.couplings = {{"clutch", Coupling::safety_clutch, 0, 1, 50.0}};
+    t.motors = {torque_motor(1), torque_motor(1)};
+    t.motors[1].law.kind = Motor::dc;
+    for (ShaftMotor& m : t.motors) m.law.rated_torque = 1.0;
+    t.motors[1].law.electrical_time_constant = 0.02;
+    t.brakes = {{"brake", 1, 0.5}};
+    constexpr double interval = 0.0125, duration = 2.5;
+    constexpr int steps = 500;
+    for (const bool brakes : {false, true}) {
+        const std::vector<Signal> inputs{{{Breakpoint{}}, {{2.0, 1.3, 0.4}}},
+                                         {{Breakpoint{}}, {{1.5, 2.1, 0.0}}},
+                                         {{{0.0, 0.0, 0.0}, {0.4, 0.0, 1.0}, {1.6, -0.5, 0.0}}, {{1.2, 3.0, 1.0}}},
+                                         {{{0.0, brakes ? 0.5 : 0.0, 0.0}}, {{brakes ? 0.4 : 0.0, 1.7, 0.0}}}};
+        const Recorded dense(t, inputs, duration, interval / steps), exact(t, inputs, duration, interval),
+            adaptive(t, inputs, duration, interval, 1e-10);
+        REQUIRE(dense.done());
+        REQUIRE(exact.done());
+        REQUIRE(adaptive.done());
+        const double* state = dense.channel("motor1_torque");  // a first-order lag: no event has a part in it
+        double torque = 0.0, worst = 0.0, worst_adaptive = 0.0;
+        for (std::size_t k = 0; k < dense.samples; ++k) {
+            const double time = interval / steps * static_cast<double>(k);
+            const double needed = value_at(inputs[2], time) - value_at(inputs[0], time) - state[k],
+                         half = 1.0 + 0.5 * value_at(inputs[3], time);
+            torque = std::clamp(torque, needed - half, needed + half);
+            if (k % steps != 0) continue;
+            worst = std::max(worst, std::fabs(exact.channel("clutch_contact_torque")[k / steps] - torque));
+            worst_adaptive =
+                std::max(worst_adaptive, std::fabs(adaptive.channel("clutch_contact_torque")[k / steps] - torque));
+        }
+        CAPTURE(brakes);
+        CHECK(worst < 1e-6);
+        CHECK(worst_adaptive < 1e-6);
+        CHECK(exact.channel("shaft1_speed")[exact.samples - 1] == 0.0);
+        CHECK(exact.report.switching_count > 15);
+    }
 }
 
 namespace {

@@ -36,6 +36,13 @@ Values between(const Values& a, const Values& b, double share) {
     for (std::size_t i = 0; i < u.size(); ++i) u[i] = a[i] + (b[i] - a[i]) * share;
     return u;
 }
+template <class States>
+double difference(const States& x, const Values& reference) {
+    double off = 0.0;
+    for (std::size_t k = 0; k < reference.size(); ++k)
+        off = std::max(off, std::fabs(x[k] - reference[k]) / (1.0 + std::fabs(reference[k])));
+    return off;
+}
 TrainPoint point(TrainSimulation& s) {
     return s.with([](auto& in) { return in.point(); });
 }
@@ -76,14 +83,11 @@ TEST_CASE("the classic drive as a train steps with the same bits") {
     CHECK(compared > 40);
 }
 
-// Where several inputs drive contacts at rest to their limits, the torques between them are not determined by the
-// motion, and what the solver takes them for may depend on the instants at which it is asked: the next break-away may
-// then come a little earlier or later. Such trains are few, and part by little.
 TEST_CASE("random trains stepped with intervals split at random follow the run in one go") {
     RandomTrains random(52);
     constexpr double h = 0.02;
     constexpr std::size_t steps = 60;
-    int compared = 0, parted = 0;
+    int compared = 0, sensitive = 0;
     for (int n = 0; n < 150; ++n) {
         const lostmotion::TrainRun run(random.train(random.pick(2, 6), true));
         REQUIRE(run.error() == "");
@@ -110,18 +114,25 @@ TEST_CASE("random trains stepped with intervals split at random follow the run i
         if (status != Status::done) continue;
         ++compared;
         const TrainPoint end = point(stepped);
-        double off = 0.0;
-        for (std::size_t k = 0; k < whole.x.size(); ++k)
-            off = std::max(off, std::fabs(end.now.x[k] - whole.x[k]) / (1.0 + std::fabs(whole.x[k])));
-        if (off > 1e-9) {
-            ++parted;
-            MESSAGE("train " << n << " is off by " << off);
+        const double off = difference(end.now.x, whole.x);
+        if (off < 1e-9) continue;
+        // What changes of the inputs by 1e-14 do, rounding may do as well.
+        ++sensitive;
+        RandomTrains changes(n);
+        double amplified = 0.0;
+        for (int k = 0; k < 8; ++k) {
+            auto changed = levels;
+            for (Values& level : changed)
+                for (double& u : level) u *= 1.0 + changes.uniform(-1e-14, 1e-14);
+            const TrainReport other = run.run(straight_lines(changed, h), {}, {}, options, none.data());
+            REQUIRE(other.status == whole.status);
+            amplified = std::max(amplified, difference(other.x, whole.x));
         }
-        CHECK(off < 1e-5);
+        CHECK(off < 10.0 * amplified);
     }
-    MESSAGE(compared << " trains compared, " << parted << " parted");
+    MESSAGE(compared << " trains compared, " << sensitive << " that rounding may change");
     CHECK(compared > 140);
-    CHECK(parted <= 4);
+    CHECK(sensitive < 3);
 }
 
 TEST_CASE("a restored simulation of a train continues bit for bit") {

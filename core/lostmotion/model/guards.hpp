@@ -30,6 +30,9 @@ class RegimeGuards {
     void add_loss_cells(int gear, int s, Row& capacity);
     void add_loss_edges(int gear);
     void add_turning();
+    void add_driver(int contact);
+    double largest_share(const Row& torque) const;
+    bool moves(int state) const;
     void add_twist_pieces(int gear);
     void add_speed_pieces(int shaft);
     void add_input_limits();
@@ -159,44 +162,79 @@ inline void RegimeGuards::add_loss_edges(int gear) {
     regime_.in_data = regime_.in_data && g.in_data(regime_.key.branch[p.cell]);
 }
 
-// A shaft that "slips" but is kept at rest by others is at its limit: the torques go along with what drives it there,
-// as long as that goes on. When it turns back the torques stay. What drives it is the torque that it would take if it
-// were stuck, in terms of the states and inputs.
+// The contact of a shaft that "slips" but is kept at rest by others is at its limit: one torque that rest leaves open
+// goes along with that limit, as a play does. Were the contact stuck, that torque would stay, and the contact be
+// overcome as long as the torque that holds it moves away from it; once that turns back, it stays.
 inline void RegimeGuards::add_turning() {
-    for (int c = 0; c < layout_.contacts; ++c) {
-        if (places_.contacts[c].kind != ContactPlace::shaft || regime_.key.modes[c] == 0 || !regime_.at_rest[c])
-            continue;
-        Regime stuck;
-        stuck.key = regime_.key;
-        stuck.key.modes[c] = 0;
-        stuck.ties = tie(places_.contacts, static_cast<int>(train_.shafts.size()), stuck.key.modes.data());
-        std::vector<Row> acceleration(train_.shafts.size());
-        equations_.compose(stuck.key, stuck, acceleration);
-        Row& torque = stuck.contact_torque[c];
-        if (!solve_reactions(places_.contacts, layout_, stuck.key, stuck.ties, acceleration, {&torque})) continue;
-        Row rate;
-        for (int k = 0; k < layout_.states; ++k) {
-            // Of what acts on the shaft itself, the whole: no rounding of the elimination.
-            double share = torque.c[k];
-            if (std::fabs(std::fabs(share) - 1.0) < 1e-14) share = share > 0.0 ? 1.0 : -1.0;
-            if (share != 0.0) rate += share * regime_.rate[k];
+    for (int c = 0; c < layout_.contacts; ++c)
+        if (places_.contacts[c].kind == ContactPlace::shaft && regime_.key.modes[c] != 0 && regime_.at_rest[c])
+            add_driver(c);
+    regime_.driving_input = nowhere;
+    if (regime_.drivers.size() != 1) return;
+    const Driver<Row>& only = regime_.drivers[0];
+    const auto is_zero = [](double v) { return v == 0.0; };
+    if (!std::all_of(only.rate.c.begin(), only.rate.c.end(), is_zero)) return;
+    const auto inputs = only.torque.c.begin() + layout_.first_input;
+    if (std::count_if(inputs, inputs + layout_.inputs, is_zero) != layout_.inputs - 1) return;
+    const auto input = std::find_if_not(inputs, inputs + layout_.inputs, is_zero);
+    regime_.driving_input = static_cast<int>(input - inputs);
+    regime_.driving_way = *input > 0.0 ? 1.0 : -1.0;
+}
+
+inline void RegimeGuards::add_driver(int contact) {
+    Regime stuck;
+    stuck.key = regime_.key;
+    stuck.key.modes[contact] = 0;
+    stuck.ties = tie(places_.contacts, static_cast<int>(train_.shafts.size()), stuck.key.modes.data());
+    std::vector<Row> acceleration(train_.shafts.size());
+    equations_.compose(stuck.key, stuck, acceleration);
+    Row& overcome = stuck.contact_torque[contact];
+    if (!solve_reactions(places_.contacts, layout_, stuck.key, stuck.ties, acceleration, {&overcome})) return;
+    // The torque that its rest leaves open in addition.
+    int open = 0;
+    while (open < layout_.contacts && (!stuck.ties.redundant[open] || regime_.ties.redundant[open])) ++open;
+    if (open == layout_.contacts) return;
+    const ContactPlace& place = places_.contacts[open];
+    const double overcomes = regime_.key.modes[contact] * overcome.c[layout_.first_memory + place.locked];
+    if (overcomes == 0.0) return;
+    const Row& torque = place.kind == ContactPlace::gear
+                            ? regime_.output_torque[static_cast<std::size_t>(place.element)]
+                            : regime_.contact_torque[static_cast<std::size_t>(open)];
+    Driver<Row> driver{contact};
+    // What an elimination leaves of a term that cancels is none.
+    const double scale = (overcomes > 0.0 ? -1.0 : 1.0) / largest_share(torque);
+    const auto share = [&](int term) {
+        const double s = scale * torque.c[term];
+        return std::fabs(s) > 1e-14 ? s : 0.0;
+    };
+    bool by_states = false, by_inputs = false;
+    for (int k = 0; k < layout_.states; ++k)
+        if (driver.torque.c[k] = moves(k) ? share(k) : 0.0; driver.torque.c[k] != 0.0) {
+            driver.rate += driver.torque.c[k] * regime_.rate[k];
+            by_states = true;
         }
-        const double way = regime_.key.modes[c];
-        const bool by_states = std::any_of(rate.c.begin(), rate.c.end(), [](double v) { return v != 0.0; });
-        int inputs = 0, input = nowhere;
-        for (int i = 0; i < layout_.inputs; ++i)
-            if (std::fabs(torque.c[layout_.first_input + i]) > 1e-14) {
-                ++inputs;
-                input = i;
-            }
-        // Only a rate that is a form of the states, or that of one input, can be watched; with more of them the torques
-        // follow all the time.
-        if (by_states && inputs == 0) add(way * rate, Guard::turning, c, nowhere, 0);
-        if (by_states || inputs != 1) continue;
-        regime_.driving_input = input;
-        regime_.driving_way = way * (torque.c[layout_.first_input + input] > 0.0 ? 1.0 : -1.0);
-        regime_.driven_contact = c;
+    for (int i = layout_.first_input; i < layout_.first_input + layout_.inputs; ++i) {
+        driver.torque.c[i] = share(i);
+        by_inputs = by_inputs || driver.torque.c[i] != 0.0;
     }
+    if (by_inputs)
+        regime_.drivers.push_back(driver);
+    else if (by_states)
+        add(driver.rate, Guard::turning, contact, nowhere, 0);
+}
+
+// Of the terms that may change while the regime lasts.
+inline double RegimeGuards::largest_share(const Row& torque) const {
+    double largest = 0.0;
+    for (int k = 0; k < layout_.states; ++k)
+        if (moves(k)) largest = std::max(largest, std::fabs(torque.c[k]));
+    for (int i = 0; i < layout_.inputs; ++i) largest = std::max(largest, std::fabs(torque.c[layout_.first_input + i]));
+    return largest > 0.0 ? largest : 1.0;
+}
+
+inline bool RegimeGuards::moves(int state) const {
+    const Row& rate = regime_.rate[static_cast<std::size_t>(state)];
+    return std::any_of(rate.c.begin(), rate.c.end(), [](double v) { return v != 0.0; });
 }
 
 // Pieces of the torsion curve, and where the flanks part and touch again.

@@ -57,10 +57,15 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
         if (p.error_turn != nowhere)
             now.memory[p.error_turn] = gear.transmission_error.turn(now.x[places().shafts[gear.input].angle]);
         const int locked = p.contact == nowhere ? nowhere : places().contacts[p.contact].locked;
-        event.gear[g] = !gear.rigid()       ? gear.law.curve.torque(now.x[p.twist])
-                        : locked == nowhere ? 0.0
-                                            : now.memory[locked];
+        event.gear[g] = locked != nowhere ? now.memory[locked] : 0.0;
+        if (gear.rigid()) continue;
+        const double P = gear.law.curve.torque(now.x[p.twist]);
+        const double h = p.hysteresis == nowhere ? 0.0 : now.memory[p.hysteresis];
+        event.gear[g] = locked == nowhere ? P : std::clamp(event.gear[g], P - h, P + h);
     }
+    for (std::size_t k = 0; k < train().couplings.size(); ++k)
+        if (const int locked = places().contacts[places().couplings[k].contact].locked; locked != nowhere)
+            event.coupling[k] = now.memory[locked];
     for (std::size_t k = 0; k < train().angle_torques.size(); ++k) {
         const AngleTorque& t = train().angle_torques[k];
         now.memory[places().angle_torques[k].turn] = t.torque.turn(now.x[places().shafts[t.shaft].angle]);
@@ -251,7 +256,10 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
                 now.memory = before;
                 const Found found = at_limit ? settle_at_limit(cache, now, modes, event, key)
                                              : settle(cache, now, modes, event, key).found;
-                if (found == Found::yes && !event.closest && !at_limit) return found;
+                if (found == Found::yes && !event.closest && !at_limit) {
+                    hold_where_possible(cache, now, before, modes, event, key);
+                    return found;
+                }
                 if (found == Found::outside) worst = found;
                 if (found != Found::yes) continue;
                 const double v = event.closest ? violation(look_up(cache, key), now, event)
@@ -363,29 +371,32 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
     return worst;
 }
 
+template <class Sizes>
+bool SwitchedTrain<Sizes>::holds_more(const ContactPlace& c) const {
+    if (c.kind == ContactPlace::gear) return false;
+    const auto element = static_cast<std::size_t>(c.element);
+    if (c.kind == ContactPlace::coupling)
+        return train().couplings[element].holding() > train().couplings[element].torque;
+    const DryFriction& friction = train().shafts[element].friction;
+    return friction.holding() > friction.at_zero(0) ||
+           std::any_of(train().brakes.begin(), train().brakes.end(),
+                       [&](const Brake& b) { return b.shaft == c.element && b.holding() > b.torque; });
+}
+
 // Where a contact holds more than it takes while it slips, both rest and slip may be consistent: it does not break away
 // by itself.
 template <class Sizes>
 template <class Cache, class Now, class Memory>
 void SwitchedTrain<Sizes>::hold_where_possible(Cache& cache, Now& now, const Memory& before, Key modes,
                                                const Event& event, Key& key) const {
-    const auto holds_more = [&](const ContactPlace& c) {
-        if (c.kind == ContactPlace::gear) return false;
-        const auto element = static_cast<std::size_t>(c.element);
-        if (c.kind == ContactPlace::coupling)
-            return train().couplings[element].holding() > train().couplings[element].torque;
-        const DryFriction& friction = train().shafts[element].friction;
-        return friction.holding() > friction.at_zero(0) ||
-               std::any_of(train().brakes.begin(), train().brakes.end(),
-                           [&](const Brake& b) { return b.shaft == c.element && b.holding() > b.torque; });
-    };
     for (int c = 0; c < contacts(); ++c) {
         if (modes.modes[c] == 0 || !event.at_rest[c] || !holds_more(places().contacts[c])) continue;
         Key held = modes, found;
         held.modes[c] = 0;
         const auto memory = now.memory;
         now.memory = before;
-        if (settle(cache, now, held, event, found).found == Found::yes) {
+        if ((at_its_limit(held) ? settle_at_limit(cache, now, held, event, found)
+                                : settle(cache, now, held, event, found).found) == Found::yes) {
             modes = held;
             key = found;
         } else {
@@ -443,7 +454,8 @@ template <class Cache, class Now, class Input>
 bool SwitchedTrain<Sizes>::stays(Cache& cache, const Now& now, const Key& key, const Input& input) const {
     const auto& e = look_up(cache, key);
     const auto& r = regime_of(e);
-    if (const int i = r.driving_input; i >= 0 && r.driving_way * (now.input[0][i] - input[i]) < 0.0) return false;
+    for (const auto& driver : r.drivers)
+        if (falls(driver, input, now.input[0])) return false;
     Event lasting;
     lasting.by_value = true;
     std::vector<Violation> of_contacts;

@@ -75,7 +75,8 @@ struct PackedRegime {
     int n_followers = 0;
     std::array<bool, D::coupled> resting{}, following{};  // speeds kept at zero, and those that follow another
     bool solvable = true, in_data = true;
-    int driving_input = -1, driven_contact = -1;
+    std::vector<Driver<PackedForm<D>>> drivers;
+    int driving_input = -1;
     double driving_way = 0.0;
     bool complete = true;  // false: it has more guards than there is room for
 };
@@ -105,7 +106,7 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
     out.solvable = r.solvable;
     out.driving_input = r.driving_input;
     out.driving_way = r.driving_way;
-    out.driven_contact = r.driven_contact;
+    for (const Driver<Row>& d : r.drivers) out.drivers.push_back({d.contact, pack<D>(d.torque, n), pack<D>(d.rate, n)});
     out.in_data = r.in_data;
     return out;
 }

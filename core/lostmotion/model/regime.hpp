@@ -65,6 +65,15 @@ struct Ties {
     std::array<bool, max_contacts> redundant{};  // stuck, but its speed is kept at zero by those before it
 };
 
+// What takes a torque that rest leaves open along with the limit of a contact: where the inputs have a part in it, it
+// does so while `torque`, that torque in the direction that restores the hold, rises. `rate`: the part of the states in
+// its derivative.
+template <class Form>
+struct Driver {
+    int contact = -1;
+    Form torque{}, rate{};
+};
+
 struct Regime {
     Key key;
     std::vector<Row> rate;  // of each state
@@ -76,10 +85,10 @@ struct Regime {
     std::vector<Row> contact_torque;   // what each contact takes [N m]
     std::array<bool, max_contacts> at_rest{};  // contacts whose speeds this regime keeps at zero
     Ties ties;
-    // While a shaft at rest gives all that its contact can, an input by which it is driven there has to go on this way.
-    int driving_input = -1;  // -1: none
+    std::vector<Driver<Row>> drivers;
+    // The only driver, if it is one input, and which way this has to go on.
+    int driving_input = -1;  // -1: none, or more than that
     double driving_way = 0.0;
-    int driven_contact = -1;
     bool solvable = true;  // false: the reactions have no unique solution (jamming)
     bool in_data = true;   // false: a loss map is used outside its data
 };

@@ -141,6 +141,7 @@ class SwitchedTrain {
     }
 
     bool at_its_limit(const Key& key) const;
+    bool holds_more(const ContactPlace& c) const;
     template <class Cache, class Now>
     Found find(Cache& cache, Now& now, Event event, Key& key) const;
     template <class Cache, class Now>
@@ -259,8 +260,8 @@ class SwitchedTrain {
         const auto& r = regime_of(e);
         auto along = flow(e, now);
         decltype(&r.guards[0]) left = nullptr;
-        if (r.driving_input >= 0 && turns_back(r, now))
-            of_contacts.push_back({r.driven_contact, 0, n_derivatives, 0.0, true});
+        for (const auto& driver : r.drivers)
+            if (turns_back(along, driver.torque)) of_contacts.push_back({driver.contact, 0, n_derivatives, 0.0, true});
         each_near_zero(e, now, ignored, [&](const auto& guard, double value, double size) {
             const Sign s = sign_after(along, guard.form, value, size, event != nullptr && event->by_value_alone(guard));
             if (s.sign >= 0) return true;
@@ -275,15 +276,29 @@ class SwitchedTrain {
         });
         return left;
     }
-    // Does the input that drives a contact at its limit turn back just after now?
-    template <class R, class Now>
-    static bool turns_back(const R& r, const Now& now) {
-        const auto way = [&](std::size_t k) {
-            return r.driving_way * now.input[k][static_cast<std::size_t>(r.driving_input)];
-        };
-        for (std::size_t k = 1; k + 1 < n_derivatives; ++k)
-            if (std::fabs(way(k)) > time_rounding * std::fabs(now.time * way(k + 1))) return way(k) < 0.0;
+    // Does what drives a contact at its limit turn back just after now?
+    template <class F, class Form>
+    static bool turns_back(F& along, const Form& torque) {
+        for (int k = 1; k + 1 < static_cast<int>(n_derivatives); ++k) {
+            const double rate = along.rate(torque, k);
+            if (std::fabs(rate) > along.noise(along.rate_magnitude(torque, k), along.rate(torque, k + 1)))
+                return rate < 0.0;
+        }
         return false;
+    }
+    // Has it turned back where the inputs jump? A breakpoint that is met but for rounding is no jump: else a contact
+    // would hold anew what it holds at rest, and another come to its limit. (Of two shafts without that, as the drive,
+    // nothing comes of it.)
+    template <class Driver, class Input>
+    bool falls(const Driver& driver, const Input& before, const Input& after) const {
+        double change = 0.0, size = 0.0;
+        for (int i = 0; i < n_.inputs; ++i) {
+            const double share = driver.torque.c[n_.first_input + i];
+            change += share * (after[i] - before[i]);
+            size += std::fabs(share) * std::fmax(std::fabs(before[i]), std::fabs(after[i]));
+        }
+        const bool by_rounding = train().shafts.size() > 2 || holds_more(places().contacts[driver.contact]);
+        return change < (by_rounding ? -rounding * size : 0.0);
     }
     template <class E, class Now>
     double violation(const E& e, const Now& now, const Event& event) const;
@@ -292,6 +307,8 @@ class SwitchedTrain {
         double sum = 0.0;
         for (std::size_t g = 0; g < train().gears.size(); ++g)
             sum += std::fabs(evaluate(n_, r.output_torque[g], now) - event.gear[g]);
+        for (std::size_t k = 0; k < train().couplings.size(); ++k)
+            sum += std::fabs(evaluate(n_, r.contact_torque[places().couplings[k].contact], now) - event.coupling[k]);
         return sum;
     }
     template <class Cache, class Now, class G>

@@ -86,15 +86,31 @@ struct TrainReport {
     bool too_many_guards = false;  // a regime has more conditions than the kernel has room for
 
     template <class System, class Solver>
-    void ended(const System& system, const Solver& solver) {
-        const model::Layout& n = system.assembly().layout();
+    void ended(const System& system, Solver& solver) {
+        const model::Assembly& a = system.assembly();
+        const model::Layout& n = a.layout();
         time = solver.time();
         contact = solver.stopped_at();
         switching_count = solver.switchings();
         too_many_guards = system.overflowed();
         x.resize(static_cast<std::size_t>(n.states));
-        model::unpack_state<typename System::Dims>(solver.state(), n, x.begin());
+        // Speeds that are tied may have drifted apart by rounding.
+        const auto& r = solver.regime();
+        auto state = solver.state();
+        auto at_rest = r.at_rest;
+        system.stop(state, at_rest);
+        model::unpack_state<typename System::Dims>(state, n, x.begin());
         memory.assign(solver.memory().begin(), solver.memory().begin() + n.memory);
+        const auto input = solver.input_before(time, state);
+        // What rest leaves open may have gone along with the limit of a contact since its regime began.
+        for (std::size_t c = 0; c < a.places().contacts.size(); ++c) {
+            const model::ContactPlace& place = a.places().contacts[c];
+            if (place.locked == model::nowhere) continue;
+            const auto& torque =
+                place.kind == model::ContactPlace::gear ? r.output_torque[place.element] : r.contact_torque[c];
+            memory[static_cast<std::size_t>(place.locked)] =
+                evaluate<typename System::Dims>(torque, state, solver.memory(), input);
+        }
     }
     // What the balance fails by [J].
     double residual() const {
@@ -374,9 +390,15 @@ class TrainRun {
         std::vector<double> x, memory(static_cast<std::size_t>(assembly_->layout().memory));
         for (const std::string& name : model::state_names(*assembly_)) x.push_back(value_of(start.states, name));
         const std::vector<model::Gear>& gears = assembly_->train().gears;
-        for (std::size_t g = 0; g < gears.size(); ++g)
-            if (const int h = assembly_->places().gears[g].hysteresis; h != model::nowhere)
-                memory[static_cast<std::size_t>(h)] = value_of(start.hysteresis_capacities, gears[g].name);
+        for (std::size_t g = 0; g < gears.size(); ++g) {
+            const model::GearPlace& p = assembly_->places().gears[g];
+            if (p.hysteresis == model::nowhere) continue;
+            memory[static_cast<std::size_t>(p.hysteresis)] = value_of(start.hysteresis_capacities, gears[g].name);
+            if (const int locked = assembly_->places().contacts[static_cast<std::size_t>(p.contact)].locked;
+                locked != model::nowhere)
+                memory[static_cast<std::size_t>(locked)] =
+                    gears[g].law.curve.torque(x[static_cast<std::size_t>(p.twist)]);
+        }
         return {x, memory};
     }
 

@@ -244,12 +244,15 @@ class AdaptiveSolver {
             evaluate_guards(motion, end, x, dense.k[DormandPrince::stages - 1], there);
             double t_event = end;
             fired = first_event(entry, here, there, dense, t_event);
-            dense.end = fired != nullptr ? t_event : last ? limit : end;
-            observer.step(entry.regime, now_.memory, dense, fired == nullptr && last && limit >= t_end_);
-            now_.x = fired != nullptr ? dense(t_event) : x;
+            const bool turned = first_turn(entry, dense, end, t_event);
+            if (turned) fired = nullptr;
+            const bool ended = fired != nullptr || turned;
+            dense.end = ended ? t_event : last ? limit : end;
+            observer.step(entry.regime, now_.memory, dense, !ended && last && limit >= t_end_);
+            now_.x = ended ? dense(t_event) : x;
             time_ = dense.end;
             step_ = h;
-            if (fired != nullptr) return Status::done;
+            if (ended) return Status::done;
             dense.k[0] = dense.k[DormandPrince::stages - 1];
             std::swap(here, there);
             step_ = h *= std::clamp(0.9 * inverse_fifth_root(std::max(error, 1e-10)), 0.2, 5.0);
@@ -306,11 +309,33 @@ class AdaptiveSolver {
         return crossed;
     }
 
-    // Looks for the first fall of the guard below zero on a grid within the step, before t_event, and refines it by
-    // bisection on the dense output.
+    // Does a torque that goes along with the limit of a contact turn back within the step, before t_event? It leaves
+    // that instant there.
+    bool first_turn(const typename Cache::Entry& entry, const DenseStep& dense, double end, double& t_event) {
+        bool turned = false;
+        if constexpr (requires { entry.regime.drivers; })
+            for (const auto& driver : entry.regime.drivers) {
+                if (entry.regime.driving_input >= 0) break;  // the limit of the step
+                const auto rate = [&](double t) {
+                    const State x = dense(t);
+                    const Inputs u = input_at(t, x), u_rate = input_.template jet<2>()[1];
+                    double sum = evaluate<D>(driver.rate, x, now_.memory, u),
+                           size =
+                               solution_error(driver.rate, x) + rounding * magnitude<D>(driver.rate, x, now_.memory, u);
+                    for (int i = 0; i < D::inputs; ++i) {
+                        sum += driver.torque.c[D::first_input + i] * u_rate[i];
+                        size += rounding * std::fabs(driver.torque.c[D::first_input + i] * u_rate[i]);
+                    }
+                    return sum + 2.0 * size;
+                };
+                turned = first_fall(rate, 0.0, dense, end, false, t_event) || turned;
+            }
+        return turned;
+    }
+
+    // Does the guard fall below zero within the step, before t_event?
     void refine_crossing(const Guard& guard, const DenseStep& dense, double end, double& t_event,
                          const Guard*& crossed) {
-        constexpr int parts_checked = 16;
         const auto value = [&](double t) {
             const State x = dense(t);
             return evaluate<D>(guard.form, x, now_.memory, input_at(t, x));
@@ -321,10 +346,19 @@ class AdaptiveSolver {
         // The speed of the twist is a small difference, and each of its zeros sets the hysteresis anew: one that the
         // error of the solution may make is none.
         if (guard.by_grazing) noise += solution_error(guard.form, dense.x);
+        if (first_fall(value, noise, dense, end, crossed == nullptr, t_event)) crossed = &guard;
+    }
+
+    // Looks for the first fall of a value below zero on a grid within the step, before t_event (or up to it), and
+    // refines it by bisection on the dense output.
+    template <class Value>
+    static bool first_fall(const Value& value, double noise, const DenseStep& dense, double end, bool up_to,
+                           double& t_event) {
+        constexpr int parts_checked = 16;
         double low = dense.begin;
         for (int k = 1; k <= parts_checked; ++k) {
             double high = k == parts_checked ? end : dense.begin + dense.length * k / parts_checked;
-            if (low >= t_event) return;
+            if (low >= t_event) return false;
             if (value(high) >= -noise) {
                 low = high;
                 continue;
@@ -334,12 +368,11 @@ class AdaptiveSolver {
                 const double middle = 0.5 * (low + high);
                 (value(middle) > 0.0 ? low : high) = middle;
             }
-            if (high < t_event || crossed == nullptr) {
-                t_event = high;
-                crossed = &guard;
-            }
-            return;
+            if (!(high < t_event || up_to)) return false;
+            t_event = high;
+            return true;
         }
+        return false;
     }
 
     // Does the guard touch zero, as far as this solution can tell, and rise again?

@@ -8,6 +8,44 @@
 
 namespace lostmotion {
 
+// The first instant from begin_ on at which a torque that goes along with the limit of a contact turns back, before
+// `limit`; else `limit`. From a slope v and a curvature a of that torque follows v + a s - K s^2/2 <= its slope after
+// s <= h, where K bounds how its third derivative falls, so that no turn is stepped over.
+template <class System>
+double ExactSolver<System>::first_turn(Entry& e, double limit) {
+    if constexpr (requires { e.regime.drivers; }) {
+        const int level = e.propagator.bounded_level(first_level);
+        const double h = e.propagator.length(level);
+        Coupled forced{};
+        for (int i = 0; i < D::inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
+        Cursor at = *begin_;
+        while (at.time() < limit) {
+            const InstantOf<D> now{at.time(), at.x(), now_.memory, at.input().jet(), at.input().magnitudes()};
+            Flow<D> along(e.rates, now);
+            State fourth{};
+            (e.propagator.level(level).exponential_bound * (absolute(at.fourth_derivative()) + h * forced))
+                .store(fourth.data());
+            double step = std::min(h, limit - at.time());
+            for (const auto& driver : e.regime.drivers) {
+                const LinearForm& torque = driver.torque;
+                const double a = along.rate(torque, 2), b = along.rate(torque, 3);
+                const double noise = 2.0 * along.noise(along.rate_magnitude(torque, 1), a);
+                const double v = along.rate(torque, 1) + noise;
+                if (v < 0.0) return at.time();
+                double bound = 0.0;
+                for (int k = 0; k < D::states; ++k) bound += std::fabs(torque.c[k]) * fourth[k];
+                for (int i = 0; i < D::inputs; ++i) bound += std::fabs(torque.c[D::first_input + i]) * input_bound_[i];
+                const double K = std::fmax(0.0, -b) + bound * h / 3.0;
+                if (v + step * (a - 0.5 * K * step) >= 0.0) continue;
+                step = K > 0.0 ? (a + std::sqrt(a * a + 2.0 * K * v)) / K : -v / a;
+            }
+            at.advance(std::fmax(step, std::nextafter(at.time(), limit) - at.time()));
+            at.anchor(std::fmin(at.time(), limit));
+        }
+    }
+    return limit;
+}
+
 // Earliest of the certified crossings; there_ is left at it.
 template <class System>
 inline auto ExactSolver<System>::first_crossing(Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here,

@@ -105,6 +105,12 @@ class ExactSolver {
     const Course& course() const { return course_; }
     // From now on the input is value + slope * (t - now). Only for signals made with ramped_inputs().
     void set_ramp(int input, double value, double slope) { signals_[input].breakpoints[0] = {time_, value, slope}; }
+    // Of the inputs, the left limit.
+    InputsOf<D> input_before(double t, const State&) const {
+        InputState input(signals_, rotations_.basis());
+        input.anchor_left(t);
+        return input.values();
+    }
     // The inputs have changed at this instant: finds the regime anew.
     template <class Observer>
     Status inputs_changed(Observer& observer) {
@@ -150,6 +156,8 @@ class ExactSolver {
             double limit = std::min(t_end, breakpoint_);
             if (const Regime& r = entry.regime; r.driving_input >= 0) [[unlikely]]
                 limit = begin_->input().turning(r.driving_input, r.driving_way, limit);
+            else if (follows_inputs(r)) [[unlikely]]
+                limit = first_turn(entry, limit);
             const Guard* fired = nullptr;
             const Status status = run_regime(segment, limit, fired);
             if (status != Status::done) return status;
@@ -258,6 +266,7 @@ class ExactSolver {
     Departure departure(const Entry& e, const Memory& memory, const Cursor& cursor, int g) const;
 
     // Roots: exact_roots.hpp.
+    [[gnu::cold]] double first_turn(Entry& e, double limit);
     void first_crossing(Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here, const Ends& there,
                         double h, const Guard*& fired);
     [[gnu::cold]] double first_return(const LinearForm& form, const Cursor& cursor, std::size_t order, double end);

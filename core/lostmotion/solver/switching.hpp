@@ -53,6 +53,15 @@ bool wants_switching(const Observer& observer) {
         return true;
 }
 
+// Does an input take the torque of a contact at its limit along in this regime?
+template <class Regime>
+bool follows_inputs(const Regime& r) {
+    if constexpr (requires { r.drivers; })
+        return !r.drivers.empty();
+    else
+        return r.driving_input >= 0;
+}
+
 // Finds the regime that follows after `fired` has reached zero, with the inputs of that instant, or, if it is nullptr,
 // after an input has jumped. Shows the switching to the observer, if it wants to see it.
 template <class System, class Cache, class D, class Observer>
@@ -79,7 +88,7 @@ Status switch_regime(const System& system, Cache& cache, InputState<D>& input, d
     // An input that drives a contact to its limit has taken the torque with it up to here.
     std::optional<InputsOf<D>> before;
     if (fired == nullptr) {
-        if (cache.regime(key).driving_input >= 0) {
+        if (follows_inputs(cache.regime(key))) {
             input.anchor_left(time);
             before = input.values();
         }
