@@ -7,6 +7,8 @@ SOURCES := $(wildcard core/lostmotion/*/*.hpp bindings/*.cpp bindings/*.hpp scen
 
 .PHONY: demo test bench docs lint format clean
 .DELETE_ON_ERROR:
+# Not every ninja understands the job server of every make.
+unexport MAKEFLAGS
 
 demo: $(VENV)/built
 	$(BIN)/lostmotion reproduce -o out

@@ -19,6 +19,8 @@ TRAINS = [path for path in ALL_SCENARIOS if "[shafts." in path.read_text()]
 """in the long form"""
 SCENARIOS = [path for path in ALL_SCENARIOS if path not in TRAINS]
 """in the short form"""
+CONTROLLED = [path for path in ALL_SCENARIOS if "[controller" in path.read_text()]
+"""with a controller"""
 
 
 @pytest.fixture(scope="session")

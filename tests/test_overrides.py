@@ -32,6 +32,12 @@ OTHER = {
     "motor.limits.resistance": "1 ohm",
     "motor.limits.torque_constant": "50 mNm/A",
     "motor.limits.thermal_resistance": "9 K/W",
+    "motor.limits.thermal_resistance_winding_case": "2 K/W",
+    "motor.limits.thermal_resistance_case_ambient": "2 K/W",
+    "motor.limits.thermal_time_constant_winding": "20 ms",
+    "motor.limits.thermal_time_constant_motor": "1 s",
+    "motor.winding": {"pole_pairs": 4},
+    "motor.dc_voltage": "12 V",
     "motor.limits.max_winding_temperature": "90 degC",
     "motor.limits.max_voltage": "10 V",
     "motor.limits.max_current": "1 A",
@@ -66,6 +72,9 @@ OTHER = {
     "load.torque": "3 Nm",
 }
 REFUSED = {
+    "motor.limits.thermal_resistance": "say the same",  # as both of its parts
+    "motor.winding": "resistance_phase",
+    "motor.dc_voltage": "winding",
     "gearbox.stiffness.kind": "gearbox.hysteresis",  # rigid, with hysteresis
     "gearbox.losses.kind": "gearbox.losses.efficiency",
     "gearbox.losses.speeds": "has a hole",

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.signal
 import xarray as xr
 
 import lostmotion as lm
@@ -82,12 +83,17 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "save": (lm.save, {"dataset": RESULT, "path": "out.csv"}),
     "scenario_of": (lm.scenario_of, {"dataset": RESULT}),
     "shipped_scenarios": (lm.shipped_scenarios, {}),
-    "simulate": (lm.simulate, {"scenario_or_drive": SCENARIO, "command": 0.0, "load_torque": 0.0, "duration": 0.01, "sample_interval": 0.001, "initial": None, "solver": "exact", "relative_tolerance": None, "energy": True}),
+    "simulate": (lm.simulate, {"scenario_or_drive": SCENARIO, "command": 0.0, "load_torque": 0.0, "duration": 0.01, "sample_interval": 0.001, "initial": None, "solver": "exact", "relative_tolerance": None, "energy": True, "law": None}),
     "study": (lm.study, {"what": STUDY, "directory": "study", "threads": 1, "executor": None, "progress": None}),
     "switchings_of": (lm.switchings_of, {"result": RESULT}),
+    "as_filter": (lm.as_filter, {"system": scipy.signal.dlti([1.0], [1.0, -0.5], dt=1e-3)}),
+    "commission": (lm.commission, {"scenario": SCENARIO, "motor": None, "window": None, "progress": dangle}),
+    "tune": (lm.tune, {"scenario": SCENARIO, "rule": "identical_damping", "damping": 0.7, "phase_margin": 1.0, "goal": "bandwidth", "sensitivity_peak": 1.7, "motor": None}),
+    "select": (lm.select, {"task": "task.toml", "directory": None, "threads": 1, "executor": None, "progress": None}),
+    "load_task": (lm.load_task, {"path": "task.toml"}),
     "temperatures": (lm.temperatures, {"result": HEAT, "motor": None, "ambient": 25.0, "winding": 25.0, "case": 25.0, "repeated": False, "constant_resistance": False}),
     "to_control": (lm.to_control, {"response": RESPONSE, "amplitude": 1.0, "output": "load_speed"}),
-    "Simulation": (lm.Simulation, {"drive": SCENARIO, "step": 1e-3, "initial": None, "loaded": None}),
+    "Simulation": (lm.Simulation, {"drive": SCENARIO, "step": 1e-3, "initial": None, "loaded": None, "law": None}),
     "Simulation of a train": (lm.Simulation, {"drive": TRAIN, "step": 1e-3, "initial": None, "loaded": ["worm"]}),
     "TestRig": (lm.TestRig, {"gearbox": SCENARIO.gearbox}),
     "ResultAccessor": (lm.ResultAccessor, {"dataset": RESULT}),
@@ -118,7 +124,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Scenario.replace": (lambda value: SCENARIO.replace(**{"load.inertia": value}), {"value": 1.0}),
     "Scenario.from_json": (lm.Scenario.from_json, {"text": "{}"}),
 }  # fmt: skip
-SLOW = {"check_drive", "measure"}  # with an argument that is right
+SLOW = {"check_drive", "measure", "commission", "tune", "select", "load_task"}  # with an argument that is right
 
 
 def names() -> list[str]:

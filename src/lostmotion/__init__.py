@@ -80,9 +80,15 @@ if TYPE_CHECKING:
     from .response.linear import rigid_constants as rigid_constants
     from .response.shooting import periodic_motion as periodic_motion
     from .response.shooting import periodic_motions as periodic_motions
+    from .servo.commission import LoopSheet as LoopSheet
     from .servo.commission import ServoReport as ServoReport
+    from .servo.commission import Stiffness as Stiffness
     from .servo.commission import commission as commission
+    from .servo.motion import AtRest as AtRest
+    from .servo.motion import Following as Following
     from .servo.motion import LimitCycle as LimitCycle
+    from .servo.motion import Settling as Settling
+    from .servo.motion import StepResponse as StepResponse
     from .servo.tuning import Tuning as Tuning
     from .servo.tuning import tune as tune
     from .simulation.explanation import ContactState as ContactState
@@ -167,8 +173,8 @@ _HOMES = {
     "simulation.switchings": ("switchings_of",),
     "simulation.train_scenario": ("ShaftTable", "TrainInitial", "TrainScenario"),
     "simulation.variables": ("VARIABLES", "Variable"),
-    "servo.commission": ("ServoReport", "commission"),
-    "servo.motion": ("LimitCycle",),
+    "servo.commission": ("LoopSheet", "ServoReport", "Stiffness", "commission"),
+    "servo.motion": ("AtRest", "Following", "LimitCycle", "Settling", "StepResponse"),
     "servo.tuning": ("Tuning", "tune"),
     "sizing.drive_check": ("check_drive",),
     "sizing.finding": ("Finding",),
