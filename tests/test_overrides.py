@@ -35,7 +35,7 @@ OTHER = {
     "motor.limits.thermal_resistance_winding_case": "2 K/W",
     "motor.limits.thermal_resistance_case_ambient": "2 K/W",
     "motor.limits.thermal_time_constant_winding": "20 ms",
-    "motor.limits.thermal_time_constant_motor": "1 s",
+    "motor.limits.thermal_time_constant_motor": "10 ms",
     "motor.winding": {"pole_pairs": 4},
     "motor.dc_voltage": "12 V",
     "motor.limits.max_winding_temperature": "90 degC",

@@ -84,6 +84,8 @@ if TYPE_CHECKING:
     from .servo.commission import ServoReport as ServoReport
     from .servo.commission import Stiffness as Stiffness
     from .servo.commission import commission as commission
+    from .servo.margins import Bandwidth as Bandwidth
+    from .servo.margins import Margins as Margins
     from .servo.motion import AtRest as AtRest
     from .servo.motion import Following as Following
     from .servo.motion import LimitCycle as LimitCycle
@@ -174,6 +176,10 @@ _HOMES = {
     "simulation.train_scenario": ("ShaftTable", "TrainInitial", "TrainScenario"),
     "simulation.variables": ("VARIABLES", "Variable"),
     "servo.commission": ("LoopSheet", "ServoReport", "Stiffness", "commission"),
+    "servo.margins": (
+        "Bandwidth",
+        "Margins",
+    ),
     "servo.motion": ("AtRest", "Following", "LimitCycle", "Settling", "StepResponse"),
     "servo.tuning": ("Tuning", "tune"),
     "sizing.drive_check": ("check_drive",),
