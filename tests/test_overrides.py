@@ -96,7 +96,11 @@ def keys() -> set[str]:
 def what_is_seen(scenario: lm.Scenario) -> tuple[object, ...]:
     result = lm.simulate(scenario)
     motion = [result[name].values.tobytes() for name in result.data_vars]
-    return (*motion, result.attrs.get("note"), *map(str, lm.check_drive(scenario)))
+    try:
+        heat = lm.temperatures(result)["case_temperature"].values.tobytes()
+    except lm.InputError as lacking:  # such as the resistance of a torque source
+        heat = str(lacking).encode()
+    return (*motion, heat, result.attrs.get("note"), *map(str, lm.check_drive(scenario)))
 
 
 def test_every_key_is_tried() -> None:
