@@ -12,10 +12,6 @@ namespace lostmotion::control {
 // A value and its time derivatives.
 struct ReferencePoint {
     double value = 0.0, rate = 0.0, second = 0.0, third = 0.0;
-
-    friend ReferencePoint operator*(double a, const ReferencePoint& p) {
-        return {a * p.value, a * p.rate, a * p.second, a * p.third};
-    }
 };
 
 // From `time` [s] on value + rate s + second s^2/2 + third s^3/6, until the next piece.

@@ -62,6 +62,19 @@ bool follows_inputs(const Regime& r) {
         return r.driving_input >= 0;
 }
 
+// Completes a switching with what there is after it, and shows it.
+template <class System, class Cache, class D, class Observer>
+void show_switching(const System& system, Cache& cache, const InstantOf<D>& now, const typename System::Key& key,
+                    SwitchingOf<System>& s, Observer& observer) {
+    if constexpr (requires { observer.switching(s); }) {
+        s.after = key;
+        s.x = now.x;
+        s.memory = now.memory;
+        s.torque_after = evaluate<D>(system.torque_at_load(cache.regime(key)), now.x, now.memory, now.input[0]);
+        observer.switching(s);
+    }
+}
+
 // Finds the regime that follows after `fired` has reached zero, with the inputs of that instant, or, if it is nullptr,
 // after an input has jumped. Shows the switching to the observer, if it wants to see it.
 template <class System, class Cache, class D, class Observer>
@@ -104,15 +117,7 @@ Status switch_regime(const System& system, Cache& cache, InputState<D>& input, d
         }
     const Found found = system.next(cache, now, fired, key, before.value_or(now.input[0]));
     if (found != Found::yes) return status_of(found);
-    if constexpr (requires { observer.switching(s); }) {
-        if (wanted) {
-            s.after = key;
-            s.x = now.x;
-            s.memory = now.memory;
-            s.torque_after = evaluate<D>(system.torque_at_load(cache.regime(key)), now.x, now.memory, now.input[0]);
-            observer.switching(s);
-        }
-    }
+    if (wanted) show_switching(system, cache, now, key, s, observer);
     return Status::done;
 }
 
@@ -128,16 +133,10 @@ Status follow_change(const System& system, Cache& cache, const InputsOf<D>& left
     const Found found = system.next(cache, now, nullptr, key, left);
     changed = !(key == s.before);
     if (found != Found::yes || !changed) return status_of(found);
-    if constexpr (requires { observer.switching(s); }) {
-        if (wanted) {
-            s.time = now.time;
-            s.input_jump = true;
-            s.after = key;
-            s.x = now.x;
-            s.memory = now.memory;
-            s.torque_after = evaluate<D>(system.torque_at_load(cache.regime(key)), now.x, now.memory, now.input[0]);
-            observer.switching(s);
-        }
+    if (wanted) {
+        s.time = now.time;
+        s.input_jump = true;
+        show_switching(system, cache, now, key, s, observer);
     }
     return Status::done;
 }

@@ -45,23 +45,17 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
         The motor has neither a winding nor `limits.torque_constant`, or `motor` names none.
     """
     m, where, (command, torque, speed) = _motor_of(result, motor)
+    current, voltage, _ = current_voltage_power(m, command, torque, speed)
     attributes: dict[str, Any] = {}
     if m.winding is None:
-        constant = None if m.limits is None else m.limits.torque_constant
-        if constant is None:
+        if m.limits is None or m.limits.torque_constant is None:
             raise InputError(f"motor_current: the motor lacks {where}.limits.torque_constant; give it, or a winding")
-        found = {"current": (torque / constant, "A", "current of the armature")}
+        found = {"current": (current, "A", "current of the armature")}
     else:
-        phase = m.winding.phase_values()
-        current = torque / phase.torque_constant
-        if m.kind == "synchronous":
-            u_q = np.clip(command, -1.0, 1.0) * m.phase_voltage
-        else:  # a torque source gives what it takes, but for the voltage of L_q di_q/dt
-            u_q = phase.resistance * current + phase.voltage_constant * speed
         found = {
             "current": (current, "A", "current i_q, amplitude of a phase"),
             "current_rms": (abs(current) / math.sqrt(2.0), "A", "current of a phase, rms"),
-            "voltage": (phase.voltage(u_q, torque, speed), "V", "voltage, amplitude of a phase"),
+            "voltage": (voltage, "V", "voltage, amplitude of a phase"),
         }
         if m.dc_voltage is not None:
             attributes["voltage_limit"] = m.phase_voltage
@@ -79,7 +73,7 @@ def current_voltage_power(
         i = torque / phase.torque_constant
         if m.kind == "synchronous":
             u_q = m.phase_voltage * np.clip(command, -1.0, 1.0)
-        else:
+        else:  # a torque source gives what it takes, but for the voltage of L_q di_q/dt
             u_q = phase.resistance * i + phase.voltage_constant * speed
         return i, np.asarray(phase.voltage(u_q, torque, speed)), 1.5 * u_q * i
     limits = m.limits
