@@ -202,9 +202,9 @@ inline void RegimeGuards::add_driver(int contact) {
                             : regime_.contact_torque[static_cast<std::size_t>(open)];
     Driver<Row> driver{contact};
     // What an elimination leaves of a term that cancels is none.
-    const double scale = (overcomes > 0.0 ? -1.0 : 1.0) / largest_share(torque);
+    const double scale = std::copysign(largest_share(torque), -overcomes);
     const auto share = [&](int term) {
-        const double s = scale * torque.c[term];
+        const double s = torque.c[term] / scale;
         return std::fabs(s) > 1e-14 ? s : 0.0;
     };
     bool by_states = false, by_inputs = false;
