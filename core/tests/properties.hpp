@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "support.hpp"
+#include "drive_runs.hpp"
 
 namespace lostmotion {
 

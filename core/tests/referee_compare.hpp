@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "drive_runs.hpp"
 #include "referee.hpp"
-#include "support.hpp"
 
 namespace lostmotion::referee {
 

@@ -4,7 +4,7 @@
 
 #include <initializer_list>
 
-#include "support.hpp"
+#include "drive_runs.hpp"
 
 namespace lostmotion {
 

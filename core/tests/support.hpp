@@ -1,4 +1,4 @@
-// Drives and runs shared by the tests.
+// Drives shared by the tests.
 #pragma once
 
 #include <cmath>
@@ -7,12 +7,8 @@
 #include <vector>
 
 #include "lostmotion/simulation/run.hpp"
-#include "lostmotion/simulation/stepping.hpp"
 
 namespace lostmotion {
-
-// The solvers of drives take long to compile: once, in drive_runs.cpp.
-extern template class SimulationOf<SwitchedDrive>;
 
 inline constexpr double pi = std::numbers::pi;
 
@@ -75,17 +71,6 @@ inline Drive plain_drive(double ratio, double J_1, double J_2) {
     d.load.inertia = J_2;
     return d;
 }
-
-struct Samples {
-    RunReport report;
-    std::size_t count = 0;
-    std::vector<double> data;
-    double operator()(Channel c, std::size_t k) const { return data[c * count + k]; }
-};
-
-// By the exact solver, or by the adaptive one to a tolerance.
-Samples run(const Drive& drive, const Signals& signals, double duration, double interval = 1e-3,
-            const Start& start = {}, double adaptive_tolerance = 0.0);
 
 // Random drives that mix all parts and signals. Sizes are drawn by the logarithm, over what real drives have.
 class RandomDrives {

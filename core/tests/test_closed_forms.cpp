@@ -1,7 +1,7 @@
 // One effect at a time against its closed form.
 #include <doctest/doctest.h>
 
-#include "support.hpp"
+#include "drive_runs.hpp"
 
 using namespace lostmotion;
 using doctest::Approx;

@@ -2,7 +2,7 @@
 #include <doctest/doctest.h>
 
 #include "lostmotion/analysis/explain.hpp"
-#include "support.hpp"
+#include "drive_runs.hpp"
 
 using namespace lostmotion;
 using doctest::Approx;

@@ -3,7 +3,7 @@
 
 #include <cstdio>
 
-#include "support.hpp"
+#include "drive_runs.hpp"
 
 using namespace lostmotion;
 

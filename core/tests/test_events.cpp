@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "support.hpp"
+#include "drive_runs.hpp"
 
 using namespace lostmotion;
 using doctest::Approx;

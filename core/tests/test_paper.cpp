@@ -1,7 +1,7 @@
 // The published drive, against the two end states that two unlike methods agree on.
 #include <doctest/doctest.h>
 
-#include "support.hpp"
+#include "drive_runs.hpp"
 
 using namespace lostmotion;
 

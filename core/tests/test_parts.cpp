@@ -4,7 +4,7 @@
 #include <random>
 
 #include "lostmotion/analysis/reduction.hpp"
-#include "support.hpp"
+#include "drive_runs.hpp"
 
 using namespace lostmotion;
 using doctest::Approx;

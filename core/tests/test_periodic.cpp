@@ -4,7 +4,7 @@
 #include <cstdio>
 
 #include "lostmotion/analysis/drive_response.hpp"
-#include "support.hpp"
+#include "drive_runs.hpp"
 
 using namespace lostmotion;
 

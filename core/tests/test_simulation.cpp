@@ -1,7 +1,7 @@
 // Step by step: splitting, restoring, agreement with whole runs.
 #include <doctest/doctest.h>
 
-#include "support.hpp"
+#include "drive_runs.hpp"
 
 using namespace lostmotion;
 using doctest::Approx;

@@ -3,6 +3,7 @@
 
 #include <cstring>
 
+#include "drive_runs.hpp"
 #include "lostmotion/analysis/train_explain.hpp"
 #include "random_trains.hpp"
 #include "train_kernels.hpp"
