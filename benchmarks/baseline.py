@@ -18,7 +18,7 @@ from report import VECTORS, Report
 
 ROOT = Path(__file__).parent.parent
 BASELINE = "cfbb9f610af1c58c3c7e1ccc2c74f35c1b148355"  # the last before motions that die out were solved exactly
-PAIRS, RUNS = 100, 250
+PAIRS, RUNS = 250, 250
 
 
 def take(directory: Path) -> None:
