@@ -114,6 +114,54 @@ inline std::vector<std::tuple<std::string, std::string, std::string>> axis_signa
     return out;
 }
 
+inline void bind_inverse_model(nb::module_& m) {
+    using namespace control;
+    nb::class_<GearLosses> losses(m, "GearLosses");
+    nb::enum_<GearLosses::Kind>(losses, "Kind")
+        .value("none", GearLosses::none)
+        .value("efficiency", GearLosses::constant_efficiency)
+        .value("map", GearLosses::loss_map);
+    losses.def(nb::init<>())
+        .def_rw("kind", &GearLosses::kind)
+        .def_rw("ratio", &GearLosses::ratio)
+        .def_rw("efficiency", &GearLosses::efficiency)
+        .def_rw("map", &GearLosses::map)
+        .def_rw("rated_torque", &GearLosses::rated_torque)
+        .def_rw("rated_speed", &GearLosses::rated_speed)
+        .def("__call__", &GearLosses::operator(), "output_torque"_a, "direction"_a, "speed"_a)
+        .def("output_torque", &GearLosses::output_torque, "input_torque"_a, "direction"_a, "speed"_a, "factor"_a);
+    nb::class_<Adaptation>(m, "Adaptation")
+        .def(nb::init<>())
+        .def_rw("rate", &Adaptation::rate)
+        .def_rw("min", &Adaptation::min)
+        .def_rw("max", &Adaptation::max);
+    nb::class_<InverseModel>(m, "InverseModel")
+        .def(nb::init<>())
+        .def_rw("present", &InverseModel::present)
+        .def_rw("motor_inertia", &InverseModel::motor_inertia)
+        .def_rw("motor_viscous_friction", &InverseModel::motor_viscous_friction)
+        .def_rw("load_inertia", &InverseModel::load_inertia)
+        .def_rw("load_viscous_friction", &InverseModel::load_viscous_friction)
+        .def_rw("load_torque", &InverseModel::load_torque)
+        .def_rw("losses", &InverseModel::losses)
+        .def_rw("loss_factor", &InverseModel::loss_factor)
+        .def_rw("friction_torque", &InverseModel::friction_torque)
+        .def_rw("of_losses", &InverseModel::of_losses)
+        .def_rw("of_friction", &InverseModel::of_friction)
+        .def_rw("min_speed", &InverseModel::min_speed)
+        .def_rw("through_gear", &InverseModel::through_gear)
+        .def_rw("curve", &InverseModel::curve)
+        .def_rw("twist_rate", &InverseModel::twist_rate);
+    nb::class_<LoadObserver>(m, "LoadObserver")
+        .def(nb::init<>())
+        .def_rw("present", &LoadObserver::present)
+        .def_rw("input_time", &LoadObserver::input_time)
+        .def_rw("load_time", &LoadObserver::load_time)
+        .def_rw("input_share", &LoadObserver::input_share)
+        .def_rw("load_share", &LoadObserver::load_share)
+        .def_rw("bandwidth", &LoadObserver::bandwidth);
+}
+
 inline void bind_control(nb::module_& m) {
     using namespace control;
     nb::class_<TickDelay>(m, "TickDelay").def(nb::init<>()).def_rw("ticks", &TickDelay::ticks);
@@ -175,6 +223,7 @@ inline void bind_control(nb::module_& m) {
         .def(nb::init<>())
         .def_rw("backlash", &BacklashCompensation::backlash)
         .def_rw("rate", &BacklashCompensation::rate);
+    bind_inverse_model(m);
     nb::class_<DiscreteSystem>(m, "DiscreteSystem")
         .def(
             "__init__",
@@ -212,6 +261,8 @@ inline void bind_control(nb::module_& m) {
         .def_rw("speed_loop", &BoundAxis::speed_loop)
         .def_rw("current_loop", &BoundAxis::current_loop)
         .def_rw("feedforward", &BoundAxis::feedforward)
+        .def_rw("inverse_model", &BoundAxis::inverse_model)
+        .def_rw("load_observer", &BoundAxis::load_observer)
         .def_rw("backlash", &BoundAxis::backlash)
         .def_rw("speed_filters", &BoundAxis::speed_filters)
         .def_rw("torque_filters", &BoundAxis::torque_filters)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from .control.encoder import Encoder as Encoder
     from .control.filters import TransferFunction as TransferFunction
     from .control.filters import as_filter as as_filter
+    from .control.inverse_model import InverseModel as InverseModel
+    from .control.inverse_model import LoadObserver as LoadObserver
     from .control.law import Law as Law
     from .control.references import Move as Move
     from .control.references import PositionReference as PositionReference
@@ -136,6 +138,7 @@ _HOMES = {
     "control.controller": ("Controller",),
     "control.encoder": ("Encoder",),
     "control.filters": ("TransferFunction", "as_filter"),
+    "control.inverse_model": ("InverseModel", "LoadObserver"),
     "control.law": ("Law",),
     "control.references": ("Move", "PositionReference", "SpeedReference", "TorqueReference"),
     "data_sheets.components": ("gearbox", "motor"),

@@ -16,6 +16,8 @@
 #include "encoder.hpp"
 #include "feedforward.hpp"
 #include "filter.hpp"
+#include "inverse_model.hpp"
+#include "load_observer.hpp"
 #include "own_law.hpp"
 #include "position_loop.hpp"
 #include "speed_estimate.hpp"
@@ -52,6 +54,9 @@ enum AxisSignal : int {
     speed_reference,     // [rad/s], of the motor
     measured_speed,      // the same
     torque_reference,    // [N m], of the motor
+    loss_factor,         // of the inverse model
+    friction_torque,     // the same [N m]
+    load_torque,         // [N m], of the load observer
     n_axis_signals
 };
 
@@ -64,6 +69,9 @@ inline constexpr std::array<AxisSignalName, n_axis_signals> axis_signal_names{{
     {"speed_reference", "rad/s", "speed of the motor that the controller wants"},
     {"measured_speed", "rad/s", "speed of the motor that the controller has read"},
     {"torque_reference", "N*m", "torque of the motor that the controller wants"},
+    {"model_loss_factor", "1", "factor on the losses of the gear that the inverse model has adapted"},
+    {"model_friction_torque", "N*m", "friction torque of the motor that the inverse model has adapted"},
+    {"observed_load_torque", "N*m", "load torque that the load observer has found"},
 }};
 
 class Axis {
@@ -85,6 +93,8 @@ class Axis {
     SpeedLoop speed_loop;
     std::optional<CurrentLoop> current_loop;
     TorqueFeedforward feedforward;
+    InverseModel inverse_model;  // in the place of feedforward and backlash
+    LoadObserver load_observer;
     BacklashCompensation backlash;
     std::vector<DiscreteSystem> speed_filters, torque_filters;
     OwnLaw own_law;  // instead of all loops
@@ -101,6 +111,8 @@ class Axis {
         speed_loop.place(slots);
         if (current_loop) current_loop->place(slots);
         backlash.place(slots);
+        inverse_model.place(slots);
+        load_observer.place(slots);
         for (auto* filters : {&speed_filters, &torque_filters})
             for (DiscreteSystem& f : *filters) f.place(slots);
         own_law.place(slots);
@@ -115,6 +127,9 @@ class Axis {
         if (two_encoders) position_sensor.encoder.start(y.position_angle, slot);
         const double angle = speed_sensor.scale * speed_sensor.encoder.reading(y.speed_angle);
         estimate.start(angle, speed_sensor.scale * y.speed, tick_length * speed_schedule.every, slot);
+        inverse_model.start(slot);
+        load_observer.start(speed_sensor.scale * y.speed, inverse_model, slot);
+        show_model(slot);
         if (two_encoders)
             slot[blended] = position_sensor.scale * position_sensor.encoder.reading(y.position_angle) - angle / ratio;
     }
@@ -126,9 +141,12 @@ class Axis {
         slot[speed_angle] = speed_sensor.scale * speed_sensor.encoder(y.speed_angle, tick, slot);
         if (two_encoders)
             slot[position_angle] = position_sensor.scale * position_sensor.encoder(y.position_angle, tick, slot);
-        if (speed_schedule.due(tick))
+        if (speed_schedule.due(tick)) {
+            const double T = tick_length * speed_schedule.every;
             slot[measured_speed] = estimate(slot[speed_angle], speed_sensor.scale * y.speed, slot[torque_reference],
-                                            speed_schedule.sample(tick), tick_length * speed_schedule.every, slot);
+                                            speed_schedule.sample(tick), T, slot);
+            if (load_observer.present) load_observer.observe(y.motor_torque, slot[measured_speed], inverse_model, slot);
+        }
         if (own_law.present()) {
             if (!run_own_law(time, y, command, slot)) return false;
         } else {
@@ -166,8 +184,11 @@ class Axis {
         const ReferencePoint ahead = reference.at(time);
         slot[position_reference] = reference_delay == 0.0 ? ahead.value : reference.at(time - reference_delay).value;
         slot[measured_position] = position(slot);
-        const double e = slot[position_reference] + backlash(ahead.rate, T, slot) - slot[measured_position];
-        slot[speed_reference] = ratio * position_loop(e, ahead.rate, T, slot);
+        const InverseModel::Ahead twist =
+            inverse_model.twist(ahead.rate, ahead.second, load_observer.load(slot), T, slot);
+        const double e =
+            slot[position_reference] + backlash(ahead.rate, T, slot) + twist.angle - slot[measured_position];
+        slot[speed_reference] = ratio * position_loop(e, ahead.rate + twist.rate, T, slot);
     }
 
     void run_speed_loop(double time, double T, double* slot) const {
@@ -177,10 +198,22 @@ class Axis {
                      gain_ahead = mode == speed_mode ? r.rate : r.second;
         double wanted = slot[speed_reference];
         for (const DiscreteSystem& f : speed_filters) wanted = f(wanted, slot);
+        const double known = inverse_model.present
+                                 ? inverse_model.torque(speed_ahead, gain_ahead, load_observer.load(slot),
+                                                        wanted - slot[measured_speed], T, slot)
+                                 : feedforward(ratio * speed_ahead, ratio * gain_ahead);
         double M =
-            speed_loop(wanted, slot[measured_speed], feedforward(ratio * speed_ahead, ratio * gain_ahead), T, slot);
+            load_observer.schedule(speed_loop, inverse_model, slot)(wanted, slot[measured_speed], known, T, slot);
+        show_model(slot);
         for (const DiscreteSystem& f : torque_filters) M = f(M, slot);
         slot[torque_reference] = std::clamp(M, -speed_loop.torque_limit, speed_loop.torque_limit);
+    }
+
+    void show_model(double* slot) const {
+        if (!inverse_model.present) return;
+        slot[loss_factor] = inverse_model.loss_factor_now(slot);
+        slot[friction_torque] = inverse_model.friction_now(slot);
+        slot[load_torque] = load_observer.load(slot);
     }
 
     bool run_own_law(double time, const Sampled& y, double& command, double* slot) const {

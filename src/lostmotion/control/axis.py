@@ -133,6 +133,10 @@ class _Place:
                     raise InputError(f"speed.{key}[{k}]: {problem}") from None
             setattr(out, "speed_filters" if key == "reference_filters" else key, filters)
         out.feedforward = c.feedforward.core()
+        if c.inverse_model is not None:
+            on_motor = self.encoder_shaft("encoder" if c.position_encoder is None else "position_encoder") != self.shaft
+            out.inverse_model = c.inverse_model.core(self.train, self.name, self.shaft, on_motor=on_motor)
+            out.load_observer = c.inverse_model.core_observer(time)
         if c.feedforward.backlash > 0.0:
             out.backlash.backlash = c.feedforward.backlash
             out.backlash.rate = c.feedforward.backlash_rate or 0.0

@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import NotNegative, Positive, Switch, Time, Whole
 from .encoder import Encoder
+from .inverse_model import InverseModel
 from .loops import CurrentLoop, Feedforward, FirstOrderCurrent, IdealCurrent, PositionLoop, SpeedLoop, VoltageCommand
 from .references import PositionReference, SpeedReference, TorqueReference
 
@@ -45,6 +46,8 @@ class Controller(Part):
     speed: SpeedLoop | None = None
     current: AnyCurrent = IdealCurrent()
     feedforward: Feedforward = Feedforward()
+    inverse_model: InverseModel | None = None
+    """feedforward by the model of the drive, with adaptation; in the place of `feedforward`"""
     law: Switch = False
     """the loops are a function of your own, which `simulate(..., law=function)` gives"""
     phase: Annotated[Time, NotNegative] = 0.0
@@ -80,6 +83,11 @@ class Controller(Part):
             raise ValueError("has a blend_time but no position_encoder to blend; leave it out")
         if self.feedforward != Feedforward() and self.speed is None:
             raise ValueError("has a feedforward, which the speed loop adds, but no speed loop; leave it out")
+        if self.inverse_model is not None:
+            if self.speed is None:
+                raise ValueError("has an inverse_model, which the speed loop adds, but no speed loop; leave it out")
+            if self.feedforward != Feedforward():
+                raise ValueError("has feedforward and inverse_model, which both add the torque that is known; give one")
         return self
 
     def schedules(self) -> Iterator[tuple[str, float, int]]:

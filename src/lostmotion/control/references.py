@@ -16,6 +16,7 @@ from ..inputs.quantities import Acceleration, Angle, Jerk, NotNegative, Positive
 from ..inputs.validation import shown
 from ..model.signals import Breakpoint, Samples, TimeFunction, taylor
 from .profiles import segments
+from .targets import Target
 
 V = TypeVar("V")  # the value of the reference, with its unit
 
@@ -163,8 +164,12 @@ class PositionReference(Reference[Angle]):
     dwell: Annotated[Time, NotNegative] = 0.0
     """rest after each move that has none of its own"""
     moves: tuple[Move, ...] = ()
+    target: Target | None = None
+    """the angle under which a target in space is seen"""
 
     def _check(self) -> None:
+        if self.target is not None and self.moves:
+            raise ValueError("has a target and moves; give one of them")
         limits = [key for key in ("speed", "acceleration", "jerk") if getattr(self, key) is not None]
         if self.steps and (limits or self.moves):
             raise ValueError(
@@ -208,6 +213,8 @@ class PositionReference(Reference[Angle]):
         return found
 
     def _pieces(self) -> list[list[Breakpoint]]:
+        if self.target is not None:
+            return [*super()._pieces(), list(self.target.breakpoints())]
         if not self.moves:
             return super()._pieces()
         points = self._segments().T.reshape(-1, 5).tolist()

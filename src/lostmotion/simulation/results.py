@@ -19,7 +19,7 @@ from .scenario import Scenario
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import packed
 from .train_scenario import TrainScenario, is_train
-from .train_variables import AXIS_SIGNALS, axis_variables, train_variables
+from .train_variables import ALL_SIGNALS, axis_variables, train_variables
 from .variables import CHANNEL_NAMES, STATES, VARIABLES, Variable
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def raw_result(scenario: Scenario, result: Any, solver: str, *, ledger: bool) ->
     table, switchings, count, energy, state, capacity, left_data_at, steps, signals = result
     data = dict(zip(CHANNEL_NAMES, table, strict=True))
     for axis in signals:
-        data |= dict(zip(AXIS_SIGNALS["position"], axis, strict=True))
+        data |= dict(zip(ALL_SIGNALS, axis, strict=True))
     add_derived(data, scenario.gearbox.ratio)
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     attributes = {

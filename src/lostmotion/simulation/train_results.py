@@ -17,7 +17,7 @@ from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import CONTACTS_OF_TRAIN, packed
 from .train_scenario import TrainScenario
 from .train_state import start_capacities, start_values
-from .train_variables import angle_through, angles_through_gears
+from .train_variables import ALL_SIGNALS, angle_through, angles_through_gears
 
 
 def run_train(
@@ -35,9 +35,8 @@ def run_train(
     result = _core.run_train(core, inputs, start, capacities, *(*options, scenario.control(laws)))
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     data = dict(zip((name for name, _, _ in core.channels()), result["values"], strict=True))
-    shown = [name for name, _, _ in _core.axis_signals()]
     for motor, signals in zip(scenario.controllers, result["control"], strict=True):
-        data |= {f"{motor}_{name}": values for name, values in zip(shown, signals, strict=True)}
+        data |= {f"{motor}_{name}": values for name, values in zip(ALL_SIGNALS, signals, strict=True)}
     add_derived_of_train(scenario.train(), data, time)
     attributes = _attributes(scenario, result, how, ledger=ledger)
     return RawResult(time, data, attributes | {CONTACTS_OF_TRAIN: " ".join(core.contact_names())})

@@ -28,12 +28,21 @@ def train_variables(train: DriveTrain, loaded: Collection[str]) -> tuple[Variabl
     return (*channels, *(variable for variable in _derived(train) if variable.name not in known))
 
 
-# Of the signals of an axis those that its outermost loop has.
-AXIS_SIGNALS = {
-    "position": tuple(name for name, _, _ in _core.axis_signals()),
+ALL_SIGNALS = tuple(name for name, _, _ in _core.axis_signals())
+# Those that its loops have.
+LOOP_SIGNALS = {
+    "position": ("position_reference", "measured_position", "speed_reference", "measured_speed", "torque_reference"),
     "speed": ("speed_reference", "measured_speed", "torque_reference"),
     "torque": ("torque_reference",),
 }
+
+
+def _signals_of(controller: Controller) -> Iterator[str]:
+    yield from LOOP_SIGNALS[controller.reference.kind]
+    if controller.inverse_model is not None:
+        yield from ("model_loss_factor", "model_friction_torque")
+        if controller.inverse_model.load_observer is not None:
+            yield "observed_load_torque"
 
 
 def axis_variables(controllers: Mapping[str, Controller]) -> tuple[Variable, ...]:
@@ -42,7 +51,7 @@ def axis_variables(controllers: Mapping[str, Controller]) -> tuple[Variable, ...
         Variable(f"{motor}_{name}" if motor else name, "", unit, meaning)
         for motor, controller in controllers.items()
         for name, unit, meaning in _core.axis_signals()
-        if name in AXIS_SIGNALS[controller.reference.kind]
+        if name in _signals_of(controller)
     )
 
 

@@ -1,0 +1,58 @@
+// What the controller knows of the losses of a gear, and the load that follows from the torque at its input.
+#pragma once
+
+#include <cmath>
+
+#include "../parts/loss_map.hpp"
+
+namespace lostmotion::control {
+
+// Losses at the input of a gear that turns in direction s, at output torque T_2 and speed w of the input.
+struct GearLosses {
+    enum Kind { none, constant_efficiency, loss_map } kind = none;
+
+    double ratio = 1.0;
+    double efficiency = 1.0;                       // driving and in reverse
+    LossMap map;                                   // m_2B
+    double rated_torque = 1.0, rated_speed = 1.0;  // T_2R [N m], n_1R [rad/s]
+
+    // M_2B/i >= 0 [N m].
+    double operator()(double T_2, double s, double w) const { return at(T_2, s, w).torque; }
+
+    // dm_2B/dmu: how much of a change of the load the gear takes for itself.
+    double slope(double T_2, double s, double w) const { return at(T_2, s, w).per_load; }
+
+    // T_2 that solves T_2 + s factor M_2B(T_2) = i T_1. The left side rises with T_2 (a loss that fell faster than the
+    // load rises would drive the gear).
+    double output_torque(double T_1, double s, double w, double factor) const {
+        double T_2 = ratio * T_1;
+        for (int k = 0; k < 20; ++k) {
+            const Loss loss = at(T_2, s, w);
+            const double left = T_2 + s * factor * ratio * loss.torque - ratio * T_1;
+            const double next = T_2 - left / (1.0 + factor * loss.per_load);
+            if (next == T_2) break;
+            T_2 = next;
+        }
+        return T_2;
+    }
+
+ private:
+    struct Loss {
+        double torque = 0.0;    // [N m] at the input
+        double per_load = 0.0;  // d(i torque)/d(s T_2)
+    };
+
+    Loss at(double T_2, double s, double w) const {
+        const double load = s * T_2;
+        if (kind == constant_efficiency) {
+            const double slope = load > 0.0 ? 1.0 / efficiency - 1.0 : efficiency - 1.0;
+            return {load * slope / ratio, slope};
+        }
+        if (kind == none) return {};
+        const double mu = load / rated_torque, v = std::fabs(w) / rated_speed;
+        const Plane p = map.plane(map.triangle(mu, v));
+        return {(p.at_zero + p.per_speed * v + p.per_load * mu) * rated_torque / ratio, p.per_load};
+    }
+};
+
+}  // namespace lostmotion::control

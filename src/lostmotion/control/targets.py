@@ -1,0 +1,238 @@
+"""Targets that a pointing axis follows: their paths in space, and the angles under which they are seen.
+
+Coordinates are those of the station: x to the right of the bearing 0, y along it, z up. Angles: traverse A = atan2(x, y), to the
+right; elevation E = atan2(z, sqrt(x^2 + y^2)). All derivatives are those of the path itself, by truncated Taylor series.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..errors import need
+from ..inputs.part import Part
+from ..inputs.quantities import Angle, Frequency, Length, LinearSpeed, NotNegative, Positive, Speed, Time
+
+ORDER = 4  # coefficients of the series: value to third derivative
+TOLERANCE = 1e-13  # [rad], of a piece of third degree between two instants
+MAX_PIECES = 2_000_000
+SIDEREAL_RATE = 7.292115e-5  # [rad/s], turn of the earth against the stars (IERS Conventions 2010, table 1.2)
+
+Jet = np.ndarray
+"""(4, n): Taylor coefficients of a function of time at n instants, value, rate, second/2, third/6"""
+
+
+def product(a: Jet, b: Jet) -> Jet:
+    """Of two series."""
+    return np.array([sum(a[j] * b[k - j] for j in range(k + 1)) for k in range(len(a))])
+
+
+def quotient(a: Jet, b: Jet) -> Jet:
+    """Of two series."""
+    out: list[np.ndarray] = []
+    for k in range(len(a)):
+        out.append((a[k] - sum((out[j] * b[k - j] for j in range(k)), np.zeros_like(a[0]))) / b[0])
+    return np.array(out)
+
+
+def root(a: Jet) -> Jet:
+    """Square root of a series."""
+    out = [np.sqrt(a[0])]
+    for k in range(1, len(a)):
+        inner = sum((out[j] * out[k - j] for j in range(1, k)), np.zeros_like(a[0]))
+        out.append((a[k] - inner) / (2.0 * out[0]))
+    return np.array(out)
+
+
+def angle_of(y: Jet, x: Jet) -> Jet:
+    """atan2(y, x) of two series, without jumps of a turn from instant to instant."""
+    k = np.arange(1, ORDER)[:, None]
+    rate = quotient(
+        product(k * y[1:], x[:-1]) - product(y[:-1], k * x[1:]), product(x[:-1], x[:-1]) + product(y[:-1], y[:-1])
+    )
+    return np.vstack([np.unwrap(np.arctan2(y[0], x[0]))[None], rate / k])
+
+
+def sine_and_cosine(angle: np.ndarray, rate: float) -> tuple[Jet, Jet]:
+    """Of an angle that grows at a constant rate [rad/s]."""
+    factors = np.array([1.0, rate, rate**2 / 2.0, rate**3 / 6.0])[:, None]
+    sin, cos = np.sin(angle), np.cos(angle)
+    return factors * np.array([sin, cos, -sin, -cos]), factors * np.array([cos, -sin, -cos, sin])
+
+
+def straight(start: np.ndarray | float, rate: float, t: np.ndarray) -> Jet:
+    """start + rate t."""
+    out = np.zeros((ORDER, t.size))
+    out[0], out[1] = start + rate * t, rate
+    return out
+
+
+class TargetPath(Part):
+    """Where a target is over time, and which axis follows it."""
+
+    axis: Literal["traverse", "elevation"]
+    bearing: Angle = 0.0
+    """of the direction y, which the path is given in; it adds to the traverse"""
+    duration: Annotated[Time, Positive] = 60.0
+    """for which the axis follows; after it the reference stays"""
+
+    def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
+        """x, y and z [m] at instants [s]."""
+        raise NotImplementedError
+
+    def angles(self, t: np.ndarray) -> Jet:
+        """Series of the angle of this axis [rad] at instants [s]."""
+        x, y, z = self.position(t)
+        if self.axis == "traverse":
+            out = angle_of(x, y)
+            out[0] += self.bearing
+            return out
+        return angle_of(z, root(product(x, x) + product(y, y)))
+
+    def at(self, time: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Angle [rad] and its first, second and third derivative at instants [s]."""
+        value, rate, second, third = self.angles(np.atleast_1d(np.asarray(time, float)))
+        return value, rate, 2.0 * second, 6.0 * third
+
+    def breakpoints(self) -> list[tuple[float, ...]]:
+        """(time, angle, first, second, third derivative): pieces of third degree from exact values, 1e-13 rad apart at their ends."""
+        n = 1000
+        while True:
+            t = np.linspace(0.0, self.duration, n + 1)
+            found = np.array(self.at(t))
+            step = self.duration / n
+            # The fourth derivative from the third ones.
+            remainder = np.abs(np.diff(found[3])).max() * step**3 / 24.0
+            if not np.isfinite(found).all() or n > MAX_PIECES:
+                raise ValueError("passes too near to the station: its angle changes faster than numbers can follow")
+            if remainder <= TOLERANCE:
+                break
+            n = math.ceil(1.1 * n * max(1.0, (remainder / TOLERANCE) ** 0.25))
+        last = (self.duration, float(found[0, -1]), 0.0, 0.0, 0.0)
+        return [*map(tuple, np.vstack([t, found])[:, :-1].T.tolist()), last]
+
+
+class Crossing(TargetPath):
+    """A straight level path that crosses the bearing at a right angle."""
+
+    distance: Annotated[Length, Positive]
+    """R_0, horizontal, of the point next to the station"""
+    height: Length = 0.0
+    """above the station"""
+    speed: Annotated[LinearSpeed, Positive]
+    crossing_time: Annotated[Time, NotNegative]
+    """when it is next to the station"""
+    heading: Literal["right", "left"] = "right"
+
+    def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
+        rate = self.speed if self.heading == "right" else -self.speed
+        along = straight(-rate * self.crossing_time, rate, t)
+        return along, straight(self.distance, 0.0, t), straight(self.height, 0.0, t)
+
+
+class FlyBy(Crossing):
+    """A straight level path past the station."""
+
+    path: Literal["fly_by"]
+
+
+class Weave(Crossing):
+    """A path past the station that swings to and fro across its course."""
+
+    path: Literal["weave"]
+    width: Annotated[Length, Positive]
+    """amplitude of the swing"""
+    frequency: Annotated[Frequency, Positive]
+
+    @model_validator(mode="after")
+    def _stays_in_front(self) -> Self:
+        if self.width >= self.distance:
+            raise ValueError(
+                f"has width = {self.width:g} m, not less than its distance, {self.distance:g} m; take less"
+            )
+        return self
+
+    def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
+        x, y, z = super().position(t)
+        omega = 2.0 * math.pi * self.frequency
+        return x, y + self.width * sine_and_cosine(omega * t, omega)[0], z
+
+
+class Circle(TargetPath):
+    """A level circle at constant speed."""
+
+    path: Literal["circle"]
+    distance: Annotated[Length, NotNegative]
+    """of its centre, horizontal, along the bearing"""
+    radius: Annotated[Length, Positive]
+    height: Length = 0.0
+    speed: Annotated[LinearSpeed, Positive]
+    start: Angle = 0.0
+    """where on the circle it begins, from the point farthest along the bearing, to the right"""
+
+    @model_validator(mode="after")
+    def _misses_the_station(self) -> Self:
+        if self.radius == self.distance:
+            raise ValueError("passes over the station, where its traverse jumps; change its radius or its distance")
+        return self
+
+    def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
+        omega = self.speed / self.radius
+        sin, cos = sine_and_cosine(self.start + omega * t, omega)
+        return self.radius * sin, straight(self.distance, 0.0, t) + self.radius * cos, straight(self.height, 0.0, t)
+
+
+class Track(TargetPath):
+    """A measured path: a cubic spline through its points, or straight lines."""
+
+    path: Literal["track"]
+    times: tuple[Annotated[Time, NotNegative], ...] = Field(min_length=4)
+    x: tuple[Length, ...]
+    y: tuple[Length, ...]
+    z: tuple[Length, ...]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        lengths = {key: len(getattr(self, key)) for key in ("times", "x", "y", "z")}
+        if len(set(lengths.values())) > 1:
+            raise ValueError(f"has lists of different length, {lengths}; give one position for each time")
+        if np.any(np.diff(self.times) <= 0.0):
+            raise ValueError("has times that do not rise; sort them, and give each once")
+        if self.times[0] > 0.0 or self.times[-1] < self.duration:
+            raise ValueError(
+                f"has times from {self.times[0]:g} s to {self.times[-1]:g} s, which must cover 0 to duration = {self.duration:g} s"
+            )
+        return self
+
+    def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
+        need("scipy", "a measured track", "control")
+        from scipy.interpolate import CubicSpline
+
+        spline = CubicSpline(self.times, np.array([self.x, self.y, self.z]).T)
+        x, y, z = np.array([spline(t, k) / math.factorial(k) for k in range(ORDER)]).transpose(2, 0, 1)
+        return x, y, z
+
+
+class Star(TargetPath):
+    """A direction fixed among the stars, as the earth turns: without refraction. Traverse is the azimuth less the bearing of y."""
+
+    path: Literal["star"]
+    declination: Angle
+    hour_angle: Angle
+    """at the start, west of the meridian"""
+    latitude: Angle
+    rate: Speed = SIDEREAL_RATE
+    """at which the hour angle grows; for the sun 7.2722e-5 rad/s"""
+
+    def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
+        sin, cos = sine_and_cosine(self.hour_angle + self.rate * t, self.rate)
+        sd, cd, sl, cl = (f(v) for v in (self.declination, self.latitude) for f in (math.sin, math.cos))
+        one = straight(1.0, 0.0, t)
+        # East, north, up.
+        return -cd * sin, cl * sd * one - sl * cd * cos, sl * sd * one + cl * cd * cos
+
+
+Target = Annotated[FlyBy | Weave | Circle | Track | Star, Field(discriminator="path")]
