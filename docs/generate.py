@@ -11,6 +11,7 @@ import motors_figures
 import reference_figures
 import self_locking_figures
 import servo_figures
+import tracking_figures
 import two_motors_figures
 from typer.main import get_command
 
@@ -305,6 +306,7 @@ def generate(out: Path = OUT) -> None:
     reference_figures.write(out)
     self_locking_figures.write(out)
     servo_figures.write(out)
+    tracking_figures.write(out)
     two_motors_figures.write(out)
     motors_figures.write(out)
     for name, text in pages.items():

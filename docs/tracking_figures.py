@@ -1,0 +1,108 @@
+"""Figures of docs/tracking.md, from exact runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lostmotion as lm
+from lostmotion.reports import plots
+from lostmotion.reports.panels import Curve, Panel
+
+DARK: dict[str, Any] = {"color": "#0b3c5d", "linewidth": 1.4}
+LIGHT: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.3}
+GREEN: dict[str, Any] = {"color": "#7fae3f", "linestyle": "-.", "linewidth": 1.3}
+GREY: dict[str, Any] = {"color": "#808080", "linestyle": ":", "linewidth": 1.3}
+FREQUENCY = 0.25
+PEAK_SPEEDS = np.geomspace(0.002, 2.0, 13)
+# Of each controller what its inverse model knows.
+MODELS: dict[str, tuple[dict[str, Any] | None, dict[str, Any]]] = {
+    "no feedforward of torque": (None, GREY),
+    "constant efficiency of 0.9": ({"efficiency": 0.9}, LIGHT),
+    "loss map": ({}, DARK),
+    "0.6 of the losses, adapting": (
+        {"loss_factor": 0.6, "loss_adaptation": {"rate": 500.0}, "min_speed": 0.05},
+        GREEN,
+    ),
+}
+
+
+def axis(peak_speed: float, model: dict[str, Any] | None) -> lm.Scenario:
+    """The axis of the shipped scenarios on a sine, from its lower end, with ideal encoders."""
+    shipped = lm.load("tracking-loss-map")
+    assert isinstance(shipped, lm.Scenario)
+    assert shipped.controller is not None
+    controller = shipped.controller.model_dump(exclude_none=True)
+    amplitude = peak_speed / (2.0 * np.pi * FREQUENCY)
+    controller["reference"] = {
+        "kind": "position",
+        "amplitude": amplitude,
+        "frequency": FREQUENCY,
+        "phase": -0.5 * np.pi,
+    }
+    controller["encoder"], controller["position_encoder"] = {"ideal": True}, {"ideal": True, "shaft": "load"}
+    del controller["speed"]["torque_limit"], controller["inverse_model"]
+    if model is not None:
+        controller["inverse_model"] = model
+    start = {"initial.load_angle": -amplitude, "initial.load_speed": 0.0, "initial.motor_speed": 0.0}
+    return shipped.replace(controller=controller, **{"simulation.duration": 20.0}, **start)
+
+
+def peak_error(scenario: lm.Scenario, after: float) -> float:
+    """Of the load [rad]."""
+    run = lm.simulate(scenario, energy=False)
+    t = run["time"].to_numpy()
+    error = scenario.controller.reference.at(t)[0] - run["load_angle"].to_numpy()  # type: ignore[union-attr]
+    return float(np.abs(error)[t > after].max())
+
+
+def over_amplitude(out: Path) -> None:
+    """The claim: how the peak error depends on how fast the axis moves."""
+    curves = tuple(
+        Curve(name, PEAK_SPEEDS, np.array([1e3 * peak_error(axis(w, model), 12.0) for w in PEAK_SPEEDS]), style)
+        for name, (model, style) in MODELS.items()
+    )
+    panel = Panel(
+        "sine of 0.25 Hz: peak error of the load", "peak speed of the load [rad/s]", "error [mrad]", curves,
+        log_x=True, log_y=True,
+    )  # fmt: skip
+    _save(out, "tracking-amplitude", [panel], 1, (8.0, 4.0))
+
+
+def fly_by(out: Path) -> None:
+    """The shipped scenarios."""
+    names = {"tracking-constant-efficiency": LIGHT, "tracking-loss-map": DARK, "tracking-adaptive": GREEN}
+    errors, factors = [], []
+    for name, style in names.items():
+        scenario = lm.load(name)
+        run = lm.simulate(scenario, energy=False)
+        t = run["time"].to_numpy()
+        error = scenario.controller.reference.at(t)[0] - run["load_angle"].to_numpy()  # type: ignore[union-attr]
+        label = name.removeprefix("tracking-").replace("-", " ")
+        errors.append(Curve(label, t, 1e3 * error, style))
+        if name != "tracking-constant-efficiency":
+            factors.append(Curve(label, t, run["model_loss_factor"].to_numpy(), style))
+    panels = [
+        Panel("elevation of a fly-by: reference less load", "time [s]", "error [mrad]", tuple(errors)),
+        Panel("factor on the losses in the controller", "time [s]", "[-]", tuple(factors)),
+    ]
+    _save(out, "tracking-fly-by", panels, 2, (10.0, 3.6))
+
+
+def _save(out: Path, name: str, panels: list[Panel], columns: int, size: tuple[float, float]) -> None:
+    plots.draw(panels, columns, size).savefig(out / f"{name}.png", metadata={"Software": None})
+
+
+def write(out: Path) -> None:
+    """All figures of the page into a directory."""
+    over_amplitude(out)
+    fly_by(out)
+
+
+if __name__ == "__main__":
+    from generate import OUT
+
+    OUT.mkdir(exist_ok=True)
+    write(OUT)
