@@ -37,6 +37,18 @@ def section(report: Report, programs: dict[str, list[list[str]]]) -> None:
         ),
     ]
     report.table(("", "time [ms]"), [(name, f"{best(5, work):.2f}") for name, work in rows])
+    compared = [row for row in programs.get("peer_cvode", []) if row[0] == "cascade"]
+    if compared:
+        exact = next(float(row[4]) for row in programs[name] if row[0] == "sine of 0.2 rad")
+        report.add(
+            "",
+            "The sine without encoder lines by CVODE, restarted at each tick, with the same controllers and contact logic:",
+            "",
+        )
+        report.table(
+            ("", "time [ms]", "ratio to the exact solver", "largest error"),
+            [(case, f"{float(ms):.1f}", f"{float(ms) / exact:.0f}", gap) for _, case, ms, gap in compared],
+        )
 
 
 def axis(**changes: Any) -> lm.Scenario:

@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <numeric>
 
+#include "cascade.hpp"
+#include "lostmotion/simulation/drive_control.hpp"
 #include "train_runs.hpp"
 
 using namespace lostmotion;
@@ -85,7 +87,7 @@ class Cvode {
     using Guard = typename System::Guard;
 
     Cvode(const Task<System>& task, int method, double tolerance)
-        : task_(task), basis_(input_basis(task.signals)), input_(task.signals, basis_) {
+        : task_(task), signals_(task.signals), basis_(input_basis(signals_)), input_(signals_, basis_) {
         const auto n = static_cast<sunindextype>(task.states.size());
         user_.states = task.states;
         user_.input = &input_;
@@ -117,44 +119,60 @@ class Cvode {
         SUNContext_Free(&context_);
     }
 
-    // Calls keep(state) at `samples` instants. False if it gives up.
-    template <class Keep>
-    bool run(double interval, std::size_t samples, Keep&& keep) {
-        Instant now;
-        typename System::Key key;
-        now.x = task_.start;
-        input_.anchor(0.0);
-        see_inputs(input_, 0.0, now);
-        if (task_.system.start(task_.cache, now, key) != Found::yes) return false;
-        enter(now, key);
-        keep(now.x);
+    // As the project's own solvers have it, so that controllers run on it.
+    Status begin(double t, const State& x, const typename D::Memory&) {
+        now_.x = x;
+        time_ = t;
+        input_.anchor(t);
+        see_inputs(input_, t, now_);
+        if (task_.system.start(task_.cache, now_, key_) != Found::yes) return Status::jammed;
+        enter();
+        return Status::done;
+    }
+    template <class Observer>
+    Status advance(double t_end, Observer&&) {
         std::array<int, D::guards> found{};
-        for (std::size_t next = 1; next < samples;) {
-            realtype t = 0.0;
-            const double wanted = static_cast<double>(next) * interval;
-            CVodeSetStopTime(memory_, limit_);
-            const int status = CVode(memory_, wanted, y_, &t, CV_NORMAL);
-            if (status < 0) return false;
-            if (status == CV_SUCCESS || (status == CV_TSTOP_RETURN && t == wanted)) {
-                keep(user_.state_of(y_));
-                ++next;
-            }
-            if (status == CV_SUCCESS) continue;
+        while (time_ < t_end) {
+            CVodeSetStopTime(memory_, controlled_ ? std::fmin(limit_, t_end) : limit_);
+            const int status = CVode(memory_, t_end, y_, &time_, CV_NORMAL);
+            if (status < 0) return Status::zeno;
             const Guard* fired = nullptr;
             if (status == CV_ROOT_RETURN) {
                 CVodeGetRootInfo(memory_, found.data());
-                const auto& old = task_.cache.regime(key);
+                const auto& old = task_.cache.regime(key_);
                 for (int k = 0; k < old.n_guards; ++k)
                     if (found[k] < 0) fired = &old.guards[k];
                 if (fired == nullptr) continue;  // a guard that rises from zero, where the regime began
+            } else if (time_ < limit_) {
+                continue;
             }
-            now.x = user_.state_of(y_);
-            input_.follow(t);
-            const auto before = input_.values();
-            input_.anchor(t);
-            see_inputs(input_, t, now);
-            if (task_.system.next(task_.cache, now, fired, key, before) != Found::yes) return false;
-            enter(now, key);
+            input_.follow(time_);
+            if (!go_on(fired, input_.values())) return Status::jammed;
+        }
+        return Status::done;
+    }
+    // As a controller does: the integration begins anew.
+    void set_ramp(int input, double value, double slope) {
+        controlled_ = true;
+        before_ = input_.values();
+        signals_[static_cast<std::size_t>(input)].breakpoints[0] = {time_, value, slope};
+    }
+    template <class Observer>
+    Status inputs_changed(Observer&&) {
+        return go_on(nullptr, before_) ? Status::done : Status::jammed;
+    }
+    State state() const { return user_.state_of(y_); }
+    const typename D::Memory& memory() const { return user_.memory; }
+    double time() const { return time_; }
+
+    // Calls keep(state) at `samples` instants. False if it gives up.
+    template <class Keep>
+    bool run(double interval, std::size_t samples, Keep&& keep) {
+        if (begin(0.0, task_.start, {}) != Status::done) return false;
+        keep(now_.x);
+        for (std::size_t k = 1; k < samples; ++k) {
+            if (advance(static_cast<double>(k) * interval, nothing_) != Status::done) return false;
+            keep(state());
         }
         return true;
     }
@@ -162,23 +180,39 @@ class Cvode {
  private:
     using Instant = InstantOf<D>;
 
-    void enter(const Instant& now, const typename System::Key& key) {
-        const auto& r = task_.cache.regime(key);
+    bool go_on(const Guard* fired, const InputsOf<D>& before) {
+        now_.x = state();
+        input_.anchor(time_);
+        see_inputs(input_, time_, now_);
+        if (task_.system.next(task_.cache, now_, fired, key_, before) != Found::yes) return false;
+        enter();
+        return true;
+    }
+    void enter() {
+        const auto& r = task_.cache.regime(key_);
         user_.regime = &r;
-        user_.memory = now.memory;
+        user_.memory = now_.memory;
         std::fill(user_.left_zero.begin(), user_.left_zero.end(), false);
-        user_.linear = &task_.cache.entry(key).rates;
-        user_.constant = user_.linear->constant(now.memory);
-        limit_ = next_breakpoint(task_.signals, now.time);
+        user_.linear = &task_.cache.entry(key_).rates;
+        user_.constant = user_.linear->constant(now_.memory);
+        limit_ = next_breakpoint(signals_, now_.time);
         if (r.driving_input >= 0) limit_ = input_.turning(r.driving_input, r.driving_way, limit_);
-        user_.put(now.x, y_);
-        CVodeReInit(memory_, now.time, y_);
+        user_.put(now_.x, y_);
+        CVodeReInit(memory_, now_.time, y_);
     }
 
     const Task<System>& task_;
+    SignalsOf<D> signals_;
     std::vector<InputBasis> basis_;
     InputState<D> input_;
     Context<System> user_;
+    Instant now_;
+    typename System::Key key_;
+    InputsOf<D> before_{};
+    double time_ = 0.0;        // [s]
+    bool controlled_ = false;  // no step leads across a tick
+    struct {
+    } nothing_;
     double limit_ = 0.0;  // [s], of the stretch that has no jump of an input
     SUNContext context_ = nullptr;
     N_Vector y_ = nullptr;
@@ -247,9 +281,50 @@ void compare(const char* name, const Task<System>& task, double interval, std::s
         }
 }
 
+// The drive under the cascade of bench_control.cpp, restarted at each tick; errors against the exact solver.
+void compare_cascade(const Drive& drive) {
+    const SwitchedDrive system(drive);
+    RegimeCache<SwitchedDrive> cache(system);
+    std::vector<int> states(n_states);
+    std::iota(states.begin(), states.end(), 0);
+    const Signals none;
+    const Task<SwitchedDrive> task{
+        system, none, {}, drive.rated_scale(), drive.balanced_scale(), states, {load_speed, twist}, cache};
+    const Control control = cascade(drive, 0.0, 0.2);
+    const std::vector<control::Axis> laws = control.laws();
+    const ClosedLoop<DriveDims> loop = closed_loop_of(drive, control, laws);
+    struct {
+        bool segment(const Segment<SwitchedDrive>&) { return true; }
+    } nothing;
+    constexpr int instants = 100;
+    const auto follow = [&](auto& solver, auto&& keep) {
+        ClosedLoopRun run(solver, loop);
+        Status status = run.begin({}, {});
+        for (int k = 1; k <= instants && status == Status::done; ++k) {
+            status = run.advance(static_cast<double>(k) / instants, nothing, [](double) {});
+            keep(solver.state());
+        }
+        return status == Status::done;
+    };
+    Watched exact(task.watched, instants);
+    ExactSolver<SwitchedDrive> solver(system, none, 1.0 / instants, drive.balanced_scale());
+    follow(solver, [&](const auto& x) { exact.keep(x); });
+    for (const double tolerance : {1e-6, 1e-8}) {
+        Watched other(task.watched, instants);
+        Cvode<SwitchedDrive> cvode(task, CV_ADAMS, tolerance);
+        const bool done = follow(cvode, [&](const auto& x) { other.keep(x); });
+        const double time = best_ms(done ? 3 : 0, [&] {
+            Cvode<SwitchedDrive> again(task, CV_ADAMS, tolerance);
+            follow(again, [](const auto&) {});
+        });
+        std::printf("cascade|SUNDIALS CVODE Adams in C, rtol %g|%.6f|%.3g\n", tolerance, time, other.gap(exact));
+    }
+}
+
 }  // namespace
 
 int main() {
+    compare_cascade(PaperRun().drive);
     for (const auto& [map, paper] : PaperRun::both()) {
         const SwitchedDrive system(paper.drive);
         RegimeCache<SwitchedDrive> cache(system);
