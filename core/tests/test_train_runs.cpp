@@ -1,6 +1,7 @@
 // Whole runs of trains: the exact solver against the drive's, the adaptive solver and the ledger.
 #include <doctest/doctest.h>
 
+#include "drive_runs.hpp"
 #include "random_train_runs.hpp"
 
 TEST_SUITE_BEGIN("train_runs");

@@ -52,8 +52,9 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
         set(p.piece, piece);
         if (p.parted == nowhere) continue;
         const double w_in = now.x[places().shafts[gear.input].speed], w_out = now.x[places().shafts[gear.output].speed];
-        const double pressed = gear.law.curve.torque(d) +
-                               gear.mesh_damping * (assembly_.per_input(static_cast<int>(g), trial) * w_in - w_out);
+        double rate = assembly_.per_input(static_cast<int>(g), trial) * w_in - w_out;
+        if (gear.housing != nowhere) rate += gear.per_housing() * now.x[places().shafts[gear.housing].speed];
+        const double pressed = gear.law.curve.torque(d) + gear.mesh_damping * rate;
         set(p.parted, piece != 0 && piece * pressed < 0.0 ? 1 : 0);
     }
     for (std::size_t k = 0; k < train().angle_torques.size(); ++k) {
@@ -121,7 +122,9 @@ void SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
             for (std::size_t g = 0; g < train().gears.size(); ++g) {
                 const Gear& gear = train().gears[g];
                 if (gear.output == out && !(is_gear && static_cast<int>(g) == c.element)) needed -= T_2[g];
-                if (gear.input == out) needed += T_2[g] / (gear.law.ratio * gear.law.efficiency);
+                const double T_1 = T_2[g] / (gear.law.ratio * gear.law.efficiency);
+                if (gear.input == out) needed += T_1;
+                if (gear.housing == out) needed += T_2[g] - T_1;
             }
             for (std::size_t n = 0; n < train().couplings.size(); ++n) {
                 if (train().couplings[n].output == out && (is_gear || static_cast<int>(n) != c.element))
