@@ -174,6 +174,8 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
     locate_losses(now, T_2, trial);
     hold(now, event, trial, T_2);
     Trial result = walk(cache, now, event, trial, key);
+    if (result.found == Found::inconsistent && settle_on_corner(cache, now, event, trial, key))
+        result.found = Found::yes;
     if (result.found != Found::inconsistent || !event.from_each_load) return result;
     // The torque that keeps a twist at rest depends on the cell, and the cell on the torque.
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
@@ -195,6 +197,33 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
         }
     }
     return result;
+}
+
+// The torque that a transmission error lets an input shaft feel jumps at its corners. A shaft at rest on one may have
+// that of either side: does the piece on the other side of such a corner hold?
+template <class Sizes>
+template <class Cache, class Now>
+bool SwitchedTrain<Sizes>::settle_on_corner(Cache& cache, Now& now, const Event& event, const Key& trial,
+                                            Key& key) const {
+    const auto memory = now.memory;
+    for (std::size_t g = 0; g < train().gears.size(); ++g) {
+        const GearPlace& p = places().gears[g];
+        if (p.error_piece == nowhere) continue;
+        const PeriodicCurve& e = train().gears[g].transmission_error;
+        const double phi = now.x[places().shafts[train().gears[g].input].angle];
+        const int k = trial.branch[p.error_piece], last = e.pieces() - 1;
+        for (const bool ahead : {false, true}) {
+            const double corner = now.memory[p.error_turn] + (ahead ? e.upper(k) : e.lower(k));
+            if (std::fabs(phi - corner) > on_corner * (std::fabs(phi) + e.period())) continue;
+            const bool turns = k == (ahead ? last : 0);
+            Key other = trial;
+            other.branch[p.error_piece] = static_cast<std::int16_t>(turns ? last - k : ahead ? k + 1 : k - 1);
+            if (turns) now.memory[p.error_turn] += ahead ? e.period() : -e.period();
+            if (walk(cache, now, event, other, key).found == Found::yes) return true;
+            now.memory = memory;
+        }
+    }
+    return false;
 }
 
 // Is this combination, in which a contact is at its limit, consistent, or, if what drives it there turns back, does
