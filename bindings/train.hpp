@@ -221,6 +221,7 @@ inline void bind_train(nb::module_& m) {
         .def("add_gear", &TrainDescription::add_gear, "name"_a, "input"_a, "output"_a, "parameters"_a,
              "torsion_curve"_a.none(), "loss_map"_a.none(), "efficiencies"_a.none(), "mesh_damping"_a,
              "transmission_error"_a.none())
+        .def("set_housing", &TrainDescription::set_housing, "gear"_a, "shaft"_a)
         .def("add_brake", &TrainDescription::add_brake, "name"_a, "shaft"_a, "torque"_a, "breakaway_torque"_a)
         .def("add_clutch", add_coupling(Coupling::clutch), "name"_a, "input"_a, "output"_a, "torque"_a,
              "breakaway_torque"_a)

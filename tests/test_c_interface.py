@@ -224,6 +224,13 @@ def test_what_is_wrong_is_said_in_one_line(library: c.CDLL, worm: Simulation) ->
     assert "brake 'b'" in train.error()
     assert train.attempt("lm_add_brake", "worm", "worm", 1.0, 0.0) == INVALID
     assert train.error() == "the name 'worm' is taken; use another one"
+    assert train.attempt("lm_set_housing", "nix", "worm") == INVALID
+    assert train.error() == "there is no gear 'nix'"
+    assert train.attempt("lm_set_housing", "coupling", "nix") == INVALID
+    assert train.error() == "there is no shaft 'nix'"
+    assert train.attempt("lm_set_housing", "coupling", "worm") == OK
+    assert library.lm_train_check(train.train) == INVALID
+    assert "gear 'coupling' has its housing on" in train.error()
     wrong = (Parameter * 1)(Parameter(b"motor.colour", 1.0))
     assert train.attempt("lm_add_motor", "m2", "worm", wrong, 1, False, 1.0) == INVALID
     assert train.error() == "motor 'm2': there is no parameter 'motor.colour'"

@@ -91,6 +91,19 @@ def test_a_file_in_the_long_form_gives_the_train_in_si(file: Path) -> None:
             "shafts.table.inertia=2 kg",
             'key shafts.table.inertia: "2 kg" has the unit of something else (kg); it must be a value in kg*m^2, such as "1 kg*m^2"',
         ),
+        (
+            "gears.belt.housing=tble",
+            'key gears.belt.housing: "tble" is no shaft; did you mean table?',
+        ),
+        (
+            "gears.belt.housing=worm",
+            "key gears.belt: has its housing on shaft 'worm', which it joins as well; give the housing a shaft of its own",
+        ),
+        (
+            "gears.worm.housing=motor",
+            "key gears.worm: has a housing that turns and losses that depend on the direction of its motion, which are "
+            "solved against the frame only; leave one of them out",
+        ),
         ("gears.belt.output=motor", "key gears.belt: joins shaft 'motor' with itself; give it another output"),
         (
             "shafts.idle.inertia=1",
@@ -159,6 +172,21 @@ def test_rigid_gears_bind_the_speeds_at_the_start() -> None:
     assert train(**gears, **{"initial.speeds": {"motor": 4.0, "worm": 2.0}})
     with pytest.raises(lm.InputError, match="do not fit the rigid gear belt; their quotient must be its ratio, 2"):
         train(**gears, **{"initial.speeds": {"motor": 5.0, "worm": 2.0}})
+
+
+def test_a_rigid_gear_on_a_housing_binds_three_speeds_at_the_start() -> None:
+    planetary = {"input": "sun", "output": "carrier", "housing": "ring", "ratio": 4.0}
+    tables: dict[str, Any] = {
+        "shafts": {name: {"inertia": 1.0, "torque": 0.0} for name in ("sun", "carrier", "ring")},
+        "gears": {"planetary": planetary},
+        "simulation": {"duration": 1.0, "sample_interval": 0.1},
+    }
+    speeds = {"sun": 9.0, "carrier": 3.0, "ring": 1.0}
+    result = lm.simulate(lm.TrainScenario(**tables, initial={"speeds": speeds}))
+    assert {name: float(result[f"{name}_speed"][-1]) for name in speeds} == speeds
+    assert {name: float(result[f"{name}_angle"][-1]) for name in speeds} == pytest.approx(speeds, rel=1e-14)
+    with pytest.raises(lm.InputError, match=r"on the housing ring = 0.5 rad/s; relative to it their quotient must be"):
+        lm.TrainScenario(**tables, initial={"speeds": speeds | {"ring": 0.5}})
 
 
 def test_angles_at_the_start_follow_through_the_gears() -> None:
@@ -435,6 +463,17 @@ ELEMENTS = {
         angle_torques={"cog": {"kind": "sine", "shaft": "a", "amplitude": 0.02, "order": 12, "error": 0.001}},
     ),
     "transmission error": two_shafts(gears={"g": SOFT | {"mesh_damping": 0.01, "transmission_error": ERROR}}),
+    "housing": two_shafts(
+        gears={
+            "g": SOFT | {"housing": "h", "stiffness": GAP, "mesh_damping": 0.01},
+            "support": SOFT | {"input": "h", "output": "b", "ratio": 1.5},
+        },
+        shafts={"h": {"inertia": 4e-3, "friction_torque": 0.02}},
+    ),
+    "planetary gear": two_shafts(
+        gears={"g": STIFF | {"ratio": 4.0, "housing": "ring"}},
+        shafts={"ring": {"inertia": 4e-3, "friction_torque": 0.1}},
+    ),
     "friction over speed": two_shafts(gears={"g": SOFT}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, **STRIBECK}}),
     "drag": two_shafts(gears={"g": STIFF}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, "drag": FAN}}),
     "damped play": two_shafts(gears={"g": SOFT | {"stiffness": GAP, "mesh_damping": 0.2}}),

@@ -1,7 +1,6 @@
 """Examples of Modelica.Mechanics.Rotational, rebuilt as drive trains, against an integration of their equations by scipy.
 
 The equations stand here as the examples' pages give them, with event logic of their own: nothing of the core is used.
-Its Gear of ElasticBearing joins three flanges (input, output, housing), for which there is no element.
 """
 
 from __future__ import annotations
@@ -192,6 +191,67 @@ def test_first() -> None:
     times = np.arange(101) * 0.01
     expected, _ = reduced.run(np.zeros(3), times, [])
     close(speeds(scenario, "gear", "load"), expected[:, :2])
+
+
+@pytest.mark.parametrize("inertia", [0.0, 1e-3])
+def test_elastic_bearing(inertia: float) -> None:
+    """A gear whose housing of 5 kg·m² rests on a spring and a damper; a brake stands for the ground.
+
+    Between gear and spring the example has no inertia: the two are one compliant gear. With an inertia there the gear is rigid.
+    """
+    stiffness = {"stiffness": {"kind": "linear", "stiffness": 1e3}}
+    ends = {"input": "shaft", "output": "output" if inertia else "load", "housing": "housing", "ratio": 3.0}
+    bearing = {"stiffness": {"kind": "linear", "stiffness": 1e5}, "mesh_damping": 5.0}
+    gears = {
+        "gear": ends if inertia else ends | stiffness,
+        "bearing": {"input": "housing", "output": "ground", "ratio": 1.0} | bearing,
+    }
+    if inertia:
+        gears["spring"] = {"input": "output", "output": "load", "ratio": 1.0} | stiffness
+    scenario = lm.TrainScenario(
+        shafts={
+            "shaft": {"inertia": 1.0, "torque": {"ramps": [{"rise": -100.0, "duration": 5.0}]}},
+            "housing": {"inertia": 5.0},
+            "load": {"inertia": 50.0},
+            "ground": {"inertia": 1.0},
+        }
+        | ({"output": {"inertia": inertia}} if inertia else {}),
+        gears=gears,
+        brakes={"fixed": {"shaft": "ground", "torque": 1e6}},
+        command={"fixed": {"mean": 1.0}},
+        simulation=simulation(10.0),
+    )
+
+    # The flanges of the gear: w_a - w_s = 3 (w_b - w_s), tau_b = -3 tau_a, tau_a + tau_b + tau_s = 0.
+    def rates(t: float, y: Vector) -> Vector:
+        shaft, housing, load, output, bearing, twist = y
+        spring = 1e3 * twist
+        mesh, at_output = spring, 0.0
+        if inertia:  # tau_b accelerates the output flange as fast as the other two let it turn
+            free = 20.0 * min(t, 5.0) / 3.0 - 2.0 / 3.0 * (1e5 * bearing + 5.0 * housing) / 5.0
+            mesh = (free + spring / inertia) / (1.0 / 9.0 + 4.0 / 9.0 / 5.0 + 1.0 / inertia)
+            at_output = (mesh - spring) / inertia
+        else:
+            output = (shaft - housing) / 3.0 + housing
+        accelerations = [
+            20.0 * min(t, 5.0) - mesh / 3.0,
+            (-1e5 * bearing - 5.0 * housing - 2.0 / 3.0 * mesh) / 5.0,
+            spring / 50.0,
+            at_output,
+        ]
+        return np.array([*accelerations, housing, output - load])
+
+    times = np.arange(1001) * 0.01
+    first = solve_ivp(rates, (0.0, 5.0), np.zeros(6), "DOP853", t_eval=times[:501], **TIGHT)
+    second = solve_ivp(rates, (5.0, 10.0), first.y[:, -1], "DOP853", t_eval=times[500:], **TIGHT)
+    expected = np.concatenate([first.y.T, second.y.T[1:]])
+    result = lm.simulate(scenario)
+    for name, column in (("shaft_speed", 0), ("housing_speed", 1), ("load_speed", 2), ("bearing_twist", 4)):
+        close(result[name].values, expected[:, column])
+    energy = lm.energy_of(result)
+    assert abs(energy["residual"]) < 1e-10 * energy["turned_over"]
+    adaptive = lm.simulate(scenario, solver="dormand-prince", relative_tolerance=1e-11)
+    close(adaptive["load_speed"].values, expected[:, 2], 1e-7)
 
 
 def coupled_clutches(peak: float) -> tuple[lm.TrainScenario, Hybrid]:

@@ -186,6 +186,19 @@ int lm_add_gear(lm_train* train, const char* name, const char* input, const char
     });
 }
 
+int lm_set_housing(lm_train* train, const char* gear, const char* shaft) {
+    return train->attempt([&] {
+        const auto named = [](const char* name) {
+            return [name](const auto& element) { return element.name == text(name); };
+        };
+        const lm::model::Train& t = train->description.train;
+        if (std::ranges::none_of(t.gears, named(gear))) return "there is no gear '" + text(gear) + "'";
+        if (std::ranges::none_of(t.shafts, named(shaft))) return "there is no shaft '" + text(shaft) + "'";
+        train->description.set_housing(text(gear), text(shaft));
+        return std::string{};
+    });
+}
+
 int lm_add_brake(lm_train* train, const char* name, const char* shaft, double torque, double breakaway_torque) {
     return train->attempt([&] {
         std::string wrong = name_error(*train, name);

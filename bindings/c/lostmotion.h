@@ -95,6 +95,8 @@ LM_API int lm_add_motor(lm_train* train, const char* name, const char* shaft, co
 LM_API int lm_add_gear(lm_train* train, const char* name, const char* input, const char* output,
                        const lm_parameter* parameters, size_t n, const lm_curve* stiffness, const lm_loss_map* losses,
                        const double* efficiencies, double mesh_damping, const lm_periodic_curve* transmission_error);
+/* Puts the housing of a gear, by default on the frame, on a shaft. LM_INVALID: there is none of that name. */
+LM_API int lm_set_housing(lm_train* train, const char* gear, const char* shaft);
 /* torque while it slips, breakaway_torque at rest (0: the same), at command 1. */
 LM_API int lm_add_brake(lm_train* train, const char* name, const char* shaft, double torque, double breakaway_torque);
 LM_API int lm_add_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,

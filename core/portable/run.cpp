@@ -184,6 +184,7 @@ model::TrainDescription train_of(Input& in) {
         if (what == "add_shaft") return train.add_shaft(shaft(in));
         if (what == "add_gear") return add_gear(in, train);
         const std::string name = in.text(), at = in.text();
+        if (what == "set_housing") return train.set_housing(name, at);
         if (what == "add_motor") {
             const auto parameters = in.by_name();
             const bool torque_source = in.flag();

@@ -30,35 +30,40 @@ inline std::vector<double> least_constraint(const Assembly& a, const Instant& no
         double low, high, torque = 0.0;
     };
     std::vector<Constraint> rows;
-    // A dry contact between shafts: its torque acts against its speed.
-    const auto contact = [&](int in, double per_in, int out, double per_out, double sliding, double holding,
-                             bool exact = false) {
-        const double v = per_in * w[in] + (out < 0 ? 0.0 : per_out * w[out]);
-        if (!exact && v != 0.0) {
-            const double F = v > 0.0 ? sliding : -sliding;
-            torque[in] -= per_in * F;
-            if (out >= 0) torque[out] -= per_out * F;
+    // A dry contact between shafts: its torque acts against its speed, c w.
+    const auto between = [&](const std::vector<double>& c, double sliding, double holding, bool exact) {
+        double v = 0.0;
+        for (std::size_t s = 0; s < n; ++s) v += c[s] * w[s];
+        if (exact || v == 0.0) {
+            rows.push_back({c, -holding, holding});
             return;
         }
-        Constraint r{std::vector<double>(n), -holding, holding};
-        r.c[in] = per_in;
-        if (out >= 0) r.c[out] = per_out;
-        rows.push_back(r);
+        for (std::size_t s = 0; s < n; ++s) torque[s] -= c[s] * (v > 0.0 ? sliding : -sliding);
+    };
+    const auto contact = [&](int in, double per_in, int out, double per_out, double sliding, double holding,
+                             bool exact = false) {
+        std::vector<double> c(n);
+        c[in] = per_in;
+        if (out >= 0) c[out] = per_out;
+        between(c, sliding, holding, exact);
     };
     const double infinite = std::numeric_limits<double>::infinity();
     for (std::size_t g = 0; g < t.gears.size(); ++g) {
         const Gear& gear = t.gears[g];
         const double i = gear.law.ratio;
+        std::vector<double> rate(n);  // of the twist
+        rate[gear.input] = 1.0 / i;
+        rate[gear.output] = -1.0;
+        if (gear.housing >= 0) rate[gear.housing] = 1.0 - 1.0 / i;
         if (gear.rigid()) {
-            contact(gear.input, 1.0 / i, gear.output, -1.0, 0.0, infinite, true);
+            between(rate, 0.0, infinite, true);
             continue;
         }
         const double P = gear.law.curve.torque(now.x[p.gears[g].twist]);
-        torque[gear.output] += P;
-        torque[gear.input] -= P / i;
+        for (std::size_t s = 0; s < n; ++s) torque[s] -= rate[s] * P;
         if (p.gears[g].hysteresis != nowhere) {
             const double h = now.memory[p.gears[g].hysteresis];
-            contact(gear.input, 1.0 / i, gear.output, -1.0, h, h);
+            between(rate, h, h, false);
         }
     }
     for (std::size_t s = 0; s < n; ++s) {

@@ -8,7 +8,8 @@ namespace lostmotion::model {
 
 class RandomTrains {
  public:
-    explicit RandomTrains(unsigned seed) : random_(seed) {}
+    // housings: those of some gears turn; such a train may not be possible.
+    explicit RandomTrains(unsigned seed, bool housings = false) : housings_(housings), random_(seed) {}
 
     double uniform(double a, double b) { return std::uniform_real_distribution<double>(a, b)(random_); }
     double spread(double a, double b) { return std::exp(uniform(std::log(a), std::log(b))); }
@@ -48,6 +49,7 @@ class RandomTrains {
             }
         }
         if (coin(0.3)) t.brakes.push_back({"brake", pick(0, shafts - 1), spread(0.2, 2.0)});
+        put_housings(t);
         return t;
     }
 
@@ -111,6 +113,7 @@ class RandomTrains {
             t.angle_torques.push_back(
                 {"gravity", pick(0, shafts - 1), chords(spread(0.2, 2.0), 1, uniform(0.0, 6.0), 0.05)});
         if (coin(0.1)) t.angle_torques.push_back({"cogging", pick(0, shafts - 1), chords(0.1, 6, 0.0, 0.02)});
+        put_housings(t);
         return t;
     }
 
@@ -201,6 +204,7 @@ class RandomTrains {
             for (const ContactPlace& c : p.contacts) {
                 double &in = now.x[p.shafts[c.a].speed], *out = c.b == nowhere ? nullptr : &now.x[p.shafts[c.b].speed];
                 if (c.bilateral) *out = in * c.per_a;
+                if (c.bilateral && c.housing != nowhere) *out += now.x[p.shafts[c.housing].speed] * c.per_housing;
                 if (c.one_way && in > *out) *out = in;
             }
         for (int i = 0; i < a.layout().inputs; ++i) {
@@ -212,6 +216,21 @@ class RandomTrains {
     }
 
  private:
+    // Losses and laws that act against the frame are taken out.
+    void put_housings(Train& t) {
+        if (!housings_ || t.shafts.size() < 3) return;
+        for (Gear& g : t.gears) {
+            if (!coin(0.7)) continue;
+            do g.housing = pick(0, static_cast<int>(t.shafts.size()) - 1);
+            while (g.housing == g.input || g.housing == g.output);
+            g.efficiencies.reset();
+            g.law.losses = Gearbox::constant_efficiency;
+            g.law.viscous_friction = 0.0;
+            g.transmission_error = {};
+        }
+    }
+
+    bool housings_;
     std::mt19937_64 random_;
 };
 

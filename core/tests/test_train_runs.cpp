@@ -1,6 +1,7 @@
 // Whole runs of trains: the exact solver against the drive's, the adaptive solver and the ledger.
 #include <doctest/doctest.h>
 
+#include "drive_runs.hpp"
 #include "random_train_runs.hpp"
 
 TEST_SUITE_BEGIN("train_runs");
@@ -181,6 +182,45 @@ TEST_CASE("a pendulum held by friction stays; once it slips, chords and sine dif
         CHECK(std::fabs(chords.report.x[1] - low) < error * (angle - low) / brakes);
         CHECK(std::fabs(chords.report.x[1] - low) > 1e-9);
     }
+}
+
+// The slope of the error, and with it the torque at the input, (1 - e') T_2, jumps there: T_2 = 10 N m takes 11 N m
+// ahead of the corner and 9 N m behind it.
+TEST_CASE("a shaft at rest on a corner of a transmission error stays as either side of it can hold it") {
+    const auto run = [](double motor, double corner, double tolerance) {
+        Train t;
+        t.shafts = {shaft(1.0), shaft(1.0)};
+        t.shafts[0].friction.torque = 1.0;
+        t.shafts[1].friction.torque = 1e3;
+        t.motors = {torque_motor(0)};
+        t.gears = {spring(0, 1, 1.0, TorsionCurve({}, {100.0}))};
+        // A peak at the corner.
+        constexpr double h = 0.7;
+        const double at_zero = corner == 0.0 ? 0.1 * h : 0.0;
+        t.gears[0].transmission_error = PeriodicCurve(2.0 * h, {0.0, h}, {at_zero, 0.1 * h - at_zero});
+        const Assembly a(t);
+        std::vector<double> x(static_cast<std::size_t>(a.layout().states));
+        x[static_cast<std::size_t>(a.places().gears[0].twist)] = 0.1;
+        x[static_cast<std::size_t>(a.places().shafts[0].angle)] = corner;
+        return Recorded(t, {{{Breakpoint{0.0, motor, 0.0}}, {}}}, 0.5, 0.1, tolerance, x);
+    };
+    for (const double corner : {0.0, 0.7, -0.7})
+        for (const double tolerance : {0.0, 1e-10}) {
+            CAPTURE(corner);
+            CAPTURE(tolerance);
+            // 8 to 10 N m hold it behind the corner, 10 to 12 ahead.
+            for (const double motor : {8.1, 9.0, 9.9, 10.1, 11.0, 11.9}) {
+                CAPTURE(motor);
+                const Recorded r = run(motor, corner, tolerance);
+                REQUIRE(r.done());
+                CHECK(r.channel("shaft0_speed")[r.samples - 1] == 0.0);
+            }
+            const Recorded ahead = run(12.1, corner, tolerance), back = run(7.9, corner, tolerance);
+            REQUIRE(ahead.done());
+            REQUIRE(back.done());
+            CHECK(ahead.channel("shaft0_speed")[1] > 0.0);
+            CHECK(back.channel("shaft0_speed")[1] < 0.0);
+        }
 }
 
 }  // namespace lostmotion::model

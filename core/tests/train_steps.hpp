@@ -178,6 +178,7 @@ class TrainSteps {
         Linear f;
         f.c[at(gear(g).input)] += 1.0 / gear(g).law.ratio - error_slope(g);
         f.c[at(gear(g).output)] -= 1.0;
+        if (gear(g).housing >= 0) f.c[at(gear(g).housing)] += 1.0 - 1.0 / gear(g).law.ratio;
         return f;
     }
     bool has_gap(int g) const { return gear(g).law.curve.torque(1e-12) == 0.0; }
@@ -186,8 +187,7 @@ class TrainSteps {
             if (gear(g).law.compliance == Gearbox::rigid || gear(g).mesh_damping == 0.0) continue;
             modes_.flanks[at(g)] = has_gap(g) && gear(g).law.curve.torque(twist[at(g)]) == 0.0 ? 0 : 1;
             if (modes_.flanks[at(g)] == 0 || !has_gap(g)) continue;
-            const double rate =
-                (1.0 / gear(g).law.ratio - error_slope(g)) * speed[at(gear(g).input)] - speed[at(gear(g).output)];
+            const double rate = value(twist_rate(g), speed);
             const double P = gear(g).law.curve.torque(twist[at(g)]);
             if (P * (P + gear(g).mesh_damping * rate) < 0.0) modes_.flanks[at(g)] = -1;
         }
@@ -203,7 +203,7 @@ class TrainSteps {
         // The slope of the curve in the direction in which the twist goes is found by one small difference.
         constexpr double small = 1e-9;
         const double P = e.law.curve.torque(twist[at(g)]);
-        const double way = rate.c[at(e.input)] * speed[at(e.input)] - speed[at(e.output)] >= 0.0 ? small : -small;
+        const double way = value(rate, speed) >= 0.0 ? small : -small;
         f.one = P;
         f.add(rate, h_ * (e.law.curve.torque(twist[at(g)] + way) - P) / way);
         if (m.flanks[at(g)] > 0) f.add(rate, e.mesh_damping);
@@ -291,7 +291,9 @@ class TrainSteps {
             if (gear(g).output == s) row.add(T_2[at(g)], 1.0);
             const double efficiency =
                 lossy(g) || gear(g).law.losses != Gearbox::constant_efficiency ? 1.0 : gear(g).law.efficiency;
-            if (gear(g).input == s) row.add(T_2[at(g)], -(1.0 / gear(g).law.ratio - error_slope(g)) / efficiency);
+            const double per_T_2 = (1.0 / gear(g).law.ratio - error_slope(g)) / efficiency;
+            if (gear(g).input == s) row.add(T_2[at(g)], -per_T_2);
+            if (gear(g).housing == s) row.add(T_2[at(g)], per_T_2 - 1.0);
         }
         for (std::size_t k = 0; k < places_.size(); ++k) {
             if (places_[k].what == of_shaft && places_[k].element == s) row.add(torque_of(static_cast<int>(k)), -1.0);
@@ -472,6 +474,7 @@ class TrainSteps {
             const PeriodicCurve& e = gear(g).transmission_error;
             const double phi = angle[at(gear(g).input)], turned = h_ * z_[at(gear(g).input)];
             twist[at(g)] += turned / gear(g).law.ratio - h_ * z_[at(gear(g).output)];
+            if (gear(g).housing >= 0) twist[at(g)] += (1.0 - 1.0 / gear(g).law.ratio) * h_ * z_[at(gear(g).housing)];
             if (e.present()) twist[at(g)] -= e(phi + turned) - e(phi);
         }
         for (std::size_t m = 0; m < train_.motors.size(); ++m) motor_torque[m] = value(drive(m), z_);

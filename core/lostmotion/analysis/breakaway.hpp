@@ -24,8 +24,8 @@ class Breakaway {
         : assembly_(a), train_(a.train()), key_(r.key), now_(now) {
         for (const model::Row& T : r.output_torque) T_2_.push_back(model::evaluate(a.layout(), T, now));
     }
-    // Forward s = +1, backward s = -1. Infinite if no command turns it; NaN if it turns a loop, whose torques depend on
-    // more than statics.
+    // Forward s = +1, backward s = -1. Infinite if no command turns it; NaN if it turns a loop or a gear whose housing
+    // turns, whose torques depend on more than statics.
     double command(int motor, int s) {
         const model::ShaftMotor& m = train_.motors[static_cast<std::size_t>(motor)];
         left_out_ = motor;
@@ -47,6 +47,10 @@ class Breakaway {
             needed += s * c.forward;
         for (std::size_t g = 0; g < train_.gears.size(); ++g) {
             const model::Gear& gear = train_.gears[g];
+            if (gear.housing != model::nowhere) {
+                loop_ = loop_ || gear.input == shaft || gear.output == shaft || gear.housing == shaft;
+                continue;
+            }
             if (&gear == from || (gear.input != shaft && gear.output != shaft)) continue;
             needed += gear.input == shaft ? to_drive(static_cast<int>(g), s) : to_drive_back(static_cast<int>(g), s);
         }

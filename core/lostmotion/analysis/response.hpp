@@ -50,7 +50,8 @@ struct PowerChannels {
     };
     struct Gear {
         Pair in, out;
-        bool last;  // its output shaft turns no other gear
+        bool last;               // its output shaft turns no other gear
+        int housing_speed = -1;  // -1: it stands
     };
     std::vector<Pair> motors;
     std::vector<Gear> gears;
@@ -64,7 +65,7 @@ struct ResponseResultOf {
     std::vector<double> mean_square;
     double motor_power = 0.0;   // [W] mean of M_D w_M, of all motors
     double load_power = 0.0;    // [W] mean of T_2 w, of the last gears
-    double gear_loss = 0.0;     // [W] mean of T_1 w_M - T_2 w, of all gears
+    double gear_loss = 0.0;     // [W] mean of T_1 w_M - T_2 w - (T_1 - T_2) w_h, of all gears
     std::vector<double> table;  // channels x samples, if it is kept
 };
 
@@ -81,6 +82,9 @@ void add_mean_powers(const std::vector<double>& table, std::size_t samples, cons
             const double in = power(g.in), out = power(g.out);
             if (g.last) result.load_power += out;
             result.gear_loss += in - out;
+            if (g.housing_speed < 0) continue;
+            const auto value = [&](int channel) { return table[static_cast<std::size_t>(channel) * samples + k]; };
+            result.gear_loss -= (value(g.in.torque) - value(g.out.torque)) * value(g.housing_speed);
         }
     }
     for (double* p : {&result.motor_power, &result.load_power, &result.gear_loss}) *p /= static_cast<double>(samples);

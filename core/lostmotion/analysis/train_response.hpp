@@ -48,7 +48,8 @@ inline PowerChannels power_channels(const model::Assembly& a, const std::vector<
                                        [&](const model::Gear& other) { return other.input == gear.output; });
         out.gears.push_back({{channel(TrainChannel::input_torque, static_cast<int>(g)), speed(gear.input)},
                              {channel(TrainChannel::output_torque, static_cast<int>(g)), speed(gear.output)},
-                             last});
+                             last,
+                             gear.housing == model::nowhere ? -1 : speed(gear.housing)});
     }
     return out;
 }

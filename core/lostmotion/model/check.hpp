@@ -56,9 +56,31 @@ class TrainCheck {
             }
             return {};
         };
-        for (std::string error : {one("motor", train_.motors), two("gear", train_.gears), one("brake", train_.brakes),
-                                  two("coupling", train_.couplings), one("angle torque", train_.angle_torques)})
+        for (std::string error :
+             {one("motor", train_.motors), two("gear", train_.gears), housings(), one("brake", train_.brakes),
+              two("coupling", train_.couplings), one("angle torque", train_.angle_torques)})
             if (!error.empty()) return error;
+        return {};
+    }
+
+    std::string housings() const {
+        for (std::size_t k = 0; k < train_.gears.size(); ++k) {
+            const Gear& g = train_.gears[k];
+            if (g.housing == nowhere) continue;
+            const std::string name = named("gear", g.name, k);
+            if (!exists(g.housing))
+                return name + " names shaft number " + std::to_string(g.housing) +
+                       " as its housing, which the train does not have";
+            if (g.housing == g.input || g.housing == g.output)
+                return name + " has its housing on " + shaft(g.housing) +
+                       ", which it joins as well; give the housing a shaft of its own";
+            if (g.has_dry_losses() || g.law.viscous_friction > 0.0 || g.transmission_error.present())
+                return name + " has a housing that turns and " +
+                       (g.has_dry_losses()             ? "losses that depend on the direction of its motion"
+                        : g.law.viscous_friction > 0.0 ? "viscous friction"
+                                                       : "a transmission error") +
+                       ", which are solved against the frame only; leave one of them out";
+        }
         return {};
     }
 
@@ -100,20 +122,17 @@ class TrainCheck {
     std::string rigid_loops() const {
         std::vector<ContactPlace> rigid;
         for (std::size_t k = 0; k < train_.gears.size(); ++k)
-            if (train_.gears[k].rigid())
-                rigid.push_back({ContactPlace::gear, static_cast<int>(k), train_.gears[k].input, train_.gears[k].output,
-                                 1.0 / train_.gears[k].law.ratio, -1.0, true});
+            if (train_.gears[k].rigid()) rigid.push_back(twist_place(train_.gears[k], static_cast<int>(k)));
         const int shafts = static_cast<int>(train_.shafts.size());
         std::vector<std::int8_t> modes(rigid.size(), 1);
         for (std::size_t k = 0; k < rigid.size(); ++k) {
-            const Ties before = tie(rigid, shafts, modes.data());
             modes[k] = 0;
-            if (before.leader[rigid[k].a] != before.leader[rigid[k].b]) continue;
+            const Ties ties = tie(rigid, shafts, modes.data());
+            if (!ties.redundant[k] && !ties.at_rest[rigid[k].a]) continue;
             const auto gear = static_cast<std::size_t>(rigid[k].element);
-            double speed;
             return named("gear", train_.gears[gear].name, gear) + " closes a loop of rigid gears with " +
-                   (moves_in_tie(rigid[k], before, speed) ? "another ratio: nothing could turn"
-                                                          : "the same ratio: its torque would not be determined") +
+                   (ties.redundant[k] ? "the same ratio: its torque would not be determined"
+                                      : "another ratio: nothing could turn") +
                    "; give it a stiffness or leave it out";
         }
         return {};
@@ -127,7 +146,10 @@ class TrainCheck {
             const int from = part[static_cast<std::size_t>(a)], to = part[static_cast<std::size_t>(b)];
             std::replace(part.begin(), part.end(), from, to);
         };
-        for (const Gear& g : train_.gears) join(g.input, g.output);
+        for (const Gear& g : train_.gears) {
+            join(g.input, g.output);
+            if (g.housing != nowhere) join(g.input, g.housing);
+        }
         for (const Coupling& c : train_.couplings) join(c.input, c.output);
         std::vector<bool> acted_on(part.size());
         for (const ShaftMotor& m : train_.motors) acted_on[static_cast<std::size_t>(part[m.shaft])] = true;
@@ -179,10 +201,18 @@ inline std::string check_start(const Train& train, const std::vector<double>& sp
     constexpr double rounding = 1e-12;  // of speeds that were converted from other units
     for (const Gear& g : train.gears) {
         const double in = speed[static_cast<std::size_t>(g.input)] / g.law.ratio,
-                     out = speed[static_cast<std::size_t>(g.output)];
-        if (g.rigid() && std::fabs(in - out) > rounding * std::fmax(std::fabs(in), std::fabs(out)))
-            return both(g.input, g.output) + " do not fit the rigid gear " + g.name +
-                   "; their quotient must be its ratio, " + number(g.law.ratio);
+                     out = speed[static_cast<std::size_t>(g.output)],
+                     housing =
+                         g.housing == nowhere ? 0.0 : g.per_housing() * speed[static_cast<std::size_t>(g.housing)];
+        const double size = std::fmax(std::fmax(std::fabs(in), std::fabs(out)), std::fabs(housing));
+        if (!g.rigid() || std::fabs(in - out + housing) <= rounding * size) continue;
+        if (g.housing != nowhere)
+            return both(g.input, g.output) + " do not fit the rigid gear " + g.name + " on the housing " +
+                   train.shafts[static_cast<std::size_t>(g.housing)].name + " = " +
+                   number(speed[static_cast<std::size_t>(g.housing)]) +
+                   " rad/s; relative to it their quotient must be its ratio, " + number(g.law.ratio);
+        return both(g.input, g.output) + " do not fit the rigid gear " + g.name +
+               "; their quotient must be its ratio, " + number(g.law.ratio);
     }
     for (const Coupling& c : train.couplings) {
         const double in = speed[static_cast<std::size_t>(c.input)], out = speed[static_cast<std::size_t>(c.output)];

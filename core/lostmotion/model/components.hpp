@@ -85,6 +85,7 @@ inline std::vector<Row> geometric_constraints(const Assembly& a, const Key& key)
         Equation e;
         e.angle[static_cast<std::size_t>(gear.input)] = a.per_input(static_cast<int>(g), key);
         e.angle[static_cast<std::size_t>(gear.output)] = -1.0;
+        if (gear.housing != nowhere) e.angle[static_cast<std::size_t>(gear.housing)] = gear.per_housing();
         if (!gear.rigid()) e.state = terms.state(a.places().gears[g].twist);
         equations.push_back(e);
     }
@@ -187,10 +188,10 @@ class ComponentLaws<model::TrainSystem<D>> {
         const model::Ties t = ties(modes);
         const auto& shafts = assembly_.places().shafts;
         for (std::size_t s = 0; s < shafts.size(); ++s) {
-            const auto leader = static_cast<std::size_t>(t.leader[s]);
-            if (!t.at_rest[s] && leader == s) continue;
+            const int shaft = static_cast<int>(s);
+            if (!t.at_rest[s] && !t.follows(shaft)) continue;
             jump.row[shafts[s].speed] = {};
-            if (!t.at_rest[s]) jump.row[shafts[s].speed][shafts[leader].speed] = t.factor[s];
+            t.each_share(shaft, [&](int k, double share) { jump.row[shafts[s].speed][shafts[k].speed] = share; });
         }
         for (std::size_t g = 0; g < gears().size(); ++g) {
             const model::GearPlace& p = gears()[g];

@@ -29,14 +29,16 @@ class ElementForms {
     // The speed of a contact, as a form.
     Row contact_speed(int contact) const {
         const ContactPlace& c = places_.contacts[contact];
-        Row f = terms_.state(places_.shafts[c.a].speed, c.per_a);
-        if (c.b != nowhere) f += terms_.state(places_.shafts[c.b].speed, c.per_b);
+        Row f;
+        c.each_shaft([&](int s, double per) { f.c[places_.shafts[s].speed] += per; });
         return f;
     }
     Row twist_rate(int gear, const Key& key) const {
         const Gear& g = train_.gears[gear];
-        return terms_.state(places_.shafts[g.input].speed, per_input(gear, key)) -
-               terms_.state(places_.shafts[g.output].speed);
+        Row rate = terms_.state(places_.shafts[g.input].speed, per_input(gear, key)) -
+                   terms_.state(places_.shafts[g.output].speed);
+        if (g.housing != nowhere) rate += terms_.state(places_.shafts[g.housing].speed, g.per_housing());
+        return rate;
     }
     // P(d) in its piece; 0 of a rigid gear.
     Row spring_torque(int gear, const Key& key) const {
@@ -91,9 +93,8 @@ class ElementForms {
     bool twist_rests(int gear, const Regime& r) const {
         const Gear& g = train_.gears[gear];
         if (g.rigid()) return true;
-        if (r.ties.at_rest[g.input] && r.ties.at_rest[g.output]) return true;
-        return !g.transmission_error.present() &&
-               kept_at_rest({ContactPlace::gear, gear, g.input, g.output, 1.0 / g.law.ratio, -1.0}, r.ties);
+        if (r.ties.at_rest[g.input] && r.ties.at_rest[g.output] && g.housing == nowhere) return true;
+        return !g.transmission_error.present() && kept_at_rest(twist_place(g, gear), r.ties);
     }
     // Capacity of a brake or clutch: linear in its input, 0 below 0 and 1 above 1.
     Row commanded(int input, int branch, double torque, const Key& key) const {

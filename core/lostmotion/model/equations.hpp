@@ -1,8 +1,8 @@
 // Equations of a regime: torques, accelerations and rates from the forms of the elements.
 //
 // The torques of a shaft are added up in one order: motors, gears and couplings that turn it; viscous friction; the
-// load; its dry contact; gears and couplings that it turns. Losses act on the contact of the input shaft, whose
-// capacity is the sum over all that is dry there: one speed, one sign.
+// load; its dry contact; gears and couplings that it turns; gears whose housing it is. Losses act on the contact of the
+// input shaft, whose capacity is the sum over all that is dry there: one speed, one sign.
 #pragma once
 
 #include "element_forms.hpp"
@@ -32,10 +32,11 @@ class Equations {
     Row acceleration(int shaft, const Key& key, const Regime& r) const;
 
     int mode(const Key& key, int contact) const { return key.modes[contact]; }
-    // The speed of a shaft where it acts: 0 at rest, that of the leader where it is tied to one.
+    // The speed of a shaft where it acts: 0 at rest, in terms of those that it follows where it is tied to others.
     Row speed(int shaft, const Regime& r) const {
-        if (r.ties.at_rest[shaft]) return Row{};
-        return terms_.state(places_.shafts[r.ties.leader[shaft]].speed, r.ties.factor[shaft]);
+        Row f;
+        r.ties.each_share(shaft, [&](int k, double share) { f.c[places_.shafts[k].speed] = share; });
+        return f;
     }
     // What a stuck contact takes: found from its rest, or, where the motion does not determine it, as it was.
     Row held(int contact, const Regime& r) const {
@@ -162,6 +163,8 @@ inline Row Equations::acceleration(int shaft, const Key& key, const Regime& r) c
         if (train_.gears[g].input == shaft) sum -= r.input_torque[g];
     for (std::size_t k = 0; k < train_.couplings.size(); ++k)
         if (train_.couplings[k].input == shaft) sum -= r.contact_torque[places_.couplings[k].contact];
+    for (std::size_t g = 0; g < train_.gears.size(); ++g)
+        if (train_.gears[g].housing == shaft) sum -= r.output_torque[g] - r.input_torque[g];
     return sum / p.inertia;
 }
 
@@ -175,10 +178,12 @@ inline void Equations::set_rates(const Key& key, const std::vector<Row>& acceler
                                                   p.branch == nowhere ? 0 : key.branch[p.branch]);
     }
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
-        const int leader = r.ties.leader[s];
         if (r.ties.at_rest[s]) continue;
-        r.rate[places_.shafts[s].speed] =
-            leader == static_cast<int>(s) ? acceleration[s] : r.ties.factor[s] * acceleration[leader];
+        Row& rate = r.rate[places_.shafts[s].speed];
+        if (!r.ties.follows(static_cast<int>(s)))
+            rate = acceleration[s];
+        else
+            r.ties.each_share(static_cast<int>(s), [&](int k, double share) { rate += share * acceleration[k]; });
     }
     for (std::size_t g = 0; g < train_.gears.size(); ++g) {
         const GearPlace& p = places_.gears[g];

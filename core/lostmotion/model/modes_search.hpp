@@ -25,10 +25,9 @@ void SwitchedTrain<Sizes>::stop(X& x, AtRest& at_rest) const {
     for (int c = 0; c < contacts(); ++c) at_rest[c] = kept_at_rest(places().contacts[c], ties);
     for (std::size_t s = 0; s < train().shafts.size(); ++s) {
         double& w = x[places().shafts[s].speed];
-        if (ties.at_rest[s])
-            w = 0.0;
-        else if (ties.leader[s] != static_cast<int>(s))
-            w = x[places().shafts[ties.leader[s]].speed] * ties.factor[s];
+        if (!ties.at_rest[s] && !ties.follows(static_cast<int>(s))) continue;
+        w = 0.0;
+        ties.each_share(static_cast<int>(s), [&](int k, double share) { w += x[places().shafts[k].speed] * share; });
     }
 }
 
@@ -41,14 +40,17 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
     bool snap = false;
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
-        const double a = p.per_a * now.x[places().shafts[p.a].speed],
-                     b = p.b == nowhere ? 0.0 : p.per_b * now.x[places().shafts[p.b].speed];
+        double speed = 0.0, size = 0.0;
+        p.each_shaft([&](int s, double per) {
+            speed += per * now.x[places().shafts[s].speed];
+            size += std::fabs(per * now.x[places().shafts[s].speed]);
+        });
         // Speeds that differ by rounding are the same: a state that a run has ended with may be that of the next.
-        const bool same = std::fabs(a + b) <= few_roundings * (std::fabs(a) + std::fabs(b));
-        if (p.one_way && a + b > 0.0 && !same) return Found::inconsistent;
-        key.modes[c] = p.one_way || a + b < 0.0 ? -1 : +1;
+        const bool same = std::fabs(speed) <= few_roundings * size;
+        if (p.one_way && speed > 0.0 && !same) return Found::inconsistent;
+        key.modes[c] = p.one_way || speed < 0.0 ? -1 : +1;
         event.at_rest[c] = p.bilateral || same;
-        snap = snap || (same && !p.bilateral && a != -b);
+        snap = snap || (same && !p.bilateral && speed != 0.0);
     }
     if (snap) stop(now.x, event.at_rest);
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
@@ -150,8 +152,7 @@ template <class E, class Now>
 bool SwitchedTrain<Sizes>::turns_the_other_way(const E& e, const Now& now, const Event& event) const {
     const ContactPlace& c = places().contacts[event.contact];
     std::decay_t<decltype(regime_of(e).guards[0].form)> speed;
-    speed.c[places().shafts[c.a].speed] = event.neighbour * c.per_a;
-    if (c.b != nowhere) speed.c[places().shafts[c.b].speed] = event.neighbour * c.per_b;
+    c.each_shaft([&](int s, double per) { speed.c[places().shafts[s].speed] += event.neighbour * per; });
     auto along = flow(e, now);
     return sign_after(along, speed, evaluate(n_, speed, now), magnitude(n_, speed, now)).relative < -max_violation;
 }
@@ -180,18 +181,19 @@ template <class Sizes>
 bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
     const std::vector<ContactPlace>& all = places().contacts;
     const Ties ties = tie(all, static_cast<int>(train().shafts.size()), key.modes.data());
-    std::array<int, max_shafts> direction{};  // of each leader
+    std::array<int, max_shafts> direction{};  // of each free shaft
+    std::array<double, max_shafts> speed;
     for (std::size_t k = 0; k < all.size(); ++k) {
         if (key.modes[k] == 0) continue;
         const ContactPlace& c = all[k];
-        if (kept_at_rest(c, ties)) return true;
-        if (c.b != nowhere && ties.leader[c.a] != ties.leader[c.b]) continue;
-        double speed;
-        moves_in_tie(c, ties, speed);
-        const int way = key.modes[k] * (speed > 0.0 ? 1 : -1);
-        int& of_leader = direction[ties.leader[c.a]];
-        if (of_leader * way < 0) return true;
-        of_leader = way;
+        if (!tied_speed(c, ties, speed)) return true;
+        const auto turns = [](double v) { return v != 0.0; };
+        const auto end = speed.begin() + ties.shafts, free = std::find_if(speed.begin(), end, turns);
+        if (std::any_of(free + 1, end, turns)) continue;
+        const int way = key.modes[k] * (*free > 0.0 ? 1 : -1);
+        int& of_free = direction[free - speed.begin()];
+        if (of_free * way < 0) return true;
+        of_free = way;
     }
     return false;
 }

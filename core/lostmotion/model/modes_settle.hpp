@@ -52,8 +52,9 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
         set(p.piece, piece);
         if (p.parted == nowhere) continue;
         const double w_in = now.x[places().shafts[gear.input].speed], w_out = now.x[places().shafts[gear.output].speed];
-        const double pressed = gear.law.curve.torque(d) +
-                               gear.mesh_damping * (assembly_.per_input(static_cast<int>(g), trial) * w_in - w_out);
+        double rate = assembly_.per_input(static_cast<int>(g), trial) * w_in - w_out;
+        if (gear.housing != nowhere) rate += gear.per_housing() * now.x[places().shafts[gear.housing].speed];
+        const double pressed = gear.law.curve.torque(d) + gear.mesh_damping * rate;
         set(p.parted, piece != 0 && piece * pressed < 0.0 ? 1 : 0);
     }
     for (std::size_t k = 0; k < train().angle_torques.size(); ++k) {
@@ -121,7 +122,9 @@ void SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
             for (std::size_t g = 0; g < train().gears.size(); ++g) {
                 const Gear& gear = train().gears[g];
                 if (gear.output == out && !(is_gear && static_cast<int>(g) == c.element)) needed -= T_2[g];
-                if (gear.input == out) needed += T_2[g] / (gear.law.ratio * gear.law.efficiency);
+                const double T_1 = T_2[g] / (gear.law.ratio * gear.law.efficiency);
+                if (gear.input == out) needed += T_1;
+                if (gear.housing == out) needed += T_2[g] - T_1;
             }
             for (std::size_t n = 0; n < train().couplings.size(); ++n) {
                 if (train().couplings[n].output == out && (is_gear || static_cast<int>(n) != c.element))
@@ -171,6 +174,8 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
     locate_losses(now, T_2, trial);
     hold(now, event, trial, T_2);
     Trial result = walk(cache, now, event, trial, key);
+    if (result.found == Found::inconsistent && settle_on_corner(cache, now, event, trial, key))
+        result.found = Found::yes;
     if (result.found != Found::inconsistent || !event.from_each_load) return result;
     // The torque that keeps a twist at rest depends on the cell, and the cell on the torque.
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
@@ -192,6 +197,33 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
         }
     }
     return result;
+}
+
+// The torque that a transmission error lets an input shaft feel jumps at its corners. A shaft at rest on one may have
+// that of either side: does the piece on the other side of such a corner hold?
+template <class Sizes>
+template <class Cache, class Now>
+bool SwitchedTrain<Sizes>::settle_on_corner(Cache& cache, Now& now, const Event& event, const Key& trial,
+                                            Key& key) const {
+    const auto memory = now.memory;
+    for (std::size_t g = 0; g < train().gears.size(); ++g) {
+        const GearPlace& p = places().gears[g];
+        if (p.error_piece == nowhere) continue;
+        const PeriodicCurve& e = train().gears[g].transmission_error;
+        const double phi = now.x[places().shafts[train().gears[g].input].angle];
+        const int k = trial.branch[p.error_piece], last = e.pieces() - 1;
+        for (const bool ahead : {false, true}) {
+            const double corner = now.memory[p.error_turn] + (ahead ? e.upper(k) : e.lower(k));
+            if (std::fabs(phi - corner) > on_corner * (std::fabs(phi) + e.period())) continue;
+            const bool turns = k == (ahead ? last : 0);
+            Key other = trial;
+            other.branch[p.error_piece] = static_cast<std::int16_t>(turns ? last - k : ahead ? k + 1 : k - 1);
+            if (turns) now.memory[p.error_turn] += ahead ? e.period() : -e.period();
+            if (walk(cache, now, event, other, key).found == Found::yes) return true;
+            now.memory = memory;
+        }
+    }
+    return false;
 }
 
 // Is this combination, in which a contact is at its limit, consistent, or, if what drives it there turns back, does

@@ -66,14 +66,7 @@ struct PackedRegime {
     std::array<PackedGuard<D>, D::guards> guards{};
     int n_guards = 0;
     std::array<bool, D::contacts> at_rest{};
-    // Shafts that follow another: speed state, that of their leader and the factor; n_followers of them.
-    struct Follower {
-        int state, leader;
-        double factor;
-    };
-    std::array<Follower, D::coupled> followers{};
-    int n_followers = 0;
-    std::array<bool, D::coupled> resting{}, following{};  // speeds kept at zero, and those that follow another
+    std::array<bool, D::coupled> resting{}, following{};  // speeds kept at zero, and those that follow others
     bool solvable = true, in_data = true;
     std::vector<Driver<PackedForm<D>>> drivers;
     int driving_input = -1;
@@ -99,9 +92,7 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
     const auto& shafts = a.places().shafts;
     for (int s = 0; s < static_cast<int>(shafts.size()); ++s) {
         out.resting[shafts[s].speed] = r.ties.at_rest[s];
-        out.following[shafts[s].speed] = !r.ties.at_rest[s] && r.ties.leader[s] != s;
-        if (const int leader = r.ties.leader[s]; !r.ties.at_rest[s] && leader != s)
-            out.followers[out.n_followers++] = {shafts[s].speed, shafts[leader].speed, r.ties.factor[s]};
+        out.following[shafts[s].speed] = r.ties.follows(s);
     }
     out.solvable = r.solvable;
     out.driving_input = r.driving_input;

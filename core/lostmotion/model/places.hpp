@@ -13,6 +13,14 @@
 
 namespace lostmotion::model {
 
+// Where the twist of a gear rests or slips.
+inline ContactPlace twist_place(const Gear& g, int gear) {
+    ContactPlace c{ContactPlace::gear, gear, g.input, g.output, 1.0 / g.law.ratio, -1.0, g.rigid()};
+    c.housing = g.housing;
+    if (g.housing != nowhere) c.per_housing = g.per_housing();
+    return c;
+}
+
 struct MotorPlace {
     int torque = nowhere;  // state
     int command = nowhere, branch = nowhere;
@@ -119,7 +127,8 @@ inline void Places::place_states(const Train& train) {
         for (int& l : last)
             if (l == from) l = to;
     };
-    for (const Gear& g : train.gears) join(g.input, g.output);
+    for (const Gear& g : train.gears)
+        if (g.housing == nowhere) join(g.input, g.output);  // else its twist leaves one angle open
     for (const Coupling& c : train.couplings) join(c.input, c.output);
     for (std::size_t s = 0; s < shafts.size(); ++s)
         if (last[s] == static_cast<int>(s)) last_shaft.push_back(static_cast<int>(s));
@@ -144,8 +153,7 @@ inline void Places::place_contacts(const Train& train) {
             const Gear& g = train.gears[k];
             if (g.input != static_cast<int>(s) || !(g.rigid() || g.law.has_hysteresis())) continue;
             gears[k].contact = static_cast<int>(contacts.size());
-            contacts.push_back(
-                {ContactPlace::gear, static_cast<int>(k), g.input, g.output, 1.0 / g.law.ratio, -1.0, g.rigid()});
+            contacts.push_back(twist_place(g, static_cast<int>(k)));
         }
     }
     for (std::size_t k = 0; k < couplings.size(); ++k) {

@@ -62,8 +62,10 @@ inline std::vector<PowerFlow> power_flows(const Assembly& a, const Regime& r) {
     for (std::size_t g = 0; g < train.gears.size(); ++g) {
         const Gear& gear = train.gears[g];
         const double per_input = a.per_input(index(g), r.key);
+        Row relative = speed(gear.input);  // to the housing
+        if (gear.housing != nowhere) relative -= speed(gear.housing);
         flows.push_back({PowerFlow::loss, PowerFlow::gear, index(g), "mesh",
-                         r.input_torque[g] - per_input * r.output_torque[g], speed(gear.input)});
+                         r.input_torque[g] - per_input * r.output_torque[g], relative});
         if (gear.rigid() || a.twist_rests(index(g), r)) continue;
         // All of the output torque that is not the spring's.
         const Row rate = a.twist_rate(index(g), r.key);

@@ -26,6 +26,7 @@ inline std::optional<Row> shaft_angle(const Assembly& a, int shaft) {
             std::optional<Row>&in = angle[static_cast<std::size_t>(gear.input)],
             &out = angle[static_cast<std::size_t>(gear.output)];
             if (in.has_value() == out.has_value() || gear.transmission_error.present()) continue;
+            if (gear.housing != nowhere) continue;  // each of its shafts has an angle, or one that another follows
             const Row twist = gear.rigid() ? Row{} : Row::unit(places.gears[g].twist);
             if (out)
                 in = gear.law.ratio * (*out + twist);

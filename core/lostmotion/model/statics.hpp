@@ -21,8 +21,8 @@ struct StuckRows {
         for (std::size_t k = 0; k < contacts.size(); ++k) {
             if (key.modes[k] != 0 || ties.redundant[k]) continue;
             const ContactPlace& c = contacts[k];
-            rows.push_back(c.per_a * acceleration[c.a]);
-            if (c.b != nowhere) rows.back() += c.per_b * acceleration[c.b];
+            rows.emplace_back();
+            c.each_shaft([&](int s, double per) { rows.back() += per * acceleration[s]; });
             unknowns.push_back(layout.terms + static_cast<int>(k));
         }
     }
@@ -40,7 +40,7 @@ inline bool moves_freely(const std::vector<ContactPlace>& contacts, const Layout
         if (done[first]) continue;
         std::vector<std::size_t> part;
         for (std::size_t k = first; k < all.rows.size(); ++k)
-            if (ties.leader[shaft(k)] == ties.leader[shaft(first)]) {
+            if (ties.part[shaft(k)] == ties.part[shaft(first)]) {
                 part.push_back(k);
                 done[k] = true;
             }

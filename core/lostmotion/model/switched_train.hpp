@@ -156,6 +156,8 @@ class SwitchedTrain {
     template <class Cache, class Now>
     Trial settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const;
     template <class Cache, class Now>
+    bool settle_on_corner(Cache& cache, Now& now, const Event& event, const Key& trial, Key& key) const;
+    template <class Cache, class Now>
     Found settle_at_limit(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const;
     template <class Cache, class Now>
     Trial walk(Cache& cache, Now& now, const Event& event, Key trial, Key& key) const;
@@ -316,8 +318,9 @@ class SwitchedTrain {
     template <class Cache, class Now, class Input>
     bool stays(Cache& cache, const Now& now, const Key& key, const Input& input) const;
 
-    static constexpr double max_violation = 1e-6;  // that rounding may make
-    static constexpr double max_tried = 729.0;     // combinations that are tried as a last resort
+    static constexpr double max_violation = 1e-6;                                      // that rounding may make
+    static constexpr double on_corner = 8.0 * std::numeric_limits<double>::epsilon();  // of an angle and its period
+    static constexpr double max_tried = 729.0;  // combinations that are tried as a last resort
     static constexpr std::size_t from_one_start = 300, longest_pivoting = 600;
 
     const Assembly& assembly_;

@@ -1,12 +1,13 @@
 // Which speeds the contacts at rest tie together, and which of those contacts are redundant.
 //
-// Each stuck contact is a linear equation between one or two speeds. A set of such equations has the rank of a gain
-// graph: in each part that hangs together, the number of shafts if it is at rest (a shaft is held, or a loop
-// contradicts itself), else one less. A contact that does not raise the rank is redundant: its reaction is not
-// determined by the motion.
+// Each stuck contact is a linear equation between the speeds of one or two shafts, or of three where the housing of a
+// gear turns. Each that does not follow from those before it makes one speed follow the others, or stop. One that does
+// follow is redundant: its reaction is not determined by the motion.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "contact_place.hpp"
@@ -17,59 +18,66 @@ namespace lostmotion::model {
 // Ratios in a loop agree within this share.
 inline constexpr double loop_rounding = 1e-12;
 
-// What a contact's speed is times that of its leader; both shafts must have the same one.
-inline bool moves_in_tie(const ContactPlace& c, const Ties& t, double& speed) {
-    const double a = c.per_a * t.factor[c.a], b = c.b == nowhere ? 0.0 : c.per_b * t.factor[c.b];
-    speed = a + b;
-    return std::fabs(speed) > loop_rounding * (std::fabs(a) + std::fabs(b));
+// The speed of a contact in terms of those that are free; what cancels to within rounding is none. False if all does.
+inline bool tied_speed(const ContactPlace& c, const Ties& t, std::array<double, max_shafts>& speed) {
+    bool moves = false;
+    for (int k = 0; k < t.shafts; ++k) {
+        double sum = 0.0, size = 0.0;
+        c.each_shaft([&](int s, double per) {
+            sum += per * t.share[s][k];
+            size += std::fabs(per * t.share[s][k]);
+        });
+        speed[k] = std::fabs(sum) > loop_rounding * size ? sum : 0.0;
+        moves = moves || speed[k] != 0.0;
+    }
+    return moves;
+}
+
+// Makes the last of the free shafts that the speed of a contact depends on follow the others.
+inline void stop_contact(const ContactPlace& c, std::size_t k, Ties& t) {
+    std::array<double, max_shafts> speed;
+    t.redundant[k] = !tied_speed(c, t, speed);
+    int part = t.part[c.a];
+    c.each_shaft([&](int s, double) { part = std::min(part, t.part[s]); });
+    c.each_shaft([&](int s, double) {
+        std::replace(t.part.begin(), t.part.begin() + t.shafts, int{t.part[s]}, part);
+    });
+    if (t.redundant[k]) return;
+    int last = t.shafts - 1;
+    while (speed[last] == 0.0) --last;
+    for (int s = 0; s < t.shafts; ++s) {
+        const double share = std::exchange(t.share[s][last], 0.0);
+        for (int free = 0; share != 0.0 && free < last; ++free) {
+            if (speed[free] == 0.0) continue;
+            const double before = t.share[s][free], change = share * (-speed[free] / speed[last]);
+            const double sum = before + change;
+            t.share[s][free] = std::fabs(sum) > loop_rounding * std::fabs(change) ? sum : 0.0;
+        }
+    }
 }
 
 // stuck: a contact is at rest where this is 0. Frame contacts come first, so that it is a gear or coupling whose
 // torque is redundant where a shaft is held twice.
 inline Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes) {
     Ties t;
-    std::array<bool, max_shafts> held{};  // by leader
+    t.shafts = shafts;
     for (int s = 0; s < shafts; ++s) {
-        t.leader[s] = s;
-        t.factor[s] = 1.0;
+        t.part[s] = s;
+        std::fill_n(t.share[s].begin(), shafts, 0.0);
+        t.share[s][s] = 1.0;
     }
-    const auto all_of = [&](int from, int to, double times) {
-        for (int s = 0; s < shafts; ++s)
-            if (t.leader[s] == from) {
-                t.leader[s] = to;
-                t.factor[s] = t.factor[s] * times;
-            }
-    };
-    for (const ContactPlace& c : contacts)
-        if (c.kind == ContactPlace::shaft && modes[&c - contacts.data()] == 0) held[c.a] = true;
-    for (const ContactPlace& c : contacts) {
-        const std::size_t k = static_cast<std::size_t>(&c - contacts.data());
-        if (c.b == nowhere || modes[k] != 0) continue;
-        const int a = t.leader[c.a], b = t.leader[c.b];
-        double speed;
-        if (a == b) {
-            t.redundant[k] = held[a] || !moves_in_tie(c, t, speed);
-            held[a] = held[a] || !t.redundant[k];
-            continue;
-        }
-        t.redundant[k] = held[a] && held[b];
-        const bool either = held[a] || held[b];
-        if (a < b)
-            all_of(b, a, -c.per_a * t.factor[c.a] / (c.per_b * t.factor[c.b]));
-        else
-            all_of(a, b, -c.per_b * t.factor[c.b] / (c.per_a * t.factor[c.a]));
-        held[std::min(a, b)] = either;
-    }
-    for (int s = 0; s < shafts; ++s) t.at_rest[s] = held[t.leader[s]];
+    for (const bool frame : {true, false})
+        for (std::size_t k = 0; k < contacts.size(); ++k)
+            if (modes[k] == 0 && (contacts[k].b == nowhere) == frame) stop_contact(contacts[k], k, t);
+    for (int s = 0; s < shafts; ++s)
+        t.at_rest[s] = std::all_of(t.share[s].begin(), t.share[s].begin() + shafts, [](double v) { return v == 0.0; });
     return t;
 }
 
 // Is the speed of a contact kept at zero by these ties?
 inline bool kept_at_rest(const ContactPlace& c, const Ties& t) {
-    if (c.b == nowhere) return t.at_rest[c.a];
-    if (t.at_rest[c.a] && t.at_rest[c.b]) return true;
-    double speed;
-    return t.leader[c.a] == t.leader[c.b] && !moves_in_tie(c, t, speed);
+    std::array<double, max_shafts> speed;
+    return !tied_speed(c, t, speed);
 }
 
 }  // namespace lostmotion::model

@@ -31,6 +31,11 @@ class TrainDescription {
         if (transmission_error != nullptr) g.transmission_error = *transmission_error;
         train.gears.push_back(std::move(g));
     }
+    // Puts the housing of a gear, by default on the frame, on a shaft.
+    void set_housing(const std::string& gear, const std::string& shaft) {
+        for (Gear& g : train.gears)
+            if (g.name == gear) g.housing = place_of(shaft);
+    }
     void add_brake(const std::string& name, const std::string& shaft, double torque, double breakaway_torque) {
         train.brakes.push_back({name, place_of(shaft), torque, breakaway_torque});
     }

@@ -20,6 +20,9 @@ struct MeshLoss {
 struct Gear {
     std::string name;
     int input = 0, output = 0;  // shafts
+    // Shaft that the housing is on: w_in - w_h = i (w_out - w_h); -1: the frame. Of a planetary gear whose sun is the
+    // input and whose carrier is the output it is the ring.
+    int housing = -1;
     Gearbox law;
     std::optional<MeshEfficiency> efficiencies;  // of both directions of power flow, in place of the law's losses
     // Mesh damping [N m s/rad, at the output]: acts while the flanks touch. They part when P + c d' would pull.
@@ -30,6 +33,7 @@ struct Gear {
     bool has_dry_losses() const { return efficiencies || law.losses == Gearbox::loss_map; }
     bool has_backlash() const { return !rigid() && law.curve.slope(0) == 0.0; }
     bool parts_flanks() const { return mesh_damping > 0.0 && has_backlash(); }
+    double per_housing() const { return 1.0 - 1.0 / law.ratio; }                          // of the twist's rate
     double rated_torque() const { return efficiencies ? 1.0 : law.rated_output_torque; }  // scales mu
 
     // The loss law, whichever it is.

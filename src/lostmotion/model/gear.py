@@ -21,6 +21,9 @@ class Gear(Transmission):
     """shaft"""
     output: str
     """shaft"""
+    housing: str | None = None
+    """shaft that carries the housing, or the ring of a planetary gear from its sun to its carrier: input speed - housing speed =
+    ratio * (output speed - housing speed); left out, the frame"""
     stiffness: Annotated[TorsionCurve | LinearStiffness | Rigid, Field(discriminator="kind")] = Rigid()
     """left out, rigid"""
     losses: Annotated[ConstantEfficiency | LossMap | MeshEfficiency | WormMesh, Field(discriminator="kind")] = (
@@ -34,7 +37,8 @@ class Gear(Transmission):
 
     def __repr__(self) -> str:
         laws = f"stiffness {self.stiffness.kind}, losses {self.losses.kind}"
-        return f"Gear({self.input} -> {self.output}, {self.ratio:g}:1, {laws})"
+        housing = "" if self.housing is None else f" on {self.housing}"
+        return f"Gear({self.input} -> {self.output}{housing}, {self.ratio:g}:1, {laws})"
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -199,12 +199,16 @@ def self_locking(
     Raises
     ------
     InputError
-        The train has no such gear; no torque is given, and the gear has no rated one.
+        The train has no such gear, or one whose housing turns; no torque is given, and the gear has no rated one.
     """
     if gear not in train.gears:
         known = list(train.gears)
         meant = did_you_mean(gear, known, f"there are {', '.join(known)}" if known else "there is none")
         raise InputError(f"{gear} is no gear of this train; {meant}")
+    if turning := [name for name, g in train.gears.items() if g.housing is not None]:
+        raise InputError(
+            f"the housing of gear {turning[0]} turns; what its load drives has no verdict here, only a run"
+        )
     core = train.core(())
     part = train.gears[gear]
     try:
@@ -255,7 +259,7 @@ def _growth(names: list[str], rate: np.ndarray) -> tuple[list[complex], float]:
 def _joints(train: DriveTrain) -> list[tuple[str, str, float]]:
     """(input, output, ratio) of all that joins two shafts."""
     couplings = [(c.input, c.output, 1.0) for table in (train.clutches, train.freewheels) for c in table.values()]
-    return [(g.input, g.output, g.ratio) for g in train.gears.values()] + couplings
+    return [(g.input, g.output, g.ratio) for g in train.fixed_gears().values()] + couplings
 
 
 def _speeds(train: DriveTrain, gear: Gear, speed: float) -> dict[str, float]:

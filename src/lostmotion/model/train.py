@@ -55,12 +55,16 @@ class TrainElements(Part):
         clutches = (name for name, clutch in self.clutches.items() if clutch.kind == "friction")
         return [*self.motors, *self.brakes, *clutches]
 
+    def fixed_gears(self) -> dict[str, Gear]:
+        """Gears whose housing stands: the speeds of their two shafts have the ratio."""
+        return {name: gear for name, gear in self.gears.items() if gear.housing is None}
+
     def references(self) -> Iterator[tuple[str, str]]:
         """Each key that names a shaft, and the name."""
         for table in TrainElements.model_fields:
             for name, element in getattr(self, table).items():
-                for key in ("shaft", "input", "output"):
-                    if key in type(element).model_fields:
+                for key in ("shaft", "input", "output", "housing"):
+                    if getattr(element, key, None) is not None:
                         yield f"{table}.{name}.{key}", getattr(element, key)
 
 
@@ -152,3 +156,5 @@ def add_gear(train: _core.Train, name: str, gear: Gear) -> None:
         mesh_damping=gear.mesh_damping,
         transmission_error=None if error is None else error.core(),
     )
+    if gear.housing is not None:
+        train.set_housing(name, gear.housing)

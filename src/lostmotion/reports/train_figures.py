@@ -78,7 +78,7 @@ def ratios_to(train: DriveTrain, last: str) -> dict[str, float]:
     waiting = [last]
     while waiting:
         shaft = waiting.pop()
-        for gear in train.gears.values():
+        for gear in train.fixed_gears().values():
             for near, far, ratio in (
                 (gear.output, gear.input, gear.ratio),
                 (gear.input, gear.output, 1.0 / gear.ratio),

@@ -219,6 +219,8 @@ def _of_train(
 
 
 def _verdicts(train: DriveTrain, named: dict[str, float]) -> Iterator[SelfLocking]:
+    if train.fixed_gears() != train.gears:
+        return
     for name, gear in train.gears.items():
         torque = abs(named[f"{name}_output_torque"]) or gear.rated_output_torque
         if torque and (verdict := self_locking(train, name, torque)).notable:

@@ -74,7 +74,7 @@ def angles_at_start(train: DriveTrain, given: Mapping[str, float], twists: Mappi
             angles[start], origin[start] = 0.0, start
             waiting.append(start)
         shaft = waiting.pop(0)
-        for name, gear in train.gears.items():
+        for name, gear in train.fixed_gears().items():
             if shaft not in (gear.input, gear.output):
                 continue
             other = gear.output if shaft == gear.input else gear.input

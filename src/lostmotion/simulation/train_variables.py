@@ -79,7 +79,7 @@ def angles_through_gears(train: DriveTrain, known: Collection[str]) -> Iterator[
     waiting = [name for name in train.shafts if name in reached]
     while waiting:
         shaft = waiting.pop()
-        for name, gear in train.gears.items():
+        for name, gear in train.fixed_gears().items():
             if shaft not in (gear.input, gear.output):
                 continue
             other = gear.output if shaft == gear.input else gear.input

@@ -58,6 +58,8 @@ def _gear(scenario: TrainScenario, name: str, result: xarray.Dataset) -> list[Fi
     if gear.rated_input_speed is not None or gear.limits is not None:
         findings += input_speeds(gear, cycle, where)
     findings = _named(name, findings)
+    if scenario.fixed_gears() != scenario.gears:
+        return findings  # what its load drives then has no verdict
     if not isinstance(gear.losses, ConstantEfficiency) and (torques := _load_torques(scenario, name, result)):
         findings += locks(scenario.train(), name, torques)
     return findings
