@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import control_figures
 import motors_figures
 import reference_figures
 import self_locking_figures
@@ -309,6 +310,7 @@ def generate(out: Path = OUT) -> None:
     tracking_figures.write(out)
     two_motors_figures.write(out)
     motors_figures.write(out)
+    control_figures.write(out)
     for name, text in pages.items():
         (out / f"{name}.md").write_text(text, encoding="utf-8")
 

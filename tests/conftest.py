@@ -15,7 +15,7 @@ import lostmotion as lm
 
 ROOT = Path(__file__).parent.parent
 ALL_SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
-TRAINS = [path for path in ALL_SCENARIOS if "[shafts." in path.read_text()]
+TRAINS = [p for p in ALL_SCENARIOS if any(table in p.read_text() for table in ("[shafts.", "[controllers."))]
 """in the long form"""
 SCENARIOS = [path for path in ALL_SCENARIOS if path not in TRAINS]
 """in the short form"""

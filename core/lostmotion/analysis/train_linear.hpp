@@ -1,6 +1,7 @@
 // The regime of a train at a point as matrices: its rates and outputs over states and inputs.
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,12 @@ inline LinearRegime linearize(const model::Assembly& a, const std::vector<TrainC
     for (std::size_t g = 0; g < a.train().gears.size(); ++g)
         if (const int k = a.places().gears[g].twist; k != model::nowhere)
             moves[static_cast<std::size_t>(k)] = !a.train().gears[g].rigid();
+    // An angle that torques depend on is integrated once more beside the coupled states: that is no state of its own.
+    const std::vector<std::string> names = model::state_names(a);
+    const auto first = [&](std::size_t k) {
+        return static_cast<std::size_t>(std::find(names.begin(), names.end(), names[k]) - names.begin());
+    };
+    for (std::size_t k = 0; k < names.size(); ++k) moves[k] = moves[k] && first(k) == k;
     const auto row = [&](const model::Row& f) {
         std::vector<double> out;
         for (int k = 0; k < n.states; ++k)
@@ -41,7 +48,6 @@ inline LinearRegime linearize(const model::Assembly& a, const std::vector<TrainC
         return out;
     };
     LinearRegime out;
-    const std::vector<std::string> names = model::state_names(a);
     for (std::size_t k = 0; k < names.size(); ++k) {
         if (!moves[k]) continue;
         out.states.push_back(names[k]);
@@ -54,7 +60,7 @@ inline LinearRegime linearize(const model::Assembly& a, const std::vector<TrainC
     };
     for (const Channel& c : channels) {
         const auto k = static_cast<std::size_t>(c.index);
-        if (c.kind == Channel::state) add(c, model::Row::unit(c.index));
+        if (c.kind == Channel::state) add(c, model::Row::unit(static_cast<int>(first(k))));
         if (c.kind == Channel::motor_torque) add(c, r.motor_torque[k]);
         if (c.kind == Channel::output_torque) add(c, r.output_torque[k]);
         if (c.kind == Channel::input_torque) add(c, r.input_torque[k]);

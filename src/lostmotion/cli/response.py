@@ -39,8 +39,8 @@ def response(
         typer.Option(
             "--input",
             metavar="NAME",
-            help="What is a sine: command or load_torque; of a train <motor>_command, <shaft>_load_torque ... Left out, the command of "
-            "the only motor.",
+            help="What is a sine: command, with a controller reference, or load_torque; of a train <motor>_command, <motor>_reference, "
+            "<shaft>_load_torque ... Left out, command or reference of the only motor.",
         ),
     ] = None,
     variable: Annotated[
@@ -48,7 +48,8 @@ def response(
         typer.Option(
             "--variable",
             metavar="NAME",
-            help="Which variable's response to draw; left out, load_speed, of a train the speed of its last shaft.",
+            help="Which variable's response to draw; left out, load_speed, of a train the speed of its last shaft, with a controller what "
+            "its outermost loop measures.",
         ),
     ] = None,
     refine: Annotated[
@@ -66,7 +67,7 @@ def response(
 ) -> None:
     """Frequency response over amplitude: each point from a periodic motion, on all cores.
 
-    Of the scenario the drive or train and the constant parts of its inputs are taken. Writes Bode figures (bode.png, .svg, .csv), maps of gain, phase, efficiency and distortion over amplitude and
+    Of the scenario the drive or train, its controllers and the constant parts of the inputs are taken. Writes Bode figures (bode.png, .svg, .csv), maps of gain, phase, efficiency and distortion over amplitude and
     frequency (maps.png, .svg), and all numbers (response.csv, characteristics.csv, and response.nc where NetCDF is
     installed).
 
@@ -105,12 +106,12 @@ def response(
 def _known(loaded: Mapping[str, Scenario | TrainScenario], source: str | None, variable: str | None) -> tuple[str, str]:
     """The unit of the input, and the name of the variable, which all of the scenarios must have."""
     from ..errors import InputError
-    from ..response.plant import plant_of
+    from ..response.plant import plant_or_loop
 
     units: list[str] = []
     variables: list[str] = []
     for scenario in loaded.values():
-        plant = plant_of(scenario)
+        plant = plant_or_loop(scenario)
         try:
             units.append(plant.unit(plant.known_source(source)))
         except InputError as error:
@@ -139,11 +140,30 @@ def _print_reasons(result: xarray.Dataset) -> None:
     """How many points were found, and why others were not."""
     reasons = [r for r in result["reason"].values.ravel() if r]
     found_points = result["reason"].size - len(reasons)
-    worst = float(result["residual"].where(result["reason"] == "").max())
-    within = f", repeating within {worst:.1e} of their magnitude" if found_points else ""
+    repeating = (result["reason"] == "") & ~(result["spread"] > 0.0 if "spread" in result else False)
+    worst = float(result["residual"].where(repeating).max())
+    within = f", repeating within {worst:.1e} of their magnitude" if repeating.any() else ""
     print(f"  {found_points} of {result['reason'].size} motions found{within}")
+    if "spread" in result:
+        _print_closed_loop(result)
     different = list(dict.fromkeys(reasons))
     for reason in different[:3]:
         print(f"  not found at {reasons.count(reason)} point(s): {reason}")
     if len(different) > 3:
         print(f"  {len(different) - 3} more reasons are in response.csv")
+
+
+def _print_closed_loop(result: xarray.Dataset) -> None:
+    """Which frequencies had to fit the sample times, and which motions do not repeat."""
+    f, asked = result["frequency"].values, result["asked_frequency"].values
+    off = abs(f / asked - 1.0)
+    if off.max() > 1e-9:
+        print(
+            f"  {(off > 1e-9).sum()} of {len(f)} frequencies moved to the nearest that fits the sample times, by {off.max():.1%} at most"
+        )
+    spread = result["spread"].values
+    if (spread > 0.0).any():
+        print(
+            f"  {(spread > 0.0).sum()} motions do not repeat, as the encoder has steps: means over many periods, whose first harmonics "
+            f"vary by {spread[spread > 0.0].max():.2g} of their mean at most"
+        )

@@ -55,7 +55,7 @@ def run(
     """
     from ..errors import InputError
     from ..simulation.sources import load
-    from ..simulation.train_scenario import TrainScenario
+    from ..simulation.train_scenario import TrainScenario, need_open_loop
 
     _try_files(output, plot)
     loaded = load(scenario, overrides or ())
@@ -63,6 +63,8 @@ def run(
         raise InputError(
             f"--explain {explain}: must lie between 0 and simulation.duration, {loaded.simulation.duration} s"
         )
+    if explain is not None:
+        need_open_loop(loaded, f"--explain {explain:g}")
     _check_solver(solver, tolerance)
     from ..simulation.run import run as work
 

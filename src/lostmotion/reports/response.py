@@ -42,9 +42,11 @@ def points_csv(response: xarray.Dataset, output: str) -> str:
                 float(p[k])
                 for k in ("efficiency", "motor_power", "gear_loss", "angle_advance", "residual", "multiplier")
             ]
+            numbers += [float(p["spread"])] if "spread" in p else []
             rows.append([a, f, *numbers, str(p["reason"].item())])
     header = ["amplitude", "frequency [Hz]", "gain", "phase [degrees]", "distortion", "efficiency", "motor_power [W]"]
-    return table_csv([*header, "gear_loss [W]", "angle advance [rad]", "residual", "multiplier", "reason"], rows)
+    header += ["gear_loss [W]", "angle advance [rad]", "residual", "multiplier"]
+    return table_csv([*header, *(["spread"] if "spread" in response else []), "reason"], rows)
 
 
 def write_response(

@@ -43,7 +43,7 @@ def characteristics(
     xarray.Dataset
         Over ``amplitude``: ``bandwidth`` [Hz], where the gain first falls 3 dB below that at the lowest frequency;
         ``phase_crossover`` [Hz], where the phase first falls through -180 degrees; NaN where that lies outside the
-        frequencies. Of a drive, the attributes ``dead_zone_forward``, ``dead_zone_backward``: constant commands beyond
+        frequencies. Of a drive without a controller, the attributes ``dead_zone_forward``, ``dead_zone_backward``: constant commands beyond
         which the load moves from rest.
     """
     import xarray as xr
@@ -52,7 +52,7 @@ def characteristics(
     bandwidth = [three_decibels_down(frequencies, np.abs(curve)) for curve in values]
     crossover = [_falls_through(frequencies, np.degrees(np.unwrap(np.angle(curve))), -180.0) for curve in values]
     dead_zone = {}
-    if not isinstance(drive, TrainScenario):
+    if isinstance(drive, Drive) or (isinstance(drive, Scenario) and drive.controller is None):
         core = drive_of(drive).core()
         dead_zone = {
             f"dead_zone_{way}": core.smallest_command(0.0, 0.0, s) for way, s in (("forward", +1), ("backward", -1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,9 +15,11 @@ from ..inputs.quantities import Count, Number, Torque, arguments
 from ..model.drive import Drive
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
+from .closed_response import respond_closed, windows_for
 from .linear import python_control
-from .plant import Plant, known_output, plant_of
+from .plant import Plant, known_output, plant_or_loop
 from .shooting import MAX_PERIODS, SAMPLES_PER_PERIOD, floquet_multipliers, is_stable, reason_of, respond
+from .windows import CORNERS, SAMPLES
 
 if TYPE_CHECKING:
     import control
@@ -36,6 +39,7 @@ def frequency_response(
     refine: Number | None = None,
     threads: Count | None = None,
     max_periods: Count = MAX_PERIODS,
+    law: Any = None,
     progress: Callable[[], None] | None = None,
 ) -> xarray.Dataset:
     """Response by harmonic linearisation (describing functions): harmonics of all outputs over one sinusoidal input.
@@ -43,17 +47,24 @@ def frequency_response(
     Each point is a periodic motion, found by shooting. Points are independent of each other; the result is the same
     for any number of threads.
 
+    Of a scenario with controllers the sine is that of a reference or a load torque. Its periods have to fit the sample times: where
+    ten of them do not, the nearest frequency is taken that does. Encoders with steps may keep the motion from repeating; then the
+    harmonics are means over many periods, and ``spread`` says how far they vary. Variables of controllers are taken
+    at their samples, those of the drive between two ticks, at least 256 times a period. A load torque runs in at least 2048 straight
+    lines a period, its first harmonic as asked for and the others, from the 2047th on, below a millionth of it.
+
     Parameters
     ----------
     drive
-        A drive, or a scenario, of which the drive or train and the constant parts of its inputs are taken.
+        A drive, or a scenario, of which drive or train, controllers and the constant parts of the inputs are taken.
     frequencies
         [Hz].
     amplitudes
-        Of the input: E_CA [-], or [N·m] for a load torque.
+        Of the input: E_CA [-], [N·m] for a load torque; of a reference in its unit, rad, rad/s or N·m.
     source
-        The input that is a sine, ``"command"`` or ``"load_torque"``, of a train ``"<motor>_command"``,
-        ``"<shaft>_load_torque"`` ...; the others are constant. Left out, the command of the only motor.
+        The input that is a sine, ``"command"``, with a controller ``"reference"``, or ``"load_torque"``, of a train
+        ``"<motor>_command"``, ``"<motor>_reference"``, ``"<shaft>_load_torque"`` ...; the others are constant. Left out, command or
+        reference of the only motor.
     mean_command, mean_load_torque
         Constant parts of E_C [-] and M_Z [N·m] of a drive; left out, those of the scenario, or 0.
     harmonics
@@ -63,7 +74,9 @@ def frequency_response(
         decibels (and ten times as many degrees) of the straight line through its neighbours, or the grid is sixteen
         times as fine.
     threads
-        All cores, if left out.
+        All cores, if left out; with controllers always one.
+    law
+        The law of a controller with ``law = true``, as of `simulate`.
     progress
         Called after each point.
 
@@ -75,40 +88,44 @@ def frequency_response(
         above the first / of the first), ``efficiency`` (mean power out of the last gears / mean power of the motors), ``motor_power``,
         ``load_power``, ``gear_loss`` [W], ``angle_advance`` [rad] of the load, or last shaft, a period, ``residual`` of periodicity, ``periods``,
         ``newton_steps``, ``multiplier`` (largest Floquet multiplier), ``stable``, ``reason`` (empty where a motion was
-        found; elsewhere why not, and the values are NaN).
+        found; elsewhere why not, and the values are NaN). With controllers, ``output`` is if not said otherwise what the outermost
+        loop measures, ``newton_steps`` are extrapolations, ``multiplier`` is NaN, since the map has no derivative; there are
+        ``spread`` (of the first harmonic of ``output`` from period to period / its mean; 0 where the motion repeats) and
+        ``asked_frequency`` [Hz].
 
     Raises
     ------
     InputError
         An argument cannot be used.
     """
-    plant = plant_of(drive)
+    plant = plant_or_loop(drive)
     source = plant.known_source(source)
     frequencies, amplitudes = _checked(frequencies, amplitudes, plant.unit(source))
     plant = plant.with_means(mean_command, mean_load_torque)
-
-    def compute(new: Sequence[float]) -> xarray.Dataset:
-        seen = 0
-
-        def report(done: int) -> None:
-            nonlocal seen
-            for _ in range(done - seen):
-                if progress is not None:
-                    progress()
-            seen = done
-
-        points = [(plant.sine(source, a, f), 1.0 / f, plant.rest) for a in amplitudes for f in new]
-        r = respond(
+    if plant.closed is None and law is not None:
+        raise InputError("law: the scenario has no controller with law = true; set it, or leave law out")
+    if plant.closed is not None:
+        compute = partial(
+            _of_closed_loop,
             plant,
-            points,
+            amplitudes,
+            source,
             harmonics=harmonics,
-            keep_table=False,
+            max_periods=max_periods,
+            law=law,
+            progress=progress,
+        )
+    else:
+        compute = partial(
+            _of_open_loop,
+            plant,
+            amplitudes,
+            source,
+            harmonics=harmonics,
             max_periods=max_periods,
             threads=threads,
-            progress=report,
+            progress=progress,
         )
-        return _labelled(r, plant, amplitudes, new, source)
-
     result = compute(frequencies)
     for _ in range(4 if refine is not None else 0):
         assert refine is not None
@@ -118,8 +135,48 @@ def frequency_response(
         import xarray as xr
 
         more = compute(new)
+        more = more.isel(frequency=~np.isin(more["frequency"].values, result["frequency"].values))
         result = xr.concat([result, more], dim="frequency", combine_attrs="override").sortby("frequency")
     return result
+
+
+def _of_open_loop(
+    plant: Plant,
+    amplitudes: Sequence[float],
+    source: str,
+    frequencies: Sequence[float],
+    *,
+    progress: Callable[[], None] | None,
+    **options: Any,
+) -> xarray.Dataset:
+    seen = 0
+
+    def report(done: int) -> None:
+        nonlocal seen
+        for _ in range(done - seen):
+            if progress is not None:
+                progress()
+        seen = done
+
+    points = [(plant.sine(source, a, f), 1.0 / f, plant.rest) for a in amplitudes for f in frequencies]
+    r = respond(plant, points, keep_table=False, progress=report, **options)
+    return _labelled(r, plant, amplitudes, frequencies, source)
+
+
+def _of_closed_loop(
+    plant: Plant, amplitudes: Sequence[float], source: str, frequencies: Sequence[float], **options: Any
+) -> xarray.Dataset:
+    windows = windows_for(plant, source, frequencies)
+    r = respond_closed(plant, source, amplitudes, windows, **options)
+    shape = (len(amplitudes), len(windows))
+    meaning = "deviation of the output's first harmonic from period to period / its mean"
+    out = _labelled(r, plant, amplitudes, [w.frequency for w in windows], source)
+    asked = ("frequency", [w.asked for w in windows], {"units": "Hz", "long_name": "frequency that was asked for"})
+    out = out.assign_coords(asked_frequency=asked)
+    out.attrs["samples_per_period"] = SAMPLES if source in plant.references else CORNERS
+    return out.assign(
+        spread=(("amplitude", "frequency"), r["spread"].reshape(shape), {"units": "1", "long_name": meaning})
+    )
 
 
 def _checked(
@@ -236,6 +293,9 @@ def _of_each_point(r: dict[str, Any], found: np.ndarray) -> tuple[dict[str, np.n
     with np.errstate(divide="ignore", invalid="ignore"):
         efficiency = points["load_power"] / points["motor_power"]
     points["efficiency"] = np.where(points["motor_power"] > 0.0, efficiency, np.nan)
+    if "jacobian" not in r:  # the map of a closed loop has none
+        points["multiplier"] = np.full(found.shape, np.nan)
+        return points, found
     multipliers = [floquet_multipliers(r, k) for k in range(found.size)]
     largest_multiplier = np.array([abs(m[0]) for m in multipliers]).reshape(found.shape)
     points["multiplier"] = np.where(found, largest_multiplier, np.nan)

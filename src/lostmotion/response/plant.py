@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from .. import _core
+from ..control.references import PositionReference, SpeedReference, TorqueReference
 from ..errors import InputError
 from ..inputs.validation import shown
 from ..model.drive import Drive
@@ -19,21 +20,24 @@ from ..simulation.scenario import Initial, Scenario, mean_inputs
 from ..simulation.train_results import add_derived_of_train
 from ..simulation.train_scenario import TrainInitial, TrainScenario, need_open_loop
 from ..simulation.train_state import start_values
-from ..simulation.train_variables import train_variables
+from ..simulation.train_variables import axis_variables, train_variables
 from ..simulation.variables import CHANNELS, STATES, VARIABLES, Variable
 
 Signal = CommandSignal | TorqueSignal
+AnyReference = PositionReference | SpeedReference | TorqueReference
+UNITS = {"position": "rad", "speed": "rad/s", "torque": "N*m"}
+"""of references"""
 
 
 @dataclass(frozen=True)
 class Plant:
-    """A drive or a train as the core's search for periodic motions takes it."""
+    """A drive or a train as the search for periodic motions takes it: with commands, or with controllers and their references."""
 
     core: _core.Drive | _core.Train
     signals: Mapping[str, Signal]
-    """by the name of their variable, in the order of the core"""
+    """by the name of their variable; of open loops in the order of the core"""
     source: str | None
-    """the input that is meant if none is named: the command of the only motor"""
+    """the input that is meant if none is named: command or reference of the only motor"""
     start: Mapping[str, float]
     """of the scenario, by component; what is left out is 0"""
     rest: Mapping[str, float]
@@ -52,15 +56,20 @@ class Plant:
     floors: Mapping[str, float]
     """rated magnitudes of the variables by which motions are compared"""
     attributes: Mapping[str, float]
+    closed: Scenario | TrainScenario | None = None
+    """the scenario, if it has controllers"""
+
+    references: Mapping[str, AnyReference] = field(default_factory=dict)
+    """of its controllers, by the name of the input"""
 
     def known_source(self, source: str | None) -> str:
-        """The name of an input, if it is one, or of the only motor's command.
+        """The name of an input, if it is one, or of the only motor's command or reference.
 
         Raises
         ------
         InputError
         """
-        names = list(self.signals)
+        names = [*self.references, *self.signals]
         listed = " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
         if source is None and self.source is None:
             raise InputError(f"source is missing, and there is not one motor alone; name an input: {listed}")
@@ -79,6 +88,8 @@ class Plant:
 
     def unit(self, source: str) -> str:
         """Of an input."""
+        if source in self.references:
+            return UNITS[self.references[source].kind]
         return "N*m" if isinstance(self.signals[source], TorqueSignal) else "1"
 
     def with_means(self, command: float | None, load_torque: float | None) -> Plant:
@@ -92,6 +103,10 @@ class Plant:
         given = {"command": command, "load_torque": load_torque}
         wanted = {name: mean for name, mean in given.items() if mean is not None}
         for name in wanted:
+            if name not in self.signals and isinstance(self.closed, Scenario):
+                raise InputError(
+                    f"mean_{name}: a controller turns the motor; the constant part of its reference is that of the scenario"
+                )
             if name not in self.signals:
                 raise InputError(
                     f"mean_{name}: is for drives; of a train the constant parts of its inputs are those of its scenario, "
@@ -109,9 +124,43 @@ class Plant:
 
 
 def plant_of(what: Drive | Scenario | TrainScenario) -> Plant:
-    """The plant of a drive without inputs, or of a scenario with its own."""
+    """The plant of a drive without inputs, or of a scenario with its own commands."""
     if isinstance(what, Scenario | TrainScenario):
         need_open_loop(what, "response")
+    return _plant_of(what)
+
+
+def plant_or_loop(what: Drive | Scenario | TrainScenario) -> Plant:
+    """The same, or of a scenario with controllers what these and the plant are together."""
+    plant = _plant_of(what)
+    if not isinstance(what, Scenario | TrainScenario) or not what.axes():
+        return plant
+    axes = what.axes()
+    prefix = "{}_" if isinstance(what, TrainScenario) else ""
+    references = {f"{prefix.format(motor)}reference": c.reference for motor, c in axes.items()}
+    commands = [f"{prefix.format(motor)}command" for motor in axes]
+    shown_by = axis_variables(axes if prefix else {"": what.axes()["motor"]})
+    first, controller = next(iter(axes.items()))
+    measured = {"position": "measured_position", "speed": "measured_speed", "torque": "torque"}[
+        controller.reference.kind
+    ]
+    own = (
+        *(Variable(name, "", UNITS[r.kind], f"{r.kind} that the controller follows") for name, r in references.items()),
+        *shown_by,
+    )
+    return replace(
+        plant,
+        signals={name: s for name, s in plant.signals.items() if name not in commands},
+        references=references,
+        source=next(iter(references)) if len(references) == 1 else None,
+        channels=(*plant.channels, *(v.name for v in own)),
+        variables=(*plant.variables, *own),
+        output=f"{first}_torque" if measured == "torque" else prefix.format(first) + measured,
+        closed=what,
+    )
+
+
+def _plant_of(what: Drive | Scenario | TrainScenario) -> Plant:
     if isinstance(what, TrainScenario):
         return _plant_of_train(what)
     scenario = what if isinstance(what, Scenario) else None

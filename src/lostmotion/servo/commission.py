@@ -226,7 +226,8 @@ def _loop_sheet(axis: Axis, regime: Regime, loop: str) -> LoopSheet:
 def _stiffness(axis: Axis, regime: Regime) -> Stiffness:
     closed = SampledLoop(axis, regime, axis.loops[-1], False)
     f = frequencies(closed)
-    return Stiffness(regime.name, axis.shaft, f, 1.0 / np.abs(closed.compliance(f, axis.shaft, axis.shaft)))
+    with np.errstate(divide="ignore"):  # a shaft that sticks is infinitely stiff
+        return Stiffness(regime.name, axis.shaft, f, 1.0 / np.abs(closed.compliance(f, axis.shaft, axis.shaft)))
 
 
 def _shown(value: float, unit: str) -> str:
