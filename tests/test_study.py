@@ -272,7 +272,7 @@ def test_coupled_keys_go_together(tmp_path: Path):
 
 LONG = """
 base = "{base}"
-set = {{ "simulation.duration" = 1.0 }}
+set = {{ "simulation.duration" = 2.0 }}
 design = "random"
 runs = 6000
 [[vary]]

@@ -14,7 +14,7 @@ from ..control.law import Law
 from ..model.train import DriveTrain
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, in_long_form
-from ..simulation.train_variables import AXIS_SIGNALS
+from ..simulation.train_variables import signals_of
 from .closed_loop import AxisSignal, ClosedLoop, Motion, Search, mean_of
 from .plant import Plant
 from .windows import CORNERS, SAMPLES, Window, fitting
@@ -50,7 +50,7 @@ def axis_signals(scenario: Scenario | TrainScenario) -> Iterator[AxisSignal]:
         mode = c.reference.kind
         every = {loop: n * round(c.sample_time / base) for loop, _, n in c.schedules()}
         for slot, (name, _, _) in enumerate(_core.axis_signals()):
-            if name not in AXIS_SIGNALS[mode]:
+            if name not in signals_of(c):
                 continue
             outer = mode == "position" and name in ("position_reference", "measured_position", "speed_reference")
             title = name if isinstance(scenario, Scenario) else f"{motor}_{name}"

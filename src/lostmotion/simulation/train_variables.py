@@ -37,7 +37,8 @@ LOOP_SIGNALS = {
 }
 
 
-def _signals_of(controller: Controller) -> Iterator[str]:
+def signals_of(controller: Controller) -> Iterator[str]:
+    """Names of what a controller shows."""
     yield from LOOP_SIGNALS[controller.reference.kind]
     if controller.inverse_model is not None:
         yield from ("model_loss_factor", "model_friction_torque")
@@ -51,7 +52,7 @@ def axis_variables(controllers: Mapping[str, Controller]) -> tuple[Variable, ...
         Variable(f"{motor}_{name}" if motor else name, "", unit, meaning)
         for motor, controller in controllers.items()
         for name, unit, meaning in _core.axis_signals()
-        if name in _signals_of(controller)
+        if name in signals_of(controller)
     )
 
 
