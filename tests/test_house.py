@@ -26,7 +26,7 @@ LAYERS = [
     {"data_sheets", "control"},
     {"simulation"},
     {"response", "test_rig"},
-    {"sizing", "servo"},
+    {"sizing", "servo", "pointing"},
     {"studies"},
     {"reports"},
     {"paper"},
@@ -202,6 +202,7 @@ def test_help_names_every_command() -> None:
         "scenarios",
         "drive",
         "servo",
+        "track",
         "study",
         "schema",
     ):

@@ -41,8 +41,9 @@ TEST_SUITE("differential") {
         double worst_energy = 0.0;
         std::vector<double> gaps;
         for (int n = 0; n < drives; ++n) {
-            const Drive drive = random.drive();
+            Drive drive = random.drive();
             const Signals signals = random.signals(drive, duration);
+            if (n % 7 == 0) drive.motor.armature_voltage_constant = 1.0;  // no back-e.m.f., as a current loop makes it
             if (drive.rigid() && drive.min_rigid_inertia() <= 0.0) {
                 ++refused;
                 continue;

@@ -71,6 +71,10 @@ if TYPE_CHECKING:
     from .model.torsion import Rigid as Rigid
     from .model.torsion import TorsionCurve as TorsionCurve
     from .model.train import DriveTrain as DriveTrain
+    from .pointing.budget import PointingBudget as PointingBudget
+    from .pointing.budget import PointingError as PointingError
+    from .pointing.budget import View as View
+    from .pointing.budget import pointing_budget as pointing_budget
     from .reports.accessor import ResultAccessor as ResultAccessor
     from .response.bandwidth import bandwidth as bandwidth
     from .response.bandwidth import characteristics as characteristics
@@ -163,6 +167,7 @@ _HOMES = {
     "model.torsion": ("Hysteresis", "LinearStiffness", "Rigid", "TorsionCurve"),
     "model.train": ("DriveTrain",),
     "reports.accessor": ("ResultAccessor",),
+    "pointing.budget": ("PointingBudget", "PointingError", "View", "pointing_budget"),
     "response.bandwidth": ("bandwidth", "characteristics"),
     "response.harmonic": ("frequency_response", "to_control"),
     "response.linear": ("LinearModel", "RigidConstants", "linearize", "rigid_constants"),

@@ -1,0 +1,79 @@
+"""`lostmotion track`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .arguments import Overrides, SourceArgument, number
+from .targets import try_directory, writing
+from .terminal import busy, progress
+
+if TYPE_CHECKING:
+    from ..pointing.budget import PointingBudget
+
+
+def track(
+    scenario: SourceArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
+        "track"
+    ),
+    after: Annotated[
+        float | None,
+        typer.Option("--after", metavar="TIME", parser=number("s"), help='From which on errors count, e.g. "2 s".'),
+    ] = None,
+    view: Annotated[
+        list[str] | None,
+        typer.Option("--view", metavar="MOTOR=ANGLE", help='Whole angle of view of an axis, e.g. "motor=6.65 deg".'),
+    ] = None,
+    overrides: Overrides = None,
+) -> None:
+    """Pointing sheet: how far axes miss the direction that they follow, and what each cause contributes.
+
+    Writes track.html (one page), the errors over time as PNG and SVG, and errors and budget as CSV.
+
+    \\b
+    lostmotion track tracking-loss-map --after "2 s"
+    lostmotion track axes.toml --view "traverse=6.65 deg" --view "elevation=5.27 deg" -o sheet
+    """
+    from ..errors import InputError, need
+    from ..simulation.sources import load
+
+    loaded = load(scenario, overrides or ())
+    try_directory(output)
+    need("jinja2", "The pointing sheet", "report")
+    from ..pointing.budget import pointing_budget, runs_of
+
+    angles = {}
+    for text in view or ():
+        motor, equals, angle = text.partition("=")
+        if not equals:
+            raise InputError(f'--view: "{text}" must be MOTOR=ANGLE, such as "motor=6.65 deg"')
+        angles[motor.strip()] = angle.strip()
+    with progress(runs_of(loaded), "Runs") as step:
+        budget = pointing_budget(loaded, after=after or 0.0, view=angles, progress=step)
+    with writing(output), busy("Drawing"):
+        from ..reports.pointing import write_pointing
+
+        page = write_pointing(output, Path(scenario).stem, budget)
+    _print_summary(loaded.title or Path(scenario).stem, budget)
+    print(f"The sheet is at {page}")
+
+
+def _print_summary(title: str, budget: PointingBudget) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from ..reports.pointing import HEADER, budget_rows, view_line
+
+    print(title)
+    table = Table(box=None, pad_edge=False)
+    for k, name in enumerate(HEADER):
+        table.add_column(name, justify="left" if k < 2 else "right")
+    for row in budget_rows(budget):
+        table.add_row(*row)
+    Console(width=140).print(table)
+    if budget.view is not None:
+        print(f"  {view_line(budget)}")

@@ -1,0 +1,1 @@
+"""What pointing axes miss, and what causes it."""

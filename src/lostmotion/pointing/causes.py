@@ -1,0 +1,110 @@
+"""What makes an axis miss its target, and the axis without it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from ..simulation.train_scenario import TrainScenario
+
+Tables = dict[str, Any]
+
+
+def _backlash(data: Tables) -> None:
+    for gear in data["gears"].values():
+        stiffness = gear["stiffness"]
+        if stiffness["kind"] != "curve":
+            continue
+        stiffness["backlash"] = 0.0
+        slopes = list(stiffness["slopes"])
+        if slopes[0] == 0.0:
+            gap = stiffness["breaks"][0]
+            stiffness["slopes"] = tuple(slopes[1:])
+            stiffness["breaks"] = tuple(b - gap for b in stiffness["breaks"][1:])
+
+
+def _soft_zone(data: Tables) -> None:
+    for gear in data["gears"].values():
+        stiffness = gear["stiffness"]
+        if stiffness["kind"] == "curve":
+            stiff = stiffness["slopes"][-1]
+            stiffness["slopes"] = tuple(stiff if slope > 0.0 else 0.0 for slope in stiffness["slopes"])
+
+
+def _hysteresis(data: Tables) -> None:
+    for gear in data["gears"].values():
+        gear.pop("hysteresis", None)
+
+
+def _friction(data: Tables) -> None:
+    for motor in data["motors"].values():
+        motor["friction_torque"] = 0.0
+    for shaft in data["shafts"].values():
+        for key in ("friction_torque", "breakaway_torque", "stribeck_speed", "friction_error", "friction_curve"):
+            shaft.pop(key, None)
+
+
+def _losses(data: Tables) -> None:
+    for gear in data["gears"].values():
+        gear["losses"] = {"kind": "constant_efficiency", "efficiency": 1.0}
+
+
+def _quantisation(data: Tables) -> None:
+    for controller in data["controllers"].values():
+        for key in ("encoder", "position_encoder"):
+            if key in controller:
+                kept = {name: controller[key][name] for name in ("shaft", "delay") if name in controller[key]}
+                controller[key] = kept | {"ideal": True}
+
+
+def _delay(data: Tables) -> None:
+    for controller in data["controllers"].values():
+        controller["delay"] = 0
+        for key in ("encoder", "position_encoder"):
+            if key in controller:
+                controller[key]["delay"] = 0
+
+
+CAUSES: dict[str, Callable[[Tables], None]] = {
+    "backlash": _backlash,
+    "soft zone": _soft_zone,
+    "hysteresis": _hysteresis,
+    "dry friction": _friction,
+    "losses of the gears": _losses,
+    "encoder steps": _quantisation,
+    "delay": _delay,
+}
+"""how each is taken out of the tables of a scenario"""
+
+
+def _on_motor(data: Tables) -> None:
+    for controller in data["controllers"].values():
+        controller.pop("position_encoder", None)
+        controller.pop("blend_time", None)
+
+
+def _scaled_losses(factor: float) -> Callable[[Tables], None]:
+    def change(data: Tables) -> None:
+        for controller in data["controllers"].values():
+            if "inverse_model" in controller:
+                model = controller["inverse_model"]
+                model["loss_factor"] = factor * model.get("loss_factor", 1.0)
+
+    return change
+
+
+VARIANTS: dict[str, Callable[[Tables], None]] = {
+    "encoders on the motors": _on_motor,
+    "losses in the controller x 0.6": _scaled_losses(0.6),
+    "losses in the controller x 1.5": _scaled_losses(1.5),
+}
+"""other controllers of the same axes"""
+
+
+def without(scenario: TrainScenario, changes: list[Callable[[Tables], None]]) -> TrainScenario | None:
+    """The scenario after the changes; None if they change nothing."""
+    data = scenario.model_dump(exclude_none=True)
+    before = scenario.model_dump(exclude_none=True)
+    for change in changes:
+        change(data)
+    return None if data == before else TrainScenario(**data)

@@ -1,0 +1,176 @@
+"""The pointing sheet: closed forms of what an axis misses, and how causes are taken away."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.stats import norm
+from typer.testing import CliRunner
+
+import lostmotion as lm
+from lostmotion.cli import app
+
+ROOT = Path(__file__).parent.parent
+IDEAL = {"ideal": True}
+FLY_BY = lm.load("tracking-constant-efficiency", {"simulation.duration": 12.0})
+
+
+def rigid_axis(friction: float, controller: dict[str, Any], duration: float) -> lm.Scenario:
+    """An inertia on a motor with dry friction, without delay and without encoder steps."""
+    return lm.Scenario(
+        motor={"kind": "torque_source", "rotor_inertia": 1e-4, "rated_torque": 1.0, "friction_torque": friction},
+        gearbox={
+            "ratio": 50.0, "rated_input_speed": 300.0, "rated_output_torque": 50.0, "stiffness": {"kind": "rigid"},
+            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
+        },
+        load={"inertia": 0.5},
+        controller={"sample_time": 2e-5, "delay": 0, "encoder": IDEAL} | controller,
+        simulation={"duration": duration, "sample_interval": 1e-4},
+    )  # fmt: skip
+
+
+def test_the_axis_sticks_at_a_reversal_as_long_as_the_closed_form_says() -> None:
+    # Before the reversal the motor gives i J a - F against the motion, at rest up to F holds it: it sticks until
+    # i (K_p (a t + K_v a t^2/2) + K_i (a t^2/2 + K_v a t^3/6)) = 2 F - i J a.
+    a, K_v, K_p, K_i, F, i = 0.4, 10.0, 0.02, 0.3, 0.08, 50.0
+    J = 1e-4 + 0.5 / i**2
+    reference = {
+        "kind": "position", "speed": 10.0, "acceleration": a,
+        "moves": [{"to": 1.6}, {"to": 0.0}],
+    }  # fmt: skip
+    controller = {
+        "reference": reference,
+        "position": {"gain": K_v, "feedforward": 1.0},
+        "speed": {"gain": K_p, "integral_gain": K_i, "estimate": {"kind": "exact"}},
+    }
+    s = rigid_axis(F, controller, 6.0)
+    turn = s.controller.reference.intervals()[0][1]
+
+    def lacking(t: float) -> float:
+        linear = K_p * (a * t + K_v * a * t**2 / 2.0) + K_i * (a * t**2 / 2.0 + K_v * a * t**3 / 6.0)
+        return i * linear - (2.0 * F - i * J * a)
+
+    stuck = brentq(lacking, 0.0, 1.0)
+    r = lm.simulate(s)
+    moving = r.time.values[(r.time.values > turn + 1e-3) & (r.load_speed.values != 0.0)]
+    assert moving[0] - turn == pytest.approx(stuck, abs=1.2e-4 + 2e-5)
+    just_before = r.time.values < moving[0] - 1e-4
+    error = (s.controller.reference.at(r.time.values)[0] - r.load_angle.values)[just_before][-1]
+    assert abs(error) == pytest.approx(a * stuck**2 / 2.0, rel=2e-2)
+
+
+def test_a_motor_encoder_errs_by_torque_over_stiffness_in_steady_motion() -> None:
+    s = lm.load("position-axis")
+    w, k, b = 0.3, 2.65e4, s.load.viscous_friction
+    controller = s.controller.model_dump(exclude_none=True)
+    controller |= {"encoder": IDEAL, "reference": {"kind": "position", "ramps": [{"rise": 8.0 * w, "duration": 8.0}]}}
+    data = s.model_dump(exclude_none=True) | {"controller": controller}
+    data["gearbox"] |= {"stiffness": {"kind": "linear", "stiffness": k}, "hysteresis": None}
+    scenario = lm.Scenario(**data).replace(**{"simulation.duration": 7.9})
+    budget = lm.pointing_budget(scenario, after=6.0)
+    # Reference less load: the twist, and what the position loop takes a sample too late.
+    error = budget.whole["motor"]
+    assert error.mean == pytest.approx(b * w / k, abs=w * 2e-4)
+    assert error.measured_rms == pytest.approx(b * w / k, rel=1e-3)
+
+
+def test_causes_are_those_that_the_scenario_has() -> None:
+    budget = lm.pointing_budget(FLY_BY, after=2.0)
+    assert set(budget.without) == set(budget.alone)
+    assert "backlash" not in budget.without
+    assert {"hysteresis", "losses of the gears", "encoder steps", "dry friction"} <= set(budget.without)
+    whole, left = budget.whole["motor"], budget.without["losses of the gears"]["motor"]
+    assert left.peak < 0.05 * whole.peak  # what a constant efficiency does not know
+    assert budget.alone["losses of the gears"]["motor"].peak > 0.5 * whole.peak
+    assert budget.ideal["motor"].peak < 0.01 * whole.peak
+    again = lm.pointing_budget(FLY_BY, after=2.0)
+    assert again.whole == budget.whole
+    assert again.without == budget.without
+
+
+def test_a_cause_that_is_taken_away_is_the_scenario_without_it() -> None:
+    budget = lm.pointing_budget(FLY_BY)
+    by_hand = FLY_BY.replace(**{"gearbox.hysteresis": None})
+    r = lm.simulate(by_hand)
+    error = by_hand.controller.reference.at(r.time.values)[0] - r.load_angle.values
+    assert budget.without["hysteresis"]["motor"].peak == pytest.approx(np.abs(error).max(), rel=1e-9)
+
+
+def test_a_gap_is_taken_out_of_the_torsion_curve() -> None:
+    gap = FLY_BY.replace(
+        **{"gearbox.stiffness.slopes": (0.0, 2e4, 3e4), "gearbox.stiffness.breaks": (1e-3, 2e-3),
+           "controller.inverse_model": None, "simulation.duration": 3.0}
+    )  # fmt: skip
+    closed = gap.replace(**{"gearbox.stiffness.slopes": (2e4, 3e4), "gearbox.stiffness.breaks": (1e-3,)})
+    found = lm.pointing_budget(gap).without["backlash"]["motor"]
+    assert found.peak == pytest.approx(lm.pointing_budget(closed).whole["motor"].peak, rel=1e-12)
+
+
+def test_the_field_of_view_counts_time_and_probability() -> None:
+    angle = 2.0 * 4e-4
+    budget = lm.pointing_budget(FLY_BY, after=2.0, view={"motor": angle})
+    e = budget.errors["motor"][budget.time >= 2.0]
+    assert budget.view is not None
+    assert budget.view.share == np.mean(np.abs(e) < 4e-4)
+    assert 0.0 < budget.view.share < 1.0
+    between = norm.cdf(4e-4, e.mean(), e.std()) - norm.cdf(-4e-4, e.mean(), e.std())
+    assert budget.view.probability == pytest.approx(between, rel=1e-12)
+    assert budget.whole["motor"].probable == pytest.approx(norm.ppf(0.75) * e.std(), rel=1e-12)
+
+
+def test_two_axes_in_one_scenario_are_those_of_two() -> None:
+    both = lm.load("direction-finder", {"simulation.duration": 4.0})
+    data = both.model_dump(exclude_none=True)
+    for controller in data["controllers"].values():  # rounding may decide which of two steps an encoder shows
+        controller["encoder"] = IDEAL
+        controller["position_encoder"] = IDEAL | {"shaft": controller["shaft"]}
+    both = type(both)(**data)
+    together = lm.simulate(both, energy=False)
+    for axis in ("traverse", "elevation"):
+        one = dict(data)
+        for table, mine in (("shafts", axis), ("motors", axis), ("gears", axis), ("controllers", axis)):
+            one[table] = {name: value for name, value in data[table].items() if name.startswith(mine)}
+        one["gravity"] = data["gravity"] if axis == "elevation" else {}
+        one["initial"] = {"angles": {axis: data["initial"]["angles"][axis]}}
+        alone = lm.simulate(type(both)(**one), energy=False)
+        for variable in (f"{axis}_angle", f"{axis}_drive_torque_reference"):
+            gap = np.abs(alone[variable].values - together[variable].values).max()
+            assert gap <= 1e-9 * np.abs(alone[variable].values).max()
+
+
+def test_the_command_writes_its_sheet(tmp_path: Path) -> None:
+    changes = ["--set", "simulation.duration=3", "--view", "motor=5.27 deg"]
+    done = CliRunner().invoke(app, ["track", "tracking-loss-map", "-o", str(tmp_path / "sheet"), *changes])
+    assert done.exit_code == 0, done.output
+    assert "without hysteresis" in done.output
+    assert "in view 100 %" in done.output
+    made = {p.name for p in (tmp_path / "sheet").iterdir()}
+    assert made == {"track.html", "errors.png", "errors.svg", "errors.csv", "budget.csv"}
+    assert "http" not in (tmp_path / "sheet" / "track.html").read_text().replace("http://www.w3.org", "")
+
+
+@pytest.mark.parametrize(
+    ("scenario", "options", "said"),
+    [
+        ("paper-2dof-nl-small", {}, "no controller"),
+        ("speed-axis", {}, "not what an axis points by"),
+        ("tracking-loss-map", {"after": 30.0}, "less than the duration"),
+        ("tracking-loss-map", {"view": {"moter": 0.1}}, "moter"),
+        ("tracking-loss-map", {"view": {"motor": -0.1}}, "above 0"),
+        ("tracking-loss-map", {"view": {"motor": "5 kg"}}, "view"),
+    ],
+)
+def test_what_does_not_fit_is_refused(scenario: str, options: dict[str, Any], said: str) -> None:
+    with pytest.raises(lm.InputError, match=said):
+        lm.pointing_budget(lm.load(scenario), **options)
+
+
+def test_probable_error_is_half_of_all() -> None:
+    from lostmotion.pointing.budget import PROBABLE
+
+    assert math.erf(PROBABLE / math.sqrt(2.0)) == pytest.approx(0.5, rel=1e-15)
