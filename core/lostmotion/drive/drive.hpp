@@ -59,10 +59,7 @@ class Drive {
         const double i = gearbox.ratio, J = input_inertia();
         State s{};
         s[motor_torque] = 1.0;
-        s[motor_speed] = 1.0;
-        if (motor.kind == Motor::dc)
-            s[motor_speed] = std::sqrt(motor.electrical_time_constant * motor.rated_speed /
-                                       (J * (motor.armature_voltage_constant - 1.0) * motor.rated_torque));
+        s[motor_speed] = motor.balanced_speed(J);
         if (rigid()) {
             s[load_speed] = s[motor_speed] / i;
             s[twist] = s[load_angle] = s[load_speed] * J;

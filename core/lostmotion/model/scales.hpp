@@ -54,12 +54,7 @@ void balanced_scale(const Assembly& a, State& s, int first_angle) {
     const int first = train.motors.empty() ? 0 : train.motors[0].shaft;
     for (std::size_t m = 0; m < train.motors.size(); ++m)
         if (p.motors[m].torque != nowhere) s[p.motors[m].torque] = 1.0;
-    double w = 1.0;
-    if (!train.motors.empty() && train.motors[0].law.kind == Motor::dc) {
-        const Motor& motor = train.motors[0].law;
-        w = std::sqrt(motor.electrical_time_constant * motor.rated_speed /
-                      (inertia(first) * (motor.armature_voltage_constant - 1.0) * motor.rated_torque));
-    }
+    const double w = train.motors.empty() ? 1.0 : train.motors[0].law.balanced_speed(inertia(first));
     for (std::size_t n = 0; n < train.shafts.size(); ++n)
         s[p.shafts[n].speed] = w * std::sqrt(inertia(first) / inertia(static_cast<int>(n)));
     s[p.shafts[first].speed] = w;

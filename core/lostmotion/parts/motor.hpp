@@ -1,6 +1,7 @@
 // What drives the input shaft.
 #pragma once
 
+#include <cmath>
 #include <limits>
 
 namespace lostmotion {
@@ -38,6 +39,15 @@ struct Motor {
     }
 
     bool limits_voltage() const { return kind == dc && voltage_limit < std::numeric_limits<double>::infinity(); }
+
+    // Speed [rad/s] that balances the coupling of both equations against a torque of 1 N m; without back-e.m.f., what
+    // that torque gives within its time constant.
+    double balanced_speed(double inertia) const {
+        if (kind != dc) return 1.0;
+        const double back_emf = inertia * (armature_voltage_constant - 1.0) * rated_torque;
+        return back_emf > 0.0 ? std::sqrt(electrical_time_constant * rated_speed / back_emf)
+                              : electrical_time_constant / inertia;
+    }
 
     // Torque [N m] at standstill per unit of command.
     double stall_torque() const { return kind == dc ? armature_voltage_constant * rated_torque : rated_torque; }
