@@ -45,8 +45,22 @@ TEST_CASE("exact and adaptive solver agree on a thousand random trains of all el
     }
     MESSAGE(tally.compared << " trains compared, largest difference " << tally.worst << "; " << tally.undecided
                            << " that the adaptive solver does not settle, " << tally.jammed << " that jam");
-    CHECK(tally.compared > 950);
+    CHECK(tally.compared > 990);
     CHECK(tally.wrong == 0);
+    CHECK(tally.jammed == 0);
+}
+
+// Trains 17, 45 and 98 of this seed: a twist in a loop that others keep at rest, and contacts at their limits that hold
+// more than they take while they slip.
+TEST_CASE("the laws hold where contacts at their limits hold more than they take while they slip") {
+    RandomTrains random(2004);
+    LawTally tally;
+    for (int n = 0; n < 100; ++n) {
+        CAPTURE(n);
+        check_laws(random, 6, 0.4, tally);
+    }
+    CHECK(tally.runs > 95);
+    CHECK(tally.failed() == 0);
 }
 
 TEST_CASE("the laws that every run obeys hold on a thousand random trains of all elements") {
@@ -122,6 +136,32 @@ TEST_CASE("the torque between two shafts at rest is a play of all that drives it
         CHECK(worst_adaptive < 1e-6);
         CHECK(exact.channel("shaft1_speed")[exact.samples - 1] == 0.0);
         CHECK(exact.report.switching_count > 15);
+    }
+}
+
+// A bearing that holds 1.5 N m and takes 1 N m while it slips, on a shaft that a clutch ties to one that stands.
+// Neither moves: the clutch takes what is above 1.5 N m, without a jump to 1 N m when that limit is reached, and keeps
+// it until the bearing is at its other limit.
+TEST_CASE("a contact at its limit gives what it holds, since it does not slip") {
+    Train t;
+    t.shafts = {shaft(1.0), shaft(1.0)};
+    t.shafts[0].friction.torque = 100.0;
+    t.shafts[1].friction.torque = 1.0;
+    t.shafts[1].friction.breakaway_torque = 1.5;
+    t.couplings = {{"clutch", Coupling::safety_clutch, 0, 1, 50.0}};
+    t.motors = {torque_motor(1)};
+    t.motors[0].law.rated_torque = 1.0;
+    const std::vector<Signal> inputs{{{{0.0, 0.0, 1.0}, {2.0, 2.0, -1.0}}, {}}};
+    for (const double tolerance : {0.0, 1e-10}) {
+        const Recorded r(t, inputs, 6.0, 0.1, tolerance);
+        REQUIRE(r.done());
+        double clutch = 0.0;
+        for (std::size_t k = 0; k < r.samples; ++k) {
+            const double time = 0.1 * static_cast<double>(k), motor = time < 2.0 ? time : 4.0 - time;
+            clutch = std::clamp(clutch, -1.5 - motor, 1.5 - motor);
+            CHECK(r.channel("clutch_contact_torque")[k] == doctest::Approx(clutch).scale(1.0).epsilon(1e-9));
+        }
+        CHECK(clutch == doctest::Approx(0.5));
     }
 }
 

@@ -83,6 +83,22 @@ class ElementForms {
         return terms_.one(mode(key, p.contact) * (p.motor_friction + friction.at_zero(piece))) +
                terms_.state(p.speed, friction.per_speed(piece));
     }
+    // What a shaft holds at rest, without gears.
+    Row held_friction(int shaft, const Key& key) const {
+        Row F = terms_.one(places_.shafts[shaft].motor_friction + train_.shafts[shaft].friction.holding());
+        for (std::size_t b = 0; b < train_.brakes.size(); ++b)
+            if (const Brake& brake = train_.brakes[b]; brake.shaft == shaft)
+                F += commanded(places_.brakes[b].input, places_.brakes[b].branch, brake.holding(), key);
+        return F;
+    }
+    // What a clutch takes while it slips, or holds at rest; of a freewheel, what it passes on backward.
+    Row coupling_capacity(int k, const Key& key, bool at_rest) const {
+        const Coupling& c = train_.couplings[k];
+        const CouplingPlace& p = places_.couplings[k];
+        const double torque = at_rest ? c.holding() : c.torque;
+        if (c.kind == Coupling::clutch) return commanded(p.input, p.branch, torque, key);
+        return c.kind == Coupling::safety_clutch ? terms_.one(torque) : Row{};
+    }
     // What an engaged brake takes of a shaft that slips.
     Row brake_torque(int k, const Key& key) const {
         const BrakePlace& p = places_.brakes[k];

@@ -126,19 +126,23 @@ inline void Equations::compose_coupling(int coupling, const Key& key, Regime& r)
     Row& torque = r.contact_torque[p.contact];
     if (slip == 0)
         torque = held(p.contact, r);
-    else if (c.kind == Coupling::clutch)
-        torque = static_cast<double>(slip) * forms_.commanded(p.input, p.branch, c.torque, key);
-    else if (c.kind == Coupling::safety_clutch)
-        torque = terms_.one(slip * c.torque);
+    else if (c.kind != Coupling::freewheel)
+        torque = static_cast<double>(slip) *
+                 forms_.coupling_capacity(coupling, key, kept_at_rest(places_.contacts[p.contact], r.ties));
 }
 
-// What the dry contact of a shaft takes.
+// What the dry contact of a shaft takes. One that "slips" while others keep it at rest gives all that it holds.
 inline Row Equations::shaft_friction(int shaft, const Key& key, const Regime& r, const std::vector<Row>& loss) const {
     const ShaftPlace& p = places_.shafts[shaft];
     if (mode(key, p.contact) == 0) return held(p.contact, r);
-    Row F = forms_.sliding_friction(shaft, key);
-    for (std::size_t b = 0; b < train_.brakes.size(); ++b)
-        if (train_.brakes[b].shaft == shaft) F += forms_.brake_torque(static_cast<int>(b), key);
+    Row F;
+    if (r.ties.at_rest[shaft]) {
+        F = static_cast<double>(mode(key, p.contact)) * forms_.held_friction(shaft, key);
+    } else {
+        F = forms_.sliding_friction(shaft, key);
+        for (std::size_t b = 0; b < train_.brakes.size(); ++b)
+            if (train_.brakes[b].shaft == shaft) F += forms_.brake_torque(static_cast<int>(b), key);
+    }
     for (std::size_t g = 0; g < train_.gears.size(); ++g)
         if (train_.gears[g].input == shaft && train_.gears[g].has_dry_losses()) F += loss[g];
     return F;

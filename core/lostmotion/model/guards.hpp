@@ -23,6 +23,7 @@ class RegimeGuards {
     void add_all();
 
  private:
+    bool held_in_motion(int contact) const;
     void add_speed_guards();
     void add_gear_capacities();
     void add_coupling_capacities();
@@ -71,10 +72,15 @@ inline void RegimeGuards::add_all() {
                          train_.angle_torques[k].torque);
 }
 
+// Is a contact that "slips" kept at rest while its shafts turn, as in a loop of gears? Its speed is rounding.
+inline bool RegimeGuards::held_in_motion(int contact) const {
+    return regime_.at_rest[contact] && !regime_.ties.at_rest[places_.contacts[contact].a];
+}
+
 inline void RegimeGuards::add_speed_guards() {
     for (int c = 0; c < layout_.contacts; ++c) {
         const int mode = regime_.key.modes[c];
-        if (mode == 0) continue;
+        if (mode == 0 || held_in_motion(c)) continue;
         // (16) sets the hysteresis anew whenever the twist rate reaches zero, whether it then changes sign or not.
         add(static_cast<double>(mode) * forms_.contact_speed(c), Guard::speed, c, nowhere, 0).by_grazing =
             places_.contacts[c].kind == ContactPlace::gear;
@@ -97,9 +103,7 @@ inline void RegimeGuards::add_coupling_capacities() {
         const CouplingPlace& p = places_.couplings[k];
         if (regime_.key.modes[p.contact] != 0) continue;
         const Row& torque = regime_.contact_torque[p.contact];
-        Row capacity;
-        if (c.kind == Coupling::clutch) capacity = forms_.commanded(p.input, p.branch, c.holding(), regime_.key);
-        if (c.kind == Coupling::safety_clutch) capacity = terms_.one(c.holding());
+        const Row capacity = forms_.coupling_capacity(static_cast<int>(k), regime_.key, true);
         if (c.kind != Coupling::freewheel) add(capacity - torque, Guard::capacity, p.contact, nowhere, +1);
         add(capacity + torque, Guard::capacity, p.contact, nowhere, -1);
     }
@@ -118,11 +122,7 @@ inline void RegimeGuards::add_shaft_guards(int shaft) {
         return;
     }
     for (const int s : {+1, -1}) {
-        Row F = terms_.one(p.motor_friction + train_.shafts[shaft].friction.holding());
-        for (std::size_t b = 0; b < train_.brakes.size(); ++b)
-            if (train_.brakes[b].shaft == shaft)
-                F += forms_.commanded(places_.brakes[b].input, places_.brakes[b].branch, train_.brakes[b].holding(),
-                                      regime_.key);
+        Row F = forms_.held_friction(shaft, regime_.key);
         each_gear([&](int g) { add_loss_cells(g, s, F); });
         add(F - static_cast<double>(s) * regime_.contact_torque[p.contact], Guard::capacity, p.contact, nowhere, s);
     }

@@ -122,7 +122,9 @@ void SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
             for (std::size_t g = 0; g < train().gears.size(); ++g) {
                 const Gear& gear = train().gears[g];
                 if (gear.output == out && !(is_gear && static_cast<int>(g) == c.element)) needed -= T_2[g];
-                const double T_1 = T_2[g] / (gear.law.ratio * gear.law.efficiency);
+                double T_1 = T_2[g] / (gear.law.ratio * gear.law.efficiency);
+                if (const int piece = places().gears[g].error_piece; piece != nowhere)
+                    T_1 -= gear.transmission_error.slope(modes.branch[piece]) * T_2[g] / gear.law.efficiency;
                 if (gear.input == out) needed += T_1;
                 if (gear.housing == out) needed += T_2[g] - T_1;
             }

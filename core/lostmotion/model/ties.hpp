@@ -39,9 +39,7 @@ inline void stop_contact(const ContactPlace& c, std::size_t k, Ties& t) {
     t.redundant[k] = !tied_speed(c, t, speed);
     int part = t.part[c.a];
     c.each_shaft([&](int s, double) { part = std::min(part, t.part[s]); });
-    c.each_shaft([&](int s, double) {
-        std::replace(t.part.begin(), t.part.begin() + t.shafts, int{t.part[s]}, part);
-    });
+    c.each_shaft([&](int s, double) { std::replace(t.part.begin(), t.part.begin() + t.shafts, int{t.part[s]}, part); });
     if (t.redundant[k]) return;
     int last = t.shafts - 1;
     while (speed[last] == 0.0) --last;
