@@ -36,14 +36,28 @@ AXIS_SIGNALS = {
 }
 
 
+WINDING_SIGNALS = tuple(name for name, _, _ in _core.winding_signals())
+
+
 def axis_variables(controllers: Mapping[str, Controller]) -> tuple[Variable, ...]:
     """What the controllers of a run show, after the names of their motors; that of a drive alone without."""
     return tuple(
         Variable(f"{motor}_{name}" if motor else name, "", unit, meaning)
         for motor, controller in controllers.items()
-        for name, unit, meaning in _core.axis_signals()
+        for name, unit, meaning in (*_core.axis_signals(), *_core.winding_signals())
         if name in AXIS_SIGNALS[controller.reference.kind]
+        or (name in WINDING_SIGNALS and controller.current.kind == "field_oriented")
     )
+
+
+def named_signals(controllers: Mapping[str, Controller], values: Any) -> dict[str, np.ndarray]:
+    """What the core has recorded of the controllers, axis by axis and signal by signal, as `axis_variables` calls it."""
+    return {
+        f"{motor}_{name}" if motor else name: row
+        for (motor, controller), rows in zip(controllers.items(), values, strict=True)
+        for name, row in zip((*AXIS_SIGNALS["position"], *WINDING_SIGNALS), rows, strict=False)
+        if name not in WINDING_SIGNALS or controller.current.kind == "field_oriented"
+    }
 
 
 def _derived(train: DriveTrain) -> Iterator[Variable]:
