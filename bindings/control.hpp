@@ -17,7 +17,9 @@ namespace lostmotion::binding {
 // A controller that is a Python function. What it raises ends the run and is raised again after it.
 class [[gnu::visibility("hidden")]] PythonLaw {
  public:
-    PythonLaw(nb::callable function, int states) : function_(std::move(function)), states_(states) {}
+    // voltages: it gives u_d and u_q of a winding, and is told i_d and i_q.
+    PythonLaw(nb::callable function, int states, bool voltages)
+        : function_(std::move(function)), states_(states), voltages_(voltages) {}
 
     static int call(double time, const double* measured, const double* reference, double* state, double* command,
                     void* data) {
@@ -25,14 +27,22 @@ class [[gnu::visibility("hidden")]] PythonLaw {
         const nb::gil_scoped_acquire hold;
         try {
             const Array slots(state, {static_cast<std::size_t>(self.states_)}, nb::handle());
+            const nb::object read =
+                self.voltages_ ? nb::make_tuple(measured[0], measured[1], measured[2], measured[3], measured[4])
+                               : nb::make_tuple(measured[0], measured[1], measured[2]);
             const nb::object given =
-                self.function_(time, nb::make_tuple(measured[0], measured[1], measured[2]),
-                               nb::make_tuple(reference[0], reference[1], reference[2], reference[3]),
+                self.function_(time, read, nb::make_tuple(reference[0], reference[1], reference[2], reference[3]),
                                nb::cast(slots, nb::rv_policy::reference));
-            if (!nb::try_cast<double>(given, *command))
-                throw nb::type_error(
-                    ("law: returned " + std::string(nb::repr(given).c_str()) + "; it must return the command, a number")
-                        .c_str());
+            std::pair<double, double> both;
+            if (self.voltages_ && nb::try_cast(given, both)) {
+                command[0] = both.first;
+                command[1] = both.second;
+                return 0;
+            }
+            if (self.voltages_ || !nb::try_cast<double>(given, *command))
+                throw nb::type_error(("law: returned " + std::string(nb::repr(given).c_str()) + "; it must return " +
+                                      (self.voltages_ ? "the voltages (u_d, u_q)" : "the command, a number"))
+                                         .c_str());
             return 0;
         } catch (...) {
             self.raised_ = std::current_exception();
@@ -47,6 +57,7 @@ class [[gnu::visibility("hidden")]] PythonLaw {
  private:
     nb::callable function_;
     int states_;
+    bool voltages_;
     std::exception_ptr raised_;
 };
 
@@ -54,7 +65,7 @@ struct [[gnu::visibility("hidden")]] BoundAxis : control::Axis {
     std::shared_ptr<PythonLaw> python_law;
 
     void set_python_law(nb::callable function, int states) {
-        python_law = std::make_shared<PythonLaw>(std::move(function), states);
+        python_law = std::make_shared<PythonLaw>(std::move(function), states, field_orientation.has_value());
         own_law = {};
         own_law.function = PythonLaw::call;
         own_law.data = python_law.get();
@@ -98,19 +109,20 @@ inline void raise_again(const BoundControl& bound) {
 // Of what the axes show in a run: the shape, and room for it.
 template <class Options>
 std::vector<std::size_t> control_shape(const Options& options) {
-    return {options.control.axes.size(), control::n_axis_signals, options.samples};
+    return {options.control.axes.size(), static_cast<std::size_t>(options.control.signals()), options.samples};
 }
 template <class Options>
 std::unique_ptr<double[]> control_room(Options& options) {
-    auto room = std::make_unique_for_overwrite<double[]>(options.control.axes.size() * control::n_axis_signals *
-                                                         options.samples);
+    const std::vector<std::size_t> shape = control_shape(options);
+    auto room = std::make_unique_for_overwrite<double[]>(shape[0] * shape[1] * shape[2]);
     options.control_out = room.get();
     return room;
 }
 
-inline std::vector<std::tuple<std::string, std::string, std::string>> axis_signals() {
+template <class Names>
+std::vector<std::tuple<std::string, std::string, std::string>> signal_names(const Names& names) {
     std::vector<std::tuple<std::string, std::string, std::string>> out;
-    for (const auto& [name, unit, meaning] : control::axis_signal_names) out.emplace_back(name, unit, meaning);
+    for (const auto& [name, unit, meaning] : names) out.emplace_back(name, unit, meaning);
     return out;
 }
 
@@ -213,6 +225,28 @@ inline void bind_control(nb::module_& m) {
         .def_rw("back_emf", &CurrentLoop::back_emf)
         .def_rw("rated_torque", &CurrentLoop::rated_torque)
         .def_rw("limit", &CurrentLoop::limit);
+    nb::class_<FieldOrientation>(m, "FieldOrientation")
+        .def(nb::init<>())
+        .def_prop_rw(
+            "winding",
+            [](const FieldOrientation& f) {
+                const SynchronousWinding& w = f.winding;
+                return std::array{w.pole_pairs, w.resistance, w.inductance_d, w.inductance_q, w.flux_linkage};
+            },
+            [](FieldOrientation& f, const std::array<double, 5>& w) { f.winding = {w[0], w[1], w[2], w[3], w[4]}; })
+        .def_rw("gain_d", &FieldOrientation::gain_d)
+        .def_rw("gain_q", &FieldOrientation::gain_q)
+        .def_rw("integral_gain", &FieldOrientation::integral_gain)
+        .def_rw("back_emf", &FieldOrientation::back_emf)
+        .def_rw("decoupling", &FieldOrientation::decoupling)
+        .def_rw("field_weakening", &FieldOrientation::field_weakening)
+        .def_rw("weakening_voltage", &FieldOrientation::weakening_voltage)
+        .def_rw("voltage_limit", &FieldOrientation::voltage_limit)
+        .def_rw("current_limit", &FieldOrientation::current_limit)
+        .def_rw("sample_time", &FieldOrientation::sample_time)
+        .def_rw("delay_time", &FieldOrientation::delay_time)
+        .def_rw("delay", &FieldOrientation::delay)
+        .def_rw("parts", &FieldOrientation::parts);
     nb::class_<TorqueFeedforward>(m, "TorqueFeedforward")
         .def(nb::init<>())
         .def_rw("inertia", &TorqueFeedforward::inertia)
@@ -260,6 +294,8 @@ inline void bind_control(nb::module_& m) {
         .def_rw("position_loop", &BoundAxis::position_loop)
         .def_rw("speed_loop", &BoundAxis::speed_loop)
         .def_rw("current_loop", &BoundAxis::current_loop)
+        .def_rw("field_orientation", &BoundAxis::field_orientation)
+        .def_rw("commutates_by_encoder", &BoundAxis::commutates_by_encoder)
         .def_rw("feedforward", &BoundAxis::feedforward)
         .def_rw("inverse_model", &BoundAxis::inverse_model)
         .def_rw("load_observer", &BoundAxis::load_observer)
@@ -271,8 +307,13 @@ inline void bind_control(nb::module_& m) {
         .def("set_python_law", &BoundAxis::set_python_law, "function"_a, "states"_a,
              nb::sig("def set_python_law(self, function: collections.abc.Callable[..., float], states: int) -> None"))
         .def("set_compiled_law", &BoundAxis::set_compiled_law, "function"_a, "data"_a, "states"_a);
-    m.def("axis_signals", &axis_signals, nb::sig("def axis_signals() -> list[tuple[str, str, str]]"),
-          "Name, unit, meaning of what each axis shows.");
+    m.def(
+        "axis_signals", [] { return signal_names(axis_signal_names); },
+        nb::sig("def axis_signals() -> list[tuple[str, str, str]]"), "Name, unit, meaning of what each axis shows.");
+    m.def(
+        "winding_signals", [] { return signal_names(winding_signal_names); },
+        nb::sig("def winding_signals() -> list[tuple[str, str, str]]"),
+        "The same of what one with a winding shows beside it.");
 }
 
 }  // namespace lostmotion::binding

@@ -1,4 +1,4 @@
-"""Figure of docs/motors.md: current and temperatures of a synchronous motor in a cycle that repeats."""
+"""Figures of docs/motors.md: a synchronous motor in a cycle that repeats, and beyond the voltage of its magnets."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ def scenario() -> lm.Scenario:
 
 
 def write(out: Path) -> None:
-    """The page's figure into a directory."""
+    """The page's figures into a directory."""
+    write_weakening(out)
     result = lm.simulate(scenario())
     current = lm.motor_current(result)
     steady = lm.temperatures(result, repeated=True)
@@ -66,3 +67,29 @@ def write(out: Path) -> None:
         Panel("the cycle repeated for ever", "time [s]", "temperature [°C]", within),
     ]
     save(panels, 3, (13.0, 3.4), out, "motors-temperatures")
+
+
+def write_weakening(out: Path) -> None:
+    """The shipped scenario beyond the voltage."""
+    result = lm.simulate(lm.load("field-weakening"))
+    time, rpm = result["time"].values, 30.0 / np.pi
+    speed = (
+        Curve("wanted", time, rpm * result["m_speed_reference"].values, DOTS),
+        Curve("motor", time, rpm * result["motor_speed"].values, DARK),
+    )
+    currents = (
+        Curve("across the magnets, $i_q$", time, result["m_quadrature_current"].values, LIGHT),
+        Curve("along the magnets, $i_d$", time, result["m_direct_current"].values, DARK),
+    )
+    of_motor = lm.motor_current(result)
+    limit = of_motor.attrs["voltage_limit"]
+    voltage = (
+        Curve("motor", time, of_motor["voltage"].values, DARK),
+        Curve("largest", [time[0], time[-1]], [limit, limit], DOTS),
+    )
+    panels = [
+        Panel("speed", "time [s]", "speed [rpm]", speed),
+        Panel("currents, amplitude", "time [s]", "current [A]", currents),
+        Panel("voltage, amplitude of a phase", "time [s]", "voltage [V]", voltage),
+    ]
+    save(panels, 3, (13.0, 3.4), out, "motors-field-weakening")

@@ -9,12 +9,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <limits>
 #include <optional>
+#include <type_traits>
 #include <vector>
 
 #include "current_loop.hpp"
 #include "encoder.hpp"
 #include "feedforward.hpp"
+#include "field_orientation.hpp"
 #include "filter.hpp"
 #include "inverse_model.hpp"
 #include "load_observer.hpp"
@@ -45,6 +49,9 @@ struct Sampled {
     double speed_angle = 0.0;     // of the shaft with the encoder of the speed loop [rad]
     double speed = 0.0;           // of that shaft [rad/s]
     double motor_torque = 0.0;    // [N m]
+    double rotor_angle = 0.0;     // of the motor itself [rad]
+    double rotor_speed = 0.0;     // [rad/s]
+    double time = 0.0;            // [s]
 };
 
 // What an axis shows, held from tick to tick.
@@ -74,6 +81,25 @@ inline constexpr std::array<AxisSignalName, n_axis_signals> axis_signal_names{{
     {"observed_load_torque", "N*m", "load torque that the load observer has found"},
 }};
 
+// What an axis with a winding shows beside them, at any instant.
+enum WindingSignal : int {
+    direct_current,  // [A], amplitude, as all of these
+    quadrature_current,
+    direct_voltage,      // [V]
+    quadrature_voltage,  // [V]
+    electrical_energy,   // [J], since the start
+    copper_heat,         // [J], the same
+    n_winding_signals
+};
+inline constexpr std::array<AxisSignalName, n_winding_signals> winding_signal_names{{
+    {"direct_current", "A", "current along the magnets, amplitude of a phase"},
+    {"quadrature_current", "A", "current across the magnets, amplitude of a phase"},
+    {"direct_voltage", "V", "voltage along the magnets, amplitude of a phase"},
+    {"quadrature_voltage", "V", "voltage across the magnets, amplitude of a phase"},
+    {"electrical_energy", "J", "energy that the winding has taken from the inverter"},
+    {"copper_heat", "J", "heat that has arisen in the winding"},
+}};
+
 class Axis {
  public:
     enum Mode { torque_mode, speed_mode, position_mode } mode = speed_mode;  // what the reference is of
@@ -92,6 +118,8 @@ class Axis {
     PositionLoop position_loop;
     SpeedLoop speed_loop;
     std::optional<CurrentLoop> current_loop;
+    std::optional<FieldOrientation> field_orientation;  // in its place
+    bool commutates_by_encoder = true;                  // of the speed; else the angle of the rotor is known
     TorqueFeedforward feedforward;
     InverseModel inverse_model;  // in the place of feedforward and backlash
     LoadObserver load_observer;
@@ -110,6 +138,11 @@ class Axis {
         position_loop.place(slots);
         speed_loop.place(slots);
         if (current_loop) current_loop->place(slots);
+        if (field_orientation) {
+            field_orientation->place(slots);
+            course_ = slots.take(sizeof(WindingCourse) / sizeof(double));
+            energy_ = slots.take(2);
+        }
         backlash.place(slots);
         inverse_model.place(slots);
         load_observer.place(slots);
@@ -132,6 +165,10 @@ class Axis {
         show_model(slot);
         if (two_encoders)
             slot[blended] = position_sensor.scale * position_sensor.encoder.reading(y.position_angle) - angle / ratio;
+        if (field_orientation) {
+            field_orientation->start(y.rotor_angle, y.rotor_speed, slot);
+            set_course(WindingCourse::at(y.time, {}, {}, y.rotor_speed), slot);
+        }
     }
 
     // One tick. Returns false if the user's own law has failed, or the command is no number.
@@ -155,19 +192,64 @@ class Axis {
             if (mode != torque_mode && speed_schedule.due(tick))
                 run_speed_loop(time, tick_length * speed_schedule.every, slot);
             if (mode == torque_mode) slot[torque_reference] = reference.at(time).value;
-            if (!current_loop)
+            if (field_orientation) {
+                if (current_schedule.due(tick))
+                    field_orientation->control(slot[torque_reference], reading(y, slot), slot);
+            } else if (!current_loop) {
                 command = slot[torque_reference] / rated_torque;
-            else if (current_schedule.due(tick))
+            } else if (current_schedule.due(tick)) {
                 command = (*current_loop)(slot[torque_reference], y.motor_torque, slot[measured_speed], slot);
+            }
+        }
+        if (field_orientation) {
+            if (!field_orientation->finite(slot)) return false;
+            field_orientation->act(tick, slot);
+            return true;
         }
         if (!std::isfinite(command)) return false;
         slot[computed_command] = command;
         slot[acting_command] = delay(command, tick, slot);
         return true;
     }
-    // What acts on the motor from this tick on.
+    // What acts on the motor from this tick on, of an axis without a winding.
     double command(const double* slot) const { return slot[acting_command]; }
     static double signal(int s, const double* slot) { return slot[s]; }
+
+    // Of the winding, from the last exchange of torque and speed on.
+    WindingCourse course(const double* slot) const {
+        static_assert(std::is_trivially_copyable_v<WindingCourse>);
+        WindingCourse c;
+        std::memcpy(static_cast<void*>(&c), slot + course_, sizeof c);
+        return c;
+    }
+    // The next one, from where the last one has been followed up to.
+    void set_course(const WindingCourse& next, double* slot) const {
+        const auto [electrical, heat] = energy(next.begin, slot);
+        slot[energy_] = electrical;
+        slot[energy_ + 1] = heat;
+        std::memcpy(slot + course_, &next, sizeof next);
+    }
+    // What acts on the motor as a torque source, in a straight line.
+    Ramp torque_command(double time, const double* slot) const {
+        const WindingCourse c = course(slot);
+        const Ramp torque = c.torque(field_orientation->winding);
+        return {(torque.value + torque.slope * (time - c.begin)) / rated_torque, torque.slope / rated_torque};
+    }
+    double winding_torque(double time, const double* slot) const {
+        const DirectQuadrature i = course(slot).current(time);
+        return field_orientation->winding.torque(i.d, i.q);
+    }
+    double winding_signal(int s, double time, const double* slot) const {
+        const WindingCourse c = course(slot);
+        switch (s) {
+            case direct_current: return c.current(time).d;
+            case quadrature_current: return c.current(time).q;
+            case direct_voltage: return c.voltage(time).d;
+            case quadrature_voltage: return c.voltage(time).q;
+            case electrical_energy: return energy(time, slot).electrical;
+            default: return energy(time, slot).heat;
+        }
+    }
 
  private:
     // Beside the signals: the angles as read, how far the second encoder's is taken over, and the command.
@@ -202,11 +284,24 @@ class Axis {
                                  ? inverse_model.torque(speed_ahead, gain_ahead, load_observer.load(slot),
                                                         wanted - slot[measured_speed], T, slot)
                                  : feedforward(ratio * speed_ahead, ratio * gain_ahead);
-        double M =
-            load_observer.schedule(speed_loop, inverse_model, slot)(wanted, slot[measured_speed], known, T, slot);
+        const double limit = field_orientation
+                                 ? std::fmin(speed_loop.torque_limit, field_orientation->available_torque(slot))
+                                 : speed_loop.torque_limit;
+        double M = load_observer.schedule(speed_loop, inverse_model, slot)(wanted, slot[measured_speed], known, limit,
+                                                                           T, slot);
         show_model(slot);
         for (const DiscreteSystem& f : torque_filters) M = f(M, slot);
-        slot[torque_reference] = std::clamp(M, -speed_loop.torque_limit, speed_loop.torque_limit);
+        slot[torque_reference] = std::clamp(M, -limit, limit);
+    }
+
+    FieldOrientation::Reading reading(const Sampled& y, const double* slot) const {
+        return {commutates_by_encoder ? slot[speed_angle] : y.rotor_angle, slot[measured_speed], y.rotor_angle,
+                course(slot).current(y.time)};
+    }
+    WindingCourse::Energy energy(double time, const double* slot) const {
+        const WindingCourse c = course(slot);
+        const auto [electrical, heat] = c.energy(field_orientation->winding, c.begin, time);
+        return {slot[energy_] + electrical, slot[energy_ + 1] + heat};
     }
 
     void show_model(double* slot) const {
@@ -222,9 +317,21 @@ class Axis {
         slot[mode == position_mode ? position_reference
              : mode == speed_mode  ? speed_reference
                                    : torque_reference] = mode == speed_mode ? ratio * r.value : r.value;
-        const std::array<double, 3> measured{slot[measured_position], slot[measured_speed], y.motor_torque};
+        std::array<double, 5> measured{slot[measured_position], slot[measured_speed], y.motor_torque};
         const std::array<double, 4> wanted{r.value, r.rate, r.second, r.third};
-        return own_law(time, measured.data(), wanted.data(), &command, slot) == 0;
+        std::array<double, 2> given{command};
+        if (field_orientation) {
+            const FieldOrientation::Reading seen = reading(y, slot);
+            const DirectQuadrature i = field_orientation->measured(seen);
+            measured[3] = i.d;
+            measured[4] = i.q;
+            if (own_law(time, measured.data(), wanted.data(), given.data(), slot) != 0) return false;
+            field_orientation->command({given[0], given[1]}, seen, slot);
+            return true;
+        }
+        if (own_law(time, measured.data(), wanted.data(), given.data(), slot) != 0) return false;
+        command = given[0];
+        return true;
     }
 
     // Of the reference's shaft. With two encoders that of the motor, and what that of the load says beyond it by and
@@ -236,7 +343,7 @@ class Axis {
         return by_motor + slot[blended];
     }
 
-    int slots_ = 0;
+    int slots_ = 0, course_ = 0, energy_ = 0;
 };
 
 }  // namespace lostmotion::control

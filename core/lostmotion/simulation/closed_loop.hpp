@@ -3,12 +3,13 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
-#include "../control/axis.hpp"
 #include "../solver/components.hpp"
 #include "../solver/exact_solver.hpp"
+#include "winding_coupling.hpp"
 
 namespace lostmotion {
 
@@ -24,6 +25,13 @@ struct Control {
     std::vector<ControlledAxis> axes;
 
     bool present() const { return !axes.empty(); }
+    // How many of them each axis shows: those of a winding too if there is one.
+    int signals() const {
+        int n = control::n_axis_signals;
+        for (const ControlledAxis& axis : axes)
+            if (axis.law.field_orientation) n = int{control::n_axis_signals} + int{control::n_winding_signals};
+        return n;
+    }
     // The controllers, ready to run.
     std::vector<control::Axis> laws() const {
         std::vector<control::Axis> out;
@@ -33,13 +41,6 @@ struct Control {
         }
         return out;
     }
-};
-
-// An axis in a system: the input of its motor, and the forms that give what is sampled.
-template <class D>
-struct AxisPlace {
-    int input = 0;
-    LinearFormOf<D> position_angle{}, speed_angle{}, speed{}, motor_torque{};
 };
 
 // The controllers of a run, all at the same base tick. Parameters only.
@@ -62,11 +63,11 @@ struct ControlCourse {
     std::vector<double> slots;  // of all axes, one after the other
 };
 
-// The signals of the axes at the instants of a record: out[(axis * n_axis_signals + signal) * count + k] at k *
-// interval.
+// The signals of the axes at the instants of a record: out[(axis * signals + signal) * count + k] at k * interval.
 class ControlRecord {
  public:
-    ControlRecord(double interval, std::size_t count, double* out) : interval_(interval), count_(count), out_(out) {}
+    ControlRecord(double interval, std::size_t count, int signals, double* out)
+        : interval_(interval), count_(count), signals_(signals), out_(out) {}
 
     // What holds before time `end`.
     template <class D>
@@ -75,25 +76,42 @@ class ControlRecord {
             const double* slot = course.slots.data();
             double* to = out_ + next_;
             for (const control::Axis& a : loop.axes) {
-                for (int s = 0; s < control::n_axis_signals; ++s, to += count_) *to = a.signal(s, slot);
+                for (int s = 0; s < signals_; ++s, to += count_) *to = signal(a, s, slot);
                 slot += a.slots();
             }
         }
     }
 
  private:
+    double signal(const control::Axis& a, int s, const double* slot) const {
+        if (s < control::n_axis_signals) return a.signal(s, slot);
+        return a.field_orientation
+                   ? a.winding_signal(s - control::n_axis_signals, static_cast<double>(next_) * interval_, slot)
+                   : 0.0;
+    }
+
     double interval_;
     std::size_t count_;
+    int signals_;
     double* out_;
     std::size_t next_ = 0;
 };
+
+// Signals of which those that windings turn will be set to ramps. input(motor): its number among them.
+template <std::size_t n, class Input>
+std::array<Signal, n> with_ramps(std::array<Signal, n> signals, const Control& control, Input&& input) {
+    for (const ControlledAxis& axis : control.axes)
+        if (axis.law.field_orientation) signals[static_cast<std::size_t>(input(axis.motor))] = {{{0.0, 0.0, 1.0}}, {}};
+    return signals;
+}
 
 template <class Solver>
 class ClosedLoopRun {
  public:
     using D = typename Solver::D;
 
-    ClosedLoopRun(Solver& solver, const ClosedLoop<D>& loop) : solver_(solver), loop_(loop) {}
+    ClosedLoopRun(Solver& solver, const ClosedLoop<D>& loop)
+        : solver_(solver), loop_(loop), windings_(solver, loop.tick, loop.axes, loop.places) {}
 
     const ControlCourse& course() const { return course_; }
     // Goes on from what the controllers were, at the time and state that the solver has.
@@ -101,15 +119,20 @@ class ClosedLoopRun {
         course_ = course;
         if (course_.slots.empty()) return;  // not begun
         each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
-            solver_.set_ramp(p.input, a.command(slot), 0.0);
+            const Ramp command = command_of(a, slot);
+            solver_.set_ramp(p.input, command.value, command.slope);
             return true;
         });
+    }
+    // The inputs that no controller gives have changed.
+    void forget_plan() {
+        if (windings_.present()) windings_.forget_plan(course_.slots);
     }
     // What acts on the motors, among the inputs.
     void write_commands(InputsOf<D>& inputs) {
         if (course_.slots.empty()) return;
         each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
-            inputs[p.input] = a.command(slot);
+            inputs[p.input] = command_of(a, slot).value;
             return true;
         });
     }
@@ -123,6 +146,10 @@ class ClosedLoopRun {
             return true;
         });
         if (!run_tick(x, memory)) return Status::controller;
+        each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double*) {
+            if (a.field_orientation) solver_.set_ramp(p.input, 0.0, 0.0);
+            return true;
+        });
         return solver_.begin(0.0, x, memory);
     }
     // To t_end, the ticks up to it included unless they fall on it. record(t): what the controllers show holds until t.
@@ -131,10 +158,11 @@ class ClosedLoopRun {
         while (true) {
             const double tick = static_cast<double>(course_.next) * loop_.tick;
             const bool last = !(tick < t_end);
-            record(last ? std::numeric_limits<double>::infinity() : tick);
+            if (!windings_.present()) record(last ? std::numeric_limits<double>::infinity() : tick);
             if (last || tick > solver_.time()) {
                 Passing<Observer> passing{observer, last};
-                const Status status = solver_.advance(last ? t_end : tick, passing);
+                const Status status = windings_.present() ? advance_windings(tick, t_end, observer, record)
+                                                          : solver_.advance(last ? t_end : tick, passing);
                 if (status != Status::done || last) return status;
             }
             if constexpr (requires { observer.flush(); })
@@ -176,12 +204,33 @@ class ClosedLoopRun {
         }
     };
 
+    // With windings, by the parts of a tick.
+    template <class Observer, class Record>
+    Status advance_windings(double tick, double t_end, Observer& observer, Record& record) {
+        const double to = std::fmin(tick, t_end);
+        while (true) {
+            if (!(windings_.end(course_.slots) > solver_.time()) && solver_.time() < to)
+                if (const Status s = windings_.plan(tick, course_.slots, observer); s != Status::done) return s;
+            const double end = std::fmin(windings_.end(course_.slots), to);
+            const bool last = !(tick < t_end) && !(end < t_end);
+            record(last ? std::numeric_limits<double>::infinity() : end);
+            Passing<Observer> passing{observer, last};
+            if (const Status s = solver_.advance(end, passing); s != Status::done) return s;
+            if (!(end < to)) return Status::done;
+        }
+    }
+
     control::Sampled sample(const AxisPlace<D>& p, const StateOf<D>& x, const typename D::Memory& memory,
                             double command) const {
         InputsOf<D> u{};
         u[p.input] = command;
         const auto value = [&](const LinearFormOf<D>& f) { return evaluate<D>(f, x, memory, u); };
-        return {value(p.position_angle), value(p.speed_angle), value(p.speed), value(p.motor_torque)};
+        return {value(p.position_angle), value(p.speed_angle), value(p.speed), value(p.motor_torque),
+                value(p.rotor_angle),    value(p.rotor_speed), solver_.time()};
+    }
+    // What acts now.
+    Ramp command_of(const control::Axis& a, const double* slot) const {
+        return a.field_orientation ? a.torque_command(solver_.time(), slot) : Ramp{a.command(slot), 0.0};
     }
     template <class Use>
     bool each_axis(Use&& use) {
@@ -196,9 +245,10 @@ class ClosedLoopRun {
     bool run_tick(const StateOf<D>& x, const typename D::Memory& memory) {
         changed_ = course_.next == 0;
         const bool well = each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
-            const double before = a.command(slot);
+            const double before =
+                a.field_orientation ? a.winding_torque(solver_.time(), slot) / a.rated_torque : a.command(slot);
             if (!a.step(course_.next, loop_.tick, sample(p, x, memory, before), slot)) return false;
-            if (a.command(slot) == before && course_.next > 0) return true;
+            if (a.field_orientation || (a.command(slot) == before && course_.next > 0)) return true;
             solver_.set_ramp(p.input, a.command(slot), 0.0);
             changed_ = true;
             return true;
@@ -210,6 +260,7 @@ class ClosedLoopRun {
     Solver& solver_;
     const ClosedLoop<D>& loop_;
     ControlCourse course_;
+    WindingCoupling<Solver> windings_;
     bool changed_ = false;
 };
 
@@ -228,7 +279,7 @@ Status run_recorded(Solver& solver, const StartOf<typename Solver::D>& start, co
     const auto loop = make_loop(laws);
     ClosedLoopRun<Solver> run(solver, loop);
     ControlRecord record(options.sample_interval, options.control_out == nullptr ? 0 : options.samples,
-                         options.control_out);
+                         options.control.signals(), options.control_out);
     const Status begun = run.begin(start.x, start.memory);
     if (begun != Status::done) return begun;
     return run.advance(options.duration, observer, [&](double end) { record.hold_until(end, loop, run.course()); });

@@ -8,6 +8,9 @@
 
 namespace lostmotion {
 
+// The input of the only motor.
+inline constexpr auto only_motor = [](int) { return command - first_input; };
+
 // Those of a drive, whose shafts are 0, the motor's, and 1, the load's. The laws must stay.
 inline ClosedLoop<DriveDims> closed_loop_of(const Drive& drive, const Control& control,
                                             const std::vector<control::Axis>& laws) {
@@ -16,10 +19,11 @@ inline ClosedLoop<DriveDims> closed_loop_of(const Drive& drive, const Control& c
                      of_load = LinearForm::unit(load_angle);
     ClosedLoop<DriveDims> loop{control.tick, laws, {}};
     for (const ControlledAxis& axis : control.axes)
-        loop.places.push_back({command - first_input, axis.position_shaft == 0 ? of_motor : of_load,
+        loop.places.push_back({only_motor(axis.motor), axis.position_shaft == 0 ? of_motor : of_load,
                                axis.speed_shaft == 0 ? of_motor : of_load,
                                LinearForm::unit(axis.speed_shaft == 0 ? motor_speed : load_speed),
-                               drive.motor.torque<LinearForm>({motor_torque, motor_speed, command, one})});
+                               drive.motor.torque<LinearForm>({motor_torque, motor_speed, command, one}), of_motor,
+                               LinearForm::unit(motor_speed)});
     return loop;
 }
 

@@ -77,8 +77,8 @@ inline RunReport run_exact(Workspace& workspace, const Signals& signals, const S
                            double* out) {
     RunReport report;
     const Drive& drive = workspace.drive;
-    ExactSolver<SwitchedDrive> solver(workspace.system, signals, options.sample_interval, drive.balanced_scale(),
-                                      &workspace.cache);
+    ExactSolver<SwitchedDrive> solver(workspace.system, with_ramps(signals, options.control, only_motor),
+                                      options.sample_interval, drive.balanced_scale(), &workspace.cache);
     Recorder recorder(drive, options, out, report);
     recorder.begin(start.x);
     report.status = run_recorded(solver, start, options, recorder,
@@ -135,7 +135,7 @@ inline RunReport run_adaptive(const Drive& drive, const Signals& signals, const 
     report.left_data_at = std::numeric_limits<double>::infinity();
     const SwitchedDrive system(drive);
     using Solver = AdaptiveSolver<SwitchedDrive>;
-    Solver solver(system, signals, relative_tolerance, drive.rated_scale());
+    Solver solver(system, with_ramps(signals, options.control, only_motor), relative_tolerance, drive.rated_scale());
     AdaptiveRecorder<Solver> recorder(drive, solver, options, out, report);
     report.status = run_recorded(solver, start, options, recorder,
                                  [&](const auto& laws) { return closed_loop_of(drive, options.control, laws); });

@@ -96,8 +96,10 @@ Status SimulationOf<System>::advance(double interval, Inputs begin, Inputs end) 
     Status status = Status::done;
     if (!now_.started)
         status = begin_motion();
-    else if (!unchanged)
+    else if (!unchanged) {
+        if (controllers_) controllers_->forget_plan();
         status = solver_.inputs_changed();
+    }
     const double to = now_.time + interval;
     if (status == Status::done)
         status = controllers_ ? controllers_->advance(to, nothing, [](double) {}) : solver_.advance(to, nothing);

@@ -13,12 +13,25 @@ namespace lostmotion {
 
 // What is wrong with the controllers of a train, or empty.
 inline std::string check_control(const model::Assembly& a, const Control& control) {
-    for (const ControlledAxis& axis : control.axes)
+    const auto told = [&](int shaft, const char* has, const char* remedy) -> std::string {
+        if (model::shaft_angle(a, shaft)) return "";
+        return "shaft '" + a.train().shafts[static_cast<std::size_t>(shaft)].name + "' " + has +
+               ", but its angle does not follow from that of the load: a clutch or a transmission error lies "
+               "between; " +
+               remedy;
+    };
+    for (const ControlledAxis& axis : control.axes) {
         for (const int shaft : {axis.position_shaft, axis.speed_shaft})
-            if (!model::shaft_angle(a, shaft))
-                return "shaft '" + a.train().shafts[static_cast<std::size_t>(shaft)].name +
-                       "' carries an encoder, but its angle does not follow from that of the load: a clutch or a "
-                       "transmission error lies between; put the encoder on another shaft";
+            if (const std::string error = told(shaft, "carries an encoder", "put the encoder on another shaft");
+                !error.empty())
+                return error;
+        if (!axis.law.field_orientation) continue;
+        const int rotor = a.train().motors[static_cast<std::size_t>(axis.motor)].shaft;
+        if (const std::string error =
+                told(rotor, "is that of a motor under field-oriented control", "take a current loop of kind \"pi\"");
+            !error.empty())
+            return error;
+    }
     return "";
 }
 
@@ -39,6 +52,9 @@ ClosedLoop<D> closed_loop_of(const model::Assembly& a, const Control& control, c
         p.motor_torque =
             packed(law.kind == Motor::dc ? model::Row::unit(motor.torque)
                                          : model::Row::unit(n.first_input + motor.command, law.rated_torque));
+        const int rotor = a.train().motors[static_cast<std::size_t>(axis.motor)].shaft;
+        if (const auto angle = model::shaft_angle(a, rotor)) p.rotor_angle = packed(*angle);
+        p.rotor_speed = packed(model::Row::unit(a.places().shafts[static_cast<std::size_t>(rotor)].speed));
         loop.places.push_back(p);
     }
     return loop;

@@ -288,7 +288,9 @@ TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std:
     if (report.message.empty()) report.message = check_control(a, options.control);
     if (!report.message.empty()) return report;
     const System system(a);
-    const SignalsOf<D> signals = model::packed_signals<D>(inputs);
+    const SignalsOf<D> signals = with_ramps(model::packed_signals<D>(inputs), options.control, [&](int motor) {
+        return a.places().motors[static_cast<std::size_t>(motor)].command;
+    });
     const auto [x, m] = model::packed_start<D>(n, start, memory);
     TrainRecorder<D> recorder(model, options, out, report);
     const auto in_train = [&](const auto& laws) { return closed_loop_of<D>(a, options.control, laws); };

@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -134,6 +135,18 @@ class AdaptiveSolver {
     }
 
     // As of the exact solver.
+    std::unique_ptr<AdaptiveSolver> twin() const {
+        return std::make_unique<AdaptiveSolver>(system_, signals_, tolerance_, scale_, remainder_);
+    }
+    void follow(const AdaptiveSolver& o) {
+        time_ = o.time_;
+        now_ = o.now_;
+        key_ = o.key_;
+        step_ = o.step_;
+        for (int i = 0; i < D::inputs; ++i)
+            if (signals_[i].breakpoints.size() == 1) signals_[i].breakpoints[0] = o.signals_[i].breakpoints[0];
+        left_.reset();
+    }
     void set_ramp(int input, double value, double slope) {
         if (!left_) left_ = input_before(time_, now_.x);
         signals_[input].breakpoints[0] = {time_, value, slope};

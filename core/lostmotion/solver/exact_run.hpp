@@ -105,6 +105,16 @@ class ExactSolver {
     const Course& course() const { return course_; }
     // From now on the input is value + slope * (t - now). Only for signals made with ramped_inputs().
     void set_ramp(int input, double value, double slope) { signals_[input].breakpoints[0] = {time_, value, slope}; }
+    // Another solver of the same system, inputs and regimes. Made before a run begins.
+    std::unique_ptr<ExactSolver> twin() const {
+        return std::make_unique<ExactSolver>(system_, signals_, unit_, scale_, &cache_);
+    }
+    // To where another is, with the same inputs. What follows is inputs_changed().
+    void follow(const ExactSolver& o) {
+        resume(o.time_, o.now_.x, o.now_.memory, o.key_, o.course_);
+        for (int i = 0; i < D::inputs; ++i)
+            if (signals_[i].breakpoints.size() == 1) signals_[i].breakpoints[0] = o.signals_[i].breakpoints[0];
+    }
     // Of the inputs, the left limit.
     InputsOf<D> input_before(double t, const State&) const {
         InputState input(signals_, rotations_.basis());

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from ..model.train import DriveTrain
 from .controller import Controller, whole_multiple
 from .filters import core_filter
 from .law import Law
-from .loops import CurrentLoop, FirstOrderCurrent, VoltageCommand
+from .loops import CurrentLoop, FieldOriented, FirstOrderCurrent, VoltageCommand
 
 Bound = tuple[float, list[tuple[_core.Axis, int, int, int]]]
 """base tick [s]; of each axis the controller, its motor, and the shafts of the position's and of the speed's encoder"""
@@ -97,6 +98,9 @@ class _Place:
             out.position_schedule.phase = phase
         if isinstance(c.current, CurrentLoop):
             out.current_loop = self._current(c.current)
+        elif isinstance(c.current, FieldOriented):
+            out.field_orientation = self._field_oriented(c.current, out.delay)
+            out.commutates_by_encoder = self.encoder_shaft("encoder") == self.motor_shaft
         return out
 
     def _encoders(self, out: _core.Axis, ticks: int) -> None:
@@ -156,6 +160,38 @@ class _Place:
         out.back_emf = loop.back_emf * (k_N - 1.0) / (k_N * m.rated_speed)
         out.rated_torque = m.rated_torque
         out.limit = math.inf if m.command_limit is None else m.command_limit
+        return out
+
+    def _field_oriented(self, loop: FieldOriented, delay: _core.TickDelay) -> _core.FieldOrientation:
+        m = self.motor
+        if m.kind != "synchronous" or m.winding is None:
+            raise InputError(
+                f'current.kind: "field_oriented" needs a motor of kind "synchronous", and this one is a {m.kind}; take "pi", "ideal" or "first_order"'
+            )
+        if m.winding.max_current is None:
+            raise InputError(
+                'current.kind: "field_oriented" needs the largest current; give motor.winding.max_current_rms or max_current_peak'
+            )
+        phase = m.winding.phase_values()
+        current, time = math.sqrt(2.0) * m.winding.max_current, self.controller.loop_time("current")
+        if (phase.inductance_d - phase.inductance_q) * current >= phase.flux_linkage:
+            raise InputError(
+                'current.kind: "field_oriented": L_d - L_q times the largest current is not below the flux linkage, so that field '
+                "weakening would turn the torque around; exchange inductance_d and inductance_q, or lower the largest current"
+            )
+        out = _core.FieldOrientation()
+        out.winding = [float(value) for value in dataclasses.astuple(phase)]
+        gains = [
+            -loop.gain * phase.resistance / math.expm1(-phase.resistance * time / L)
+            for L in (phase.inductance_d, phase.inductance_q)
+        ]
+        out.gain_d, out.gain_q = gains
+        out.integral_gain = loop.gain * phase.resistance
+        out.back_emf, out.decoupling, out.field_weakening = loop.back_emf, loop.decoupling, loop.field_weakening
+        out.voltage_limit, out.current_limit = m.phase_voltage, current
+        out.weakening_voltage = loop.weakening_voltage * m.phase_voltage
+        out.sample_time, out.delay_time = time, self.controller.delay * self.controller.sample_time
+        out.delay = delay
         return out
 
 

@@ -13,11 +13,22 @@ from ..inputs.part import Part
 from ..inputs.quantities import NotNegative, Positive, Switch, Time, Whole
 from .encoder import Encoder
 from .inverse_model import InverseModel
-from .loops import CurrentLoop, Feedforward, FirstOrderCurrent, IdealCurrent, PositionLoop, SpeedLoop, VoltageCommand
+from .loops import (
+    CurrentLoop,
+    Feedforward,
+    FieldOriented,
+    FirstOrderCurrent,
+    IdealCurrent,
+    PositionLoop,
+    SpeedLoop,
+    VoltageCommand,
+)
 from .references import PositionReference, SpeedReference, TorqueReference
 
 AnyReference = Annotated[PositionReference | SpeedReference | TorqueReference, Field(discriminator="kind")]
-AnyCurrent = Annotated[IdealCurrent | FirstOrderCurrent | CurrentLoop | VoltageCommand, Field(discriminator="kind")]
+AnyCurrent = Annotated[
+    IdealCurrent | FirstOrderCurrent | CurrentLoop | FieldOriented | VoltageCommand, Field(discriminator="kind")
+]
 MAX_TICKS = 1_000_000  # of the base tick in the sample time of a loop
 
 
@@ -60,11 +71,11 @@ class Controller(Part):
             wanted = ()
             if isinstance(self.current, CurrentLoop):
                 raise ValueError(
-                    'has law = true and a current loop of kind "pi"; with a law of one\'s own, take "ideal", "first_order" or "voltage"'
+                    'has law = true and a current loop of kind "pi"; with a law of one\'s own, take "ideal", "first_order", "voltage" or "field_oriented"'
                 )
         elif isinstance(self.current, VoltageCommand):
             raise ValueError(
-                'has current.kind = "voltage", which needs law = true; take "pi", "first_order" or "ideal"'
+                'has current.kind = "voltage", which needs law = true; take "pi", "field_oriented", "first_order" or "ideal"'
             )
         for loop in ("position", "speed"):
             present = getattr(self, loop) is not None

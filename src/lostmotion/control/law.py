@@ -27,7 +27,9 @@ class Law:
 
     ``measured`` is (position of the reference's shaft [rad], speed of the motor [rad/s], torque of the motor [N·m]),
     ``reference`` (value, first, second, third derivative); ``command`` is in the unit of `[command]`: 1 is rated torque,
-    or with ``current.kind = "voltage"`` rated voltage.
+    or with ``current.kind = "voltage"`` rated voltage. With ``current.kind = "field_oriented"`` ``measured`` goes on with i_d and
+    i_q [A], and the command is the pair u_d, u_q [V] in coordinates of the rotor as it is read now; the inverter turns it ahead
+    to where the rotor will be in the middle of the time that it acts, and holds it in the stator.
     """
 
     function: Any

@@ -173,16 +173,37 @@ class FirstOrderCurrent(Part):
     time_constant: Annotated[Time, Positive]
 
 
-class CurrentLoop(Part):
-    """A sampled PI controller of the voltage, its zero on the pole of the winding; gain g of the loop g/(z (z - 1))."""
+class SampledCurrent(Part):
+    """A sampled PI controller of the voltage, its zero on the pole of the winding, so that the loop is g/(z (z - 1))."""
 
-    kind: Literal["pi"]
     gain: Annotated[Number, Limit(gt=0.0, le=1.0)] = 1.0 / 3.0
     """g: with 1/3 and one sample time of delay it overshoots by 1/27, with a phase margin of 61 degrees"""
     back_emf: Annotated[Number, Share] = 1.0
     """share of the back-e.m.f. that is compensated"""
     sample_time: Annotated[Time, Positive] | None = None
     """left out, that of the controller"""
+
+
+class CurrentLoop(SampledCurrent):
+    """Sampled control of the current that makes the torque."""
+
+    kind: Literal["pi"]
+
+
+class FieldOriented(SampledCurrent):
+    """Sampled control of both currents of a synchronous motor, i_d and i_q, each as the loop of kind "pi".
+
+    Voltage circle dc_voltage/sqrt(3), current circle `motor.winding.max_current_rms` with priority for i_d, maximum torque per
+    ampere, field weakening ``i_d* += k (u_f^2 - |u|^2)``; the inverter holds its voltage in coordinates of the stator.
+    """
+
+    kind: Literal["field_oriented"]
+    decoupling: Annotated[Number, Share] = 1.0
+    """share of what the current of one axis induces in the other that is compensated"""
+    field_weakening: Annotated[Number, Share] = 0.02
+    """share of the excess of the voltage that i_d makes up for in one sample time; 0: none"""
+    weakening_voltage: Annotated[Number, Limit(gt=0.0, le=1.0)] = 0.95
+    """share of the largest voltage above which the field is weakened; the rest is a reserve to control the currents with"""
 
 
 class Feedforward(Part):

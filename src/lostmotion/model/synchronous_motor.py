@@ -145,6 +145,10 @@ class PhaseValues:
         """Heat of the three phases to a torque squared, 1.5 R i² = 1.5 R (M/(1.5 p psi))² [W/(N·m)²]."""
         return 1.5 * self.resistance / self.torque_constant**2
 
+    def torque(self, i_d: Any, i_q: Any) -> Any:
+        """1.5 p (psi i_q + (L_d - L_q) i_d i_q) [N·m], of currents [A]."""
+        return 1.5 * self.pole_pairs * (self.flux_linkage + (self.inductance_d - self.inductance_q) * i_d) * i_q
+
     def direct_current(self, voltage: float, torque: float) -> tuple[float, float, float]:
         """Electrical time constant tau_a [s], k_N and omega_DR [rad/s] of (2), for u_R [V] and M_R [N·m]."""
         current = torque / self.torque_constant

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..simulation.results import RawResult, energy_of, is_train_result
 from ..simulation.train_scenario import TrainScenario
+from ..simulation.windings import errors_of
 
 if TYPE_CHECKING:
     import xarray
@@ -51,9 +52,22 @@ def summary(result: xarray.Dataset | RawResult) -> str:
         )
         if e["turned_over"] > 0.0:
             lines.append(f"  energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}")
+    lines += error_lines(result)
     lines += [f"  warning: {result.attrs['warning']}"] if "warning" in result.attrs else []
     lines += [f"  note: {result.attrs['note']}"] if "note" in result.attrs else []
     return "\n".join(lines)
+
+
+def error_lines(result: xarray.Dataset | RawResult) -> list[str]:
+    """By how much currents, torques and speeds of motors under field-oriented control may be wrong, and their largest values."""
+    bounds = errors_of(result)
+    if not bounds:
+        return []
+    shown = (
+        f"{name.replace('_', ' ')} {bound:.1e} of {np.max(np.abs(np.asarray(result[name]))):.4g} {unit}"
+        for (name, bound), unit in zip(bounds.items(), ("A", "A", "N·m", "rad/s") * len(bounds), strict=False)
+    )
+    return [f"  error of the field-oriented control at most: {', '.join(shown)}"]
 
 
 def train_summary(result: xarray.Dataset | RawResult) -> str:
@@ -86,5 +100,6 @@ def train_summary(result: xarray.Dataset | RawResult) -> str:
         lines.append(f"  energy [J]: {parts or 'none'}")
         if e["turned_over"] > 0.0:
             lines.append(f"  energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}")
+    lines += error_lines(result)
     lines += [f"  {kind}: {result.attrs[kind]}" for kind in ("warning", "note") if kind in result.attrs]
     return "\n".join(lines)

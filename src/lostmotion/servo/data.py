@@ -8,7 +8,7 @@ import numpy as np
 
 from ..control.axis import turns
 from ..control.controller import Controller
-from ..control.loops import CurrentLoop, Difference, FirstOrderCurrent, Observer
+from ..control.loops import Difference, FirstOrderCurrent, Observer, SampledCurrent
 from ..control.tuning import TwoInertias
 from ..errors import InputError
 from ..model.gear import Gear
@@ -83,7 +83,7 @@ def lag_sum(controller: Controller) -> float:
         raise InputError("the controller has no speed loop, whose lags are asked for; add one")
     T = c.loop_time("speed")
     by_output = c.delay * c.sample_time
-    lag = c.loop_time("current") / c.current.gain if isinstance(c.current, CurrentLoop) else by_output
+    lag = c.loop_time("current") / c.current.gain if isinstance(c.current, SampledCurrent) else by_output
     if isinstance(c.current, FirstOrderCurrent):
         lag += c.current.time_constant
     lag += 0.5 * T + (0.0 if c.encoder is None else c.encoder.delay * c.sample_time)

@@ -12,6 +12,7 @@ import numpy as np
 from .. import _core
 from ..control.axis import turns
 from ..control.controller import Controller
+from ..control.loops import CurrentLoop, FieldOriented, SampledCurrent
 from ..errors import InputError, need
 from ..inputs.validation import shown
 from ..model.gear import Gear
@@ -103,10 +104,21 @@ def axis_of(scenario: Scenario | TrainScenario, motor: str | None = None) -> Axi
         raise InputError(
             f"the controller of {name} has law = true, a function whose loops are not known; give it loops"
         )
-    axis = _loaded(Axis(scenario if isinstance(scenario, TrainScenario) else in_long_form(scenario), name))
+    axis = _loaded(_across(Axis(scenario if isinstance(scenario, TrainScenario) else in_long_form(scenario), name)))
     if not axis.loops:
         raise InputError(f'the controller of {name} closes no loop; give it a speed loop, or current.kind = "pi"')
     return axis
+
+
+def _across(axis: Axis) -> Axis:
+    """The axis with the current loop that field-oriented control is while i_d is zero: of kind "pi", with the inductance L_q."""
+    loop = axis.controller.current
+    if not isinstance(loop, FieldOriented):
+        return axis
+    pi = CurrentLoop(kind="pi", **{key: getattr(loop, key) for key in SampledCurrent.model_fields})
+    controller = axis.controller.model_copy(update={"current": pi})
+    controllers = {**axis.scenario.controllers, axis.motor: controller}
+    return Axis(axis.scenario.model_copy(update={"controllers": controllers}), axis.motor)
 
 
 def _loaded(axis: Axis) -> Axis:

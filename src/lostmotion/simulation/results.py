@@ -19,8 +19,9 @@ from .scenario import Scenario
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import packed
 from .train_scenario import TrainScenario, is_train
-from .train_variables import ALL_SIGNALS, axis_variables, train_variables
+from .train_variables import axis_variables, named_signals, train_variables
 from .variables import CHANNEL_NAMES, STATES, VARIABLES, Variable
+from .windings import set_torques
 
 if TYPE_CHECKING:
     import xarray
@@ -60,8 +61,9 @@ def raw_result(scenario: Scenario, result: Any, solver: str, *, ledger: bool) ->
     """What the solver returned, with all that belongs to it."""
     table, switchings, count, energy, state, capacity, left_data_at, steps, signals = result
     data = dict(zip(CHANNEL_NAMES, table, strict=True))
-    for axis in signals:
-        data |= dict(zip(ALL_SIGNALS, axis, strict=True))
+    if scenario.controller is not None:
+        data |= named_signals({"": scenario.controller}, signals)
+    set_torques(scenario, data)
     add_derived(data, scenario.gearbox.ratio)
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     attributes = {

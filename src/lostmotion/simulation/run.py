@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 from typing import TYPE_CHECKING, Any, Literal
 
 from .. import _core
+from ..control.axis import Bound
 from ..control.law import as_laws
 from ..errors import InputError
 from ..inputs.arguments import checked
@@ -18,6 +20,8 @@ from .train_results import run_train
 from .train_scenario import TrainScenario
 from .train_variables import axis_variables, train_variables
 from .variables import STATES
+from .windings import ATTRIBUTE as ERROR_BOUND
+from .windings import coarser, error_bound, oriented
 
 if TYPE_CHECKING:
     import xarray
@@ -135,12 +139,22 @@ def run(
         MAX_SWITCHINGS,
     )
     laws = as_laws(law, scenario.axes())
-    if isinstance(scenario, TrainScenario):
-        return run_train(scenario, options, how, laws, ledger=energy and exact)
-    _, command, load_torque, state, capacity = core_inputs(scenario)
     control = scenario.control(laws)
+    result = whole_run(scenario, options, how, control)
+    if any(oriented(scenario)) and not laws:
+        again = whole_run(scenario, (*options[:3], False, *options[4:]), how, coarser(control))
+        result.attrs[ERROR_BOUND] = json.dumps(error_bound(scenario, result.values, again.values))
+    return result
+
+
+def whole_run(scenario: Scenario | TrainScenario, options: tuple[Any, ...], how: str, control: Bound) -> RawResult:
+    """One run of the core."""
+    ledger = options[3]
+    if isinstance(scenario, TrainScenario):
+        return run_train(scenario, options, how, control, ledger=ledger)
+    _, command, load_torque, state, capacity = core_inputs(scenario)
     result = _core.run(scenario.core(), command, load_torque, state, capacity, *(*options, control))
-    return raw_result(scenario, result, how, ledger=energy and exact)
+    return raw_result(scenario, result, how, ledger=ledger)
 
 
 def check_memory(samples: int, width: int = BYTES_PER_SAMPLE) -> None:

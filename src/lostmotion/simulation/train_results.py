@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from .. import _core
-from ..control.law import Law
+from ..control.axis import Bound
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from .results import RawResult, installed_version
@@ -17,11 +16,12 @@ from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import CONTACTS_OF_TRAIN, packed
 from .train_scenario import TrainScenario
 from .train_state import start_capacities, start_values
-from .train_variables import ALL_SIGNALS, angle_through, angles_through_gears
+from .train_variables import angle_through, angles_through_gears, named_signals
+from .windings import set_torques
 
 
 def run_train(
-    scenario: TrainScenario, options: tuple[Any, ...], how: str, laws: Mapping[str, Law], *, ledger: bool
+    scenario: TrainScenario, options: tuple[Any, ...], how: str, control: Bound, *, ledger: bool
 ) -> RawResult:
     """A run of a drive train.
 
@@ -32,11 +32,11 @@ def run_train(
         many switchings are kept.
     """
     core, inputs, start, capacities = core_case(scenario)
-    result = _core.run_train(core, inputs, start, capacities, *(*options, scenario.control(laws)))
+    result = _core.run_train(core, inputs, start, capacities, *(*options, control))
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     data = dict(zip((name for name, _, _ in core.channels()), result["values"], strict=True))
-    for motor, signals in zip(scenario.controllers, result["control"], strict=True):
-        data |= {f"{motor}_{name}": values for name, values in zip(ALL_SIGNALS, signals, strict=True)}
+    data |= named_signals(scenario.controllers, result["control"])
+    set_torques(scenario, data)
     add_derived_of_train(scenario.train(), data, time)
     attributes = _attributes(scenario, result, how, ledger=ledger)
     return RawResult(time, data, attributes | {CONTACTS_OF_TRAIN: " ".join(core.contact_names())})

@@ -37,6 +37,9 @@ LOOP_SIGNALS = {
 }
 
 
+WINDING_SIGNALS = tuple(name for name, _, _ in _core.winding_signals())
+
+
 def signals_of(controller: Controller) -> Iterator[str]:
     """Names of what a controller shows."""
     yield from LOOP_SIGNALS[controller.reference.kind]
@@ -44,6 +47,8 @@ def signals_of(controller: Controller) -> Iterator[str]:
         yield from ("model_loss_factor", "model_friction_torque")
         if controller.inverse_model.load_observer is not None:
             yield "observed_load_torque"
+    if controller.current.kind == "field_oriented":
+        yield from WINDING_SIGNALS
 
 
 def axis_variables(controllers: Mapping[str, Controller]) -> tuple[Variable, ...]:
@@ -51,9 +56,19 @@ def axis_variables(controllers: Mapping[str, Controller]) -> tuple[Variable, ...
     return tuple(
         Variable(f"{motor}_{name}" if motor else name, "", unit, meaning)
         for motor, controller in controllers.items()
-        for name, unit, meaning in _core.axis_signals()
+        for name, unit, meaning in (*_core.axis_signals(), *_core.winding_signals())
         if name in signals_of(controller)
     )
+
+
+def named_signals(controllers: Mapping[str, Controller], values: Any) -> dict[str, np.ndarray]:
+    """What the core has recorded of the controllers, axis by axis and signal by signal, as `axis_variables` calls it."""
+    return {
+        f"{motor}_{name}" if motor else name: row
+        for (motor, controller), rows in zip(controllers.items(), values, strict=True)
+        for name, row in zip((*ALL_SIGNALS, *WINDING_SIGNALS), rows, strict=False)
+        if name in signals_of(controller)
+    }
 
 
 def _derived(train: DriveTrain) -> Iterator[Variable]:

@@ -37,7 +37,8 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
     xarray.Dataset
         Over ``time`` [s], of a motor with a winding: `current` [A], i_q, the amplitude of a phase with the sign of the torque;
         `current_rms` [A]; `voltage` [V], the amplitude of a phase with that of the decoupling, which may exceed `voltage_limit`
-        since only u_q ends there. Of any other motor `current` alone, torque / torque constant.
+        since only u_q ends there. Under field-oriented control the amplitudes of both axes together, as they were in the run.
+        Of any other motor `current` alone, torque / torque constant.
 
     Raises
     ------
@@ -45,7 +46,8 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
         The motor has neither a winding nor `limits.torque_constant`, or `motor` names none.
     """
     m, where, (command, torque, speed) = _motor_of(result, motor)
-    current, voltage, _ = current_voltage_power(m, command, torque, speed)
+    oriented = _amplitudes(result, where)
+    current, voltage = oriented or current_voltage_power(m, command, torque, speed)[:2]
     attributes: dict[str, Any] = {}
     if m.winding is None:
         if m.limits is None or m.limits.torque_constant is None:
@@ -53,13 +55,23 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
         found = {"current": (current, "A", "current of the armature")}
     else:
         found = {
-            "current": (current, "A", "current i_q, amplitude of a phase"),
+            "current": (current, "A", f"current{' i_q' if oriented is None else ''}, amplitude of a phase"),
             "current_rms": (abs(current) / math.sqrt(2.0), "A", "current of a phase, rms"),
             "voltage": (voltage, "V", "voltage, amplitude of a phase"),
         }
         if m.dc_voltage is not None:
             attributes["voltage_limit"] = m.phase_voltage
     return _dataset(result, found, attributes)
+
+
+def _amplitudes(result: xarray.Dataset, where: str) -> tuple[np.ndarray, np.ndarray] | None:
+    """Current [A], with the sign of the torque, and voltage [V] under field-oriented control; None without."""
+    prefix = "" if where == "motor" else f"{where.removeprefix('motors.')}_"
+    names = [f"{prefix}{axis}_{what}" for what in ("current", "voltage") for axis in ("direct", "quadrature")]
+    if any(name not in result for name in names):
+        return None
+    i_d, i_q, u_d, u_q = _read(result, *names)
+    return np.copysign(np.hypot(i_d, i_q), i_q), np.hypot(u_d, u_q)
 
 
 def current_voltage_power(
@@ -131,6 +143,9 @@ def temperatures(
         The motor lacks data, `motor` names none, or repeated motion has no end to its heat.
     """
     m, where, (_, torque, _) = _motor_of(result, motor)
+    heating = torque
+    if m.winding is not None and (oriented := _amplitudes(result, where)) is not None:
+        heating = m.winding.phase_values().torque_constant * oriented[0]  # with all of the current across the magnets
     if ambient is None:
         scenario = scenario_of(result)
         ambient = (Task() if isinstance(scenario, TrainScenario) else scenario.task).ambient_temperature
@@ -144,13 +159,13 @@ def temperatures(
             raise InputError(
                 "temperatures: a motion that has been repeated for ever has no beginning; leave winding and case out"
             )
-        start = bodies.repeated(time, torque)
+        start = bodies.repeated(time, heating)
     if start is None:
         raise InputError(
             "temperatures: repeated, the winding has no end to its heat: its loss grows faster than it is carried off"
         )
-    of_winding, of_case = bodies.course(time, torque, start)
-    loss = bodies.loss * torque**2 * (1.0 + bodies.alpha * (of_winding - bodies.reference))
+    of_winding, of_case = bodies.course(time, heating, start)
+    loss = bodies.loss * heating**2 * (1.0 + bodies.alpha * (of_winding - bodies.reference))
     hottest = float(of_winding.max())
     found: dict[str, tuple[Any, str, str]] = {
         "winding_temperature": (of_winding, "degC", "temperature of the winding"),
@@ -164,7 +179,7 @@ def temperatures(
             "K",
             "below the largest temperature of the winding",
         )
-    return _dataset(result, found, {"ambient": ambient, "error_bound": bodies.error_bound(time, torque, hottest)})
+    return _dataset(result, found, {"ambient": ambient, "error_bound": bodies.error_bound(time, heating, hottest)})
 
 
 def _dataset(

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from ..control.controller import Controller
 from ..control.gains import gains_by_rule
-from ..control.loops import CurrentLoop, Feedforward, FirstOrderCurrent
+from ..control.loops import Feedforward, FirstOrderCurrent, SampledCurrent
 from ..control.references import Move, PositionReference
 from ..inputs.quantities import Angle, Number, Positive, Time, Whole
 from ..model.gearbox import Gearbox
@@ -232,4 +232,4 @@ def torque_limit(motor: Motor) -> float | None:
 def _lag(controller: Controller) -> float:
     if isinstance(controller.current, FirstOrderCurrent):
         return controller.current.time_constant
-    return CURRENT_LAG * controller.loop_time("current") if isinstance(controller.current, CurrentLoop) else 0.0
+    return CURRENT_LAG * controller.loop_time("current") if isinstance(controller.current, SampledCurrent) else 0.0

@@ -1,0 +1,171 @@
+// Synchronous motors under field-oriented control, between two ticks: their windings as power series, the mechanics by
+// the solver of the run, and between both torque and speed.
+//
+// Over a part of a tick of length h the mechanics get each torque as the straight line with its impulse and moment, the
+// windings each speed as the parabola with its ends and its angle. What both leave out is orthogonal to constants and
+// straight lines, or to constants and odd: where nothing switches, the states at the end are wrong by O(h^5) for it.
+// Which speed belongs to which torque is found by passes on a second solver, each of which takes the error of the mean
+// speed to (h w)^2/6 of it, w^2 = 1.5 p^2 psi^2/(J L); the run itself then goes the way that was found.
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "../control/axis.hpp"
+#include "../kernel/form.hpp"
+#include "../solver/status.hpp"
+
+namespace lostmotion {
+
+// An axis in a system: the input of its motor, and the forms that give what is sampled.
+template <class D>
+struct AxisPlace {
+    int input = 0;
+    LinearFormOf<D> position_angle{}, speed_angle{}, speed{}, motor_torque{};
+    LinearFormOf<D> rotor_angle{}, rotor_speed{};
+};
+
+template <class Solver>
+class WindingCoupling {
+ public:
+    using D = typename Solver::D;
+
+    WindingCoupling(Solver& solver, double tick, std::span<const control::Axis> axes,
+                    std::span<const AxisPlace<D>> places)
+        : solver_(solver), tick_(tick) {
+        int first = 0;
+        for (std::size_t k = 0; k < axes.size(); ++k) {
+            if (axes[k].field_orientation) motors_.push_back({&axes[k], &places[k], first, {}});
+            first += axes[k].slots();
+        }
+        if (present()) probe_ = solver.twin();
+    }
+
+    bool present() const { return !motors_.empty(); }
+    // How far torque and speed are known [s].
+    double end(std::span<const double> slots) const { return motors_[0].course(slots).end; }
+
+    // From the solver's state on as far as to a part of a tick's end, at most to that of the tick. Sets the inputs.
+    template <class Observer>
+    Status plan(double tick_end, std::span<double> slots, Observer& observer) {
+        const double now = solver_.time();
+        for (Motor& m : motors_) m.next = from_now(m, slots);
+        double end = first_end(tick_end);
+        while (!agree(end, slots) && end - now > 1e-3 * tick_) end = now + 0.5 * (end - now);
+        for (Motor& m : motors_) {
+            m.axis->set_course(m.next, m.slots(slots));
+            set_torque(solver_, m);
+        }
+        return solver_.inputs_changed(observer);
+    }
+    // The inputs of other elements have changed: what lies ahead is not known any more.
+    void forget_plan(std::span<double> slots) {
+        for (Motor& m : motors_) m.axis->set_course(from_now(m, slots), m.slots(slots));
+    }
+
+ private:
+    static constexpr double agreement = 1e-12;  // of the currents, relative to the largest one
+    static constexpr double doubt = 1e-9;       // where rounding may be what keeps the passes from agreeing
+    static constexpr int most_passes = 20;
+
+    struct Motor {
+        const control::Axis* axis;
+        const AxisPlace<D>* place;
+        int first;  // slot
+        WindingCourse next;
+
+        const SynchronousWinding& winding() const { return axis->field_orientation->winding; }
+        double* slots(std::span<double> all) const { return all.data() + first; }
+        WindingCourse course(std::span<const double> all) const { return axis->course(all.data() + first); }
+    };
+    struct Nobody {
+        template <class... Any>
+        bool segment(const Any&...) {
+            return true;
+        }
+        template <class... Any>
+        void step(const Any&...) {}
+    };
+
+    static double value(const LinearFormOf<D>& form, const Solver& solver) {
+        return evaluate<D>(form, solver.state(), solver.memory(), InputsOf<D>{});
+    }
+    static void set_torque(Solver& solver, const Motor& m) {
+        const Ramp torque = m.next.torque(m.winding());
+        solver.set_ramp(m.place->input, torque.value / m.axis->rated_torque, torque.slope / m.axis->rated_torque);
+    }
+    // Currents, voltages and speed of this instant.
+    WindingCourse from_now(const Motor& m, std::span<double> slots) const {
+        const double now = solver_.time();
+        const WindingCourse last = m.course(slots);
+        const double angle = value(m.place->rotor_angle, solver_);
+        return WindingCourse::at(now, last.current(now), m.axis->field_orientation->voltage(angle, m.slots(slots)),
+                                 value(m.place->rotor_speed, solver_));
+    }
+    double first_end(double tick_end) const {
+        const double left = tick_end - solver_.time();
+        int parts = 1;
+        double fastest = 0.0;
+        for (const Motor& m : motors_) {
+            parts = std::max(parts, m.axis->field_orientation->parts);
+            fastest = std::max(fastest, m.winding().fastest(m.next.speed.c[0]));
+        }
+        parts *= std::max(1, static_cast<int>(std::ceil(fastest * tick_ / WindingCourse::reach)));
+        const double count = std::ceil(left * parts / tick_ - 1e-9);
+        return count > 1.0 ? solver_.time() + left / count : tick_end;
+    }
+
+    // Whether torques and speeds until `end` agree; then they are in the motors' courses.
+    bool agree(double end, std::span<double> slots) {
+        const double now = solver_.time(), h = end - now;
+        for (Motor& m : motors_) {
+            m.next.end = end;
+            const WindingCourse last = m.course(slots);
+            const double rise =
+                last.length() > 0.0 ? h * (last.speed.c[1] + 2.0 * last.speed.c[2]) / last.length() : 0.0;
+            m.next.speed = {{m.next.speed.c[0], rise, 0.0}};
+        }
+        double before = 0.0;
+        for (int pass = 0; pass < most_passes; ++pass) {
+            probe_->follow(solver_);
+            for (Motor& m : motors_) {
+                m.next.solve(m.winding());
+                set_torque(*probe_, m);
+            }
+            Nobody nobody;
+            if (probe_->inputs_changed(nobody) != Status::done || probe_->advance(end, nobody) != Status::done)
+                return true;  // the run will see for itself
+            double change = 0.0;
+            for (Motor& m : motors_) change = std::fmax(change, see_speed(m, h));
+            // The next pass would change this one's share of the last of it.
+            if (!(change > agreement) || (pass > 0 && !(change * std::fmin(1.0, change / before) > agreement)))
+                return true;
+            if (pass > 1 && change > 0.5 * before) return change < doubt;
+            before = change;
+        }
+        return true;
+    }
+    // The speed that the mechanics have made of the torque. Returns what that changes of the current, of the largest.
+    double see_speed(Motor& m, double h) {
+        const AxisPlace<D>& p = *m.place;
+        const double first = value(p.rotor_speed, solver_), last = value(p.rotor_speed, *probe_),
+                     mean = (value(p.rotor_angle, *probe_) - value(p.rotor_angle, solver_)) / h;
+        const PowerSeries<3> seen = parabola(first, last, mean);
+        const double change =
+            std::fmax(std::fabs(seen(0.5) - m.next.speed(0.5)), std::fabs(seen(1.0) - m.next.speed(1.0)));
+        m.next.speed = seen;
+        const SynchronousWinding& w = m.winding();
+        const double flux = w.flux_linkage + w.inductance_d * m.axis->field_orientation->current_limit;
+        return w.pole_pairs * flux * change * h /
+               (std::fmin(w.inductance_d, w.inductance_q) * m.axis->field_orientation->current_limit);
+    }
+
+    Solver& solver_;
+    double tick_;
+    std::vector<Motor> motors_;
+    std::unique_ptr<Solver> probe_;
+};
+
+}  // namespace lostmotion

@@ -1,0 +1,79 @@
+"""Motors under field-oriented control in a run: their torque from their currents, and how far the run may be wrong."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..control.axis import Bound
+from ..model.synchronous_motor import PhaseValues
+from .scenario import Scenario
+from .train_scenario import TrainScenario
+
+ATTRIBUTE = "error_bound"
+AGREEMENT = 1e-10  # relative, to which the passes and rounding hold currents and speeds
+
+
+def oriented(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str, PhaseValues]]:
+    """Of each motor under field-oriented control what its variables and that of its speed begin with, and its winding."""
+    for name, controller in scenario.axes().items():
+        if controller.current.kind != "field_oriented":
+            continue
+        if isinstance(scenario, Scenario):
+            prefix, shaft, motor = "", "motor", scenario.motor
+        else:
+            prefix, shaft, motor = f"{name}_", scenario.motors[name].shaft, scenario.motors[name]
+        assert motor.winding is not None
+        yield prefix, shaft, motor.winding.phase_values()
+
+
+def set_torques(scenario: Scenario | TrainScenario, data: dict[str, np.ndarray]) -> None:
+    """Puts the torque that belongs to the currents in the place of the straight lines that the mechanics were driven by."""
+    for prefix, _, phase in oriented(scenario):
+        data[f"{prefix or 'motor_'}torque"] = phase.torque(
+            data[f"{prefix}direct_current"], data[f"{prefix}quadrature_current"]
+        )
+
+
+def coarser(control: Bound) -> Bound:
+    """The same controllers, with one exchange of torque and speed in each tick in the place of two."""
+    tick, axes = control
+    for axis, *_ in axes:
+        if axis.field_orientation is not None:
+            orientation = axis.field_orientation
+            orientation.parts = 1
+            axis.field_orientation = orientation
+    return tick, axes
+
+
+def error_bound(
+    scenario: Scenario | TrainScenario, fine: Mapping[str, Any], coarse: Mapping[str, Any]
+) -> dict[str, float]:
+    """By how much the variables of the motors may be wrong, from a run with one exchange in each tick and one with two.
+
+    The error of the second is a sixteenth of the difference where nothing switches, a quarter where the torque jumps; the
+    difference itself is the bound, with what the passes leave.
+    """
+    bounds = {}
+    for prefix, shaft, _ in oriented(scenario):
+        names = [
+            f"{prefix}direct_current",
+            f"{prefix}quadrature_current",
+            f"{prefix or 'motor_'}torque",
+            f"{shaft}_speed",
+        ]
+        for name in names:
+            floor = AGREEMENT * max(
+                float(np.max(np.abs(fine[n]))) for n in (name, names[1 if name in names[:2] else 2])
+            )
+            bounds[name] = float(np.max(np.abs(fine[name] - coarse[name]))) + floor
+    return bounds
+
+
+def errors_of(result: Any) -> dict[str, float]:
+    """The bounds that a result carries, by the names of its variables; empty where there is no field-oriented control."""
+    bounds: dict[str, float] = json.loads(result.attrs.get(ATTRIBUTE, "{}"))
+    return bounds
