@@ -14,7 +14,7 @@ demo: $(VENV)/built
 	$(BIN)/lostmotion reproduce -o out
 
 test: lint test-core c-library $(VENV)/built
-	$(BIN)/pip install -q --group portable
+	$(BIN)/pip install -q --group portable --group examples
 	$(BIN)/pytest
 
 .PHONY: test-core

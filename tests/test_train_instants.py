@@ -67,7 +67,7 @@ def test_a_train_stepped_follows_its_run(path: Path) -> None:
     run = lm.simulate(scenario.replace(**changes))
     run = run.drop_vars([v.name for v in axis_variables(scenario.controllers)])  # what controllers hold is of runs
     assert set(simulation.read()) == {str(name) for name in run}
-    # At the end of the run a tick is due, whose command the run shows and the simulation not yet.
+    # A tick falls on the end: of the run it is no part, of the last step it is or not, as the times add up.
     for name in run.drop_vars([f"{motor}_command" for motor in scenario.controllers]):
         size = float(abs(run[name]).max())
         assert simulation[str(name)] == pytest.approx(float(run[name][-1]), rel=1e-9, abs=1e-9 * size), name

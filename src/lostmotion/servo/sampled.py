@@ -177,7 +177,8 @@ class SampledLoop:
 
     def _control(self, tick: _Tick, k: int) -> None:
         c, axis = self.axis.controller, self.axis
-        tick[f"{axis.shaft}_angle"] = self._output(tick, f"{axis.shaft}_angle")
+        for shaft in (axis.motor_shaft, axis.shaft):
+            tick[f"{shaft}_angle"] = self._output(tick, f"{shaft}_angle")
         due = {name: k % self.every(name) == 0 for name in LOOPS if name in self.active}
         speed_shaft = self._sensor(tick, "encoder", "speed_angle", axis.motor_shaft)
         if c.position_encoder is not None:

@@ -282,7 +282,8 @@ def _judge(axis: Axis, points: list[Regime], goal: str, peak: float) -> tuple[fl
             if goal == "bandwidth":
                 values.append(bandwidth_of(f, lambda x, c=closed: c.response(x, feedforward=False)).three_decibels)  # type: ignore[misc]
             else:
-                values.append(1.0 / float(np.abs(closed.compliance(f, axis.motor_shaft, axis.shaft)).max()))
+                most = float(np.abs(closed.compliance(f, axis.motor_shaft, axis.shaft)).max())
+                values.append(1.0 / most if most > 0.0 else math.inf)  # not where the load sticks
     least = min(values)
     return (math.log(least) if least > 0.0 else -50.0), min(spare)
 

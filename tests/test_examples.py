@@ -1,0 +1,93 @@
+"""The examples on controllers: a compiled law, a filter from python-control, an environment for reinforcement learning."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from conftest import ROOT
+
+
+def example(name: str) -> ModuleType:
+    """An example as a module of its own."""
+    spec = importlib.util.spec_from_file_location(f"example_{name}", ROOT / "examples" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_compiled_law_moves_the_axis_as_the_same_in_python() -> None:
+    pytest.importorskip("numba", reason="pip install --group examples")
+    numba_law = example("numba_law")
+    scenario = numba_law.axis().replace(**{"simulation.duration": 0.4})
+    one, two = (lm.simulate(scenario, law=lm.Law(law, states=1)) for law in (numba_law.compiled, numba_law.in_python))
+    for name in ("motor_speed", "load_angle"):  # the compiler may contract products and sums
+        assert np.abs(one[name] - two[name]).max() < 1e-9 * np.abs(one[name]).max()
+    assert float(one["load_angle"][-1]) > 0.1
+
+
+def test_the_filter_of_python_control_is_the_notch_of_the_scenario() -> None:
+    pytest.importorskip("control")
+    module = example("python_control_filter")
+    own = module.axis(lm.as_filter(module.notch(250e-6))).replace(**{"simulation.duration": 0.3})
+    shipped = module.AXIS.replace(**{"simulation.duration": 0.3})
+    plain = module.axis().replace(**{"simulation.duration": 0.3})
+    one, two, without = (lm.simulate(s, energy=False)["servo_torque"] for s in (own, shipped, plain))
+    assert float(abs(one - two).max()) < 1e-3 * float(abs(two).max())  # rounding may move an encoder's step by a tick
+    assert float(abs(two - without).max()) > 1e-2 * float(abs(two).max())
+
+
+def test_the_environment_is_one_of_gymnasium() -> None:
+    gymnasium = pytest.importorskip("gymnasium", reason="pip install --group examples")
+    from gymnasium.utils.env_checker import check_env
+
+    module = example("gymnasium_axis")
+    axis = module.Axis()
+    assert isinstance(axis, gymnasium.Env)
+    check_env(axis, skip_render_check=True)
+
+
+@pytest.mark.parametrize("installed", [True, False])
+def test_the_environment_is_the_drive_with_and_without_gymnasium(
+    installed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if installed:
+        pytest.importorskip("gymnasium", reason="pip install --group examples")
+    else:
+        monkeypatch.setitem(sys.modules, "gymnasium", None)
+    module = example("gymnasium_axis")
+    axis = module.Axis()
+    assert (module.gymnasium is not None) == installed
+    voltages = np.random.default_rng(3).uniform(-1.2, 1.2, module.STEPS)
+    seen, told = axis.reset(seed=4, options={"target": 0.1})
+    assert told == {"target": 0.1}
+    assert seen == pytest.approx([0.1 / module.REACH, 0.0, 0.0, 0.0])
+    angles, ended = [], False
+    for u in voltages:
+        assert not ended
+        seen, reward, terminated, ended, _ = axis.step([u])
+        assert not terminated
+        angles.append(0.1 - seen[0] * module.REACH)
+        assert reward == pytest.approx(-(seen[0] ** 2) - 1e-3 * min(abs(u), 1.0) ** 2)
+    assert ended
+    # The same voltages as steps of a command, in one run.
+    clipped = np.clip(voltages, -1.0, 1.0)
+    heights = np.diff(clipped, prepend=0.0).tolist()
+    steps: list[dict[str, Any]] = [{"height": h, "time": k * module.STEP} for k, h in enumerate(heights)]
+    scenario = lm.load("paper-2dof-nl-large").replace(
+        command={"steps": steps},
+        simulation={"duration": module.STEPS * module.STEP, "sample_interval": module.STEP},
+    )
+    run = lm.simulate(scenario, energy=False)["load_angle"].to_numpy()[1:]
+    assert np.array(angles) == pytest.approx(run, abs=1e-9)
+    # By hand it ends near the target; seeds repeat.
+    assert abs(module.episode(axis, module.by_hand, seed=1)[1]) < 2e-3
+    assert axis.reset(seed=7)[1] == axis.reset(seed=7)[1]
