@@ -235,7 +235,6 @@ def test_what_follows_given_commands_refuses_a_controller(axis: lm.Scenario, for
     for function in (
         lambda: lm.explain(scenario, 0.1),
         lambda: lm.linearize(scenario, time=0.1),
-        lambda: lm.frequency_response(scenario, [5.0], 0.1),
         lambda: lm.periodic_motion(scenario),
     ):
         with pytest.raises(lm.InputError, match=r"has a? ?controllers?, .* scenario.replace") as caught:
