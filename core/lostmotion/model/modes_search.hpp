@@ -179,6 +179,7 @@ Found SwitchedTrain<Sizes>::find(Cache& cache, Now& now, Event event, Key& key) 
 // that.
 template <class Sizes>
 bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
+    if (!some_redundant_) return false;
     const std::vector<ContactPlace>& all = places().contacts;
     const Ties ties = tie(all, static_cast<int>(train().shafts.size()), key.modes.data());
     std::array<int, max_shafts> direction{};  // of each free shaft
@@ -186,12 +187,11 @@ bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
     for (std::size_t k = 0; k < all.size(); ++k) {
         if (key.modes[k] == 0) continue;
         const ContactPlace& c = all[k];
-        if (!tied_speed(c, ties, speed)) return true;
-        const auto turns = [](double v) { return v != 0.0; };
-        const auto end = speed.begin() + ties.shafts, free = std::find_if(speed.begin(), end, turns);
-        if (std::any_of(free + 1, end, turns)) continue;
-        const int way = key.modes[k] * (*free > 0.0 ? 1 : -1);
-        int& of_free = direction[free - speed.begin()];
+        const unsigned free = tied_speed(c, ties, speed);
+        if (free == 0) return true;
+        if (!std::has_single_bit(free)) continue;
+        const int shaft = std::countr_zero(free), way = key.modes[k] * (speed[shaft] > 0.0 ? 1 : -1);
+        int& of_free = direction[shaft];
         if (of_free * way < 0) return true;
         of_free = way;
     }

@@ -88,6 +88,7 @@ template <class Sizes>
 template <class Now>
 void SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
                                 std::array<double, max_contacts>& T_2) const {
+    if (!some_redundant_) return;
     const std::vector<ContactPlace>& all = places().contacts;
     const Ties ties = tie(all, static_cast<int>(train().shafts.size()), modes.modes.data());
     std::array<double, max_contacts> coupling = event.coupling;

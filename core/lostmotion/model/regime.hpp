@@ -57,19 +57,19 @@ struct Guard {
     bool is_of_contact() const { return kind == speed || kind == capacity || kind == turning; }
 };
 
-// Speeds that the contacts at rest tie together: each a sum over those that stay free, w_s = sum_k share[s][k] w_k, or
-// 0.
+// Speeds that the contacts at rest tie together: each a sum over those that stay free, w_s = sum_k share[s][k] w_k.
 struct Ties {
-    int shafts = 0;
-    std::array<std::array<double, max_shafts>, max_shafts> share;  // of the shafts that there are
-    std::array<int, max_shafts> part{};                            // the first shaft of those that hang together
+    std::array<std::uint16_t, max_shafts> free{};                  // bits of the k in the sum; 0: at rest
+    std::array<std::array<double, max_shafts>, max_shafts> share;  // where the bit is set
     std::array<bool, max_shafts> at_rest{};
-    bool follows(int s) const { return !at_rest[s] && share[s][s] == 0.0; }
+    bool follows(int s) const { return free[s] != 0 && (free[s] >> s & 1) == 0; }
     // Calls use(k, share) for each free shaft that the speed of a shaft depends on.
     template <class Use>
     void each_share(int s, Use&& use) const {
-        for (int k = 0; k < shafts; ++k)
-            if (share[s][k] != 0.0) use(k, share[s][k]);
+        for (unsigned left = free[s]; left != 0; left &= left - 1) {
+            const int k = std::countr_zero(left);
+            use(k, share[s][k]);
+        }
     }
     std::array<bool, max_contacts> redundant{};  // stuck, but its speed is kept at zero by those before it
 };

@@ -1,8 +1,11 @@
 // Reactions of stuck contacts, from the condition that their speeds stay zero.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -28,19 +31,36 @@ struct StuckRows {
     }
 };
 
+// The first shaft of those that hang together by contacts at rest, of each shaft.
+inline std::array<int, max_shafts> parts(const std::vector<ContactPlace>& contacts, const Key& key) {
+    std::array<int, max_shafts> part;
+    std::iota(part.begin(), part.end(), 0);
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+        if (key.modes[k] != 0) continue;
+        int first = part[contacts[k].a];
+        contacts[k].each_shaft([&](int s, double) { first = std::min(first, part[s]); });
+        contacts[k].each_shaft([&](int s, double) {
+            const int from = part[s];
+            std::replace(part.begin(), part.end(), from, first);
+        });
+    }
+    return part;
+}
+
 // Does a torque that the gears of a rigidly tied part pass on turn it forward or, while a contact of it is at its
 // limit, wind it up? Without friction the matrix of accelerations over reactions, -d(rows)/d(reactions), is positive
 // definite. Friction that changes the sign of its determinant jams: no motion or several (Painleve).
 inline bool moves_freely(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key,
                          const Ties& ties, const std::vector<Row>& acceleration) {
     const StuckRows all(contacts, layout, key, ties, acceleration);
+    const std::array<int, max_shafts> of = parts(contacts, key);
     std::vector<bool> done(all.rows.size());
     for (std::size_t first = 0; first < all.rows.size(); ++first) {
         const auto shaft = [&](std::size_t k) { return contacts[all.unknowns[k] - layout.terms].a; };
         if (done[first]) continue;
         std::vector<std::size_t> part;
         for (std::size_t k = first; k < all.rows.size(); ++k)
-            if (ties.part[shaft(k)] == ties.part[shaft(first)]) {
+            if (of[shaft(k)] == of[shaft(first)]) {
                 part.push_back(k);
                 done[k] = true;
             }

@@ -44,7 +44,10 @@ template <class Sizes = Layout>
 class SwitchedTrain {
  public:
     explicit SwitchedTrain(const Assembly& assembly) : SwitchedTrain(assembly, assembly.layout()) {}
-    SwitchedTrain(const Assembly& assembly, const Sizes& sizes) : assembly_(assembly), n_(sizes) { set_near_event(); }
+    SwitchedTrain(const Assembly& assembly, const Sizes& sizes) : assembly_(assembly), n_(sizes) {
+        set_near_event();
+        for (const ContactPlace& c : places().contacts) some_redundant_ = some_redundant_ || c.locked != nowhere;
+    }
 
     const Assembly& assembly() const { return assembly_; }
     const Sizes& sizes() const { return n_; }
@@ -327,6 +330,7 @@ class SwitchedTrain {
     Sizes n_;
     std::array<double, max_states> near_state_{};
     std::array<double, max_inputs> near_input_{};
+    bool some_redundant_ = false;  // while all contacts are at rest; else no one keeps another at rest
 };
 
 }  // namespace lostmotion::model

@@ -5,9 +5,8 @@
 // follow is redundant: its reaction is not determined by the motion.
 #pragma once
 
-#include <algorithm>
+#include <bit>
 #include <cmath>
-#include <utility>
 #include <vector>
 
 #include "contact_place.hpp"
@@ -18,64 +17,68 @@ namespace lostmotion::model {
 // Ratios in a loop agree within this share.
 inline constexpr double loop_rounding = 1e-12;
 
-// The speed of a contact in terms of those that are free; what cancels to within rounding is none. False if all does.
-inline bool tied_speed(const ContactPlace& c, const Ties& t, std::array<double, max_shafts>& speed) {
-    bool moves = false;
-    for (int k = 0; k < t.shafts; ++k) {
+// The speed of a contact in terms of those that are free, as bits of them; what cancels to within rounding is none.
+inline unsigned tied_speed(const ContactPlace& c, const Ties& t, std::array<double, max_shafts>& speed) {
+    unsigned all = 0;
+    c.each_shaft([&](int s, double) { all |= t.free[s]; });
+    unsigned moves = 0;
+    for (unsigned left = all; left != 0; left &= left - 1) {
+        const int k = std::countr_zero(left);
         double sum = 0.0, size = 0.0;
         c.each_shaft([&](int s, double per) {
-            sum += per * t.share[s][k];
-            size += std::fabs(per * t.share[s][k]);
+            const double part = t.free[s] >> k & 1 ? per * t.share[s][k] : 0.0;
+            sum += part;
+            size += std::fabs(part);
         });
-        speed[k] = std::fabs(sum) > loop_rounding * size ? sum : 0.0;
-        moves = moves || speed[k] != 0.0;
+        speed[k] = sum;
+        if (std::fabs(sum) > loop_rounding * size) moves |= 1u << k;
     }
     return moves;
 }
 
-// Makes the last of the free shafts that the speed of a contact depends on follow the others.
-inline void stop_contact(const ContactPlace& c, std::size_t k, Ties& t) {
+// Makes the last of the free shafts that the speed of a contact depends on follow the others. False if it follows
+// from those before that its speed is zero.
+inline bool stop_contact(const ContactPlace& c, int shafts, Ties& t) {
     std::array<double, max_shafts> speed;
-    t.redundant[k] = !tied_speed(c, t, speed);
-    int part = t.part[c.a];
-    c.each_shaft([&](int s, double) { part = std::min(part, t.part[s]); });
-    c.each_shaft([&](int s, double) { std::replace(t.part.begin(), t.part.begin() + t.shafts, int{t.part[s]}, part); });
-    if (t.redundant[k]) return;
-    int last = t.shafts - 1;
-    while (speed[last] == 0.0) --last;
-    for (int s = 0; s < t.shafts; ++s) {
-        const double share = std::exchange(t.share[s][last], 0.0);
-        for (int free = 0; share != 0.0 && free < last; ++free) {
-            if (speed[free] == 0.0) continue;
-            const double before = t.share[s][free], change = share * (-speed[free] / speed[last]);
-            const double sum = before + change;
-            t.share[s][free] = std::fabs(sum) > loop_rounding * std::fabs(change) ? sum : 0.0;
+    const unsigned moves = tied_speed(c, t, speed);
+    if (moves == 0) return false;
+    const int last = std::bit_width(moves) - 1;
+    for (int s = 0; s < shafts; ++s) {
+        if ((t.free[s] >> last & 1) == 0) continue;
+        t.free[s] ^= static_cast<std::uint16_t>(1u << last);
+        for (unsigned left = moves ^ 1u << last; left != 0; left &= left - 1) {
+            const int k = std::countr_zero(left);
+            const auto bit = static_cast<std::uint16_t>(1u << k);
+            const double change = t.share[s][last] * (-speed[k] / speed[last]),
+                         sum = (t.free[s] & bit) != 0 ? t.share[s][k] + change : change;
+            t.share[s][k] = sum;
+            t.free[s] |= bit;
+            if (!(std::fabs(sum) > loop_rounding * std::fabs(change))) t.free[s] ^= bit;
         }
     }
+    return true;
 }
 
 // stuck: a contact is at rest where this is 0. Frame contacts come first, so that it is a gear or coupling whose
 // torque is redundant where a shaft is held twice.
 inline Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes) {
     Ties t;
-    t.shafts = shafts;
     for (int s = 0; s < shafts; ++s) {
-        t.part[s] = s;
-        std::fill_n(t.share[s].begin(), shafts, 0.0);
+        t.free[s] = static_cast<std::uint16_t>(1u << s);
         t.share[s][s] = 1.0;
     }
     for (const bool frame : {true, false})
         for (std::size_t k = 0; k < contacts.size(); ++k)
-            if (modes[k] == 0 && (contacts[k].b == nowhere) == frame) stop_contact(contacts[k], k, t);
-    for (int s = 0; s < shafts; ++s)
-        t.at_rest[s] = std::all_of(t.share[s].begin(), t.share[s].begin() + shafts, [](double v) { return v == 0.0; });
+            if (modes[k] == 0 && (contacts[k].b == nowhere) == frame)
+                t.redundant[k] = !stop_contact(contacts[k], shafts, t);
+    for (int s = 0; s < shafts; ++s) t.at_rest[s] = t.free[s] == 0;
     return t;
 }
 
 // Is the speed of a contact kept at zero by these ties?
 inline bool kept_at_rest(const ContactPlace& c, const Ties& t) {
     std::array<double, max_shafts> speed;
-    return !tied_speed(c, t, speed);
+    return tied_speed(c, t, speed) == 0;
 }
 
 }  // namespace lostmotion::model
