@@ -36,6 +36,7 @@ nb::dict as_dict(const Plant& plant, const std::vector<ResponseResultOf<System>>
     out["smooth"] = numbers(results, [](R r) { return r.motion.smooth; });
     out["periods"] = numbers(results, [](R r) { return r.motion.periods; });
     out["newton_steps"] = numbers(results, [](R r) { return r.motion.newton_steps; });
+    out["period"] = numbers(results, [](R r) { return r.motion.period; });
     out["residual"] = numbers(results, [](R r) { return r.motion.residual; });
     out["motor_power"] = numbers(results, [](R r) { return r.motor_power; });
     out["load_power"] = numbers(results, [](R r) { return r.load_power; });
@@ -81,7 +82,7 @@ nb::dict respond_in(Plant& plant, const std::vector<Point>& asked, const Start& 
 }
 
 inline nb::dict respond_drive(SharedDrive& drive, const std::vector<Point>& points, std::size_t samples, int harmonics,
-                              int max_periods, double tolerance, bool keep_table, unsigned threads,
+                              int max_periods, double tolerance, bool keep_table, bool limit_cycle, unsigned threads,
                               const nb::object& progress) {
     DrivePlant plant(drive);
     const auto start = [&](const Named& named) {
@@ -98,13 +99,13 @@ inline nb::dict respond_drive(SharedDrive& drive, const std::vector<Point>& poin
         }
         return s;
     };
-    return respond_in(plant, points, start, {samples, harmonics, max_periods, tolerance, keep_table}, threads,
-                      progress);
+    return respond_in(plant, points, start, {samples, harmonics, max_periods, tolerance, keep_table, limit_cycle},
+                      threads, progress);
 }
 
 inline nb::dict respond_train(const TrainDescription& description, const std::vector<Point>& points,
                               std::size_t samples, int harmonics, int max_periods, double tolerance, bool keep_table,
-                              unsigned threads, const nb::object& progress) {
+                              bool limit_cycle, unsigned threads, const nb::object& progress) {
     const TrainRun run(description.train);
     return run.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
         TrainPlant<D> plant(model);
@@ -116,8 +117,8 @@ inline nb::dict respond_train(const TrainDescription& description, const std::ve
                         given->second;
             return s;
         };
-        return respond_in(plant, points, start, {samples, harmonics, max_periods, tolerance, keep_table}, threads,
-                          progress);
+        return respond_in(plant, points, start, {samples, harmonics, max_periods, tolerance, keep_table, limit_cycle},
+                          threads, progress);
     });
 }
 
@@ -125,14 +126,15 @@ inline void bind_responses(nb::module_& m) {
     static const std::string arguments =
         ", points: collections.abc.Sequence[tuple[collections.abc.Sequence[Signal], float, "
         "collections.abc.Mapping[str, float]]], samples: int, harmonics: int, max_periods: int, tolerance: float, "
-        "keep_table: bool, threads: int, progress: collections.abc.Callable[[int], None] | None = None) -> "
+        "keep_table: bool, limit_cycle: bool, threads: int, progress: collections.abc.Callable[[int], None] | None = "
+        "None) -> "
         "dict[str, typing.Any]";
     static const std::string drive = "def respond(drive: Drive" + arguments,
                              train = "def respond(train: Train" + arguments;
     m.def("respond", &respond_drive, "drive"_a, "points"_a, "samples"_a, "harmonics"_a, "max_periods"_a, "tolerance"_a,
-          "keep_table"_a, "threads"_a, "progress"_a = nb::none(), nb::sig(drive.c_str()));
+          "keep_table"_a, "limit_cycle"_a, "threads"_a, "progress"_a = nb::none(), nb::sig(drive.c_str()));
     m.def("respond", &respond_train, "train"_a, "points"_a, "samples"_a, "harmonics"_a, "max_periods"_a, "tolerance"_a,
-          "keep_table"_a, "threads"_a, "progress"_a = nb::none(), nb::sig(train.c_str()));
+          "keep_table"_a, "limit_cycle"_a, "threads"_a, "progress"_a = nb::none(), nb::sig(train.c_str()));
 }
 
 }  // namespace lostmotion::binding

@@ -47,6 +47,26 @@ class TrainDescription : public model::TrainDescription {
         model::TrainDescription::add_gear(name, input, output, law, efficiencies, mesh_damping, transmission_error);
     }
 
+    // signals: kind and shaft, which only an angle and a speed have.
+    using ControllerSignal = std::pair<std::string, std::string>;
+    using Matrix = std::vector<std::vector<double>>;
+    void add_controller(const std::string& motor, const std::vector<ControllerSignal>& signals,
+                        const ControllerSignal& compared, const std::vector<std::string>& states, const Matrix& A,
+                        const Matrix& B, const std::vector<double>& C, const std::vector<double>& D,
+                        const std::vector<double>& back_calculation, double limit) {
+        model::LinearController c;
+        for (const ControllerSignal& s : signals) c.signals.push_back(controller_signal(s));
+        c.compared = controller_signal(compared);
+        c.states = states;
+        c.A = A;
+        c.B = B;
+        c.C = C;
+        c.D = D;
+        c.back_calculation = back_calculation;
+        c.limit = limit;
+        model::TrainDescription::add_controller(std::move(c), motor);
+    }
+
     std::string check() const { return TrainRun(train).error(); }
     std::string check_start(const std::vector<double>& speeds) const { return model::check_start(train, speeds); }
     // The train must have passed the check.
@@ -84,6 +104,15 @@ class TrainDescription : public model::TrainDescription {
         auto rate = std::make_unique_for_overwrite<double[]>(n * n);
         std::copy(r.rate.begin(), r.rate.end(), rate.get());
         return nb::make_tuple(r.states, as_array(std::move(rate), {n, n}), r.determined);
+    }
+
+ private:
+    model::LinearController::Signal controller_signal(const ControllerSignal& s) const {
+        using Signal = model::LinearController::Signal;
+        const auto& [kind, shaft] = s;
+        if (kind == "reference") return {Signal::reference, 0};
+        if (kind == "reference_rate") return {Signal::reference_rate, 0};
+        return {kind == "angle" ? Signal::angle : Signal::speed, shaft_number(shaft)};
     }
 };
 
@@ -234,6 +263,8 @@ inline void bind_train(nb::module_& m) {
             },
             "name"_a, "input"_a, "output"_a)
         .def("add_angle_torque", &TrainDescription::add_angle_torque, "name"_a, "shaft"_a, "torque"_a)
+        .def("add_controller", &TrainDescription::add_controller, "motor"_a, "signals"_a, "compared"_a, "states"_a,
+             "A"_a, "B"_a, "C"_a, "D"_a, "back_calculation"_a, "limit"_a)
         .def("check", &TrainDescription::check)
         .def("check_start", &TrainDescription::check_start, "speeds"_a)
         .def("channels", &TrainDescription::channels, nb::sig("def channels(self) -> list[tuple[str, str, str]]"),

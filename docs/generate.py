@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import control_figures
+import limit_cycles_figures
 import motors_figures
 import reference_figures
 import self_locking_figures
@@ -311,6 +312,7 @@ def generate(out: Path = OUT) -> None:
     two_motors_figures.write(out)
     motors_figures.write(out)
     control_figures.write(out)
+    limit_cycles_figures.write(out)
     for name, text in pages.items():
         (out / f"{name}.md").write_text(text, encoding="utf-8")
 

@@ -64,6 +64,9 @@ def test_a_train_stepped_follows_its_run(path: Path) -> None:
         element, load = name.removesuffix("_load_torque"), name.endswith("_load_torque")
         key = f"shafts.{element}.torque" if load else f"command.{name.removesuffix('_command')}"
         changes[key] = {"samples": {"times": [h * k for k in range(n + 1)], "values": u.tolist()}}
+        if name.endswith("_reference"):
+            controller = f"controllers.{name.removesuffix('_reference')}.reference"
+            changes[controller] = changes.pop(key) | {"kind": scenario.controllers["servo"].reference.kind}
     run = lm.simulate(scenario.replace(**changes))
     run = run.drop_vars([v.name for v in axis_variables(scenario.controllers)])  # what controllers hold is of runs
     assert set(simulation.read()) == {str(name) for name in run}
@@ -137,7 +140,7 @@ def test_a_train_alone_may_be_loaded_everywhere() -> None:
 
 
 REFUSED = [
-    (lambda s: s.advance(1e-3), "motor_command: missing; all commands are to be given"),
+    (lambda s: s.advance(1e-3), "motor_command: missing; all commands and references are to be given"),
     (lambda s: s.advance(1e-3, 0.1), "a train takes its inputs by name: motor_command, drum_load_torque"),
     (lambda s: s.advance(1e-3, motor_comand=0.1), "motor_comand: is no input of this train; did you mean motor_command?"),
     (lambda s: s.advance(1e-3, motor_command=0.0, worm_load_torque=1.0), 'with loaded=["worm"]'),

@@ -37,6 +37,7 @@ WRONG += [-1, 0, float("nan"), 10**30, Path("none"), lambda: None, lm.Load(inert
 
 SCENARIO = lm.load("paper-2dof-nl-small", {"simulation.duration": 0.02, "command.frequency": "50 Hz"})
 TRAIN = lm.load("worm-lowering")
+HUNTING = lm.load("hunting-with-static-friction")
 RESULT = lm.simulate(SCENARIO)
 THERMAL = {"winding_case": 1.0, "case_ambient": 2.0}
 HEATED = SCENARIO.replace(
@@ -87,6 +88,9 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "study": (lm.study, {"what": STUDY, "directory": "study", "threads": 1, "executor": None, "progress": None}),
     "switchings_of": (lm.switchings_of, {"result": RESULT}),
     "as_filter": (lm.as_filter, {"system": scipy.signal.dlti([1.0], [1.0, -0.5], dt=1e-3)}),
+    "as_state_space": (lm.as_state_space, {"system": scipy.signal.lti([1.0], [1.0, 1.0])}),
+    "limit_cycle": (lm.limit_cycle, {"scenario": HUNTING, "motor": None, "causes": False}),
+    "hunting_map": (lm.hunting_map, {"scenario": HUNTING, "grid": {"shafts.table.inertia": [0.8]}, "variable": None, "threads": 1, "progress": dangle}),
     "commission": (lm.commission, {"scenario": SCENARIO, "motor": None, "window": None, "progress": dangle}),
     "tune": (lm.tune, {"scenario": SCENARIO, "rule": "identical_damping", "damping": 0.7, "phase_margin": 1.0, "goal": "bandwidth", "sensitivity_peak": 1.7, "motor": None}),
     "select": (lm.select, {"task": "task.toml", "directory": None, "threads": 1, "executor": None, "progress": None}),

@@ -174,6 +174,33 @@ class RandomTrains {
         return g;
     }
 
+    // Of the first motor: of one to three states, of reference, angle and speed of two shafts, limited or not.
+    LinearController controller(const Train& t) {
+        LinearController c;
+        using Signal = LinearController::Signal;
+        const int last = static_cast<int>(t.shafts.size()) - 1;
+        const int shaft = pick(0, last), other = pick(0, last);
+        c.name = t.motors[0].name;
+        c.signals = {{Signal::reference, 0}, {Signal::angle, shaft}, {Signal::speed, other}};
+        if (coin(0.3)) c.signals.push_back({Signal::reference_rate, 0});
+        c.compared = c.signals[1];
+        const int n = pick(1, 3);
+        for (int k = 0; k < n; ++k) {
+            c.states.push_back("state_" + std::to_string(k + 1));
+            c.A.emplace_back();
+            for (int j = 0; j < n; ++j) c.A.back().push_back(j == k ? -spread(0.1, 5.0) : uniform(-1.0, 1.0));
+            c.B.emplace_back();
+            for (std::size_t j = 0; j < c.signals.size(); ++j) c.B.back().push_back(uniform(-2.0, 2.0));
+            c.C.push_back(uniform(-2.0, 2.0));
+            c.back_calculation.push_back(coin() ? uniform(0.0, 5.0) : 0.0);
+        }
+        const double gain = spread(0.1, 3.0);
+        c.D = {gain, -gain, -spread(0.1, 1.0)};
+        c.D.resize(c.signals.size(), 0.3);
+        if (coin(0.7)) c.limit = spread(0.3, 2.0);
+        return c;
+    }
+
     // For each input a sine and a step or a ramp.
     std::vector<Signal> signals(const Assembly& a, double duration) {
         std::vector<Signal> out(static_cast<std::size_t>(a.layout().inputs));

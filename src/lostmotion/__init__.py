@@ -13,6 +13,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     __version__: str
     from ._core import SolverError as SolverError
+    from .control.continuous import ContinuousController as ContinuousController
+    from .control.continuous import PositionPID as PositionPID
+    from .control.continuous import PositionSignal as PositionSignal
+    from .control.continuous import SpeedPID as SpeedPID
+    from .control.continuous import SpeedSignal as SpeedSignal
+    from .control.continuous import StateSpace as StateSpace
+    from .control.continuous import as_state_space as as_state_space
     from .control.controller import Controller as Controller
     from .control.encoder import Encoder as Encoder
     from .control.filters import TransferFunction as TransferFunction
@@ -90,6 +97,9 @@ if TYPE_CHECKING:
     from .servo.commission import ServoReport as ServoReport
     from .servo.commission import Stiffness as Stiffness
     from .servo.commission import commission as commission
+    from .servo.hunting import Hunting as Hunting
+    from .servo.hunting import hunting_map as hunting_map
+    from .servo.hunting import limit_cycle as limit_cycle
     from .servo.margins import Bandwidth as Bandwidth
     from .servo.margins import Margins as Margins
     from .servo.motion import AtRest as AtRest
@@ -139,6 +149,15 @@ if TYPE_CHECKING:
 # Where each public name lives; it is imported when first used, so that `import lostmotion` stays quick.
 _HOMES = {
     "_core": ("SolverError",),
+    "control.continuous": (
+        "ContinuousController",
+        "PositionPID",
+        "PositionSignal",
+        "SpeedPID",
+        "SpeedSignal",
+        "StateSpace",
+        "as_state_space",
+    ),
     "control.controller": ("Controller",),
     "control.encoder": ("Encoder",),
     "control.filters": ("TransferFunction", "as_filter"),
@@ -184,6 +203,7 @@ _HOMES = {
     "simulation.train_scenario": ("ShaftTable", "TrainInitial", "TrainScenario"),
     "simulation.variables": ("VARIABLES", "Variable"),
     "servo.commission": ("LoopSheet", "ServoReport", "Stiffness", "commission"),
+    "servo.hunting": ("Hunting", "hunting_map", "limit_cycle"),
     "servo.margins": (
         "Bandwidth",
         "Margins",
@@ -208,6 +228,7 @@ _WITH_DATASETS = (
     "response.bandwidth",
     "response.harmonic",
     "response.shooting",
+    "servo.hunting",
     "simulation.result_files",
     "simulation.results",
     "simulation.run",

@@ -71,13 +71,19 @@ class Breakaway {
     double acting(int shaft) const {
         double sum = 0.0;
         for (std::size_t m = 0; m < train_.motors.size(); ++m)
-            if (train_.motors[m].shaft == shaft && static_cast<int>(m) != left_out_)
-                sum += train_.motors[m].torque_at_rest(input(assembly_.places().motors[m].command));
+            if (train_.motors[m].shaft == shaft && static_cast<int>(m) != left_out_) sum += torque_at_rest(m);
         for (std::size_t k = 0; k < train_.angle_torques.size(); ++k)
             if (train_.angle_torques[k].shaft == shaft)
                 sum += model::evaluate(assembly_.layout(), assembly_.angle_torque(static_cast<int>(k), key_), now_);
         const int load = assembly_.places().shafts[static_cast<std::size_t>(shaft)].load;
         return load == model::nowhere ? sum : sum - input(load);
+    }
+    double torque_at_rest(std::size_t m) const {
+        const model::ShaftMotor& motor = train_.motors[m];
+        const model::MotorPlace& p = assembly_.places().motors[m];
+        if (p.controller == model::nowhere) return motor.torque_at_rest(input(p.command));
+        const model::Row u = assembly_.controller_command(p.controller, key_);
+        return motor.law.stall_torque() * model::evaluate(assembly_.layout(), u, now_);
     }
     double input(int k) const { return now_.input[0][static_cast<std::size_t>(k)]; }
 

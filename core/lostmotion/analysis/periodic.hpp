@@ -1,5 +1,6 @@
 // Periodic motion under periodic inputs, by shooting: Newton's method on the map of the state over one period (the
-// Poincare map), with its exact Jacobian. Where Newton does not converge, the transient is followed for a while.
+// Poincare map), with its exact Jacobian. Where Newton does not converge, the transient is followed for a while. Under
+// constant inputs the period of a limit cycle is one more unknown, and the phase is fixed by one more equation.
 #pragma once
 
 #include <limits>
@@ -27,6 +28,7 @@ struct PeriodicMotionOf {
     typename D::Contact contact{};
     bool converged = false;
     bool smooth = true;           // whether the Jacobian is exact: no grazing among the switchings
+    double period = 0.0;          // [s]
     int periods = 0;              // followed, all in all
     int newton_steps = 0;         // of the attempt that converged
     double residual = 0.0;        // largest change of a state over one period / its largest magnitude within it
@@ -36,7 +38,8 @@ struct PeriodicMotionOf {
 };
 
 struct ShootingOptions {
-    double period = 1.0;       // [s]
+    double period = 1.0;       // [s]; of a limit cycle a first estimate
+    bool limit_cycle = false;  // the inputs are constant, and the period is to be found
     int max_periods = 20000;   // to follow
     double tolerance = 1e-10;  // of the residual
     bool (*interrupted)(void*) = nullptr;
@@ -57,6 +60,8 @@ class ShootingOf {
           cache_(workspace.cache),
           laws_(system_),
           options_(options),
+          period_(options.period),
+          input_(constants(signals)),
           solver_(system_, signals, unit, workspace.balanced_scale(), &cache_) {
         solver_.interrupted = options.interrupted;
         solver_.interrupted_context = options.interrupted_context;
@@ -80,6 +85,7 @@ class ShootingOf {
             if (newton(here, motion)) return motion;
             if (motion.status == Status::interrupted) return motion;
             motion.status = Status::done;  // a trial that strayed is no failure of the motion
+            period_ = options_.period;
         }
         return motion;
     }
@@ -88,7 +94,7 @@ class ShootingOf {
     template <class Observer>
     Status run(const HybridState& start, Observer& observer) {
         const Status status = enter(start);
-        return status == Status::done ? solver_.advance(options_.period, observer) : status;
+        return status == Status::done ? solver_.advance(period_, observer) : status;
     }
 
  private:
@@ -103,6 +109,12 @@ class ShootingOf {
         SensitivityOf<System> sensitivity;
     };
 
+    static InputsOf<D> constants(const SignalsOf<D>& signals) {
+        InputsOf<D> u;
+        for (std::size_t i = 0; i < signals.size(); ++i) u[i] = signals[i].breakpoints[0].value;
+        return u;
+    }
+
     Status enter(const HybridState& s) {
         solver_.resume(0.0, s.x, s.memory, s.key);
         return solver_.inputs_changed();
@@ -110,7 +122,7 @@ class ShootingOf {
 
     bool advance(const HybridState& from, Image& image, Motion& motion) {
         motion.status = enter(from);
-        if (motion.status == Status::done) motion.status = solver_.advance(options_.period, image.sensitivity);
+        if (motion.status == Status::done) motion.status = solver_.advance(period_, image.sensitivity);
         motion.time = solver_.time();
         motion.contact = solver_.stopped_at();
         if (motion.status != Status::done) return false;
@@ -136,6 +148,7 @@ class ShootingOf {
     Motion& finish(Motion& motion, const HybridState& start, const Image& image, int steps) const {
         motion.converged = true;
         motion.smooth = image.sensitivity.smooth;
+        motion.period = period_;
         motion.newton_steps = steps;
         motion.start = start;
         motion.jacobian = image.sensitivity.jacobian;
@@ -189,7 +202,13 @@ class ShootingOf {
             for (double& v : M.back()) v /= largest;
             rhs.push_back(0.0);
         }
-        const std::vector<double> delta = solve_leaving_neutral(std::move(M), std::move(rhs), n, neutral);
+        if (options_.limit_cycle) free_period(image, active, scale, M, rhs);
+        const std::size_t unknowns = M[0].size();
+        const std::vector<double> delta = solve_leaving_neutral(std::move(M), std::move(rhs), unknowns, neutral);
+        if (unknowns > n) {
+            if (!(std::fabs(delta[n]) < 0.5)) return false;
+            period_ *= 1.0 + delta[n];
+        }
         for (std::size_t k = 0; k < n; ++k) {
             const double change = delta[k] * scale[k];
             if (!std::isfinite(change)) return false;
@@ -203,10 +222,34 @@ class ShootingOf {
         return true;
     }
 
+    // The change of the period, relative to it, as the last unknown: the image moves along the flow. The start is not
+    // to move along it. Where nothing moves, there is no period.
+    void free_period(const Image& image, const std::vector<int>& active, const std::vector<double>& scale,
+                     std::vector<std::vector<double>>& M, std::vector<double>& rhs) {
+        const auto& regime = cache_.regime(image.end.key);
+        std::vector<double> flow;
+        double fastest = 0.0;
+        for (std::size_t k = 0; k < active.size(); ++k) {
+            const bool is_state = active[k] < D::states;
+            flow.push_back(is_state ? period_ / scale[k] *
+                                          evaluate<D>(regime.rate[active[k]], image.end.x, image.end.memory, input_)
+                                    : 0.0);
+            fastest = std::fmax(fastest, std::fabs(flow.back()));
+        }
+        if (fastest == 0.0) return;
+        for (std::size_t row = 0; row < M.size(); ++row) M[row].push_back(row < flow.size() ? -flow[row] : 0.0);
+        for (double& f : flow) f /= fastest;
+        flow.push_back(0.0);
+        M.push_back(std::move(flow));
+        rhs.push_back(0.0);
+    }
+
     const System& system_;
     RegimeCache<System>& cache_;
     const ComponentLaws<System> laws_;
     ShootingOptions options_;
+    double period_;            // [s] at present
+    const InputsOf<D> input_;  // at the beginning
     ExactSolver<System> solver_;
 };
 

@@ -40,7 +40,8 @@ struct ResponseSpec {
     int harmonics = 8;           // coefficients 0 (mean) to this
     int max_periods = 20000;
     double tolerance = 1e-10;
-    bool keep_table = false;  // of the samples, with each result
+    bool keep_table = false;   // of the samples, with each result
+    bool limit_cycle = false;  // the inputs are constant, and the periods of the points are first estimates
 };
 
 // Channels whose products are powers.
@@ -100,12 +101,16 @@ ResponseResultOf<System> respond(const Plant& plant, typename Plant::Workspace& 
     options.period = point.period;
     options.max_periods = spec.max_periods;
     options.tolerance = spec.tolerance;
+    options.limit_cycle = spec.limit_cycle;
     options.interrupted = interrupted;
     options.interrupted_context = context;
-    const double interval = point.period / static_cast<double>(spec.samples);
-    ShootingOf<System> shooting(workspace, point.signals, interval, options);
-    result.motion = shooting.solve(point.start);
+    const double samples = static_cast<double>(spec.samples);
+    ShootingOf<System> search(workspace, point.signals, point.period / samples, options);
+    result.motion = search.solve(point.start);
     if (result.motion.status != Status::done || !result.motion.converged) return result;
+    options.period = result.motion.period;
+    const double interval = options.period / samples;
+    ShootingOf<System> shooting(workspace, point.signals, interval, options);
     table.resize(plant.channels() * spec.samples);
     auto sampler = plant.sampler(workspace, interval, spec.samples, table.data());
     result.motion.status = shooting.run(result.motion.start, sampler);

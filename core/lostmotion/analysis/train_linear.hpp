@@ -23,20 +23,12 @@ inline LinearRegime linearize(const model::Assembly& a, const std::vector<TrainC
     using Channel = TrainChannel;
     const model::Layout& n = a.layout();
     const model::Regime r = a.build(p.key);
-    // A torque source and a rigid gear may have a place in the kernel; they have no state.
-    std::vector<bool> moves(static_cast<std::size_t>(n.states), true);
-    for (std::size_t m = 0; m < a.train().motors.size(); ++m)
-        if (const int k = a.places().motors[m].torque; k != model::nowhere)
-            moves[static_cast<std::size_t>(k)] = a.train().motors[m].law.kind == Motor::dc;
-    for (std::size_t g = 0; g < a.train().gears.size(); ++g)
-        if (const int k = a.places().gears[g].twist; k != model::nowhere)
-            moves[static_cast<std::size_t>(k)] = !a.train().gears[g].rigid();
-    // An angle that torques depend on is integrated once more beside the coupled states: that is no state of its own.
+    const std::vector<bool> moves = model::moved_states(a);
     const std::vector<std::string> names = model::state_names(a);
+    // The first of its name: an angle that something depends on is integrated once more beside the coupled states.
     const auto first = [&](std::size_t k) {
         return static_cast<std::size_t>(std::find(names.begin(), names.end(), names[k]) - names.begin());
     };
-    for (std::size_t k = 0; k < names.size(); ++k) moves[k] = moves[k] && first(k) == k;
     const auto row = [&](const model::Row& f) {
         std::vector<double> out;
         for (int k = 0; k < n.states; ++k)
@@ -65,6 +57,8 @@ inline LinearRegime linearize(const model::Assembly& a, const std::vector<TrainC
         if (c.kind == Channel::output_torque) add(c, r.output_torque[k]);
         if (c.kind == Channel::input_torque) add(c, r.input_torque[k]);
         if (c.kind == Channel::contact_torque) add(c, r.contact_torque[k]);
+        if (c.kind == Channel::output) add(c, a.controller_command(c.index, p.key));
+        if (c.kind == Channel::error) add(c, a.controller_error(c.index));
     }
     return out;
 }

@@ -15,7 +15,9 @@ std::vector<NamedComponent> train_components(const model::Assembly& a) {
     const model::Train& t = a.train();
     const std::vector<std::string> states = model::state_names(a);
     std::vector<NamedComponent> out;
-    for (int k = 0; k < a.layout().coupled; ++k) out.push_back({states[static_cast<std::size_t>(k)], k, false});
+    const std::vector<bool> moves = model::moved_states(a);
+    for (int k = 0; k < a.layout().coupled; ++k)
+        out.push_back({states[static_cast<std::size_t>(k)], k, !moves[static_cast<std::size_t>(k)]});
     for (int part = 0; part < a.layout().angles; ++part)
         if (p.shafts[p.last_shaft[part]].angle == model::nowhere)
             out.push_back({t.shafts[p.last_shaft[part]].name + "_angle", D::coupled + part, true});

@@ -17,8 +17,9 @@ class TrainCheck {
     explicit TrainCheck(const Train& train) : train_(train) {}
 
     std::string operator()() const {
-        for (const auto check : {&TrainCheck::shafts_exist, &TrainCheck::elements, &TrainCheck::inertias,
-                                 &TrainCheck::rigid_loops, &TrainCheck::turned, &TrainCheck::sizes})
+        for (const auto check :
+             {&TrainCheck::shafts_exist, &TrainCheck::controllers, &TrainCheck::elements, &TrainCheck::inertias,
+              &TrainCheck::rigid_loops, &TrainCheck::turned, &TrainCheck::sizes})
             if (std::string error = (this->*check)(); !error.empty()) return error;
         return {};
     }
@@ -80,6 +81,30 @@ class TrainCheck {
                         : g.law.viscous_friction > 0.0 ? "viscous friction"
                                                        : "a transmission error") +
                        ", which are solved against the frame only; leave one of them out";
+        }
+        return {};
+    }
+
+    std::string controllers() const {
+        std::vector<bool> controlled(train_.motors.size());
+        for (std::size_t k = 0; k < train_.controllers.size(); ++k) {
+            const LinearController& c = train_.controllers[k];
+            const std::string name = named("controller", c.name, k);
+            if (c.motor < 0 || c.motor >= static_cast<int>(controlled.size()))
+                return name + " turns a motor that the train does not have";
+            if (controlled[static_cast<std::size_t>(c.motor)]) return name + " turns a motor that another one turns";
+            controlled[static_cast<std::size_t>(c.motor)] = true;
+            const std::size_t n = c.states.size(), m = c.signals.size();
+            const auto wide = [](const auto& rows, std::size_t w) {
+                return std::all_of(rows.begin(), rows.end(), [w](const auto& row) { return row.size() == w; });
+            };
+            if (c.A.size() != n || c.B.size() != n || !wide(c.A, n) || !wide(c.B, m) || c.C.size() != n ||
+                c.D.size() != m || c.back_calculation.size() != n)
+                return name + " has matrices that do not fit its states and signals";
+            if (!(c.limit > 0.0)) return name + " has a limit that is not above 0";
+            for (const LinearController::Signal& s : c.signals)
+                if (!exists(s.shaft)) return name + " takes the angle or speed of a shaft that the train does not have";
+            if (!exists(c.compared.shaft)) return name + " compares with a shaft that the train does not have";
         }
         return {};
     }

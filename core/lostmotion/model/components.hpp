@@ -59,7 +59,10 @@ inline std::vector<PeriodicAngle> periodic_angles(const Assembly& a) {
                 angle.turns.push_back({a.places().gears[g].error_turn, train.gears[g].transmission_error.period()});
         std::vector<double> periods;
         for (const PeriodicAngle::Turn& t : angle.turns) periods.push_back(t.period);
-        angle.period = common_period(periods);
+        // A controller knows the angle itself, however often the shaft has turned.
+        const bool known = std::any_of(train.controllers.begin(), train.controllers.end(),
+                                       [&](const LinearController& c) { return c.takes_angle(angle.shaft); });
+        if (!known) angle.period = common_period(periods);
         angles.push_back(std::move(angle));
     }
     return angles;

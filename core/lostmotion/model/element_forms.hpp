@@ -50,8 +50,8 @@ class ElementForms {
     }
     Motor::Terms motor_terms(int motor) const {
         const MotorPlace& p = places_.motors[motor];
-        return {p.torque, places_.shafts[train_.motors[motor].shaft].speed, layout().first_input + p.command,
-                layout().one};
+        const int command = p.command == nowhere ? layout().one : layout().first_input + p.command;
+        return {p.torque, places_.shafts[train_.motors[motor].shaft].speed, command, layout().one};
     }
     // The loss law of a gear, where T_2 is its output torque.
     LossTerms<Row> losses(int gear, const Row& T_2) const {
@@ -116,6 +116,45 @@ class ElementForms {
     Row commanded(int input, int branch, double torque, const Key& key) const {
         const int b = key.branch[branch];
         return b < 0 ? Row{} : b > 0 ? terms_.one(torque) : terms_.input(input, torque);
+    }
+
+    // What a controller takes.
+    Row controller_signal(int k, const LinearController::Signal& signal) const {
+        const ControllerPlace& p = places_.controllers[k];
+        switch (signal.kind) {
+            case LinearController::Signal::reference: return terms_.input(p.reference);
+            case LinearController::Signal::reference_rate: return terms_.input(p.reference_rate);
+            case LinearController::Signal::angle: return terms_.state(places_.shafts[signal.shaft].angle);
+            default: return terms_.state(places_.shafts[signal.shaft].speed);
+        }
+    }
+    Row controller_error(int k) const {
+        return terms_.input(places_.controllers[k].reference) - controller_signal(k, train_.controllers[k].compared);
+    }
+    // v, its output without a limit.
+    Row controller_output(int k) const {
+        const LinearController& c = train_.controllers[k];
+        Row v;
+        for (std::size_t j = 0; j < c.states.size(); ++j)
+            v += terms_.state(places_.controllers[k].first_state + static_cast<int>(j), c.C[j]);
+        for (std::size_t j = 0; j < c.signals.size(); ++j) v += c.D[j] * controller_signal(k, c.signals[j]);
+        return v;
+    }
+    // u, the command of its motor.
+    Row controller_command(int k, const Key& key) const {
+        const int branch = places_.controllers[k].branch;
+        const int at = branch == nowhere ? 0 : key.branch[branch];
+        return at == 0 ? controller_output(k) : terms_.one(at * train_.controllers[k].limit);
+    }
+    Row controller_rate(int k, std::size_t state, const Key& key) const {
+        const LinearController& c = train_.controllers[k];
+        Row rate;
+        for (std::size_t j = 0; j < c.states.size(); ++j)
+            rate += terms_.state(places_.controllers[k].first_state + static_cast<int>(j), c.A[state][j]);
+        for (std::size_t j = 0; j < c.signals.size(); ++j) rate += c.B[state][j] * controller_signal(k, c.signals[j]);
+        if (const double back = c.back_calculation[state]; back != 0.0)
+            rate += back * (controller_command(k, key) - controller_output(k));
+        return rate;
     }
 
  private:

@@ -74,6 +74,10 @@ inline void Equations::compose_motors(const Key& key, Regime& r) const {
     for (std::size_t m = 0; m < train_.motors.size(); ++m) {
         const ShaftMotor& motor = train_.motors[m];
         const MotorPlace& p = places_.motors[m];
+        if (p.controller != nowhere && motor.law.kind == Motor::torque_source) {
+            r.motor_torque.push_back(motor.law.rated_torque * forms_.controller_command(p.controller, key));
+            continue;
+        }
         const int limit = p.branch == nowhere ? 0 : key.branch[p.branch];
         r.motor_torque.push_back(motor.law.kind == Motor::torque_source && limit != 0
                                      ? terms_.one(limit * motor.torque_limit)
@@ -178,8 +182,10 @@ inline void Equations::set_rates(const Key& key, const std::vector<Row>& acceler
         const Motor& motor = train_.motors[m].law;
         const MotorPlace& p = places_.motors[m];
         if (motor.kind != Motor::dc) continue;
-        r.rate[p.torque] = motor.torque_rate<Row>(forms_.motor_terms(static_cast<int>(m)),
-                                                  p.branch == nowhere ? 0 : key.branch[p.branch]);
+        const Motor::Terms terms = forms_.motor_terms(static_cast<int>(m));
+        r.rate[p.torque] = p.controller == nowhere
+                               ? motor.torque_rate<Row>(terms, p.branch == nowhere ? 0 : key.branch[p.branch])
+                               : motor.torque_rate<Row>(terms, forms_.controller_command(p.controller, key));
     }
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
         if (r.ties.at_rest[s]) continue;
@@ -197,6 +203,10 @@ inline void Equations::set_rates(const Key& key, const std::vector<Row>& acceler
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
         if (places_.shafts[s].angle != nowhere && !r.ties.at_rest[s])
             r.rate[places_.shafts[s].angle] = terms_.state(places_.shafts[s].speed);
+    for (std::size_t k = 0; k < train_.controllers.size(); ++k)
+        for (std::size_t j = 0; j < train_.controllers[k].states.size(); ++j)
+            r.rate[static_cast<std::size_t>(places_.controllers[k].first_state) + j] =
+                forms_.controller_rate(static_cast<int>(k), j, key);
     for (int a = 0; a < layout_.angles; ++a) {
         const int s = places_.last_shaft[a];
         if (!r.ties.at_rest[s]) r.rate[layout_.coupled + a] = terms_.state(places_.shafts[s].speed);

@@ -37,6 +37,7 @@ class RegimeGuards {
     void add_twist_pieces(int gear);
     void add_speed_pieces(int shaft);
     void add_input_limits();
+    void add_output_limits();
     void add_angle_pieces(int branch, int turn, int shaft, const PeriodicCurve& curve);
 
     Guard& add(const Row& form, Guard::Kind kind, int contact, int branch, int neighbour) {
@@ -62,6 +63,7 @@ inline void RegimeGuards::add_all() {
     for (std::size_t g = 0; g < train_.gears.size(); ++g) add_twist_pieces(static_cast<int>(g));
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) add_speed_pieces(static_cast<int>(s));
     add_input_limits();
+    add_output_limits();
     for (std::size_t g = 0; g < train_.gears.size(); ++g) {
         const GearPlace& p = places_.gears[g];
         if (p.error_piece != nowhere)
@@ -295,6 +297,19 @@ inline void RegimeGuards::add_input_limits() {
                places_.shafts[train_.brakes[b].shaft].contact);
     for (const CouplingPlace& c : places_.couplings)
         if (c.branch != nowhere) limits(c.input, c.branch, 0.0, 1.0, c.contact);
+}
+
+// Where the output of a controller reaches its limit, or comes back from it.
+inline void RegimeGuards::add_output_limits() {
+    for (std::size_t k = 0; k < train_.controllers.size(); ++k) {
+        const int branch = places_.controllers[k].branch;
+        if (branch == nowhere) continue;
+        const int at = regime_.key.branch[branch];
+        const double most = train_.controllers[k].limit;
+        const Row v = forms_.controller_output(static_cast<int>(k));
+        if (at <= 0) add(terms_.one(at == 0 ? most : -most) - v, Guard::edge, nowhere, branch, at + 1);
+        if (at >= 0) add(v - terms_.one(at == 0 ? -most : most), Guard::edge, nowhere, branch, at - 1);
+    }
 }
 
 // Where the angle of a shaft leaves its piece. The last and the first piece are neighbours: then the angle at which the

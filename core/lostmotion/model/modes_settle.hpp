@@ -10,8 +10,24 @@ template <class Now>
 double SwitchedTrain<Sizes>::motor_torque(const Now& now, int motor) const {
     const ShaftMotor& m = train().motors[motor];
     if (m.law.kind == Motor::dc) return now.x[places().motors[motor].torque];
+    if (const int k = places().motors[motor].controller; k != nowhere) {
+        const double limit = train().controllers[k].limit;
+        return m.law.rated_torque * std::clamp(output_of(now, k), -limit, limit);
+    }
     return std::clamp(m.law.rated_torque * now.input[0][places().motors[motor].command], -m.torque_limit,
                       m.torque_limit);
+}
+
+// Of a controller, before its limit.
+template <class Sizes>
+template <class Now>
+double SwitchedTrain<Sizes>::output_of(const Now& now, int controller) const {
+    const Layout& n = assembly_.layout();
+    const Row v = assembly_.controller_output(controller);
+    double sum = 0.0;
+    for (int k = 0; k < n.coupled; ++k) sum += v.c[k] * now.x[k];
+    for (int k = 0; k < n.inputs; ++k) sum += v.c[n.first_input + k] * now.input[0][k];
+    return sum;
 }
 
 // The branches that the state and the inputs give alone.
@@ -61,6 +77,12 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
         const AngleTorquePlace& p = places().angle_torques[k];
         const double phi = now.x[places().shafts[train().angle_torques[k].shaft].angle];
         set(p.piece, train().angle_torques[k].torque.piece(phi - now.memory[p.turn]));
+    }
+    for (std::size_t k = 0; k < train().controllers.size(); ++k) {
+        const int branch = places().controllers[k].branch;
+        if (branch == nowhere) continue;
+        const double v = output_of(now, static_cast<int>(k)), limit = train().controllers[k].limit;
+        set(branch, v > limit ? +1 : v < -limit ? -1 : 0);
     }
 }
 

@@ -22,11 +22,31 @@ inline std::vector<std::string> state_names(const Assembly& a) {
         set(p.shafts[k].angle, t.shafts[k].name + "_angle");
     }
     for (std::size_t k = 0; k < t.gears.size(); ++k) set(p.gears[k].twist, t.gears[k].name + "_twist");
+    for (std::size_t k = 0; k < t.controllers.size(); ++k)
+        for (std::size_t j = 0; j < t.controllers[k].states.size(); ++j)
+            set(p.controllers[k].first_state + static_cast<int>(j),
+                t.controllers[k].name + "_" + t.controllers[k].states[j]);
     for (int part = 0; part < a.layout().angles; ++part) {
         const auto last = static_cast<std::size_t>(p.last_shaft[static_cast<std::size_t>(part)]);
         set(a.layout().coupled + part, t.shafts[last].name + "_angle");
     }
     return names;
+}
+
+// Which of the states the train moves: a torque source and a rigid gear may have a place in the kernel, but no state,
+// and the angle of a shaft that something depends on is a coupled state.
+inline std::vector<bool> moved_states(const Assembly& a) {
+    std::vector<bool> moves(static_cast<std::size_t>(a.layout().states), true);
+    for (std::size_t m = 0; m < a.train().motors.size(); ++m)
+        if (const int k = a.places().motors[m].torque; k != nowhere)
+            moves[static_cast<std::size_t>(k)] = a.train().motors[m].law.kind == Motor::dc;
+    for (std::size_t g = 0; g < a.train().gears.size(); ++g)
+        if (const int k = a.places().gears[g].twist; k != nowhere)
+            moves[static_cast<std::size_t>(k)] = !a.train().gears[g].rigid();
+    for (std::size_t part = 0; part < a.places().last_shaft.size(); ++part)
+        moves[static_cast<std::size_t>(a.layout().coupled) + part] =
+            a.places().shafts[static_cast<std::size_t>(a.places().last_shaft[part])].angle == nowhere;
+    return moves;
 }
 
 inline std::vector<std::string> input_names(const Assembly& a) {
@@ -40,6 +60,10 @@ inline std::vector<std::string> input_names(const Assembly& a) {
     for (std::size_t k = 0; k < t.shafts.size(); ++k) set(p.shafts[k].load, t.shafts[k].name + "_load_torque");
     for (std::size_t k = 0; k < t.brakes.size(); ++k) set(p.brakes[k].input, t.brakes[k].name + "_command");
     for (std::size_t k = 0; k < t.couplings.size(); ++k) set(p.couplings[k].input, t.couplings[k].name + "_command");
+    for (std::size_t k = 0; k < t.controllers.size(); ++k) {
+        set(p.controllers[k].reference, t.controllers[k].name + "_reference");
+        set(p.controllers[k].reference_rate, t.controllers[k].name + "_reference_rate");
+    }
     return names;
 }
 
@@ -81,6 +105,8 @@ inline std::vector<std::string> branch_names(const Assembly& a) {
         set(p.couplings[k].branch, t.couplings[k].name + ": limit of the command");
     for (std::size_t k = 0; k < t.angle_torques.size(); ++k)
         set(p.angle_torques[k].piece, t.angle_torques[k].name + ": piece of the torque over angle");
+    for (std::size_t k = 0; k < t.controllers.size(); ++k)
+        set(p.controllers[k].branch, t.controllers[k].name + ": limit of the controller");
     return names;
 }
 

@@ -1,6 +1,7 @@
 // What belongs to each element of a train in its equations: states, contacts, memory, inputs, branches.
 //
-// Coupled states: [motor torques][shaft speeds][twists][angles that a torque depends on]. Angles: one for each part of
+// Coupled states: [motor torques][shaft speeds][twists][angles that a torque or a controller depends on][states of
+// controllers]. Angles: one for each part of
 // the train that hangs together, that of its last shaft.
 #pragma once
 
@@ -22,8 +23,10 @@ inline ContactPlace twist_place(const Gear& g, int gear) {
 }
 
 struct MotorPlace {
-    int torque = nowhere;  // state
-    int command = nowhere, branch = nowhere;
+    int torque = nowhere;   // state
+    int command = nowhere;  // input, unless a controller gives it
+    int branch = nowhere;
+    int controller = nowhere;  // its number
 };
 struct ShaftPlace {
     int speed = nowhere, angle = nowhere;  // states; the angle only if a torque depends on it
@@ -49,6 +52,12 @@ struct AngleTorquePlace {
     int remainder = nowhere;              // input: what the chords leave of a sine
 };
 
+struct ControllerPlace {
+    int first_state = nowhere;
+    int reference = nowhere, reference_rate = nowhere;  // inputs
+    int branch = nowhere;
+};
+
 struct Places {
     Layout layout;
     std::vector<MotorPlace> motors;
@@ -57,6 +66,7 @@ struct Places {
     std::vector<BrakePlace> brakes;
     std::vector<CouplingPlace> couplings;
     std::vector<AngleTorquePlace> angle_torques;
+    std::vector<ControllerPlace> controllers;
     std::vector<ContactPlace> contacts;
     std::vector<int> last_shaft;  // of each part of the train, whose angle is kept
 
@@ -80,7 +90,10 @@ inline Places::Places(const Train& train, bool with_remainders)
       gears(train.gears.size()),
       brakes(train.brakes.size()),
       couplings(train.couplings.size()),
-      angle_torques(train.angle_torques.size()) {
+      angle_torques(train.angle_torques.size()),
+      controllers(train.controllers.size()) {
+    for (std::size_t k = 0; k < controllers.size(); ++k)
+        motors[train.controllers[k].motor].controller = static_cast<int>(k);
     for (std::size_t s = 0; s < shafts.size(); ++s) {
         shafts[s].inertia = train.shafts[s].inertia;
         shafts[s].viscous_friction = train.shafts[s].viscous_friction;
@@ -107,7 +120,13 @@ inline void Places::place_states(const Train& train) {
     for (const AngleTorque& t : train.angle_torques) by_angle[t.shaft] = true;
     for (const Gear& g : train.gears)
         if (g.transmission_error.present()) by_angle[g.input] = true;
-    const bool all = motors.size() + shafts.size() + gears.size() +
+    std::size_t of_controllers = 0;
+    for (const LinearController& c : train.controllers) {
+        for (std::size_t s = 0; s < shafts.size(); ++s)
+            if (c.takes_angle(static_cast<int>(s))) by_angle[s] = true;
+        of_controllers += c.states.size();
+    }
+    const bool all = motors.size() + shafts.size() + gears.size() + of_controllers +
                          static_cast<std::size_t>(std::count(by_angle.begin(), by_angle.end(), true)) <=
                      narrowest;
     int next = 0;
@@ -118,6 +137,10 @@ inline void Places::place_states(const Train& train) {
         if (all || !train.gears[g].rigid()) gears[g].twist = next++;
     for (std::size_t s = 0; s < shafts.size(); ++s)
         if (by_angle[s]) shafts[s].angle = next++;
+    for (std::size_t k = 0; k < controllers.size(); ++k) {
+        controllers[k].first_state = next;
+        next += static_cast<int>(train.controllers[k].states.size());
+    }
     layout.coupled = next;
     // Parts that hang together, by the last shaft of each.
     std::vector<int> last(shafts.size());
@@ -166,12 +189,18 @@ inline void Places::place_contacts(const Train& train) {
 }
 
 inline void Places::place_inputs(const Train& train) {
-    for (MotorPlace& m : motors) m.command = layout.inputs++;
+    for (MotorPlace& m : motors)
+        if (m.controller == nowhere) m.command = layout.inputs++;
     for (std::size_t s = 0; s < shafts.size(); ++s)
         if (train.shafts[s].loaded) shafts[s].load = layout.inputs++;
     for (BrakePlace& b : brakes) b.input = layout.inputs++;
     for (std::size_t k = 0; k < couplings.size(); ++k)
         if (train.couplings[k].commanded()) couplings[k].input = layout.inputs++;
+    for (std::size_t k = 0; k < controllers.size(); ++k) {
+        controllers[k].reference = layout.inputs++;
+        if (train.controllers[k].takes(LinearController::Signal::reference_rate))
+            controllers[k].reference_rate = layout.inputs++;
+    }
 }
 
 inline void Places::place_memory_and_branches(const Train& train) {
@@ -185,7 +214,7 @@ inline void Places::place_memory_and_branches(const Train& train) {
 
     int& next = layout.branches;
     for (std::size_t m = 0; m < motors.size(); ++m)
-        if (train.motors[m].limited()) motors[m].branch = next++;
+        if (train.motors[m].limited() && motors[m].controller == nowhere) motors[m].branch = next++;
     for (std::size_t s = 0; s < shafts.size(); ++s) {
         if (train.shafts[s].friction.pieces() > 1) shafts[s].friction_piece = next++;
         if (train.shafts[s].drag.outermost_piece() > 0) shafts[s].drag_piece = next++;
@@ -210,6 +239,8 @@ inline void Places::place_memory_and_branches(const Train& train) {
         t.piece = next++;
         t.turn = layout.memory++;
     }
+    for (std::size_t k = 0; k < controllers.size(); ++k)
+        if (train.controllers[k].limited()) controllers[k].branch = next++;
 }
 
 }  // namespace lostmotion::model

@@ -26,6 +26,30 @@ inline double rated_torque(const Train& train, int shaft) {
     return 1.0;
 }
 
+// Sizes of the states of a controller, in those of what it takes and gives: the geometric mean of what drives a state
+// and of what it takes to move the output by `of_output`.
+template <class State>
+void controller_scale(const Assembly& a, int controller, double of_output, State& s) {
+    const LinearController& c = a.train().controllers[static_cast<std::size_t>(controller)];
+    const ControllerPlace& p = a.places().controllers[static_cast<std::size_t>(controller)];
+    for (std::size_t j = 0; j < c.states.size(); ++j) {
+        double driven = 0.0;
+        for (std::size_t k = 0; k < c.signals.size(); ++k) {
+            const LinearController::Signal& y = c.signals[k];
+            const ShaftPlace& shaft = a.places().shafts[static_cast<std::size_t>(y.shaft)];
+            const double size = y.kind == LinearController::Signal::angle   ? s[shaft.angle]
+                                : y.kind == LinearController::Signal::speed ? s[shaft.speed]
+                                                                            : 0.0;
+            driven = std::fmax(driven, std::fabs(c.B[j][k]) * size);
+        }
+        const double gain = std::fabs(c.C[j]);
+        const double size = driven > 0.0 && gain > 0.0 ? std::sqrt(driven * of_output / gain)
+                            : gain > 0.0               ? of_output / gain
+                                                       : driven;
+        s[p.first_state + static_cast<int>(j)] = size > 0.0 ? size : 1.0;
+    }
+}
+
 // Sizes that the states have at rated speed and torque, for error control.
 template <class State>
 void rated_scale(const Assembly& a, State& s) {
@@ -42,6 +66,7 @@ void rated_scale(const Assembly& a, State& s) {
         if (const int k = a.places().gears[g].twist; k != nowhere)
             s[k] = gear.rigid() ? 1.0 : gear.law.rated_output_torque / gear.law.curve.max_slope();
     }
+    for (std::size_t k = 0; k < train.controllers.size(); ++k) controller_scale(a, static_cast<int>(k), 1.0, s);
 }
 
 // Sizes in which the coupling of the equations is balanced: all shafts and twists with like energy, from the first
@@ -78,6 +103,14 @@ void balanced_scale(const Assembly& a, State& s, int first_angle) {
     }
     for (std::size_t n = 0; n < train.shafts.size(); ++n)
         if (p.shafts[n].angle != nowhere) s[p.shafts[n].angle] = s[p.shafts[n].speed];
+    for (std::size_t k = 0; k < train.controllers.size(); ++k) {
+        const ShaftMotor& motor = train.motors[static_cast<std::size_t>(train.controllers[k].motor)];
+        const Motor& law = motor.law;
+        const double of_output = law.kind == Motor::dc
+                                     ? law.electrical_time_constant / law.stall_torque()
+                                     : s[p.shafts[motor.shaft].speed] * inertia(motor.shaft) / law.rated_torque;
+        controller_scale(a, static_cast<int>(k), of_output, s);
+    }
 }
 
 }  // namespace lostmotion::model

@@ -176,6 +176,8 @@ class SwitchedTrain {
     void hold(Now& now, const Event& event, const Key& modes, std::array<double, max_contacts>& T_2) const;
     template <class Now>
     double motor_torque(const Now& now, int motor) const;
+    template <class Now>
+    double output_of(const Now& now, int controller) const;
 
     // What a cache knows of a regime: an entry of the kernel's, or the regime itself.
     template <class Cache>

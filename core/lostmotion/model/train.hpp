@@ -7,6 +7,7 @@
 #include "../parts/brake.hpp"
 #include "../parts/coupling.hpp"
 #include "../parts/gear.hpp"
+#include "../parts/linear_controller.hpp"
 #include "../parts/shaft.hpp"
 #include "../parts/shaft_motor.hpp"
 
@@ -19,6 +20,7 @@ struct Train {
     std::vector<Brake> brakes;
     std::vector<Coupling> couplings;
     std::vector<AngleTorque> angle_torques;
+    std::vector<LinearController> controllers;
 };
 
 }  // namespace lostmotion::model

@@ -47,6 +47,15 @@ class TrainDescription {
         train.angle_torques.push_back({name, place_of(shaft), torque});
     }
 
+    void add_controller(LinearController c, const std::string& motor) {
+        c.motor = -1;
+        for (std::size_t k = 0; k < train.motors.size(); ++k)
+            if (train.motors[k].name == motor) c.motor = static_cast<int>(k);
+        c.name = motor;
+        train.controllers.push_back(std::move(c));
+    }
+    int shaft_number(const std::string& name) const { return place_of(name); }
+
  private:
     // -1 if there is none of that name, which the check of the train finds.
     int place_of(const std::string& shaft) const {

@@ -31,8 +31,12 @@ struct Motor {
     // dM_D/dt by eq. (2), with E_Z = E_C, or the limit with the sign of `amplifier` if that is not 0.
     template <class F>
     F torque_rate(const Terms& of, int amplifier) const {
+        return torque_rate(of, amplifier == 0 ? F::unit(of.command) : F::unit(of.one, amplifier * voltage_limit));
+    }
+    // The same with E_Z as a form.
+    template <class F>
+    F torque_rate(const Terms& of, const F& voltage) const {
         if (kind == torque_source) return F{};
-        const F voltage = amplifier == 0 ? F::unit(of.command) : F::unit(of.one, amplifier * voltage_limit);
         const F m_D = F::unit(of.torque, 1.0 / rated_torque);
         const F back_emf = F::unit(of.speed, (armature_voltage_constant - 1.0) / rated_speed);
         return rated_torque / electrical_time_constant * (armature_voltage_constant * voltage - back_emf - m_D);

@@ -12,10 +12,43 @@ namespace lostmotion {
 
 // At a jump a channel has its right limit.
 struct TrainChannel {
-    enum Kind { input, state, motor_torque, output_torque, input_torque, contact_torque, contact_mode } kind;
-    int index;  // of the input, state, motor, gear or contact
+    enum Kind {
+        input,
+        state,
+        motor_torque,
+        output_torque,
+        input_torque,
+        contact_torque,
+        contact_mode,
+        output,
+        error
+    } kind;
+    int index;  // of the input, state, motor, gear, contact or controller
     std::string name, unit, meaning;
 };
+
+// The inputs from this one on are those of the controllers.
+inline std::size_t first_reference(const model::Assembly& a) {
+    const auto& all = a.places().controllers;
+    return static_cast<std::size_t>(all.empty() ? a.layout().inputs : all[0].reference);
+}
+
+inline void add_controller_channels(const model::Assembly& a, int controller, std::vector<TrainChannel>& out) {
+    using C = TrainChannel;
+    const auto k = static_cast<std::size_t>(controller);
+    const model::LinearController& c = a.train().controllers[k];
+    const model::ControllerPlace& p = a.places().controllers[k];
+    const std::string unit = c.compared.kind == model::LinearController::Signal::angle ? "rad" : "rad/s";
+    out.push_back({C::output, controller, c.name + "_command", "", "command that the controller gives"});
+    out.push_back({C::input, p.reference, c.name + "_reference", unit, "reference of the controller"});
+    out.push_back({C::error, controller, c.name + "_error", unit, "reference less what is measured"});
+    if (p.reference_rate != model::nowhere)
+        out.push_back({C::input, p.reference_rate, c.name + "_reference_rate", unit + (unit == "rad" ? "/s" : "^2"),
+                       "rate of the reference"});
+    for (std::size_t j = 0; j < c.states.size(); ++j)
+        out.push_back(
+            {C::state, p.first_state + static_cast<int>(j), c.name + "_" + c.states[j], "", "state of the controller"});
+}
 
 inline std::vector<TrainChannel> train_channels(const model::Assembly& a) {
     using C = TrainChannel;
@@ -24,10 +57,12 @@ inline std::vector<TrainChannel> train_channels(const model::Assembly& a) {
     std::vector<C> out;
     const auto inputs = model::input_names(a);
     for (std::size_t k = 0; k < inputs.size(); ++k) {
+        if (k >= first_reference(a)) break;
         const bool load = inputs[k].ends_with("_load_torque");
         out.push_back({C::input, static_cast<int>(k), inputs[k], load ? "N*m" : "",
                        load ? "torque against the shaft" : "command"});
     }
+    for (std::size_t k = 0; k < t.controllers.size(); ++k) add_controller_channels(a, static_cast<int>(k), out);
     for (std::size_t k = 0; k < t.motors.size(); ++k)
         out.push_back(
             {C::motor_torque, static_cast<int>(k), t.motors[k].name + "_torque", "N*m", "torque of the motor"});
@@ -86,6 +121,9 @@ class TrainReader {
             case TrainChannel::motor_torque: return evaluate(row(regime_.rows.motor_torque[index]), at, k);
             case TrainChannel::output_torque: return evaluate(regime_.output_torque[index], at, k);
             case TrainChannel::input_torque: return input_torque(index, at, k);
+            case TrainChannel::output:
+                return evaluate(row(model_.assembly.controller_command(c.index, regime_.key)), at, k);
+            case TrainChannel::error: return evaluate(row(model_.assembly.controller_error(c.index)), at, k);
             case TrainChannel::contact_torque: return evaluate(regime_.contact_torque[index], at, k);
             default: return Vec{} + (regime_.at_rest[index] ? 0.0 : static_cast<double>(regime_.key.modes[index]));
         }

@@ -14,6 +14,7 @@ from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor
 from ..model.parameters import MotorLaw
 from ..model.train import DriveTrain
+from .continuous import ContinuousController
 from .controller import Controller, whole_multiple
 from .filters import core_filter
 from .law import Law
@@ -234,7 +235,7 @@ def core_control(
     return base, axes
 
 
-def driven(controller: Controller) -> MotorLaw | None:
+def driven(controller: Controller | ContinuousController) -> MotorLaw | None:
     """What a current loop makes of its motor; None where the motor stays what it is.
 
     One of first order is the law of (2) with k_N = 1: tau dM/dt = M* - M.
@@ -253,6 +254,6 @@ def driven(controller: Controller) -> MotorLaw | None:
     return (), True
 
 
-def motor_laws(controllers: Mapping[str, Controller]) -> dict[str, MotorLaw | None]:
+def motor_laws(controllers: Mapping[str, Controller | ContinuousController]) -> dict[str, MotorLaw | None]:
     """What the current loops make of the motors, by name."""
     return {name: driven(controller) for name, controller in controllers.items()}

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Annotated, Self
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import NotNegative, Positive, Switch, Time, Whole
+from .continuous import ContinuousController
 from .encoder import Encoder
 from .inverse_model import InverseModel
 from .loops import (
@@ -39,6 +40,7 @@ class Controller(Part):
     one gives acts `delay` sample times later.
     """
 
+    kind: Literal["sampled"] = "sampled"
     reference: AnyReference
     """of the position, the speed or the torque: what the outermost loop follows"""
     sample_time: Annotated[Time, Positive]
@@ -117,6 +119,15 @@ class Controller(Part):
         """Sample time of a loop [s]."""
         own = getattr(getattr(self, loop), "sample_time", None)
         return self.sample_time if own is None else float(own)
+
+
+def _kind(value: Any) -> str:
+    return str(value.get("kind", "sampled") if isinstance(value, Mapping) else getattr(value, "kind", "sampled"))
+
+
+AnyController = Annotated[
+    Annotated[Controller, Tag("sampled")] | Annotated[ContinuousController, Tag("continuous")], Discriminator(_kind)
+]
 
 
 def whole_multiple(time: float, base: float, key: str) -> int:

@@ -33,6 +33,9 @@ def follow(
         if chosen:
             nodes = list(options(schema, {"$ref": chosen[0]}))
             continue
+        if narrowed := [node for node in nodes if node.get("properties", {}).get("kind", {}).get("const") == key]:
+            nodes = narrowed
+            continue
         inner = [child for node in nodes if (child := _child(node, key)) is not None]
         if isinstance(key, int) or inner:
             keys.append(key)

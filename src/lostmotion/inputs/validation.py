@@ -140,6 +140,9 @@ class _Problem:
 
     def _kinds(self) -> list[str]:
         kinds = [kind for node in self.nodes for kind in node.get("discriminator", {}).get("mapping", {})]
+        if not kinds:
+            said = [node.get("properties", {}).get("kind", {}).get("const") for node in self.nodes]
+            kinds = [kind for kind in said if kind is not None]
         return list(dict.fromkeys(kinds))
 
     def _wanted(self) -> str:

@@ -137,9 +137,9 @@ def runs_of(scenario: Scenario | TrainScenario) -> int:
 
 
 def _check(scenario: TrainScenario, after: float) -> None:
-    if not scenario.controllers:
+    if not scenario.axes():
         raise InputError("the scenario has no controller; add [controller], or [controllers.MOTOR] for each axis")
-    for motor, controller in scenario.controllers.items():
+    for motor, controller in scenario.axes().items():
         if controller.reference.kind != "position":
             raise InputError(
                 f"key controllers.{motor}.reference.kind: {shown(controller.reference.kind)} is not what an axis points by; "
@@ -153,9 +153,9 @@ def _check(scenario: TrainScenario, after: float) -> None:
 
 def _view(scenario: TrainScenario, view: Mapping[str, float | str]) -> dict[str, float]:
     for motor in view:
-        if motor not in scenario.controllers:
-            names = ", ".join(scenario.controllers)
-            meant = did_you_mean(motor, scenario.controllers, f"the motors with a controller are {names}")
+        if motor not in scenario.axes():
+            names = ", ".join(scenario.axes())
+            meant = did_you_mean(motor, scenario.axes(), f"the motors with a controller are {names}")
             raise InputError(f"view: {shown(motor)} is the motor of no axis; {meant}")
     angles = {motor: argument(f"view[{motor}]", angle, "rad") for motor, angle in view.items()}
     for motor, angle in angles.items():
@@ -169,7 +169,7 @@ def _run(scenario: TrainScenario, after: float) -> tuple[np.ndarray, dict[str, n
     time = result["time"].to_numpy()
     counted = time >= after
     errors, found = {}, {}
-    for motor, controller in scenario.controllers.items():
+    for motor, controller in scenario.axes().items():
         shaft = controller.shaft or list(scenario.shafts)[-1]
         angle = result[f"{shaft}_angle"].to_numpy()
         wanted = controller.reference.at(time)[0]

@@ -36,7 +36,8 @@ class ResultAccessor:
 
     @checked
     def plot(self, output: str | None = None) -> Figure:
-        """The figure that the command line draws: of a run the overview, of a frequency response the Bode figure.
+        """The figure that the command line draws: of a run the overview, of a frequency response the Bode figure, of a hunting map
+        amplitude and frequency.
 
         Parameters
         ----------
@@ -49,10 +50,13 @@ class ResultAccessor:
             The dataset is of another kind.
         """
         from . import plots, response_figures, train_figures
+        from .hunting_figures import map_figure
 
         if "response" in self._dataset:
             name = str(of_output(self._dataset, output)["output"].item())
             return response_figures.bode_figure({"": self._dataset}, name)
+        if "reason" in self._dataset and "amplitude" in self._dataset:
+            return map_figure(self._dataset)
         if is_train_result(self._dataset):
             return train_figures.train_overview(self._dataset)
         lacking = [name for name in plots.OVERVIEW if name not in self._dataset]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -242,7 +242,7 @@ def _ramp(value: float, rate: float) -> _core.Signal:
 def _model_now(simulation: Simulation) -> LinearModel:
     rows = simulation._core.linearize()
     if isinstance(simulation.drive, DriveTrain):
-        return train_model(simulation.drive, list(simulation.loaded), *rows)
+        return train_model(simulation.drive, simulation._core_train or simulation.drive.core(()), *rows)
     return _drive_model(*rows)
 
 
@@ -254,7 +254,7 @@ def _model_of_run(what: Any, time: float) -> LinearModel:
     need_open_loop(what, "linearize at a time")
     if isinstance(what, Scenario):
         return _drive_model(*_core.linearize_at(*core_inputs(what), time))
-    return train_model(what.train(), what.loaded(), *_core.linearize_train_at(*core_case(what), time))
+    return train_model(what.train(), what.core(), *_core.linearize_train_at(*core_case(what), time))
 
 
 def _model_of_train(
@@ -264,7 +264,7 @@ def _model_of_train(
     rates: Mapping[str, float],
 ) -> LinearModel:
     train, loaded = loaded_train(what)
-    core = train.core(loaded)
+    core = what.core(sampled=False) if isinstance(what, TrainScenario) else train.core(loaded)
     if not isinstance(state, TrainInitial | None):
         raise InputError("state: is that of a drive; give a TrainInitial")
     if state is None:
@@ -276,7 +276,7 @@ def _model_of_train(
             if name not in names:
                 meant = did_you_mean(name, names, f"the inputs are {', '.join(names)}")
                 raise InputError(f"{which}: {shown(name)} is no input of this train; {meant}")
-    unit = {v.name: v.unit.replace("1", "") for v in train_variables(train, loaded)}
+    unit = {v.name: v.unit.replace("1", "") for v in train_variables(train, core)}
     ramps = [
         _ramp(
             argument(f"inputs.{name}", inputs.get(name, 0.0), unit[name]),
@@ -284,8 +284,8 @@ def _model_of_train(
         )
         for name in names
     ]
-    rows = _core.linearize_train_at(core, ramps, start_values(train, state), start_capacities(state), 0.0)
-    return train_model(train, loaded, *rows)
+    start = what.start(state) if isinstance(what, TrainScenario) else start_values(train, state)
+    return train_model(train, core, *_core.linearize_train_at(core, ramps, start, start_capacities(state), 0.0))
 
 
 def _drive_model(
@@ -310,7 +310,7 @@ def _drive_model(
 
 def train_model(
     train: DriveTrain,
-    loaded: Sequence[str],
+    core: _core.Train,
     states: dict[str, float],
     inputs: dict[str, float],
     rates: np.ndarray,
@@ -328,7 +328,7 @@ def train_model(
             twist = of.get(f"{name}_twist", nothing)
             of[f"{shaft}_angle"] = angle_through(train.gears[name], of[f"{source}_angle"], twist, forward=forward)
     whole = np.array(list(of.values()))
-    units = {v.name: v.unit for v in train_variables(train, loaded) if v.name in {*states, *inputs, *of}}
+    units = {v.name: v.unit for v in train_variables(train, core) if v.name in {*states, *inputs, *of}}
     return LinearModel(
         A=rates[:, :n],
         B=rates[:, n : n + m],

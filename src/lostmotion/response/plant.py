@@ -14,16 +14,14 @@ from ..control.references import PositionReference, SpeedReference, TorqueRefere
 from ..errors import InputError
 from ..inputs.validation import shown
 from ..model.drive import Drive
-from ..model.signals import CommandSignal, TorqueSignal
+from ..model.signals import CommandSignal, Signal, TorqueSignal
 from ..simulation.results import add_derived
 from ..simulation.scenario import Initial, Scenario, mean_inputs
 from ..simulation.train_results import add_derived_of_train
 from ..simulation.train_scenario import TrainInitial, TrainScenario, need_open_loop
-from ..simulation.train_state import start_values
 from ..simulation.train_variables import axis_variables, train_variables
 from ..simulation.variables import CHANNELS, STATES, VARIABLES, Variable
 
-Signal = CommandSignal | TorqueSignal
 AnyReference = PositionReference | SpeedReference | TorqueReference
 UNITS = {"position": "rad", "speed": "rad/s", "torque": "N*m"}
 """of references"""
@@ -34,7 +32,7 @@ class Plant:
     """A drive or a train as the search for periodic motions takes it: with commands, or with controllers and their references."""
 
     core: _core.Drive | _core.Train
-    signals: Mapping[str, Signal]
+    signals: Mapping[str, Signal[Any]]
     """by the name of their variable; of open loops in the order of the core"""
     source: str | None
     """the input that is meant if none is named: command or reference of the only motor"""
@@ -90,7 +88,7 @@ class Plant:
         """Of an input."""
         if source in self.references:
             return UNITS[self.references[source].kind]
-        return "N*m" if isinstance(self.signals[source], TorqueSignal) else "1"
+        return next(v.unit for v in self.variables if v.name == source)
 
     def with_means(self, command: float | None, load_torque: float | None) -> Plant:
         """The same with other constant inputs of a drive.
@@ -194,15 +192,18 @@ def _start_of_drive(initial: Initial) -> dict[str, float]:
 
 def _plant_of_train(scenario: TrainScenario) -> Plant:
     train = scenario.train()
-    core = train.core(scenario.loaded())
+    core = scenario.core(sampled=False)
     signals = scenario.signals()
-    variables = train_variables(train, scenario.loaded())
+    variables = train_variables(train, core)
     last = list(train.shafts)[-1]
-    motors = list(train.motors)
+    source = None
+    if len(train.motors) == 1:
+        motor = next(iter(train.motors))
+        source = f"{motor}_reference" if motor in scenario.continuous() else f"{motor}_command"
 
     def start_of(initial: TrainInitial) -> dict[str, float]:
         capacities = initial.hysteresis_capacities.items()
-        return start_values(train, initial) | {f"{name}_hysteresis_capacity": h for name, h in capacities}
+        return scenario.start(initial) | {f"{name}_hysteresis_capacity": h for name, h in capacities}
 
     floors = {f"{name}_speed": 0.0 for name in train.shafts}
     for name, gear in train.gears.items():
@@ -215,7 +216,7 @@ def _plant_of_train(scenario: TrainScenario) -> Plant:
     return Plant(
         core=core,
         signals={name: signals[name] for name in core.input_names()},
-        source=f"{motors[0]}_command" if len(motors) == 1 else None,
+        source=source,
         start=start_of(scenario.initial),
         rest=start_of(TrainInitial(angles=scenario.initial.angles, twists=scenario.initial.twists)),
         start_of=start_of,

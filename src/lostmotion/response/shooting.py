@@ -13,10 +13,10 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Torque
 from ..model.drive import Drive
-from ..model.signals import CommandSignal, TorqueSignal
+from ..model.signals import CommandSignal, Signal, TorqueSignal
 from ..simulation.scenario import Initial, Scenario
 from ..simulation.train_scenario import TrainInitial, TrainScenario
-from .plant import Plant, Signal, plant_of
+from .plant import Plant, plant_of
 
 if TYPE_CHECKING:
     import xarray
@@ -50,11 +50,15 @@ def respond(
     *,
     harmonics: int,
     keep_table: bool,
+    limit_cycle: bool = False,
     max_periods: int,
     threads: int | None,
     progress: Callable[[int], None] | None,
 ) -> dict[str, Any]:
-    """Periodic motions, one for each (inputs, period [s], components at the start): arrays of the core, a row a point."""
+    """Periodic motions, one for each (inputs, period [s], components at the start): arrays of the core, a row a point.
+
+    Of a limit cycle, under constant inputs, the periods are first estimates.
+    """
     result = _core.respond(
         plant.core,
         points,
@@ -63,6 +67,7 @@ def respond(
         max_periods,
         PERIODICITY,
         keep_table,
+        limit_cycle,
         threads or os.cpu_count() or 1,
         progress,
     )
@@ -70,7 +75,7 @@ def respond(
     return result
 
 
-def _period(signals: Iterable[Signal]) -> float:
+def _period(signals: Iterable[Signal[Any]]) -> float:
     """The common period [s] of signals that are sums of sines and constants.
 
     Raises
@@ -144,10 +149,10 @@ def periodic_motion(
     r = respond(plant, [point], harmonics=1, keep_table=True, max_periods=max_periods, threads=1, progress=None)
     if reason := reason_of(r, 0):
         raise RuntimeError(f"no periodic motion was found: {reason}")
-    return _motion(r, plant, period)
+    return motion_of(r, plant, period)
 
 
-def _replaced(signals: Mapping[str, Signal], given: Mapping[str, Any]) -> dict[str, Signal]:
+def _replaced(signals: Mapping[str, Signal[Any]], given: Mapping[str, Any]) -> dict[str, Signal[Any]]:
     """The inputs of a plant, with those that are given in place of its own."""
     out = dict(signals)
     for name, value in given.items():
@@ -169,7 +174,7 @@ def _start(plant: Plant, start: Initial | TrainInitial) -> Mapping[str, float]:
     return plant.start_of(start)
 
 
-def _motion(r: dict[str, Any], plant: Plant, period: float) -> xarray.Dataset:
+def motion_of(r: dict[str, Any], plant: Plant, period: float) -> xarray.Dataset:
     """The dataset of the one motion that `respond` has found."""
     import xarray as xr
 
@@ -193,7 +198,7 @@ def _motion(r: dict[str, Any], plant: Plant, period: float) -> xarray.Dataset:
             "period": period,
             **plant.attributes,
             "residual": float(r["residual"][0]),
-            "angle_advance": float(r["angle_advance"][0]),
+            "angle_advance": float(r["advance"][0][r["components"].index(plant.angle)]),
             "multipliers_real": multipliers.real.tolist(),
             "multipliers_imag": multipliers.imag.tolist(),
             "stable": int(is_stable(multipliers)),

@@ -13,6 +13,7 @@ from ..control.loops import CurrentLoop, Feedforward
 from ..control.references import PositionReference
 from ..inputs.part import Part
 from ..model.torsion import TorsionCurve
+from ..response.limit_cycle import frequency_of
 from ..simulation.run import run
 from ..simulation.train_scenario import TrainScenario
 from .data import inertias
@@ -277,9 +278,11 @@ def limit_cycle(axis: Axis) -> LimitCycle | None:
     whole = at_rest(axis)
     if not whole.cycles:
         return LimitCycle(whole, {})
-    kinds = {"backlash": _without_backlash, "dry friction": _without_friction, "encoder resolution": _without_steps}
-    others = {name: change(axis) for name, change in kinds.items()}
-    return LimitCycle(whole, {name: at_rest(other) for name, other in others.items() if other is not None})
+    others = {"backlash": without_backlash(axis.scenario), "dry friction": without_friction(axis.scenario)}
+    axes = {name: Axis(scenario, axis.motor) for name, scenario in others.items() if scenario is not None}
+    if (ideal := without_steps(axis)) is not None:
+        axes["encoder resolution"] = ideal
+    return LimitCycle(whole, {name: at_rest(other) for name, other in axes.items()})
 
 
 def at_rest(axis: Axis) -> AtRest:
@@ -307,27 +310,20 @@ def _watched(axis: Axis, duration: float) -> AtRest:
     first, last = np.array_split(angle, 2)
     swing = float(np.ptp(angle))
     cycles = float(np.ptp(last)) > max(DECAY * float(np.ptp(first)), 2.0 * math.pi * AT_REST)
-    frequency = _frequency(time, angle) if cycles else math.nan
+    frequency = frequency_of(time, angle) if cycles else math.nan
     return AtRest(float(time[-1] - time[0]), 0.5 * swing, 0.5 * float(np.ptp(load)), frequency, cycles)
 
 
-def _frequency(time: np.ndarray, angle: np.ndarray) -> float:
-    """By the crossings of the middle with a hysteresis of a quarter of the swing, so that ripple does not count."""
-    middle, quarter = 0.5 * (angle.max() + angle.min()), 0.25 * np.ptp(angle)
-    side = np.where(angle > middle + quarter, 1, np.where(angle < middle - quarter, -1, 0))
-    known = np.flatnonzero(side)
-    rises = known[1:][(side[known][1:] > 0) & (side[known][:-1] < 0)]
-    return float((len(rises) - 1) / (time[rises[-1]] - time[rises[0]])) if len(rises) > 1 else math.nan
-
-
-def _changed_all(axis: Axis, table: str, change: Any) -> Axis | None:
+def _changed_all(scenario: TrainScenario, table: str, change: Any) -> TrainScenario | None:
     """With all elements of a table changed; None where that changes nothing."""
-    elements = getattr(axis.scenario, table)
+    elements = getattr(scenario, table)
     new: dict[str, Part] = {name: change(element) for name, element in elements.items()}
-    return None if new == dict(elements) else Axis(changed(axis.scenario, **{table: new}), axis.motor)
+    return None if new == dict(elements) else changed(scenario, **{table: new})
 
 
-def _without_backlash(axis: Axis) -> Axis | None:
+def without_backlash(scenario: TrainScenario) -> TrainScenario | None:
+    """With all gaps closed; None where there are none."""
+
     def change(gear: Any) -> Any:
         stiffness = gear.stiffness
         if not isinstance(stiffness, TorsionCurve) or stiffness.pieces()[1][0] > 0.0:
@@ -337,10 +333,11 @@ def _without_backlash(axis: Axis) -> Axis | None:
         closed = TorsionCurve(slopes=tuple(slopes[1:]), breaks=tuple(b - gap for b in breaks[1:]))
         return gear.model_copy(update={"stiffness": closed})
 
-    return _changed_all(axis, "gears", change)
+    return _changed_all(scenario, "gears", change)
 
 
-def _without_friction(axis: Axis) -> Axis | None:
+def without_friction(scenario: TrainScenario) -> TrainScenario | None:
+    """Without dry friction and hysteresis; None where there are none."""
     none = {
         "friction_torque": 0.0,
         "breakaway_torque": None,
@@ -358,14 +355,15 @@ def _without_friction(axis: Axis) -> Axis | None:
     def smooth(gear: Any) -> Any:
         return gear.model_copy(update={"hysteresis": None}) if gear.hysteresis is not None else gear
 
-    out, found = axis, False
+    out, found = scenario, False
     for table, how in (("shafts", change), ("motors", change), ("gears", smooth)):
         new = _changed_all(out, table, how)
         out, found = (out, found) if new is None else (new, True)
     return out if found else None
 
 
-def _without_steps(axis: Axis) -> Axis | None:
+def without_steps(axis: Axis) -> Axis | None:
+    """With encoders of no resolution; None where they have none."""
     fields = {}
     for key in ("encoder", "position_encoder"):
         encoder = getattr(axis.controller, key)

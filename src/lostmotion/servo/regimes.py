@@ -44,7 +44,7 @@ class Axis:
 
     @property
     def controller(self) -> Controller:
-        return self.scenario.controllers[self.motor]
+        return self.scenario.axes()[self.motor]
 
     @property
     def motor_shaft(self) -> str:
@@ -168,7 +168,7 @@ def _model(axis: Axis, state: TrainInitial) -> LinearModel:
     values, capacities = start_values(axis.train, state), start_capacities(state)
     ramps = [_core.Signal([(0.0, 0.0, 0.0)], []) for _ in core.input_names()]
     rows = _core.linearize_train_at(core, ramps, values, capacities, 0.0)
-    return train_model(axis.train, scenario.loaded(), *rows)
+    return train_model(axis.train, core, *rows)
 
 
 def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]]]:

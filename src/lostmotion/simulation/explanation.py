@@ -171,7 +171,7 @@ def explain(what: Scenario | Simulation | TrainScenario, time: Time | None = Non
         if time is not None:
             raise InputError("a simulation is explained at its present time; leave time out")
         if isinstance(what.drive, DriveTrain):
-            return _of_train(what.drive, what.drive.core(what.loaded), what.time, *what._core.explain())
+            return _of_train(what.drive, what._core_train or what.drive.core(()), what.time, *what._core.explain())
         return _explanation(what.drive, what.time, *what._core.explain())
     if time is None:
         raise InputError(f"time is missing; give one between 0 and the duration, {what.simulation.duration} s")

@@ -116,7 +116,7 @@ def variables_of(attributes: Mapping[str, Any]) -> tuple[Variable, ...]:
         controller = tables.get("controller")
         return VARIABLES if controller is None else (*VARIABLES, *axis_variables({"": Controller(**controller)}))
     scenario = TrainScenario(**tables)
-    return (*train_variables(scenario.train(), scenario.loaded()), *axis_variables(scenario.controllers))
+    return (*train_variables(scenario.train(), scenario.core()), *axis_variables(scenario.axes()))
 
 
 def add_derived(data: dict[str, Any], ratio: Any) -> None:

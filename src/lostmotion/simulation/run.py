@@ -126,8 +126,8 @@ def run(
     table = scenario.simulation
     width = BYTES_PER_SAMPLE
     if isinstance(scenario, TrainScenario):
-        axes = axis_variables(scenario.controllers)
-        width = 16 * (len(train_variables(scenario.train(), scenario.loaded())) + len(axes))
+        axes = axis_variables(scenario.axes())
+        width = 16 * (len(train_variables(scenario.train(), scenario.core())) + len(axes))
     check_memory(table.samples, width)
     how = "exact" if exact else f"dormand-prince, relative tolerance {tolerance:g}"
     options: tuple[Any, ...] = (

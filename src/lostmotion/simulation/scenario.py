@@ -9,6 +9,7 @@ from pydantic import model_validator
 
 from .. import _core
 from ..control.axis import NO_LAWS, Bound, core_control, driven
+from ..control.continuous import ContinuousController
 from ..control.controller import Controller
 from ..control.law import Law
 from ..data_sheets.components import Conditions, use_records
@@ -84,6 +85,19 @@ class Scenario(Part):
     initial: Initial = Initial()
     task: Task = Task()
     simulation: SimulationTable
+
+    @model_validator(mode="before")
+    @classmethod
+    def _sampled(cls, data: Any) -> Any:
+        controller = data.get("controller") if isinstance(data, Mapping) else None
+        if isinstance(controller, ContinuousController) or (
+            isinstance(controller, Mapping) and controller.get("kind") == "continuous"
+        ):
+            raise InputError(
+                "key controller.kind: a continuous controller is part of a drive train; write the drive in the long form, "
+                "[shafts.motor] [shafts.load] [motors.motor] [gears.gearbox], with [controllers.motor]"
+            )
+        return data
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -10,7 +10,8 @@ from typing import Any, overload
 import numpy as np
 
 from .. import _core
-from ..control.axis import OPEN_LOOP, motor_laws
+from ..control.axis import OPEN_LOOP
+from ..control.continuous import ContinuousController
 from ..control.controller import Controller
 from ..control.law import as_laws
 from ..errors import InputError
@@ -45,7 +46,7 @@ class SimulationState:
     values: tuple[Any, ...] = field(repr=False)
     drive: Drive | DriveTrain = field(repr=False)
     """whose state it is"""
-    controllers: dict[str, Controller] = field(default_factory=dict, repr=False)
+    controllers: dict[str, Controller | ContinuousController] = field(default_factory=dict, repr=False)
     """that turn its motors"""
 
 
@@ -92,6 +93,8 @@ class Simulation:
         self._core: _core.Simulation | _core.TrainSimulation
         self._input_places: dict[str, int] | None = None  # of a train
         self._loaded: tuple[str, ...] = ()
+        self._scenario: TrainScenario | None = None
+        self._core_train: _core.Train | None = None
         self._variables: tuple[Variable, ...] = VARIABLES
         self._channel = _CHANNEL
         self._derived: dict[str, Derived]
@@ -114,13 +117,15 @@ class Simulation:
 
     def _of_train(self, what: DriveTrain | TrainScenario, step: float, loaded: Sequence[str] | None) -> None:
         train, shafts = loaded_train(what, loaded)
-        core = train.core(shafts, motor_laws(self._controllers))
-        self._drive = train
+        scenario = what if isinstance(what, TrainScenario) else None
+        core = train.core(shafts) if scenario is None else scenario.core(loaded=shafts)
+        self._drive, self._scenario, self._core_train = train, scenario, core
         self._core = _core.TrainSimulation(core, step, self._control)
         self._input_places = {name: k for k, name in enumerate(core.input_names())}
         self._loaded = tuple(shafts)
-        self._required = {f"{name}_command" for name in train.commanded() if name not in self._controllers}
-        self._variables = train_variables(train, shafts)
+        given = {f"{name}_load_torque" for name in shafts} | self._controlled()
+        self._required = {name for name in core.input_names() if name not in given}
+        self._variables = train_variables(train, core)
         self._channel = {name: k for k, (name, _, _) in enumerate(core.channels())}
         self._derived = self._derived_of(train)
         self._initial = what.initial if isinstance(what, TrainScenario) else TrainInitial()
@@ -146,7 +151,9 @@ class Simulation:
         if isinstance(self._core, _core.TrainSimulation):
             if not isinstance(start, TrainInitial) or not isinstance(self._drive, DriveTrain):
                 raise InputError("initial: is the state of a drive; that of a train is a TrainInitial")
-            self._core.reset(start_values(self._drive, start), start_capacities(start))
+            scenario = self._scenario
+            values = start_values(self._drive, start) if scenario is None else scenario.start(start)
+            self._core.reset(values, start_capacities(start))
         else:
             if not isinstance(start, Initial):
                 raise InputError("initial: is the state of a train; that of a drive is an Initial")
@@ -170,6 +177,9 @@ class Simulation:
             return ("load_torque",) if self._controllers else ("command", "load_torque")
         return tuple(name for name in self._input_places if name not in self._controlled())
 
+    def _all_controllers(self) -> dict[str, Controller | ContinuousController]:
+        return {**self._controllers, **(self._scenario.continuous() if self._scenario is not None else {})}
+
     def _controlled(self) -> set[str]:
         return {f"{motor}_command" for motor in self._controllers}
 
@@ -187,7 +197,7 @@ class Simulation:
             Of a drive E_C [-] and M_Z [N·m]: one value, held over the interval, or two, between which it runs in a
             straight line.
         inputs
-            Of a train the same by the names in `inputs`, such as ``servo_command=0.2`` and ``table_load_torque=(0.0, 5.0)``. All
+            Of a train the same by the names in `inputs`, among them the references of continuous controllers, such as ``servo_command=0.2`` and ``table_load_torque=(0.0, 5.0)``. All
             commands are to be given; a load torque that is left out is 0.
 
         Raises
@@ -244,7 +254,7 @@ class Simulation:
             if not finite:
                 raise InputError(f"{name} {shown(value)} must be finite (SI)")
         if missing := self._required - inputs.keys():
-            raise InputError(f"{', '.join(sorted(missing))}: missing; all commands are to be given")
+            raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
         try:
             within = MIN_INTERVAL <= interval <= MAX_INTERVAL
         except (TypeError, ValueError):
@@ -343,13 +353,13 @@ class Simulation:
     def state(self) -> SimulationState:
         """The whole state; set it to return to it, or to continue it in another simulation of the same drive."""
         time, *rest = self._core.get_state()
-        return SimulationState(time, tuple(rest), self._drive, self._controllers)
+        return SimulationState(time, tuple(rest), self._drive, self._all_controllers())
 
     @state.setter
     def state(self, state: SimulationState) -> None:
         try:
             same = state.drive is self._drive or state.drive == self._drive
-            same = same and state.controllers == self._controllers
+            same = same and state.controllers == self._all_controllers()
             if same:
                 self._core.set_state(state.time, *state.values)
         except (AttributeError, TypeError):

@@ -15,7 +15,7 @@ from .results import RawResult, installed_version
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import CONTACTS_OF_TRAIN, packed
 from .train_scenario import TrainScenario
-from .train_state import start_capacities, start_values
+from .train_state import start_capacities
 from .train_variables import angle_through, angles_through_gears, named_signals
 from .windings import set_torques
 
@@ -35,7 +35,7 @@ def run_train(
     result = _core.run_train(core, inputs, start, capacities, *(*options, control))
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     data = dict(zip((name for name, _, _ in core.channels()), result["values"], strict=True))
-    data |= named_signals(scenario.controllers, result["control"])
+    data |= named_signals(scenario.axes(), result["control"])
     set_torques(scenario, data)
     add_derived_of_train(scenario.train(), data, time)
     attributes = _attributes(scenario, result, how, ledger=ledger)
@@ -46,11 +46,10 @@ def core_case(
     scenario: TrainScenario,
 ) -> tuple[_core.Train, list[_core.Signal], dict[str, float], dict[str, float]]:
     """What every run of the core begins with: train, inputs, state and hysteresis capacities by name."""
-    train = scenario.train()
     core = scenario.core()
     signals = scenario.signals()
     inputs = [signals[name].core() for name in core.input_names()]
-    return core, inputs, start_values(train, scenario.initial), start_capacities(scenario.initial)
+    return core, inputs, scenario.start(), start_capacities(scenario.initial)
 
 
 def _attributes(scenario: TrainScenario, result: dict[str, Any], how: str, *, ledger: bool) -> dict[str, Any]:

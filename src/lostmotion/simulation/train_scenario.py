@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
 from .. import _core
 from ..control.axis import NO_LAWS, Bound, core_control, motor_laws
-from ..control.controller import Controller
+from ..control.continuous import ContinuousController
+from ..control.controller import AnyController, Controller
 from ..control.law import Law
 from ..data_sheets.components import Conditions
 from ..data_sheets.train_components import RECORDS, use_train_records
 from ..errors import InputError
 from ..inputs.named import nothing
 from ..inputs.part import Part
-from ..inputs.quantities import Angle, NotNegative, Speed, Torque
+from ..inputs.quantities import Angle, NotNegative, Number, Speed, Torque
 from ..inputs.validation import did_you_mean, shown
 from ..model.shaft import Shaft
-from ..model.signals import CommandSignal, TorqueSignal
+from ..model.signals import CommandSignal, Signal, TorqueSignal
 from ..model.train import DriveTrain, Elements, TrainElements
 from .keys import set_values
 from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, json_schema
-from .train_state import start_values
+from .train_state import angles_at_start, start_values
 from .train_variables import check_names
 
 
@@ -46,6 +47,9 @@ class TrainInitial(Part):
     """of gears with a stiffness"""
     motor_torques: Elements[Torque] = Field(default_factory=nothing)
     """of DC motors"""
+    controller_states: Elements[Number] = Field(default_factory=nothing)
+    """of continuous controllers, by their result variables (SI), such as ``MOTOR_integral``; the filter of a derivative that is
+    left out has settled"""
     hysteresis_capacities: Elements[Annotated[Torque, NotNegative]] = Field(default_factory=nothing)
     """of gears with hysteresis: what the last turning point before t = 0 left behind"""
 
@@ -64,7 +68,7 @@ class TrainScenario(TrainElements):
     shafts: Elements[ShaftTable] = Field(min_length=1)
     command: Elements[CommandSignal] = Field(default_factory=nothing)
     """of each motor (1 is rated voltage, or with a torque source rated torque; left out, 0), brake and friction clutch (1 is the full torque, 0 none)"""
-    controllers: Elements[Controller] = Field(default_factory=nothing)
+    controllers: Elements[AnyController] = Field(default_factory=nothing)
     """of motors, which then have no command"""
     initial: TrainInitial = TrainInitial()
     simulation: SimulationTable
@@ -73,7 +77,11 @@ class TrainScenario(TrainElements):
     def _consistent(self) -> Self:
         train = self.train()
         train.check(self.loaded())
-        check_names(train, self.loaded(), self.controllers)
+        self._check_controllers()
+        core = self.core()
+        if self.continuous() and (problem := core.check()):
+            raise InputError(problem)
+        check_names(train, core, self.axes())
         known = self.commanded()
         for name in self.command:
             if name not in known:
@@ -88,8 +96,8 @@ class TrainScenario(TrainElements):
                 self._acting(name)
             except ValueError as problem:
                 raise InputError(f"key command.{name}: {problem}") from None
-        start_values(train, self.initial)
-        self._check_controllers()
+        self.start()
+        self.control()
         return self
 
     def _check_controllers(self) -> None:
@@ -101,19 +109,65 @@ class TrainScenario(TrainElements):
                 raise InputError(
                     f"keys command.{name}, controllers.{name}: both turn the same motor; leave one of them out"
                 )
-        self.control()
 
-    def axes(self) -> Mapping[str, Controller]:
-        """The controllers by the names of their motors."""
-        return self.controllers
+    def axes(self) -> dict[str, Controller]:
+        """The sampled controllers by the names of their motors."""
+        return {name: c for name, c in self.controllers.items() if isinstance(c, Controller)}
+
+    def continuous(self) -> dict[str, ContinuousController]:
+        """The continuous controllers by the names of their motors."""
+        return {name: c for name, c in self.controllers.items() if isinstance(c, ContinuousController)}
 
     def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
         """The solver's controllers."""
-        return core_control(self.train(), self.controllers, laws=laws)
+        return core_control(self.train(), self.axes(), laws=laws)
 
-    def core(self) -> _core.Train:
-        """The solver's train, its motors as the current loops make them."""
-        return self.train().core(self.loaded(), motor_laws(self.controllers))
+    def core(self, *, sampled: bool = True, loaded: Collection[str] | None = None) -> _core.Train:
+        """The solver's train with its continuous controllers, its motors as the current loops make them.
+
+        Parameters
+        ----------
+        sampled
+            Also those of sampled controllers.
+        loaded
+            Names of the shafts that a load torque acts on, if others than those of the scenario.
+        """
+        train, continuous = self.train(), self.continuous()
+        core = train.core(
+            self.loaded() if loaded is None else loaded, motor_laws(self.controllers if sampled else continuous)
+        )
+        for name, controller in continuous.items():
+            try:
+                controller.add_to(core, train, name)
+            except InputError as problem:
+                raise InputError(f"key controllers.{name}.{problem}") from None
+        return core
+
+    def start(self, initial: TrainInitial | None = None) -> dict[str, float]:
+        """State at t = 0 by the names of its variables; what is left out is 0.
+
+        Parameters
+        ----------
+        initial
+            In place of that of the scenario.
+        """
+        train = self.train()
+        initial = self.initial if initial is None else initial
+        values = start_values(train, initial)
+        angles = angles_at_start(train, initial.angles, initial.twists)
+        known = []
+        for name, controller in self.continuous().items():
+            shaft = controller.shaft or list(train.shafts)[-1]
+            measured = angles[shaft] if controller.reference.kind == "position" else initial.speeds.get(shaft, 0.0)
+            values |= controller.start(name, measured)
+            known += [f"{name}_{state}" for state in controller.system().states]
+        for name in initial.controller_states:
+            if name not in known:
+                meant = did_you_mean(name, known, f"they are {', '.join(known) or 'none'}")
+                raise InputError(
+                    f"key initial.controller_states.{name}: is no state of a controller of this train; {meant}"
+                )
+        return values | initial.controller_states
 
     def train(self) -> DriveTrain:
         """The drive train without its surroundings."""
@@ -126,11 +180,13 @@ class TrainScenario(TrainElements):
         """Names of the shafts that a load torque acts on."""
         return [name for name, shaft in self.shafts.items() if shaft.torque is not None]
 
-    def signals(self) -> dict[str, CommandSignal | TorqueSignal]:
+    def signals(self) -> dict[str, Signal[Any]]:
         """All that acts on the train, after delays of brakes and clutches, by the name of its result variable."""
-        commands = {f"{name}_command": self._acting(name) for name in self.commanded()}
+        controllers = self.continuous()
+        commands = {f"{name}_command": self._acting(name) for name in self.commanded() if name not in controllers}
         torques = {f"{name}_load_torque": s.torque for name, s in self.shafts.items() if s.torque is not None}
-        return {**commands, **torques}
+        references = {name: s for motor, c in controllers.items() for name, s in c.signals(motor).items()}
+        return {**commands, **torques, **references}
 
     def _acting(self, name: str) -> CommandSignal:
         """The command of a motor, brake or clutch after its delays."""
@@ -186,7 +242,7 @@ def loaded_train(what: DriveTrain | TrainScenario, loaded: Sequence[str] | None 
                 meant = did_you_mean(name, train.shafts, f"the shafts are {', '.join(train.shafts)}")
                 raise InputError(f"loaded: {shown(name)} is no shaft of this train; {meant}")
         train.check(shafts)
-    check_names(train, shafts)
+    check_names(train, train.core(shafts))
     return train, shafts
 
 
@@ -271,7 +327,7 @@ def in_long_form(scenario: Scenario) -> TrainScenario:
         motors=train.motors,
         gears=train.gears,
         command={} if scenario.controller is not None else {"motor": scenario.command},
-        controllers=scenario.axes(),
+        controllers=dict(scenario.axes()),
         initial=initial,
         simulation=scenario.simulation,
     )

@@ -15,15 +15,15 @@ from ..model.train import DriveTrain, TrainElements
 from .variables import Variable
 
 
-def train_variables(train: DriveTrain, loaded: Collection[str]) -> tuple[Variable, ...]:
+def train_variables(train: DriveTrain, core: _core.Train) -> tuple[Variable, ...]:
     """All variables that a result of this train has.
 
     Parameters
     ----------
-    loaded
-        Names of the shafts that a load torque acts on.
+    core
+        The solver's train, with what acts on it.
     """
-    channels = [Variable(name, "", unit or "1", meaning) for name, unit, meaning in train.core(loaded).channels()]
+    channels = [Variable(name, "", unit or "1", meaning) for name, unit, meaning in core.channels()]
     known = {channel.name for channel in channels}
     return (*channels, *(variable for variable in _derived(train) if variable.name not in known))
 
@@ -114,7 +114,7 @@ def angle_through(gear: Gear, angle: Any, twist: Any, *, forward: bool) -> Any:
     return angle / gear.ratio - twist - e
 
 
-def check_names(train: DriveTrain, loaded: Collection[str], controllers: Mapping[str, Controller] = {}) -> None:
+def check_names(train: DriveTrain, core: _core.Train, controllers: Mapping[str, Controller] = {}) -> None:
     """Refuse two elements whose result variables have the same name.
 
     Raises
@@ -122,7 +122,7 @@ def check_names(train: DriveTrain, loaded: Collection[str], controllers: Mapping
     InputError
     """
     seen = {"time"}
-    for variable in (*train_variables(train, loaded), *axis_variables(controllers)):
+    for variable in (*train_variables(train, core), *axis_variables(controllers)):
         if variable.name in seen:
             tables = ("shafts", *TrainElements.model_fields)
             keys = [f"{table}.{name}" for table in tables for name in getattr(train, table)]

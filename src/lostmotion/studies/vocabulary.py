@@ -42,9 +42,9 @@ def vocabulary_of(scenario: Scenario | TrainScenario) -> Vocabulary:
     """
     if isinstance(scenario, Scenario):
         return OF_DRIVES
-    train, loaded = scenario.train(), scenario.loaded()
-    variables = train_variables(train, loaded)
-    entries = train.core(loaded).ledger_names()
+    core = scenario.core()
+    variables = train_variables(scenario.train(), core)
+    entries = core.ledger_names()
     return Vocabulary(
         tuple((v.name, v.unit) for v in variables),
         tuple(v.name for v in variables if not v.derived),

@@ -1,0 +1,52 @@
+"""Figures of docs/limit-cycles.md: the scenario `hunting-with-static-friction`, its limit cycle, and maps of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lostmotion as lm
+from lostmotion.reports import plots
+from lostmotion.reports.panels import Curve, Panel
+
+DARK: dict[str, Any] = {"color": "#0b3c5d", "linewidth": 1.4}
+LIGHT: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.3}
+MRAD = 1e3
+
+
+def _curves(data: Any, name: str, label: str, factor: float, style: dict[str, Any]) -> Curve:
+    return Curve(label, data["time"].to_numpy(), factor * data[name].to_numpy(), style)
+
+
+def run(out: Path, scenario: lm.TrainScenario) -> None:
+    """From the step on, with and without static friction."""
+    without = scenario.replace(**{"shafts.table.breakaway_torque": None})
+    both = {"static friction 8 N·m": (scenario, DARK), "no more than in motion, 5 N·m": (without, LIGHT)}
+    results = {name: (lm.simulate(s, energy=False), style) for name, (s, style) in both.items()}
+    errors = tuple(_curves(r, "servo_error", name, MRAD, style) for name, (r, style) in results.items())
+    torques = tuple(_curves(r, "servo_torque", name, 1.0, style) for name, (r, style) in results.items())
+    panels = [
+        Panel("position error", "time [s]", "[mrad]", errors, y_range=(-10.0, 10.0)),
+        Panel("torque of the motor", "time [s]", "[N·m]", torques),
+    ]
+    plots.draw(panels, 1, (9.0, 5.4)).savefig(out / "hunting-run.png", dpi=100, metadata={"Software": None})
+
+
+def maps(out: Path, scenario: lm.TrainScenario) -> None:
+    """Over static friction and integral gain."""
+    grid = {
+        "controllers.servo.position.integral_gain": np.linspace(4.0, 64.0, 40),
+        "shafts.table.breakaway_torque": np.linspace(5.0, 12.0, 40),
+    }
+    found = lm.hunting_map(scenario, grid)
+    found.lm.plot().savefig(out / "hunting-map.png", dpi=100, metadata={"Software": None})
+
+
+def write(out: Path) -> None:
+    """All figures of the page, into a directory."""
+    scenario = lm.load("hunting-with-static-friction")
+    assert isinstance(scenario, lm.TrainScenario)
+    run(out, scenario)
+    maps(out, scenario)

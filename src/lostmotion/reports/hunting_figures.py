@@ -1,0 +1,47 @@
+"""Figures of limit cycles."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def map_figure(found: xarray.Dataset) -> Figure:
+    """Amplitude and frequency of a hunting map over its two keys; white where there is no limit cycle, hatched where it is
+    unstable.
+
+    Raises
+    ------
+    InputError
+        The map has one key.
+    """
+    dims = found["amplitude"].dims
+    if len(dims) != 2:
+        raise InputError("this map has one key, and the figure shows two; draw its variables amplitude and frequency")
+    figure = Figure(figsize=(10.0, 4.0), layout="constrained")
+    x, y = found[dims[1]], found[dims[0]]
+    cycles = np.isfinite(found["frequency"].values)
+    labels = {"amplitude": f"amplitude of {found.attrs['variable']} (SI)", "frequency": "frequency [Hz]"}
+    for axes, (name, label) in zip(figure.subplots(1, 2, sharey=True), labels.items(), strict=True):
+        shown: Any = np.ma.masked_array(found[name].values, ~cycles)
+        mesh = axes.pcolormesh(x.values, y.values, shown, cmap="cividis", shading="nearest", rasterized=True)
+        unstable = np.where(cycles & ~found["stable"].values, 1.0, np.nan)
+        if np.isfinite(unstable).any():
+            axes.contourf(x.values, y.values, unstable, levels=[0.5, 1.5], hatches=["///"], alpha=0.0)
+        figure.colorbar(mesh, ax=axes)
+        axes.set_title(label)
+        axes.set_xlabel(_label(x))
+    figure.axes[0].set_ylabel(_label(y))
+    return figure
+
+
+def _label(key: xarray.DataArray) -> str:
+    """The last two words of a dotted key."""
+    return ".".join(str(key.attrs["long_name"]).split(".")[-2:])

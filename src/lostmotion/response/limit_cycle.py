@@ -1,0 +1,207 @@
+"""Limit cycles under constant inputs: a run leads to their neighbourhood, Newton's method finds state and period."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..control.axis import OPEN_LOOP
+from ..errors import InputError
+from ..simulation.train_results import core_case
+from ..simulation.train_scenario import TrainScenario
+from .shooting import PERIODICITY, SAMPLES_PER_PERIOD, reason_of
+
+SAMPLES = 4000  # of the run that is watched
+LONGER = 5  # runs, each four times as long as the one before
+DECAY = 0.5  # of the swing from one quarter of the run to the next, below which it dies out
+AT_REST = 1e-9  # of the largest value in the run: a swing below it is rounding
+GROWTH = 1e6  # of the swing over that in the shortest run
+MULTIPLES = (1, 2, 3)  # of the apparent period
+MAX_PERIODS = 60  # followed by the search
+NEAR = 0.3  # by which the period may differ from the apparent one, relative
+PART_OF = 1e-6  # by which a whole number of shorter periods may differ from one, relative
+MAX_SWITCHINGS = 20_000
+
+
+@dataclass(frozen=True)
+class Found:
+    """What became of the search."""
+
+    reason: str
+    """why there is no limit cycle; empty if there is one"""
+    result: dict[str, Any] = field(default_factory=dict, repr=False)
+    """of the core's search, of one point"""
+    channels: tuple[str, ...] = ()
+
+    @property
+    def period(self) -> float:
+        """[s]"""
+        return float(self.result["period"][0])
+
+    def values(self, name: str) -> np.ndarray:
+        """A channel over one period."""
+        return np.asarray(self.result["table"][0][self.channels.index(name)])
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A train with constant inputs, ready to run."""
+
+    core: _core.Train
+    inputs: Sequence[_core.Signal]
+    constants: Sequence[_core.Signal]
+    """what the inputs have come to"""
+    start: Mapping[str, float]
+    capacities: Mapping[str, float]
+    settled: float
+    """from when on the inputs are constant [s]"""
+    watched: str
+    """the channel whose swing is looked at"""
+    channels: tuple[str, ...]
+
+    @classmethod
+    def of(cls, scenario: TrainScenario) -> Loop:
+        """Of a scenario whose inputs come to rest.
+
+        Raises
+        ------
+        InputError
+            One of them does not.
+        """
+        core, inputs, start, capacities = core_case(scenario)
+        signals, constants, settled = scenario.signals(), [], 0.0
+        for name in core.input_names():
+            time, value, slope = signals[name].breakpoint_list()[-1]
+            if signals[name].sine_list() or slope != 0.0:
+                raise InputError(
+                    f"{name}: never comes to rest, and a limit cycle is what a loop does by itself; leave out sines, or take "
+                    "periodic_motion"
+                )
+            settled = max(settled, time)
+            constants.append(_core.Signal([(0.0, value, 0.0)], []))
+        controlled, last = scenario.continuous(), list(scenario.shafts)[-1]
+        watched = f"{next(iter(controlled))}_error" if controlled else f"{last}_speed"
+        channels = tuple(name for name, _, _ in core.channels())
+        return cls(core, inputs, constants, start, capacities, settled, watched, channels)
+
+    def run(self, duration: float, samples: int) -> dict[str, Any]:
+        """From the start."""
+        return _core.run_train(
+            self.core,
+            self.inputs,
+            self.start,
+            self.capacities,
+            duration,
+            duration / samples,
+            samples,
+            False,
+            0.0,
+            MAX_SWITCHINGS,
+            OPEN_LOOP,
+        )
+
+    def rests(self, run: Mapping[str, Any]) -> bool:
+        """Whether no state moves in the last quarter of a run."""
+        states = [self.channels.index(name) for name in run["end_state"] if name in self.channels]
+        values = run["values"][states]
+        return bool(np.all(np.ptp(values[:, -SAMPLES // 4 :], axis=1) <= AT_REST * np.abs(values).max(axis=1)))
+
+    def search(self, start: Mapping[str, float], period: float, *, threads: int = 1) -> dict[str, Any]:
+        """Newton's method for state and period, from an estimate of both."""
+        return _core.respond(
+            self.core,
+            [(self.constants, period, start)],
+            SAMPLES_PER_PERIOD,
+            1,
+            MAX_PERIODS,
+            PERIODICITY,
+            True,
+            True,
+            threads,
+        )
+
+
+def find_limit_cycle(loop: Loop, duration: float) -> Found:
+    """The limit cycle that a run from the start leads to.
+
+    Parameters
+    ----------
+    duration
+        Of the shortest run [s]; where it does not suffice, longer ones follow.
+    """
+    reason, first = "", 0.0
+    for _ in range(LONGER):
+        whole = loop.settled + duration
+        run = loop.run(whole, SAMPLES)
+        watched = run["values"][loop.channels.index(loop.watched)]
+        time = np.arange(SAMPLES) * (whole / SAMPLES)
+        later = time >= loop.settled + 0.5 * duration
+        x, t = watched[later], time[later]
+        before, last = (float(np.ptp(part)) for part in np.array_split(x, 2))
+        if loop.rests(run):
+            return Found(f"it comes to rest: after {whole:.4g} s {loop.watched} stays at {x[-1]:.6g}")
+        first = first or last
+        if last > GROWTH * first or not np.isfinite(last):
+            return Found(
+                f"it grows without bound: the linear loop is unstable, and after {whole:.4g} s nothing limits it"
+            )
+        if 0.0 < last < DECAY * before:
+            reason = f"it dies out: in the last quarter of {whole:.4g} s it swings by {last / before:.3g} of the quarter before"
+        elif np.isnan(f := frequency_of(t, x)):
+            reason = f"no two swings within {0.5 * duration:.4g} s; give a longer simulation.duration"
+        else:
+            reason, found = _near(loop, run, 1.0 / f, whole)
+            if found is not None:
+                return found
+        duration *= 4.0
+    return Found(reason)
+
+
+def _near(loop: Loop, run: dict[str, Any], apparent: float, end: float) -> tuple[str, Found | None]:
+    """The limit cycle near the end of a run, or why none was found."""
+    reason = ""
+    for multiple in MULTIPLES:
+        period = multiple * apparent
+        begin = _quiet_instant(run["switchings"][:, 0], end - period, end)
+        start = loop.run(begin, 1)["end_state"]
+        result = loop.search(start, period)
+        if reason := reason_of(result, 0):
+            continue
+        found = Found("", result, loop.channels)
+        swing = float(np.ptp(found.values(loop.watched)))
+        watched = run["values"][loop.channels.index(loop.watched)]
+        if abs(found.period / period - 1.0) < NEAR and swing > 1e-3 * float(np.ptp(watched[-SAMPLES // 8 :])):
+            return "", _shortest(loop, found, multiple)
+        reason = "Newton's method leads to rest, or to another motion"
+    return f"it swings with a period of about {apparent:.4g} s, but does not repeat: {reason}", None
+
+
+def _shortest(loop: Loop, found: Found, multiple: int) -> Found:
+    """The same motion over the shortest of its periods."""
+    start = dict(zip(found.result["components"], found.result["start"][0].tolist(), strict=True))
+    for parts in range(multiple, 1, -1):
+        result = loop.search(start, found.period / parts)
+        if not reason_of(result, 0) and abs(result["period"][0] * parts / found.period - 1.0) < PART_OF:
+            return Found("", result, loop.channels)
+    return found
+
+
+def _quiet_instant(instants: np.ndarray, begin: float, end: float) -> float:
+    """The middle of the longest time between switchings, where a change of the state changes no regime."""
+    within = [begin, *instants[(instants > begin) & (instants < end)], end]
+    k = int(np.argmax(np.diff(within)))
+    return float(0.5 * (within[k] + within[k + 1]))
+
+
+def frequency_of(time: np.ndarray, values: np.ndarray) -> float:
+    """By the crossings of the middle with a hysteresis of a quarter of the swing, so that ripple does not count [Hz]; NaN
+    where there are no two swings."""
+    middle, quarter = 0.5 * (values.max() + values.min()), 0.25 * np.ptp(values)
+    side = np.where(values > middle + quarter, 1, np.where(values < middle - quarter, -1, 0))
+    known = np.flatnonzero(side)
+    rises = known[1:][(side[known][1:] > 0) & (side[known][:-1] < 0)]
+    return float((len(rises) - 1) / (time[rises[-1]] - time[rises[0]])) if len(rises) > 1 else float("nan")

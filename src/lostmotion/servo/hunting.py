@@ -1,0 +1,273 @@
+"""Hunting: what a closed loop does by itself, exactly with continuous controllers, by a long run with sampled ones."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..inputs.arguments import checked
+from ..inputs.quantities import Count
+from ..inputs.validation import shown
+from ..response.limit_cycle import Found, Loop, find_limit_cycle
+from ..response.plant import known_output, plant_of
+from ..response.shooting import floquet_multipliers, is_stable, motion_of
+from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainScenario, in_long_form
+from .motion import PART, at_rest, without_backlash, without_friction
+from .regimes import axis_of
+
+if TYPE_CHECKING:
+    import xarray
+
+NAN = float("nan")
+MAX_POINTS = 1_000_000  # of a map
+
+
+@dataclass(frozen=True)
+class Hunting:
+    """A limit cycle, or why there is none."""
+
+    reason: str
+    """why there is none; empty if there is one"""
+    exact: bool
+    """by Newton's method with the period as an unknown; else by statistics of a long run, as of sampled controllers"""
+    frequency: float
+    """[Hz]; NaN without a limit cycle"""
+    amplitudes: Mapping[str, float]
+    """half of what each variable swings by (SI)"""
+    motion: xarray.Dataset | None
+    """one period, with the Jacobian of the map over it, of an exact one"""
+    multipliers: np.ndarray
+    """Floquet multipliers of an exact one, without that of its phase, which is 1"""
+    causes: tuple[str, ...]
+    """without which there is no limit cycle, or less than half of it: backlash, dry friction, static friction (in excess of the
+    friction in motion), saturation, encoder resolution"""
+
+    @property
+    def cycles(self) -> bool:
+        """Whether there is a limit cycle."""
+        return not self.reason
+
+    @property
+    def period(self) -> float:
+        """[s]"""
+        return 1.0 / self.frequency
+
+    @property
+    def stable(self) -> bool:
+        """Whether neighbouring motions approach it; a run has led to one that is not exact, so that it is."""
+        return self.cycles and (not self.exact or is_stable(self.multipliers))
+
+    def __repr__(self) -> str:
+        if not self.cycles:
+            return f"no limit cycle: {self.reason}"
+        by = f", by {' and '.join(self.causes)}" if self.causes else ""
+        return f"{'stable' if self.stable else 'unstable'} limit cycle of {self.frequency:.6g} Hz{by}"
+
+
+@checked
+def limit_cycle(scenario: Scenario | TrainScenario, *, motor: str | None = None, causes: bool = True) -> Hunting:
+    """The limit cycle that a loop falls into by itself, from the initial state of its scenario.
+
+    With continuous controllers, or without any, a run leads to its neighbourhood, and Newton's method finds state and period
+    to rounding, with the exact Jacobian of the map over a period. Sampled controllers have no such map, since a quantised
+    angle has no derivative: of them a long run after a small step is watched, as in `commission`.
+
+    Parameters
+    ----------
+    scenario
+        Its inputs must come to rest; its duration is that of the shortest run, and longer ones follow where it does not
+        suffice.
+    motor
+        Whose sampled controller is looked at; may be left out where there is one.
+    causes
+        Whether to find out what causes it, by leaving out one possible cause after the other.
+
+    Raises
+    ------
+    InputError
+        An input never comes to rest, or there are both sampled and continuous controllers.
+    """
+    train = scenario if isinstance(scenario, TrainScenario) else in_long_form(scenario)
+    if train.axes():
+        if train.continuous():
+            raise InputError(
+                "limit_cycle: the scenario has sampled and continuous controllers; give all of them one kind"
+            )
+        return _sampled(train, motor, causes=causes)
+    found = _found(train)
+    if found.reason:
+        return Hunting(found.reason, True, NAN, {}, None, np.array([]), ())
+    plant = plant_of(train)
+    motion = motion_of(found.result, plant, found.period)
+    amplitudes = {v.name: 0.5 * float(np.ptp(motion[v.name].values)) for v in plant.variables}
+    return Hunting(
+        "", True, 1.0 / found.period, amplitudes, motion, _multipliers(found), _causes(train, found) if causes else ()
+    )
+
+
+def _found(train: TrainScenario) -> Found:
+    return find_limit_cycle(Loop.of(train), train.simulation.duration)
+
+
+def _multipliers(found: Found) -> np.ndarray:
+    """Without the one of the phase, nearest to 1."""
+    all_of_them = floquet_multipliers(found.result, 0)
+    return np.delete(all_of_them, int(np.argmin(np.abs(all_of_them - 1.0))))
+
+
+def _swing(found: Found, name: str) -> float:
+    return 0.0 if found.reason else float(np.ptp(found.values(name)))
+
+
+def _causes(train: TrainScenario, found: Found) -> tuple[str, ...]:
+    watched = Loop.of(train).watched
+    low = PART * _swing(found, watched)
+    left_out = {
+        "backlash": without_backlash(train),
+        "dry friction": without_friction(train),
+        "static friction": without_static_friction(train),
+        "saturation": without_saturation(train),
+    }
+    return tuple(name for name, other in left_out.items() if other is not None and _swing(_found(other), watched) < low)
+
+
+def without_static_friction(train: TrainScenario) -> TrainScenario | None:
+    """With the friction in motion at rest, too; None where that changes nothing."""
+    new = {}
+    for table in ("shafts", "brakes", "clutches"):
+        elements = getattr(train, table)
+        changed = {
+            name: e.model_copy(update={"breakaway_torque": None}) if e.breakaway_torque is not None else e
+            for name, e in elements.items()
+            if getattr(e, "stribeck_speed", None) is None
+        }
+        if any(changed[name] is not elements[name] for name in changed):
+            new[table] = {**elements, **changed}
+    return train.model_copy(update=new) if new else None
+
+
+def without_saturation(train: TrainScenario) -> TrainScenario | None:
+    """Without the limits of continuous controllers and of their motors; None where that changes nothing."""
+    controllers = {
+        name: c.model_copy(update={"limit": None, "anti_windup_time": None}) if c.limit is not None else c
+        for name, c in train.continuous().items()
+    }
+    motors = {
+        name: m.model_copy(update={"torque_limit": None}) if m.torque_limit is not None and name in controllers else m
+        for name, m in train.motors.items()
+    }
+    if controllers == train.continuous() and motors == dict(train.motors):
+        return None
+    return train.model_copy(update={"controllers": {**train.controllers, **controllers}, "motors": motors})
+
+
+def _sampled(train: TrainScenario, motor: str | None, *, causes: bool) -> Hunting:
+    """By a long run, as the servo sheet has it."""
+    from .motion import limit_cycle as watched
+
+    axis = axis_of(train, motor)
+    if axis.controller.position is None:
+        raise InputError(
+            f"limit_cycle: the controller of {axis.motor} has no position loop, whose rest is watched; add one, or take a "
+            "continuous controller"
+        )
+    cycle = watched(axis) if causes else None
+    rest = cycle.whole if cycle is not None else at_rest(axis)
+    if not rest.cycles:
+        return Hunting(
+            f"it comes to rest, or dies out, over {rest.watched:.4g} s", False, NAN, {}, None, np.array([]), ()
+        )
+    amplitudes = {f"{axis.motor_shaft}_angle": rest.motor_amplitude, f"{axis.shaft}_angle": rest.amplitude}
+    found = tuple(cycle.causes) if cycle is not None else ()
+    return Hunting("", False, rest.frequency, amplitudes, None, np.array([]), found)
+
+
+@checked
+def hunting_map(
+    scenario: Scenario | TrainScenario,
+    grid: Mapping[str, Any],
+    *,
+    variable: str | None = None,
+    threads: Count | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> xarray.Dataset:
+    """Amplitude and frequency of the limit cycle over one or two keys of a scenario.
+
+    Parameters
+    ----------
+    scenario
+        As of `limit_cycle`.
+    grid
+        One or two dotted keys with their values, such as ``{"controllers.servo.position.gain": np.linspace(1, 10, 40),
+        "gears.belt.stiffness.backlash": np.linspace(0, 1e-2, 40)}``.
+    variable
+        Whose amplitude is wanted; left out, the angle of the last shaft.
+    threads
+        Left out, one for each processor.
+    progress
+        Called with the number of points done.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the values of the keys: ``amplitude`` (SI; 0 without a limit cycle), ``frequency`` [Hz] (NaN without), ``stable``, and
+        ``reason`` why there is none.
+
+    Raises
+    ------
+    InputError
+        A key is unknown, or a value cannot be used.
+    """
+    import xarray as xr
+
+    train = scenario if isinstance(scenario, TrainScenario) else in_long_form(scenario)
+    keys = {key: np.atleast_1d(np.asarray(values)) for key, values in grid.items()}
+    if not 1 <= len(keys) <= 2 or not all(v.ndim == 1 and len(v) for v in keys.values()):
+        raise InputError(f"grid: {shown(dict(grid))} must give values for one or two keys")
+    shape = tuple(len(v) for v in keys.values())
+    if math.prod(shape) > MAX_POINTS:
+        raise InputError(f"grid: {math.prod(shape)} points are more than {MAX_POINTS}; give fewer values")
+    of = f"{list(train.shafts)[-1]}_angle" if variable is None else known_output(variable, Loop.of(train).channels)
+    done = 0
+
+    def point(index: tuple[int, ...]) -> tuple[float, float, bool, str]:
+        nonlocal done
+        changes = {key: values[k].item() for (key, values), k in zip(keys.items(), index, strict=True)}
+        result = _point(train.replace(**changes), of)
+        done += 1
+        if progress is not None:
+            progress(done)
+        return result
+
+    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+        rows = list(pool.map(point, np.ndindex(shape)))
+    columns = [np.array(column).reshape(shape) for column in zip(*rows, strict=True)]
+    names = tuple(key.replace(".", "_") for key in keys)
+    about = [
+        ("amplitude", {"long_name": f"half of what {of} swings by"}),
+        ("frequency", {"long_name": "frequency of the limit cycle", "units": "Hz"}),
+        ("stable", {"long_name": "whether neighbouring motions approach it"}),
+        ("reason", {"long_name": "why there is none"}),
+    ]
+    data = {name: (names, column, attrs) for (name, attrs), column in zip(about, columns, strict=True)}
+    coords = {n: (n, values, {"long_name": key}) for n, (key, values) in zip(names, keys.items(), strict=True)}
+    return xr.Dataset(data, coords=coords, attrs={"variable": of})
+
+
+def _point(train: TrainScenario, variable: str) -> tuple[float, float, bool, str]:
+    """Amplitude, frequency, stable, reason."""
+    if train.axes():
+        found = limit_cycle(train, causes=False)
+        return found.amplitudes.get(variable, 0.0), found.frequency, found.stable, found.reason
+    exact = _found(train)
+    if exact.reason:
+        return 0.0, NAN, False, exact.reason
+    return 0.5 * _swing(exact, variable), 1.0 / exact.period, is_stable(_multipliers(exact)), ""
