@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..control.axis import NO_LAWS, Bound, core_control, motor_laws
+from ..control.axis import NO_LAWS, Bound, check_torques, core_control, motor_laws
 from ..control.controller import Controller
 from ..control.law import Law
 from ..data_sheets.components import Conditions
@@ -101,6 +101,7 @@ class TrainScenario(TrainElements):
                 raise InputError(
                     f"keys command.{name}, controllers.{name}: both turn the same motor; leave one of them out"
                 )
+        check_torques(self.controllers, self.initial.motor_torques, "initial.motor_torques.{}")
         self.control()
 
     def axes(self) -> Mapping[str, Controller]:
