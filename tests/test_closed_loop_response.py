@@ -14,43 +14,18 @@ from lostmotion.cli import app
 from lostmotion.response.windows import fitting
 from lostmotion.servo.regimes import axis_of, regimes
 from lostmotion.servo.sampled import SampledLoop
-
-T = 125e-6
+from two_mass import T, two_mass
 
 
 def two_masses(kind: str, **changes: Any) -> lm.TrainScenario:
     """Two masses without friction that is dry: one linear regime."""
-    controller: dict[str, Any] = {
-        "sample_time": T,
-        "reference": {"kind": kind},
-        "encoder": {"ideal": True},
-        "speed": {
-            "gain": 1.1,
-            "integral_gain": 45.0,
-            "reference_weight": 0.6,
-            "estimate": {"kind": "difference", "time_constant": 2e-4},
-        },
-    }
+    estimate = {"kind": "difference", "time_constant": 2e-4}
+    controller: dict[str, Any] = {"reference": {"kind": kind}}
     if kind == "position":
         controller["position"] = {"gain": 20.0, "feedforward": 0.5, "sample_time": 8 * T}
         controller["position_encoder"] = {"ideal": True, "shaft": "load"}
-    return lm.TrainScenario(
-        shafts={
-            "motor": {"inertia": 2e-3, "viscous_friction": 0.01},
-            "load": {"inertia": 5e-3, "viscous_friction": 0.02, "torque": 0.0},
-        },
-        motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 2.0}},
-        gears={
-            "coupling": {
-                "input": "motor",
-                "output": "load",
-                "ratio": 1.0,
-                "stiffness": {"kind": "linear", "stiffness": 700.0},
-            }
-        },
-        controllers={"m": controller | changes},
-        simulation={"duration": 0.1, "sample_interval": 1e-3},
-    )
+    speed = {"gain": 1.1, "integral_gain": 45.0, "reference_weight": 0.6, "estimate": estimate}
+    return two_mass(speed, **(controller | changes))
 
 
 def exact_loop(scenario: lm.TrainScenario, loop: str) -> SampledLoop:

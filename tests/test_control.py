@@ -8,8 +8,7 @@ import pytest
 from scipy.linalg import expm
 
 import lostmotion as lm
-
-T = 125e-6
+from two_mass import A, B, T, two_mass
 
 
 def scenario(**tables: Any) -> lm.TrainScenario:
@@ -78,23 +77,13 @@ def test_stability_ends_at_the_gain_and_the_frequency_of_theory(kind: str, limit
 
 
 def test_a_linear_two_mass_drive_under_a_sampled_pi_is_the_linear_recursion() -> None:
-    J_M, J_L, k, d = 2e-3, 5e-3, 700.0, 0.02
     k_p, k_i, weight, share = 1.1, 45.0, 0.6, 1.0
-    axis = scenario(
-        shafts={"motor": {"inertia": J_M, "viscous_friction": 0.01}, "load": {"inertia": J_L, "viscous_friction": d}},
-        motors={"m": torque_source(rated_torque=2.0)},
-        gears={"coupling": {"input": "motor", "output": "load", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": k}}},
-        controllers={"m": {
-            "sample_time": T, "reference": {"kind": "speed", "mean": 3.0}, "encoder": {"ideal": True},
-            "speed": {"gain": k_p, "integral_gain": k_i, "reference_weight": weight, "estimate": {"kind": "difference", "time_constant": 2e-4}},
-        }},
-        simulation={"duration": 400 * T, "sample_interval": T},
-    )  # fmt: skip
+    estimate = {"kind": "difference", "time_constant": 2e-4}
+    axis = two_mass({"gain": k_p, "integral_gain": k_i, "reference_weight": weight, "estimate": estimate})
+    axis = axis.replace(**{"simulation.duration": 400 * T})
     result = lm.simulate(axis)
     # Plant: w_M, w, twist, phi_M under a torque held for T.
-    A = np.array([[-0.01 / J_M, 0, -k / J_M, 0], [0, -d / J_L, k / J_L, 0], [1, -1, 0, 0], [1, 0, 0, 0]], float)
-    B = np.array([1.0 / J_M, 0, 0, 0])
-    phi = expm(np.block([[A, B[:, None]], [np.zeros((1, 5))]]) * T)
+    phi = expm(np.block([[A, B], [np.zeros((1, 5))]]) * T)
     x, integral, estimate, before, pending = np.zeros(4), 0.0, 0.0, 0.0, 0.0
     k_t, smoothing = weight * k_p, -math.expm1(-T / 2e-4) * share
     speeds = []

@@ -23,21 +23,7 @@ from lostmotion.servo.data import lag_sum, two_inertias
 from lostmotion.servo.margins import bandwidth_of, frequencies, margins
 from lostmotion.servo.regimes import Axis, axis_of, regimes
 from lostmotion.servo.sampled import SampledLoop
-
-T = 125e-6
-J_M, J_L, k, C_M, C_L = 2e-3, 5e-3, 700.0, 0.01, 0.02  # inertias, stiffness, viscous frictions
-
-
-def two_mass(speed: dict[str, Any], **more: Any) -> lm.TrainScenario:
-    """A linear two-mass drive under torque control of the motor."""
-    axis = {"sample_time": T, "reference": {"kind": "speed", "mean": 3.0}, "encoder": {"ideal": True}, "speed": speed}
-    return lm.TrainScenario(
-        shafts={"motor": {"inertia": J_M, "viscous_friction": C_M}, "load": {"inertia": J_L, "viscous_friction": C_L, "torque": 0.0}},
-        motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 2.0}},
-        gears={"coupling": {"input": "motor", "output": "load", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": k}}},
-        controllers={"m": axis | more},
-        simulation={"duration": 0.1, "sample_interval": T},
-    )  # fmt: skip
+from two_mass import J_M, A, B, T, k, two_mass
 
 
 def sampled(scenario: Any, loop: str, cut: bool) -> SampledLoop:
@@ -48,8 +34,7 @@ def sampled(scenario: Any, loop: str, cut: bool) -> SampledLoop:
 
 def motor_speed_over_torque() -> Any:
     """The same drive in python-control, from its differential equations: motor angle over motor torque."""
-    A = np.array([[-C_M / J_M, 0, -k / J_M, 0], [0, -C_L / J_L, k / J_L, 0], [1, -1, 0, 0], [1, 0, 0, 0]], float)
-    return control.ss(A, [[1.0 / J_M], [0], [0], [0]], [[0, 0, 0, 1.0]], 0)
+    return control.ss(A, B, [[0, 0, 0, 1.0]], 0)
 
 
 # --- margins ---
