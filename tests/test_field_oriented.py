@@ -250,10 +250,12 @@ def test_field_weakening_ends_on_the_voltage_circle(share: float) -> None:
     assert float(end["direct_current"]) == pytest.approx(sampled(angle).real, rel=1e-7)
     voltage = np.hypot(result["direct_voltage"], result["quadrature_voltage"])
     assert float(voltage.max()) <= a.u_max * (1.0 + 1e-12)
+
     # The same of a voltage that turns with the rotor, up to the half turn of a sample time, (w T/2)^2/6 of it.
-    circle = lambda i_d: (
-        math.hypot(a.R * i_d - w * a.L_q * i_q, a.R * i_q + w * (a.L_d * i_d + a.psi)) - share * a.u_max
-    )  # noqa: E731
+    def circle(i_d: float) -> float:
+        u = complex(a.R * i_d - w * a.L_q * i_q, a.R * i_q + w * (a.L_d * i_d + a.psi))
+        return abs(u) - share * a.u_max
+
     assert float(end["direct_current"]) == pytest.approx(brentq(circle, -a.psi / a.L_d, 0.0), rel=0.05)
 
 
@@ -378,6 +380,7 @@ def test_an_encoder_that_is_turned_by_its_steps_misplaces_the_currents() -> None
         ({"motor.winding.inductance_d": 0.5}, ["controller.current.kind", "flux linkage"]),
         ({"controller.current.field_weakening": 1.5}, ["controller.current.field_weakening"]),
         ({"controller.current.decoupling": -0.1}, ["controller.current.decoupling"]),
+        ({"initial.motor_torque": 0.1}, ["initial.motor_torque", "no current"]),
     ],
 )
 def test_what_cannot_be_controlled_so_is_refused(changes: dict[str, Any], words: list[str]) -> None:

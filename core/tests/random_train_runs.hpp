@@ -43,7 +43,7 @@ struct Recorded {
         options.tolerance = tolerance;
         out.resize(run.channels().size() * samples);
         options.control = control;
-        signals.resize(control.axes.size() * control::n_axis_signals * samples);
+        signals.resize(control.axes.size() * static_cast<std::size_t>(control.signals()) * samples);
         options.control_out = signals.data();
         report = run.run(inputs, start, memory, options, out.data());
     }
@@ -82,9 +82,33 @@ struct RandomRun {
     }
 };
 
+// Of about the torque 1, with a field that is weakened above the speed of 0.3 of an electrical turn in a tick, and
+// gains of loops g/(z (z - 1)).
+inline control::FieldOrientation random_winding(RandomTrains& random, double sample_time) {
+    control::FieldOrientation f;
+    f.current_limit = 2.0;
+    f.winding.pole_pairs = random.pick(1, 4);
+    f.winding.flux_linkage = random.uniform(0.1, 0.3);
+    f.winding.inductance_d = f.winding.flux_linkage * random.uniform(0.1, 0.4);
+    f.winding.inductance_q = f.winding.inductance_d * (random.coin() ? 1.0 : random.uniform(1.0, 2.5));
+    f.winding.resistance = f.winding.inductance_d / (sample_time * random.uniform(5.0, 50.0));
+    const auto gain = [&](double L) {
+        return 0.3 * f.winding.resistance / -std::expm1(-f.winding.resistance * sample_time / L);
+    };
+    f.gain_d = gain(f.winding.inductance_d);
+    f.gain_q = gain(f.winding.inductance_q);
+    f.integral_gain = 0.3 * f.winding.resistance;
+    f.field_weakening = 0.02;
+    f.voltage_limit = f.winding.flux_linkage * 0.3 / sample_time;
+    f.weakening_voltage = 0.95 * f.voltage_limit;
+    f.sample_time = sample_time;
+    f.parts = random.pick(1, 2);
+    return f;
+}
+
 // Controllers for some of its motors: torque, speed or position, of plausible gains, with the encoder on any shaft
-// whose angle is known.
-inline Control random_control(RandomTrains& random, const Assembly& a) {
+// whose angle is known. windings: torque sources are such under field-oriented control.
+inline Control random_control(RandomTrains& random, const Assembly& a, bool windings = false) {
     using control::Axis;
     Control c;
     c.tick = random.spread(5e-4, 5e-3);
@@ -119,6 +143,10 @@ inline Control random_control(RandomTrains& random, const Assembly& a) {
             loop.integral_gain = 0.02;
             loop.back_emf = 0.05;
             loop.limit = 2.0;
+        } else if (windings) {
+            law.field_orientation = random_winding(random, c.tick * law.current_schedule.every);
+            law.field_orientation->delay = law.delay;
+            law.field_orientation->delay_time = c.tick * law.delay.ticks;
         }
         const double amplitude = random.uniform(0.1, 1.0);
         law.reference.sines.push_back({amplitude, random.uniform(0.5, 3.0), random.uniform(0.0, 6.0)});
@@ -228,9 +256,9 @@ struct SolverTally {
 };
 
 inline void compare_solvers(RandomTrains& random, int shafts, double duration, SolverTally& tally,
-                            const char* tell = nullptr, bool closed_loop = false) {
+                            const char* tell = nullptr, bool closed_loop = false, bool windings = false) {
     const RandomRun r(random, shafts, duration);
-    const Control control = closed_loop ? random_control(random, Assembly(r.train)) : Control{};
+    const Control control = closed_loop ? random_control(random, Assembly(r.train), windings) : Control{};
     const auto run = [&](double tolerance) {
         return Recorded(r.train, r.inputs, duration, duration / 50.0, tolerance, {}, {}, control);
     };
@@ -245,7 +273,7 @@ inline void compare_solvers(RandomTrains& random, int shafts, double duration, S
         own = fine.done() && coarse.done() ? difference(coarse, fine) : 1.0;
     }
     if (own < 1e-5 && gap > std::max(1e-6, 2.0 * own)) {
-        const Recorded finest(r.train, r.inputs, duration, duration / 50.0, 1e-12);
+        const Recorded finest = run(1e-12);
         own = finest.done() ? difference(fine, finest) : 1.0;
         gap = finest.done() ? difference(exact, finest) : 1.0;
     }

@@ -165,8 +165,7 @@ class ClosedLoopRun {
                                                           : solver_.advance(last ? t_end : tick, passing);
                 if (status != Status::done || last) return status;
             }
-            if constexpr (requires { observer.flush(); })
-                if (!observer.flush()) return Status::interrupted;
+            if (!flushed(observer)) return Status::interrupted;
             if (!run_tick(solver_.state(), solver_.memory())) return Status::controller;
             if (changed_)
                 if (const Status found = solver_.inputs_changed(observer); found != Status::done) return found;
@@ -204,13 +203,21 @@ class ClosedLoopRun {
         }
     };
 
+    // What the observer has seen but not yet read must be read before the inputs change.
+    template <class Observer>
+    static bool flushed(Observer& observer) {
+        if constexpr (requires { observer.flush(); }) return observer.flush();
+        return true;
+    }
     // With windings, by the parts of a tick.
     template <class Observer, class Record>
     Status advance_windings(double tick, double t_end, Observer& observer, Record& record) {
         const double to = std::fmin(tick, t_end);
         while (true) {
-            if (!(windings_.end(course_.slots) > solver_.time()) && solver_.time() < to)
+            if (!(windings_.end(course_.slots) > solver_.time()) && solver_.time() < to) {
+                if (!flushed(observer)) return Status::interrupted;
                 if (const Status s = windings_.plan(tick, course_.slots, observer); s != Status::done) return s;
+            }
             const double end = std::fmin(windings_.end(course_.slots), to);
             const bool last = !(tick < t_end) && !(end < t_end);
             record(last ? std::numeric_limits<double>::infinity() : end);

@@ -257,3 +257,26 @@ def driven(controller: Controller | ContinuousController) -> MotorLaw | None:
 def motor_laws(controllers: Mapping[str, Controller | ContinuousController]) -> dict[str, MotorLaw | None]:
     """What the current loops make of the motors, by name."""
     return {name: driven(controller) for name, controller in controllers.items()}
+
+
+def check_torques(controllers: Mapping[str, Controller], torques: Mapping[str, float], key: str) -> None:
+    """Refuses torques at t = 0 of motors whose current loop leaves the torque no state.
+
+    Parameters
+    ----------
+    torques
+        By the names of the motors [N·m].
+    key
+        Of the torque of a motor, for messages.
+
+    Raises
+    ------
+    InputError
+    """
+    for name, controller in controllers.items():
+        kind = controller.current.kind
+        if torques.get(name, 0.0) != 0.0 and driven(controller) == ((), True):
+            begins = "no current" if kind == "field_oriented" else "the torque that the controller asks for"
+            raise InputError(
+                f'key {key.format(name)}: with current.kind = "{kind}" a run begins with {begins}; leave it out'
+            )

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self
 from pydantic import model_validator
 
 from .. import _core
-from ..control.axis import NO_LAWS, Bound, core_control, driven
+from ..control.axis import NO_LAWS, Bound, check_torques, core_control, driven
 from ..control.continuous import ContinuousController
 from ..control.controller import Controller
 from ..control.law import Law
@@ -115,6 +115,7 @@ class Scenario(Part):
             raise ValueError("has initial.motor_torque, but a torque source has no such state; use command")
         if self.controller is not None and self.command != CommandSignal():
             raise InputError("keys command, controller: both turn the motor; leave one of them out")
+        check_torques(self.axes(), {"motor": start.motor_torque}, "initial.motor_torque")
         self.control()
         return self
 

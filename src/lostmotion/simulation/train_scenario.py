@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..control.axis import NO_LAWS, Bound, core_control, motor_laws
+from ..control.axis import NO_LAWS, Bound, check_torques, core_control, motor_laws
 from ..control.continuous import ContinuousController
 from ..control.controller import AnyController, Controller
 from ..control.law import Law
@@ -109,6 +109,7 @@ class TrainScenario(TrainElements):
                 raise InputError(
                     f"keys command.{name}, controllers.{name}: both turn the same motor; leave one of them out"
                 )
+        check_torques(self.axes(), self.initial.motor_torques, "initial.motor_torques.{}")
 
     def axes(self) -> dict[str, Controller]:
         """The sampled controllers by the names of their motors."""
