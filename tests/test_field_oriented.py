@@ -401,6 +401,11 @@ def test_what_cannot_be_controlled_so_is_refused(changes: dict[str, Any], words:
         assert word in str(refused.value)
 
 
+def test_a_response_refuses_it() -> None:
+    with pytest.raises(lm.InputError, match='response: .* "field_oriented"'):
+        lm.frequency_response(lm.load("field-weakening"), [5.0], 0.1)
+
+
 def test_a_law_must_give_both_voltages() -> None:
     one = scenario(changed(ROUND, J_M=1e-3), 10, law=True)
     with pytest.raises(TypeError, match=r"\(u_d, u_q\)"):
