@@ -402,7 +402,7 @@ def test_what_cannot_be_controlled_so_is_refused(changes: dict[str, Any], words:
 
 
 def test_a_response_refuses_it() -> None:
-    with pytest.raises(lm.InputError, match='response: .* "field_oriented"'):
+    with pytest.raises(lm.InputError, match=r'response: .* "field_oriented"'):
         lm.frequency_response(lm.load("field-weakening"), [5.0], 0.1)
 
 
