@@ -1,8 +1,8 @@
 // Sticking, sliding, jamming: the set-valued contacts.
 #include <doctest/doctest.h>
 
-#include "lostmotion/analysis/explain.hpp"
 #include "drive_runs.hpp"
+#include "lostmotion/analysis/explain.hpp"
 
 using namespace lostmotion;
 using doctest::Approx;

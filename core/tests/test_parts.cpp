@@ -3,8 +3,8 @@
 
 #include <random>
 
-#include "lostmotion/analysis/reduction.hpp"
 #include "drive_runs.hpp"
+#include "lostmotion/analysis/reduction.hpp"
 
 using namespace lostmotion;
 using doctest::Approx;

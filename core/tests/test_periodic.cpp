@@ -3,8 +3,8 @@
 
 #include <cstdio>
 
-#include "lostmotion/analysis/drive_response.hpp"
 #include "drive_runs.hpp"
+#include "lostmotion/analysis/drive_response.hpp"
 
 using namespace lostmotion;
 
