@@ -38,6 +38,7 @@ WRONG += [-1, 0, float("nan"), 10**30, Path("none"), lambda: None, lm.Load(inert
 SCENARIO = lm.load("paper-2dof-nl-small", {"simulation.duration": 0.02, "command.frequency": "50 Hz"})
 TRAIN = lm.load("worm-lowering")
 HUNTING = lm.load("hunting-with-static-friction")
+TRACKING = lm.load("tracking-loss-map", {"simulation.duration": 0.05})
 RESULT = lm.simulate(SCENARIO)
 THERMAL = {"winding_case": 1.0, "case_ambient": 2.0}
 HEATED = SCENARIO.replace(
@@ -91,6 +92,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "as_state_space": (lm.as_state_space, {"system": scipy.signal.lti([1.0], [1.0, 1.0])}),
     "limit_cycle": (lm.limit_cycle, {"scenario": HUNTING, "motor": None, "causes": False}),
     "hunting_map": (lm.hunting_map, {"scenario": HUNTING, "grid": {"shafts.table.inertia": [0.8]}, "variable": None, "threads": 1, "progress": dangle}),
+    "pointing_budget": (lm.pointing_budget, {"scenario": TRACKING, "after": 0.0, "view": None, "progress": dangle}),
     "commission": (lm.commission, {"scenario": SCENARIO, "motor": None, "window": None, "progress": dangle}),
     "tune": (lm.tune, {"scenario": SCENARIO, "rule": "identical_damping", "damping": 0.7, "phase_margin": 1.0, "goal": "bandwidth", "sensitivity_peak": 1.7, "motor": None}),
     "select": (lm.select, {"task": "task.toml", "directory": None, "threads": 1, "executor": None, "progress": None}),
@@ -128,7 +130,15 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Scenario.replace": (lambda value: SCENARIO.replace(**{"load.inertia": value}), {"value": 1.0}),
     "Scenario.from_json": (lm.Scenario.from_json, {"text": "{}"}),
 }  # fmt: skip
-SLOW = {"check_drive", "measure", "commission", "tune", "select", "load_task"}  # with an argument that is right
+SLOW = {
+    "check_drive",
+    "measure",
+    "commission",
+    "pointing_budget",
+    "tune",
+    "select",
+    "load_task",
+}  # with an argument that is right
 
 
 def names() -> list[str]:

@@ -78,7 +78,7 @@ def pointing_budget(
 ) -> PointingBudget:
     """How far axes miss the direction that they are to follow, and what each cause contributes.
 
-    All motions are simulated: the scenario as it is; with each of backlash, soft zone, hysteresis, dry friction, losses of the
+    All motions are simulated: the scenario as it is; with each of backlash, the zone of low stiffness, hysteresis, dry friction, losses of the
     gears, encoder steps and delay taken away; with each of them alone; and with other controllers. A controller with an inverse
     model knows the drive as it is in each run. A cause that the scenario does not have is left out.
 

@@ -23,7 +23,7 @@ def _backlash(data: Tables) -> None:
             stiffness["breaks"] = tuple(b - gap for b in stiffness["breaks"][1:])
 
 
-def _soft_zone(data: Tables) -> None:
+def _low_stiffness(data: Tables) -> None:
     for gear in data["gears"].values():
         stiffness = gear["stiffness"]
         if stiffness["kind"] == "curve":
@@ -67,7 +67,7 @@ def _delay(data: Tables) -> None:
 
 CAUSES: dict[str, Callable[[Tables], None]] = {
     "backlash": _backlash,
-    "soft zone": _soft_zone,
+    "low stiffness": _low_stiffness,
     "hysteresis": _hysteresis,
     "dry friction": _friction,
     "losses of the gears": _losses,
