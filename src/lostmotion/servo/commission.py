@@ -53,7 +53,7 @@ class LoopSheet:
 
 @dataclass(frozen=True)
 class Stiffness:
-    """|M_Z/phi| over frequency in one regime, all loops closed."""
+    """Magnitude of M_Z/phi over frequency in one regime, all loops closed."""
 
     regime: str
     shaft: str
