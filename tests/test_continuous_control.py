@@ -486,3 +486,12 @@ def test_a_map_has_the_limit_cycles_of_its_points() -> None:
         assert float(found["amplitude"][row, 0]) == pytest.approx(hunting(excess)[0], rel=1e-9)
         alone = lm.limit_cycle(inertia(0.3, 0.3 + excess, 100.0, position=PID | {"integral_gain": 2.0}), causes=False)
         assert float(found["frequency"][row, 1]) == alone.frequency
+
+
+def test_the_period_is_the_shortest_one() -> None:
+    # At the middle gain Newton's method is first led to four periods.
+    hunting = lm.load("hunting-with-static-friction", {"shafts.table.breakaway_torque": 11.0})
+    key = "controllers.servo.position.integral_gain"
+    found = [lm.limit_cycle(hunting.replace(**{key: k}), causes=False).frequency for k in (7.5, 8.615384615384617, 9.5)]
+    assert np.diff(found).min() > 0.0
+    assert found[1] == pytest.approx(0.157284, rel=1e-5)

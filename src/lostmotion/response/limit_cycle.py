@@ -175,19 +175,25 @@ def _near(loop: Loop, run: dict[str, Any], apparent: float, end: float) -> tuple
         swing = float(np.ptp(found.values(loop.watched)))
         watched = run["values"][loop.channels.index(loop.watched)]
         if abs(found.period / period - 1.0) < NEAR and swing > 1e-3 * float(np.ptp(watched[-SAMPLES // 8 :])):
-            return "", _shortest(loop, found, multiple)
+            return "", found if multiple == 1 else _shortest(loop, found)
         reason = "Newton's method leads to rest, or to another motion"
     return f"it swings with a period of about {apparent:.4g} s, but does not repeat: {reason}", None
 
 
-def _shortest(loop: Loop, found: Found, multiple: int) -> Found:
+def _shortest(loop: Loop, found: Found) -> Found:
     """The same motion over the shortest of its periods."""
-    start = dict(zip(found.result["components"], found.result["start"][0].tolist(), strict=True))
-    for parts in range(multiple, 1, -1):
-        result = loop.search(start, found.period / parts)
-        if not reason_of(result, 0) and abs(result["period"][0] * parts / found.period - 1.0) < PART_OF:
-            return Found("", result, loop.channels)
+    for parts in (2, 3, 5):
+        while (shorter := _part(loop, found, parts)) is not None:
+            found = shorter
     return found
+
+
+def _part(loop: Loop, found: Found, parts: int) -> Found | None:
+    start = dict(zip(found.result["components"], found.result["start"][0].tolist(), strict=True))
+    result = loop.search(start, found.period / parts)
+    if reason_of(result, 0) or abs(result["period"][0] * parts / found.period - 1.0) >= PART_OF:
+        return None
+    return Found("", result, loop.channels)
 
 
 def _quiet_instant(instants: np.ndarray, begin: float, end: float) -> float:
