@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ..inputs.validation import did_you_mean, shown
 from ..simulation.run import simulate
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, in_long_form
-from .causes import CAUSES, VARIANTS, without
+from .causes import CAUSES, VARIANTS, present, without
 
 PROBABLE = 0.6744897501960817  # of a normal distribution, in standard deviations: half of all errors are smaller
 
@@ -64,7 +64,7 @@ class PointingBudget:
     """with none of them: what the controller itself leaves"""
     variants: Mapping[str, Mapping[str, PointingError]]
     """with another controller"""
-    view: View | None = field(default=None)
+    view: View | None = None
     """where a field of view is given"""
 
 
@@ -114,17 +114,17 @@ def pointing_budget(
             progress()
         return found
 
-    present = {name: change for name, change in CAUSES.items() if without(loaded, [change]) is not None}
+    causes = present(loaded, CAUSES)
     return PointingBudget(
         scenario,
         start,
         time,
         errors,
         whole,
-        {name: made([change]) for name, change in present.items()},
-        {name: made([c for other, c in present.items() if other != name]) for name in present},
-        made(list(present.values())),
-        {name: made([change]) for name, change in VARIANTS.items() if without(loaded, [change]) is not None},
+        {name: made([change]) for name, change in causes.items()},
+        {name: made([c for other, c in causes.items() if other != name]) for name in causes},
+        made(list(causes.values())),
+        {name: made([change]) for name, change in present(loaded, VARIANTS).items()},
         _in_view(time >= start, errors, angles) if angles else None,
     )
 
@@ -132,8 +132,7 @@ def pointing_budget(
 def runs_of(scenario: Scenario | TrainScenario) -> int:
     """How many runs a budget makes."""
     loaded = in_long_form(scenario) if isinstance(scenario, Scenario) else scenario
-    causes, variants = (sum(without(loaded, [c]) is not None for c in table.values()) for table in (CAUSES, VARIANTS))
-    return 2 + 2 * causes + variants
+    return 2 + 2 * len(present(loaded, CAUSES)) + len(present(loaded, VARIANTS))
 
 
 def _check(scenario: TrainScenario, after: float) -> None:

@@ -101,10 +101,19 @@ VARIANTS: dict[str, Callable[[Tables], None]] = {
 """other controllers of the same axes"""
 
 
+def present(scenario: TrainScenario, table: dict[str, Callable[[Tables], None]]) -> dict[str, Callable[[Tables], None]]:
+    """Those changes of a table that change the scenario at all."""
+    return {name: change for name, change in table.items() if _changed(scenario, [change]) is not None}
+
+
 def without(scenario: TrainScenario, changes: list[Callable[[Tables], None]]) -> TrainScenario | None:
     """The scenario after the changes; None if they change nothing."""
-    data = scenario.model_dump(exclude_none=True)
-    before = scenario.model_dump(exclude_none=True)
+    data = _changed(scenario, changes)
+    return None if data is None else TrainScenario(**data)
+
+
+def _changed(scenario: TrainScenario, changes: list[Callable[[Tables], None]]) -> Tables | None:
+    data, before = (scenario.model_dump(exclude_none=True) for _ in range(2))
     for change in changes:
         change(data)
-    return None if data == before else TrainScenario(**data)
+    return None if data == before else data
