@@ -92,18 +92,19 @@ struct [[gnu::visibility("hidden")]] BoundAxis : control::Axis {
     }
 };
 
-// Base tick [s]; of each axis its controller, motor, and the shafts with the encoders of position and speed.
-using BoundControl = std::pair<double, std::vector<std::tuple<BoundAxis, int, int, int>>>;
+// Base tick [s]; of each axis its controller, motor, the shafts with the encoders of position and speed, and that of
+// the reference.
+using BoundControl = std::pair<double, std::vector<std::tuple<BoundAxis, int, int, int, int>>>;
 
 inline Control control_of(const BoundControl& bound) {
     Control c;
     c.tick = bound.first;
-    for (const auto& [axis, motor, position_shaft, speed_shaft] : bound.second)
-        c.axes.push_back({axis, motor, position_shaft, speed_shaft});
+    for (const auto& [axis, motor, position_shaft, speed_shaft, reference_shaft] : bound.second)
+        c.axes.push_back({axis, motor, position_shaft, speed_shaft, reference_shaft});
     return c;
 }
 inline void raise_again(const BoundControl& bound) {
-    for (const auto& [axis, motor, position_shaft, speed_shaft] : bound.second) axis.raise_again();
+    for (const auto& each : bound.second) std::get<0>(each).raise_again();
 }
 
 // Of what the axes show in a run: the shape, and room for it.
@@ -258,6 +259,23 @@ inline void bind_control(nb::module_& m) {
         .def_rw("backlash", &BacklashCompensation::backlash)
         .def_rw("rate", &BacklashCompensation::rate);
     bind_inverse_model(m);
+    nb::class_<Camera>(m, "Camera")
+        .def(nb::init<>())
+        .def_rw("present", &Camera::present)
+        .def_rw("every", &Camera::every)
+        .def_rw("latency", &Camera::latency)
+        .def_rw("step", &Camera::step)
+        .def_rw("noise", &Camera::noise)
+        .def_rw("half_field", &Camera::half_field)
+        .def_rw("seed", &Camera::seed)
+        .def_rw("stream", &Camera::stream);
+    nb::class_<Tracker>(m, "Tracker")
+        .def(nb::init<>())
+        .def_rw("alpha", &Tracker::alpha)
+        .def_rw("beta", &Tracker::beta)
+        .def_rw("gamma", &Tracker::gamma)
+        .def_rw("frame_time", &Tracker::frame_time)
+        .def_rw("predicts", &Tracker::predicts);
     nb::class_<DiscreteSystem>(m, "DiscreteSystem")
         .def(
             "__init__",
@@ -279,6 +297,8 @@ inline void bind_control(nb::module_& m) {
         .value("position", Axis::position_mode);
     axis.def(nb::init<>())
         .def_rw("mode", &BoundAxis::mode)
+        .def_rw("camera", &BoundAxis::camera)
+        .def_rw("tracker", &BoundAxis::tracker)
         .def_rw("reference_delay", &BoundAxis::reference_delay)
         .def_rw("ratio", &BoundAxis::ratio)
         .def_rw("rated_torque", &BoundAxis::rated_torque)

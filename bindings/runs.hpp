@@ -116,7 +116,7 @@ inline void bind_runs(nb::module_& m) {
           nb::sig("def run(drive: Drive, command: Signal, load_torque: Signal, state: "
                   "collections.abc.Sequence[float], hysteresis_capacity: float, duration: float, interval: float, "
                   "samples: int, energy: bool, tolerance: float, max_switchings: int, control: tuple[float, "
-                  "collections.abc.Sequence[tuple[Axis, int, int, int]]]) -> "
+                  "collections.abc.Sequence[tuple[Axis, int, int, int, int]]]) -> "
                   "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
                   "int, list[float], list[float], float, float, int, numpy.typing.NDArray[numpy.float64]]"));
     m.def("run_batch", &run_many, "drive"_a, "command"_a, "load_torque"_a, "state"_a, "hysteresis_capacity"_a,

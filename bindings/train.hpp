@@ -284,7 +284,7 @@ inline void bind_train(nb::module_& m) {
                   "collections.abc.Mapping[str, float], hysteresis_capacities: collections.abc.Mapping[str, float], "
                   "duration: float, interval: float, samples: int, energy: bool, tolerance: float, max_switchings: "
                   "int, control: tuple[float, "
-                  "collections.abc.Sequence[tuple[Axis, int, int, int]]]) -> dict[str, typing.Any]"));
+                  "collections.abc.Sequence[tuple[Axis, int, int, int, int]]]) -> dict[str, typing.Any]"));
     m.def("run_trains", &run_train_batch, "cases"_a, "duration"_a, "interval"_a, "samples"_a, "energies"_a,
           "channels"_a, "kept"_a, "threads"_a,
           nb::sig("def run_trains(cases: collections.abc.Sequence[tuple[Train, collections.abc.Sequence[Signal], "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import zlib
 from collections.abc import Callable
 from typing import Any
 
@@ -376,3 +377,89 @@ def test_a_limit_of_the_voltage_does_not_wind_up_the_current_loop() -> None:
     assert result["motor_speed"].to_numpy() == pytest.approx(np.array(speeds), abs=1e-9 * max(speeds))
     assert max(voltages) == limit
     assert voltages[-1] < limit
+
+
+# --- camera and tracker ---
+
+MASK = 2**32 - 1
+
+
+def philox(counter: list[int], key: int) -> list[int]:
+    """Philox 4x32-10 of Salmon et al. (2011)."""
+    low, high = key & MASK, key >> 32
+    for _ in range(10):
+        a, b = 0xD2511F53 * counter[0], 0xCD9E8D57 * counter[2]
+        counter = [(b >> 32) ^ counter[1] ^ low, b & MASK, (a >> 32) ^ counter[3] ^ high, a & MASK]
+        low, high = (low + 0x9E3779B9) & MASK, (high + 0xBB67AE85) & MASK
+    return counter
+
+
+def test_philox_gives_the_known_answers() -> None:
+    """Those that its authors publish with it (Random123, kat_vectors)."""
+    assert philox([0] * 4, 0) == [0x6627E8D5, 0xE169C58D, 0xBC57AC4C, 0x9B00DBD8]
+    assert philox([MASK] * 4, 2**64 - 1) == [0x408F276D, 0x41C83B0E, 0xA20BC7C6, 0x6D5451FD]
+    pi = [0x243F6A88, 0x85A308D3, 0x13198A2E, 0x03707344]
+    assert philox(pi, 0x299F31D0A4093822) == [0xD16CFE09, 0x94FDCCEB, 0x5001E420, 0x24126EA1]
+
+
+def normal(seed: int, name: str, n: int) -> float:
+    """Of the counter (n, CRC-32 of the name, 0) and the key seed: sqrt(-2 log u_1) cos(2 pi u_2), 53 bits each."""
+    r = philox([n & MASK, n >> 32, zlib.crc32(name.encode()), 0], seed)
+    u, v = (((high << 21 | low >> 11) + 0.5) / 2.0**53 for high, low in ((r[0], r[1]), (r[2], r[3])))
+    return math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)
+
+
+def test_a_camera_shows_where_the_target_was_and_the_loops_follow_what_the_tracker_expects() -> None:
+    frame, late, pixel, parts, sigma, seed, half_field = 12, 20, 3e-3, 2, 4e-3, 12345678901, 0.1
+    alpha, beta, gamma, q = 0.6, 0.3, 0.05, 2.0 * math.pi / 2**14
+    t_frame, w = frame * T, 2.0 * math.pi * 5.0
+    loop, outer, estimate = SpeedLoop(0.05, 1.0), PositionLoop(25.0, 4, k_ff=0.9), Difference(1, 0.0)
+    state = {"x": 0.0, "v": 0.0, "a": 0.0, "t": 0.0, "wanted": 0.0, "seen": 0.0, "direction": 0.0, "position": 0.0}
+    taken: dict[int, tuple[float, bool]] = {}
+    shown: dict[str, list[float]] = {"target_direction": [], "target_seen": [], "position_reference": []}
+
+    def expected(t: float) -> tuple[float, float]:
+        h = t - state["t"]
+        return state["x"] + h * state["v"] + h * h * state["a"] / 2.0, state["v"] + h * state["a"]
+
+    def control(k: int, x: np.ndarray) -> float:
+        motor, sight = read(motor_angle(x), 64), q * math.floor(float(x[3]) / q + 0.5)
+        if k % frame == 0:
+            offset = 0.3 * math.sin(w * k * T) - float(x[3])
+            step = pixel / parts
+            noisy = offset + sigma * normal(seed, "m", k // frame)
+            taken[k] = (sight + step * math.floor(noisy / step + 0.5), abs(offset) <= half_field)
+        if k - late in taken:
+            z, seen = taken.pop(k - late)
+            state["seen"] = float(seen)
+            if seen:
+                angle, rate = expected((k - late) * T)
+                r = z - angle
+                state.update(x=angle + alpha * r, v=rate + beta / t_frame * r, t=(k - late) * T, direction=z)
+                state["a"] += gamma / (2.0 * t_frame**2) * r
+        speed = estimate(motor, 0.0)
+        if k % 4 == 0:
+            state["position"], rate = expected(k * T)
+            state["wanted"] = RATIO * outer(state["position"] - sight, rate)
+        for name, value in zip(shown, (state["direction"], state["seen"], state["position"]), strict=True):
+            shown[name].append(value)
+        return loop(state["wanted"], speed)
+
+    states = recomputed(control)
+    result = simulated(
+        {
+            "reference": {"kind": "position", "amplitude": 0.3, "frequency": 5.0},
+            "encoder": {"lines": 64},
+            "position_encoder": {"shaft": "load", "bits": 14},
+            "position": {"gain": 25.0, "feedforward": 0.9, "sample_time": 4 * T},
+            "speed": {"gain": 0.05, "integral_gain": 1.0},
+            "camera": {
+                "sample_time": t_frame, "latency": late * T, "pixel": pixel, "pixel_parts": parts, "noise": sigma,
+                "seed": seed, "field": 2.0 * half_field,
+            },
+            "tracker": {"alpha": alpha, "beta": beta, "gamma": gamma},
+        }
+    )  # fmt: skip
+    agree(result, states, **shown)
+    assert set(shown["target_seen"]) == {0.0, 1.0}
+    assert len(set(shown["target_direction"])) > 20

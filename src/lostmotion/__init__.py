@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     __version__: str
     from ._core import SolverError as SolverError
+    from .control.camera import Camera as Camera
+    from .control.camera import Tracker as Tracker
     from .control.continuous import ContinuousController as ContinuousController
     from .control.continuous import PositionPID as PositionPID
     from .control.continuous import PositionSignal as PositionSignal
@@ -159,6 +161,7 @@ _HOMES = {
         "as_state_space",
     ),
     "control.controller": ("Controller",),
+    "control.camera": ("Camera", "Tracker"),
     "control.encoder": ("Encoder",),
     "control.filters": ("TransferFunction", "as_filter"),
     "control.inverse_model": ("InverseModel", "LoadObserver"),

@@ -15,6 +15,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "camera.hpp"
 #include "current_loop.hpp"
 #include "encoder.hpp"
 #include "feedforward.hpp"
@@ -26,6 +27,7 @@
 #include "position_loop.hpp"
 #include "speed_estimate.hpp"
 #include "speed_loop.hpp"
+#include "tracker.hpp"
 
 namespace lostmotion::control {
 
@@ -51,6 +53,7 @@ struct Sampled {
     double motor_torque = 0.0;    // [N m]
     double rotor_angle = 0.0;     // of the motor itself [rad]
     double rotor_speed = 0.0;     // [rad/s]
+    double shaft_angle = 0.0;     // of the reference's shaft [rad]
     double time = 0.0;            // [s]
 };
 
@@ -64,6 +67,8 @@ enum AxisSignal : int {
     loss_factor,         // of the inverse model
     friction_torque,     // the same [N m]
     load_torque,         // [N m], of the load observer
+    target_direction,    // [rad], of the camera
+    target_seen,         // 1 or 0
     n_axis_signals
 };
 
@@ -79,6 +84,8 @@ inline constexpr std::array<AxisSignalName, n_axis_signals> axis_signal_names{{
     {"model_loss_factor", "1", "factor on the losses of the gear that the inverse model has adapted"},
     {"model_friction_torque", "N*m", "friction torque of the motor that the inverse model has adapted"},
     {"observed_load_torque", "N*m", "load torque that the load observer has found"},
+    {"target_direction", "rad", "direction of the target by the last frame that has shown it"},
+    {"target_seen", "1", "whether the last frame has shown the target"},
 }};
 
 // What an axis with a winding shows beside them, at any instant.
@@ -103,7 +110,9 @@ inline constexpr std::array<AxisSignalName, n_winding_signals> winding_signal_na
 class Axis {
  public:
     enum Mode { torque_mode, speed_mode, position_mode } mode = speed_mode;  // what the reference is of
-    Reference reference;
+    Reference reference;  // with a camera the direction of the target, which only the camera sees
+    Camera camera;
+    Tracker tracker;               // of what the camera sees; the loops follow it
     double reference_delay = 0.0;  // [s] by which the reference of the position loop comes later than its feedforward
     double ratio = 1.0;            // turns of the motor for one of the reference's shaft
     double rated_torque = 1.0;     // [N m] of command 1, without a current loop
@@ -149,6 +158,8 @@ class Axis {
         for (auto* filters : {&speed_filters, &torque_filters})
             for (DiscreteSystem& f : *filters) f.place(slots);
         own_law.place(slots);
+        camera.place(slots);
+        if (camera.present) tracker.place(slots);
         slots_ = slots.count();
     }
     int slots() const { return slots_; }
@@ -165,6 +176,12 @@ class Axis {
         show_model(slot);
         if (two_encoders)
             slot[blended] = position_sensor.scale * position_sensor.encoder.reading(y.position_angle) - angle / ratio;
+        if (camera.present) {
+            slot[position_angle] =
+                two_encoders ? position_sensor.scale * position_sensor.encoder.reading(y.position_angle) : 0.0;
+            tracker.start(slot[target_direction] = line_of_sight(angle, slot), speed_sensor.scale * y.speed / ratio,
+                          slot);
+        }
         if (field_orientation) {
             field_orientation->start(y.rotor_angle, y.rotor_speed, slot);
             set_course(WindingCourse::at(y.time, {}, {}, y.rotor_speed), slot);
@@ -178,6 +195,7 @@ class Axis {
         slot[speed_angle] = speed_sensor.scale * speed_sensor.encoder(y.speed_angle, tick, slot);
         if (two_encoders)
             slot[position_angle] = position_sensor.scale * position_sensor.encoder(y.position_angle, tick, slot);
+        if (camera.present) watch(tick, tick_length, y, slot);
         if (speed_schedule.due(tick)) {
             const double T = tick_length * speed_schedule.every;
             slot[measured_speed] = estimate(slot[speed_angle], speed_sensor.scale * y.speed, slot[torque_reference],
@@ -262,9 +280,28 @@ class Axis {
         n_own_slots
     };
 
+    // What the loops follow.
+    ReferencePoint wanted(double time, const double* slot) const {
+        return camera.present ? tracker.at(time, slot) : reference.at(time);
+    }
+    // Of the reference's shaft, without blending.
+    double line_of_sight(double speed_encoder, const double* slot) const {
+        return two_encoders ? slot[position_angle] : speed_encoder / ratio;
+    }
+    void watch(std::int64_t tick, double tick_length, const Sampled& y, double* slot) const {
+        const double time = static_cast<double>(tick) * tick_length;
+        camera.expose(tick, reference.at(time).value - y.shaft_angle, line_of_sight(slot[speed_angle], slot), slot);
+        if (!camera.arrives(tick)) return;
+        const Camera::Frame frame = camera.arrived(tick, slot);
+        slot[target_seen] = frame.seen ? 1.0 : 0.0;
+        if (!frame.seen) return;
+        slot[target_direction] = frame.direction;
+        tracker(frame.direction, static_cast<double>(tick - camera.latency) * tick_length, slot);
+    }
+
     void run_position_loop(double time, double T, double* slot) const {
-        const ReferencePoint ahead = reference.at(time);
-        slot[position_reference] = reference_delay == 0.0 ? ahead.value : reference.at(time - reference_delay).value;
+        const ReferencePoint ahead = wanted(time, slot);
+        slot[position_reference] = reference_delay == 0.0 ? ahead.value : wanted(time - reference_delay, slot).value;
         slot[measured_position] = position(slot);
         const InverseModel::Ahead twist =
             inverse_model.twist(ahead.rate, ahead.second, load_observer.load(slot), T, slot);
@@ -274,21 +311,21 @@ class Axis {
     }
 
     void run_speed_loop(double time, double T, double* slot) const {
-        const ReferencePoint r = reference.at(time);
+        const ReferencePoint r = wanted(time, slot);
         if (mode == speed_mode) slot[speed_reference] = ratio * r.value;
         const double speed_ahead = mode == speed_mode ? r.value : r.rate,
                      gain_ahead = mode == speed_mode ? r.rate : r.second;
-        double wanted = slot[speed_reference];
-        for (const DiscreteSystem& f : speed_filters) wanted = f(wanted, slot);
+        double speed = slot[speed_reference];
+        for (const DiscreteSystem& f : speed_filters) speed = f(speed, slot);
         const double known = inverse_model.present
                                  ? inverse_model.torque(speed_ahead, gain_ahead, load_observer.load(slot),
-                                                        wanted - slot[measured_speed], T, slot)
+                                                        speed - slot[measured_speed], T, slot)
                                  : feedforward(ratio * speed_ahead, ratio * gain_ahead);
         const double limit = field_orientation
                                  ? std::fmin(speed_loop.torque_limit, field_orientation->available_torque(slot))
                                  : speed_loop.torque_limit;
-        double M = load_observer.schedule(speed_loop, inverse_model, slot)(wanted, slot[measured_speed], known, limit,
-                                                                           T, slot);
+        double M =
+            load_observer.schedule(speed_loop, inverse_model, slot)(speed, slot[measured_speed], known, limit, T, slot);
         show_model(slot);
         for (const DiscreteSystem& f : torque_filters) M = f(M, slot);
         slot[torque_reference] = std::clamp(M, -limit, limit);
@@ -313,23 +350,23 @@ class Axis {
 
     bool run_own_law(double time, const Sampled& y, double& command, double* slot) const {
         slot[measured_position] = position(slot);
-        const ReferencePoint r = reference.at(time);
+        const ReferencePoint r = wanted(time, slot);
         slot[mode == position_mode ? position_reference
              : mode == speed_mode  ? speed_reference
                                    : torque_reference] = mode == speed_mode ? ratio * r.value : r.value;
         std::array<double, 5> measured{slot[measured_position], slot[measured_speed], y.motor_torque};
-        const std::array<double, 4> wanted{r.value, r.rate, r.second, r.third};
+        const std::array<double, 4> asked{r.value, r.rate, r.second, r.third};
         std::array<double, 2> given{command};
         if (field_orientation) {
             const FieldOrientation::Reading seen = reading(y, slot);
             const DirectQuadrature i = field_orientation->measured(seen);
             measured[3] = i.d;
             measured[4] = i.q;
-            if (own_law(time, measured.data(), wanted.data(), given.data(), slot) != 0) return false;
+            if (own_law(time, measured.data(), asked.data(), given.data(), slot) != 0) return false;
             field_orientation->command({given[0], given[1]}, seen, slot);
             return true;
         }
-        if (own_law(time, measured.data(), wanted.data(), given.data(), slot) != 0) return false;
+        if (own_law(time, measured.data(), asked.data(), given.data(), slot) != 0) return false;
         command = given[0];
         return true;
     }

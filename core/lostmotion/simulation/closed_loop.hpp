@@ -13,11 +13,12 @@
 
 namespace lostmotion {
 
-// The controller of a motor, by the numbers of the motor and of the shafts that its encoders are on.
+// The controller of a motor, by the numbers of the motor, of the shafts that its encoders are on, and of that of its
+// reference.
 struct ControlledAxis {
     control::Axis law;
     int motor = 0;
-    int position_shaft = 0, speed_shaft = 0;
+    int position_shaft = 0, speed_shaft = 0, reference_shaft = 0;
 };
 
 struct Control {
@@ -232,8 +233,8 @@ class ClosedLoopRun {
         InputsOf<D> u{};
         u[p.input] = command;
         const auto value = [&](const LinearFormOf<D>& f) { return evaluate<D>(f, x, memory, u); };
-        return {value(p.position_angle), value(p.speed_angle), value(p.speed), value(p.motor_torque),
-                value(p.rotor_angle),    value(p.rotor_speed), solver_.time()};
+        return {value(p.position_angle), value(p.speed_angle), value(p.speed),       value(p.motor_torque),
+                value(p.rotor_angle),    value(p.rotor_speed), value(p.shaft_angle), solver_.time()};
     }
     // What acts now.
     Ramp command_of(const control::Axis& a, const double* slot) const {

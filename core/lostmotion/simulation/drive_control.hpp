@@ -23,7 +23,7 @@ inline ClosedLoop<DriveDims> closed_loop_of(const Drive& drive, const Control& c
                                axis.speed_shaft == 0 ? of_motor : of_load,
                                LinearForm::unit(axis.speed_shaft == 0 ? motor_speed : load_speed),
                                drive.motor.torque<LinearForm>({motor_torque, motor_speed, command, one}), of_motor,
-                               LinearForm::unit(motor_speed)});
+                               LinearForm::unit(motor_speed), axis.reference_shaft == 0 ? of_motor : of_load});
     return loop;
 }
 

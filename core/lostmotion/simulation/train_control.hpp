@@ -25,6 +25,11 @@ inline std::string check_control(const model::Assembly& a, const Control& contro
             if (const std::string error = told(shaft, "carries an encoder", "put the encoder on another shaft");
                 !error.empty())
                 return error;
+        if (axis.law.camera.present)
+            if (const std::string error =
+                    told(axis.reference_shaft, "carries a camera", "put the camera on another shaft");
+                !error.empty())
+                return error;
         if (!axis.law.field_orientation) continue;
         const int rotor = a.train().motors[static_cast<std::size_t>(axis.motor)].shaft;
         if (const std::string error =
@@ -55,6 +60,7 @@ ClosedLoop<D> closed_loop_of(const model::Assembly& a, const Control& control, c
         const int rotor = a.train().motors[static_cast<std::size_t>(axis.motor)].shaft;
         if (const auto angle = model::shaft_angle(a, rotor)) p.rotor_angle = packed(*angle);
         p.rotor_speed = packed(model::Row::unit(a.places().shafts[static_cast<std::size_t>(rotor)].speed));
+        if (axis.law.camera.present) p.shaft_angle = packed(*model::shaft_angle(a, axis.reference_shaft));
         loop.places.push_back(p);
     }
     return loop;

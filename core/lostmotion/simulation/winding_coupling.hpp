@@ -25,6 +25,7 @@ struct AxisPlace {
     int input = 0;
     LinearFormOf<D> position_angle{}, speed_angle{}, speed{}, motor_torque{};
     LinearFormOf<D> rotor_angle{}, rotor_speed{};
+    LinearFormOf<D> shaft_angle{};  // of the reference's shaft
 };
 
 template <class Solver>

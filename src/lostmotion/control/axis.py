@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -14,14 +15,16 @@ from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor
 from ..model.parameters import MotorLaw
 from ..model.train import DriveTrain
+from .camera import core_camera, core_tracker
 from .continuous import ContinuousController
-from .controller import Controller, whole_multiple
+from .controller import Controller
 from .filters import core_filter
 from .law import Law
 from .loops import CurrentLoop, FieldOriented, FirstOrderCurrent, VoltageCommand
+from .sample_times import whole_multiple
 
-Bound = tuple[float, list[tuple[_core.Axis, int, int, int]]]
-"""base tick [s]; of each axis the controller, its motor, and the shafts of the position's and of the speed's encoder"""
+Bound = tuple[float, list[tuple[_core.Axis, int, int, int, int]]]
+"""base tick [s]; of each axis the controller, its motor, the shafts of the position's and of the speed's encoder, and that of its reference"""
 OPEN_LOOP: Bound = (1.0, [])
 NO_LAWS: Mapping[str, Law] = MappingProxyType({})
 
@@ -92,6 +95,10 @@ class _Place:
             getattr(out, f"{name}_schedule").every = every * ticks
         self._encoders(out, ticks)
         self._loops(out)
+        if c.camera is not None and c.tracker is not None:
+            stream = zlib.crc32(self.name.encode())
+            out.camera = core_camera(c.camera, c.sample_time, ticks, stream)
+            out.tracker = core_tracker(c.tracker, c.camera.sample_time)
         if c.phase > 0.0:
             phase = whole_multiple(c.phase, c.sample_time, "phase") * ticks
             if phase >= out.position_schedule.every:
@@ -229,7 +236,8 @@ def core_control(
             axis = place.axis(ticks)
             if name in laws:
                 laws[name].set(axis)
-            axes.append((axis, list(train.motors).index(name), shafts.index(position), shafts.index(speed)))
+            encoders = shafts.index(position), shafts.index(speed)
+            axes.append((axis, list(train.motors).index(name), *encoders, shafts.index(place.shaft)))
         except InputError as problem:
             raise InputError(f"key {key.format(name)}{problem}") from None
     return base, axes

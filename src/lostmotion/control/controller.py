@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import NotNegative, Positive, Switch, Time, Whole
+from .camera import Camera, Tracker
 from .continuous import ContinuousController
 from .encoder import Encoder
 from .inverse_model import InverseModel
@@ -25,12 +24,12 @@ from .loops import (
     VoltageCommand,
 )
 from .references import PositionReference, SpeedReference, TorqueReference
+from .sample_times import whole_multiple
 
 AnyReference = Annotated[PositionReference | SpeedReference | TorqueReference, Field(discriminator="kind")]
 AnyCurrent = Annotated[
     IdealCurrent | FirstOrderCurrent | CurrentLoop | FieldOriented | VoltageCommand, Field(discriminator="kind")
 ]
-MAX_TICKS = 1_000_000  # of the base tick in the sample time of a loop
 
 
 class Controller(Part):
@@ -42,7 +41,7 @@ class Controller(Part):
 
     kind: Literal["sampled"] = "sampled"
     reference: AnyReference
-    """of the position, the speed or the torque: what the outermost loop follows"""
+    """of the position, the speed or the torque: what the outermost loop follows; with a camera, where the target is"""
     sample_time: Annotated[Time, Positive]
     """of the innermost loop, and of those that give none of their own"""
     delay: Annotated[Whole, Field(ge=0, le=1)] = 1
@@ -61,6 +60,10 @@ class Controller(Part):
     feedforward: Feedforward = Feedforward()
     inverse_model: InverseModel | None = None
     """feedforward by the model of the drive, with adaptation; in the place of `feedforward`"""
+    camera: Camera | None = None
+    """on the shaft of the reference: the loops then know of the target what it shows"""
+    tracker: Tracker | None = None
+    """of the frames of the camera"""
     law: Switch = False
     """the loops are a function of your own, which `simulate(..., law=function)` gives"""
     phase: Annotated[Time, NotNegative] = 0.0
@@ -96,12 +99,22 @@ class Controller(Part):
             raise ValueError("has a blend_time but no position_encoder to blend; leave it out")
         if self.feedforward != Feedforward() and self.speed is None:
             raise ValueError("has a feedforward, which the speed loop adds, but no speed loop; leave it out")
+        self._check_camera()
         if self.inverse_model is not None:
             if self.speed is None:
                 raise ValueError("has an inverse_model, which the speed loop adds, but no speed loop; leave it out")
             if self.feedforward != Feedforward():
                 raise ValueError("has feedforward and inverse_model, which both add the torque that is known; give one")
         return self
+
+    def _check_camera(self) -> None:
+        if (self.camera is None) != (self.tracker is None):
+            has, lacks = ("tracker", "camera") if self.camera is None else ("camera", "tracker")
+            raise ValueError(f"has a {has} but no {lacks}; camera and tracker belong together")
+        if self.camera is not None and self.reference.kind != "position":
+            raise ValueError(
+                f'has a camera and a reference of the {self.reference.kind}; with a camera take reference.kind = "position", the direction of the target'
+            )
 
     def schedules(self) -> Iterator[tuple[str, float, int]]:
         """Of each loop its name, sample time [s] and how many of the base tick that is.
@@ -128,20 +141,3 @@ def _kind(value: Any) -> str:
 AnyController = Annotated[
     Annotated[Controller, Tag("sampled")] | Annotated[ContinuousController, Tag("continuous")], Discriminator(_kind)
 ]
-
-
-def whole_multiple(time: float, base: float, key: str) -> int:
-    """How many times `base` a sample time is.
-
-    Raises
-    ------
-    InputError
-        It is no whole multiple.
-    """
-    ticks = round(time / base)
-    if ticks < 1 or ticks > MAX_TICKS or not math.isclose(ticks * base, time, rel_tol=1e-9):
-        near = max(1, min(ticks, MAX_TICKS)) * base
-        raise InputError(
-            f"{key}: {time:g} s is no whole multiple of the sample time {base:g} s; take {near:g} s, or another sample time"
-        )
-    return ticks

@@ -47,6 +47,8 @@ def signals_of(controller: Controller) -> Iterator[str]:
         yield from ("model_loss_factor", "model_friction_torque")
         if controller.inverse_model.load_observer is not None:
             yield "observed_load_torque"
+    if controller.camera is not None:
+        yield from ("target_direction", "target_seen")
     if controller.current.kind == "field_oriented":
         yield from WINDING_SIGNALS
 
