@@ -224,7 +224,7 @@ def as_scenario(
 
 def core_inputs(scenario: Scenario) -> tuple[_core.Drive, _core.Signal, _core.Signal, list[float], float]:
     """What every run of the core begins with: drive, command, load torque, state, hysteresis capacity."""
-    start = scenario.initial
+    start = scenario.start()
     return (
         scenario.drive().core(),
         scenario.command.core(),

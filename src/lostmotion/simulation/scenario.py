@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Self
 
 from pydantic import model_validator
@@ -15,7 +15,7 @@ from ..control.law import Law
 from ..data_sheets.components import Conditions, use_records
 from ..errors import InputError
 from ..inputs.part import Part
-from ..inputs.quantities import Angle, NotNegative, Positive, Speed, Time, Torque
+from ..inputs.quantities import Angle, NotNegative, Positive, Speed, Switch, Time, Torque
 from ..model.drive import Drive
 from ..model.gearbox import Gearbox
 from ..model.load import Load
@@ -49,6 +49,25 @@ class Initial(Part):
     load_angle: Angle = 0.0
     hysteresis_capacity: Annotated[Torque, NotNegative] = 0.0
     """h, which the last turning point before t = 0 left behind"""
+    on_reference: Switch = False
+    """angle and speeds are those of the controller's reference at t = 0"""
+
+
+def check_on_reference(initial: Any, controllers: Mapping[str, Controller], keys: Sequence[str]) -> None:
+    """Refuses `on_reference` where no reference says where an axis is, or where one of the keys says so, too.
+
+    Raises
+    ------
+    ValueError
+    """
+    if not initial.on_reference:
+        return
+    if not any(c.reference.kind == "position" for c in controllers.values()):
+        raise ValueError("has initial.on_reference but no controller with a reference of the position; leave it out")
+    if given := [key for key in keys if getattr(initial, key)]:
+        raise ValueError(
+            f"has initial.on_reference and initial.{given[0]}, which follows from it; leave one of them out"
+        )
 
 
 class SimulationTable(Part):
@@ -102,7 +121,8 @@ class Scenario(Part):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         drive = self.drive()
-        start = self.initial
+        check_on_reference(self.initial, self.axes(), ("load_angle", "load_speed", "motor_speed"))
+        start = self.start()
         if isinstance(drive.gearbox.stiffness, Rigid):
             if start.twist != 0.0:
                 raise ValueError(f"has initial.twist = {start.twist} rad, but the gearbox is rigid; leave it out")
@@ -122,6 +142,16 @@ class Scenario(Part):
     def axes(self) -> dict[str, Controller]:
         """The controller by the name of its motor, if there is one."""
         return {} if self.controller is None else {"motor": self.controller}
+
+    def start(self) -> Initial:
+        """State at t = 0, with what the reference says of it."""
+        if not self.initial.on_reference or self.controller is None:
+            return self.initial
+        angle, speed = (float(value) for value in self.controller.reference.at(0.0)[:2])
+        if self.controller.shaft == "motor":
+            angle, speed = angle / self.gearbox.ratio - self.initial.twist, speed / self.gearbox.ratio
+        found = {"load_angle": angle, "load_speed": speed, "motor_speed": speed * self.gearbox.ratio}
+        return self.initial.model_copy(update=found)
 
     def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
         """The solver's controllers."""

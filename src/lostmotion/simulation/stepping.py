@@ -112,7 +112,7 @@ class Simulation:
             core = scenario.core() if isinstance(scenario, Scenario) else self._drive.core()
             self._core = _core.Simulation(core, step, self._control)
             self._derived = {"efficiency": self._efficiency, "motor_power": self._motor_power}
-            self._initial = drive.initial if isinstance(drive, Scenario) else Initial()
+            self._initial = drive.start() if isinstance(drive, Scenario) else Initial()
         self.reset(initial)
 
     def _of_train(self, what: DriveTrain | TrainScenario, step: float, loaded: Sequence[str] | None) -> None:
@@ -128,7 +128,7 @@ class Simulation:
         self._variables = train_variables(train, core)
         self._channel = {name: k for k, (name, _, _) in enumerate(core.channels())}
         self._derived = self._derived_of(train)
-        self._initial = what.initial if isinstance(what, TrainScenario) else TrainInitial()
+        self._initial = what.begin() if isinstance(what, TrainScenario) else TrainInitial()
 
     def __repr__(self) -> str:
         return f"Simulation({self._drive!r}, at {self.time:.6g} s)"

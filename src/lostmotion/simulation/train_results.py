@@ -14,6 +14,7 @@ from ..model.train import DriveTrain
 from .results import RawResult, installed_version
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import CONTACTS_OF_TRAIN, packed
+from .train_parts import control_of_part, joined_results, parts_of
 from .train_scenario import TrainScenario
 from .train_state import start_capacities
 from .train_variables import angle_through, angles_through_gears, named_signals
@@ -23,7 +24,7 @@ from .windings import set_torques
 def run_train(
     scenario: TrainScenario, options: tuple[Any, ...], how: str, control: Bound, *, ledger: bool
 ) -> RawResult:
-    """A run of a drive train.
+    """A run of a drive train. Parts of it that nothing joins are solved one after the other.
 
     Parameters
     ----------
@@ -31,8 +32,7 @@ def run_train(
         Duration [s], sample interval [s], samples, whether to keep the energy ledger, relative tolerance (0: exact), and how
         many switchings are kept.
     """
-    core, inputs, start, capacities = core_case(scenario)
-    result = _core.run_train(core, inputs, start, capacities, *(*options, control))
+    core, result = _core_result(scenario, options, control)
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     data = dict(zip((name for name, _, _ in core.channels()), result["values"], strict=True))
     data |= named_signals(scenario.axes(), result["control"])
@@ -40,6 +40,22 @@ def run_train(
     add_derived_of_train(scenario.train(), data, time)
     attributes = _attributes(scenario, result, how, ledger=ledger)
     return RawResult(time, data, attributes | {CONTACTS_OF_TRAIN: " ".join(core.contact_names())})
+
+
+def _core_result(
+    scenario: TrainScenario, options: tuple[Any, ...], control: Bound
+) -> tuple[_core.Train, dict[str, Any]]:
+    """The solver's train, and what the solver gave for it."""
+    parts = parts_of(scenario)
+    if len(parts) > 1:
+        results = []
+        for part in parts:
+            core, result = _core_result(part, options, control_of_part(control, scenario, part))
+            names = {"channels": [name for name, _, _ in core.channels()], "contacts": core.contact_names()}
+            results.append(result | names)
+        return scenario.core(), joined_results(scenario, parts, results, options[-1])
+    core, inputs, start, capacities = core_case(scenario)
+    return core, _core.run_train(core, inputs, start, capacities, *(*options, control))
 
 
 def core_case(

@@ -9,22 +9,22 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..control.axis import NO_LAWS, Bound, check_torques, core_control, motor_laws
+from ..control.axis import NO_LAWS, Bound, check_torques, core_control, motor_laws, turns
 from ..control.continuous import ContinuousController
 from ..control.controller import AnyController, Controller
 from ..control.law import Law
 from ..data_sheets.components import Conditions
 from ..data_sheets.train_components import RECORDS, use_train_records
 from ..errors import InputError
-from ..inputs.named import nothing
+from ..inputs.named import Named, nothing
 from ..inputs.part import Part
-from ..inputs.quantities import Angle, NotNegative, Number, Speed, Torque
+from ..inputs.quantities import Angle, NotNegative, Number, Speed, Switch, Torque
 from ..inputs.validation import did_you_mean, shown
 from ..model.shaft import Shaft
 from ..model.signals import CommandSignal, Signal, TorqueSignal
 from ..model.train import DriveTrain, Elements, TrainElements
 from .keys import set_values
-from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, json_schema
+from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, check_on_reference, json_schema
 from .train_state import angles_at_start, start_values
 from .train_variables import check_names
 
@@ -52,6 +52,8 @@ class TrainInitial(Part):
     left out has settled"""
     hysteresis_capacities: Elements[Annotated[Torque, NotNegative]] = Field(default_factory=nothing)
     """of gears with hysteresis: what the last turning point before t = 0 left behind"""
+    on_reference: Switch = False
+    """angles of the shafts of controllers, and the speeds of all that turns with them, are those of their references at t = 0"""
 
 
 class TrainScenario(TrainElements):
@@ -78,6 +80,7 @@ class TrainScenario(TrainElements):
         train = self.train()
         train.check(self.loaded())
         self._check_controllers()
+        check_on_reference(self.initial, self.axes(), ("angles", "speeds"))
         core = self.core()
         if self.continuous() and (problem := core.check()):
             raise InputError(problem)
@@ -153,7 +156,7 @@ class TrainScenario(TrainElements):
             In place of that of the scenario.
         """
         train = self.train()
-        initial = self.initial if initial is None else initial
+        initial = self.begin() if initial is None else initial
         values = start_values(train, initial)
         angles = angles_at_start(train, initial.angles, initial.twists)
         known = []
@@ -169,6 +172,20 @@ class TrainScenario(TrainElements):
                     f"key initial.controller_states.{name}: is no state of a controller of this train; {meant}"
                 )
         return values | initial.controller_states
+
+    def begin(self) -> TrainInitial:
+        """State at t = 0, with what the references say of it."""
+        if not self.initial.on_reference:
+            return self.initial
+        angles: dict[str, float] = {}
+        speeds: dict[str, float] = {}
+        for controller in self.axes().values():
+            if controller.reference.kind == "position":
+                shaft = controller.shaft or list(self.shafts)[-1]
+                angles[shaft], speed = (float(value) for value in controller.reference.at(0.0)[:2])
+                ratios = {other: turns(self.train(), other, shaft) for other in self.shafts}
+                speeds |= {other: i * speed for other, i in ratios.items() if i is not None}
+        return self.initial.model_copy(update={"angles": Named(angles), "speeds": Named(speeds)})
 
     def train(self) -> DriveTrain:
         """The drive train without its surroundings."""
@@ -321,6 +338,7 @@ def in_long_form(scenario: Scenario) -> TrainScenario:
         twists={"gearbox": start.twist} if start.twist else {},
         motor_torques={"motor": start.motor_torque} if start.motor_torque else {},
         hysteresis_capacities={"gearbox": start.hysteresis_capacity} if start.hysteresis_capacity else {},
+        on_reference=start.on_reference,
     )
     return TrainScenario(
         title=scenario.title,

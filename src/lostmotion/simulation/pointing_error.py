@@ -1,0 +1,36 @@
+"""By how much controlled axes miss their references."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .results import RawResult
+from .scenario import Scenario
+from .train_scenario import TrainScenario
+
+NAME = "pointing_error"
+
+
+def pointing_names(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str]]:
+    """Of each axis that follows a position its motor, and what its error is called."""
+    for motor, controller in scenario.axes().items():
+        if controller.reference.kind == "position":
+            yield motor, NAME if isinstance(scenario, Scenario) else f"{motor}_{NAME}"
+
+
+def pointing_errors(scenario: Scenario | TrainScenario, result: RawResult) -> dict[str, np.ndarray]:
+    """The reference less the true angle of its shaft [rad] over time, by name; with a camera the reference is where the target is."""
+    found = {}
+    for motor, name in pointing_names(scenario):
+        controller = scenario.axes()[motor]
+        found[name] = controller.reference.at(result.time)[0] - _angle(scenario, result, controller.shaft)
+    return found
+
+
+def _angle(scenario: Scenario | TrainScenario, result: RawResult, shaft: str | None) -> np.ndarray:
+    if isinstance(scenario, TrainScenario):
+        return result[f"{shaft or list(scenario.shafts)[-1]}_angle"]
+    angle = result["load_angle"]
+    return angle if shaft != "motor" else np.asarray(scenario.gearbox.ratio * (angle + result["twist"]))

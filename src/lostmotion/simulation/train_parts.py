@@ -1,0 +1,172 @@
+"""Parts of a drive train that nothing joins: each is a train of its own, solved alone, and their results are one again."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..control.axis import Bound
+from ..inputs.named import Named
+from ..model.train import TrainElements
+from .train_scenario import TrainInitial, TrainScenario
+
+INSTANT, LEADING = 0, 2  # of a switching: the column of its instant, and how many come before those of contacts
+NO_CONTACT = 2.0
+SUMS = ("residual", "stored_change", "turned_over")  # of the ledger, over all elements
+
+
+def parts_of(scenario: TrainScenario) -> list[TrainScenario]:
+    """The trains that a scenario consists of, in the order of their first shafts; most often itself alone.
+
+    Shafts belong together that a gear, its housing, a clutch, a freewheel, or a controller joins.
+    """
+    groups = _groups(scenario)
+    return [scenario] if len(groups) == 1 else [_part(scenario, shafts) for shafts in groups]
+
+
+def _groups(scenario: TrainScenario) -> list[list[str]]:
+    group = {shaft: {shaft} for shaft in scenario.shafts}
+    for joined in _joined(scenario):
+        together = set().union(*(group[shaft] for shaft in joined))
+        for shaft in together:
+            group[shaft] = together
+    found: list[list[str]] = []
+    for shaft in scenario.shafts:
+        if not any(shaft in others for others in found):
+            found.append([s for s in scenario.shafts if s in group[shaft]])
+    return found
+
+
+def _joined(scenario: TrainScenario) -> Iterator[list[str]]:
+    """Shafts that something joins."""
+    for table in (scenario.gears, scenario.clutches, scenario.freewheels):
+        for element in table.values():
+            yield [element.input, element.output, *filter(None, [getattr(element, "housing", None)])]
+    last = list(scenario.shafts)[-1]
+    for name, controller in scenario.controllers.items():
+        shafts = [scenario.motors[name].shaft, controller.shaft or last]
+        encoders = [getattr(controller, key, None) for key in ("encoder", "position_encoder")]
+        yield shafts + [encoder.shaft for encoder in encoders if encoder is not None and encoder.shaft is not None]
+
+
+def _part(scenario: TrainScenario, shafts: Collection[str]) -> TrainScenario:
+    """The scenario of some of its shafts, whose values have been checked with the whole."""
+    kept: dict[str, Any] = {"shafts": Named({name: s for name, s in scenario.shafts.items() if name in shafts})}
+    for table in TrainElements.model_fields:
+        elements = getattr(scenario, table).items()
+        kept[table] = Named({name: e for name, e in elements if getattr(e, "shaft", getattr(e, "input", "")) in shafts})
+    last = list(scenario.shafts)[-1]
+    kept["controllers"] = Named(
+        {
+            name: c if c.shaft is not None else c.model_copy(update={"shaft": last})
+            for name, c in scenario.controllers.items()
+            if name in kept["motors"]
+        }
+    )
+    commanded = [*kept["motors"], *kept["brakes"], *kept["clutches"]]
+    kept["command"] = Named({name: c for name, c in scenario.command.items() if name in commanded})
+    states = {
+        f"{name}_{state}"
+        for name, c in scenario.continuous().items()
+        if name in kept["motors"]
+        for state in c.system().states
+    }
+    mine: dict[str, Collection[str]] = {
+        "speeds": shafts,
+        "angles": shafts,
+        "twists": kept["gears"],
+        "hysteresis_capacities": kept["gears"],
+        "motor_torques": kept["motors"],
+        "controller_states": states,
+    }
+    initial = {
+        table: Named({name: v for name, v in getattr(scenario.initial, table).items() if name in names})
+        for table, names in mine.items()
+    }
+    return scenario.model_copy(
+        update=kept | {"initial": TrainInitial(**initial, on_reference=scenario.initial.on_reference)}
+    )
+
+
+def control_of_part(control: Bound, whole: TrainScenario, part: TrainScenario) -> Bound:
+    """Those controllers that are of a part."""
+    tick, axes = control
+    motors, shafts = list(whole.motors), list(whole.shafts)
+    motor_of = {motors.index(name): k for k, name in enumerate(part.motors)}
+    shaft_of = {shafts.index(name): k for k, name in enumerate(part.shafts)}
+    return tick, [
+        (axis, motor_of[motor], shaft_of[position], shaft_of[speed], shaft_of[reference])
+        for axis, motor, position, speed, reference in axes
+        if motor in motor_of
+    ]
+
+
+def joined_results(
+    whole: TrainScenario, parts: Sequence[TrainScenario], results: Sequence[dict[str, Any]], most: int
+) -> dict[str, Any]:
+    """What the core would have given for the whole train.
+
+    Parameters
+    ----------
+    results
+        Of the parts, with `channels` and `contacts`, their names.
+    most
+        Switchings that are kept.
+    """
+    core = whole.core()
+    rows = {name: row for r in results for name, row in zip(r["channels"], r["values"], strict=True)}
+    signals = {
+        name: row
+        for part, r in zip(parts, results, strict=True)
+        for name, row in zip(part.axes(), r["control"], strict=True)
+    }
+    ledgers = [r["energy"] for r in results]
+    return {
+        "values": [rows[name] for name, _, _ in core.channels()],
+        "control": [signals[name] for name in whole.axes()],
+        "switchings": _joined_switchings(core.contact_names(), rows, results)[:most],
+        "switching_count": sum(r["switching_count"] for r in results),
+        "end_state": dict(sorted(item for r in results for item in r["end_state"].items())),
+        "energy": dict(
+            sorted(
+                {
+                    entry: sum(ledger[entry] for ledger in ledgers if entry in ledger)
+                    for ledger in ledgers
+                    for entry in ledger
+                }.items()
+            )
+        ),
+        "left_data_at": min(r["left_data_at"] for r in results),
+        "steps": sum(r["steps"] for r in results),
+    }
+
+
+def _joined_switchings(
+    contacts: Sequence[str], rows: dict[str, np.ndarray], results: Sequence[dict[str, Any]]
+) -> np.ndarray:
+    """In the order of time; the contacts of the other parts are as their own last switching has left them."""
+    n = len(contacts)
+    count = sum(len(r["switchings"]) for r in results)
+    table = np.full((count, LEADING + 2 * n), np.nan)
+    first, at = 0, {name: k for k, name in enumerate(contacts)}
+    start = np.array([rows[name][0] if name in rows else NO_CONTACT for name in contacts])
+    for r in results:
+        own, width = np.asarray(r["switchings"]), len(r["contacts"])
+        places = [at[name] for name in r["contacts"]]
+        here = slice(first, first + len(own))
+        table[here, :LEADING] = own[:, :LEADING]
+        table[here, [LEADING + k for k in places]] = own[:, LEADING : LEADING + width]
+        table[here, [LEADING + n + k for k in places]] = own[:, LEADING + width :]
+        if len(own):
+            start[places] = own[0, LEADING : LEADING + width]
+        first += len(own)
+    table = table[np.argsort(table[:, INSTANT], kind="stable")]
+    now = start
+    for row in table:
+        before, after = row[LEADING : LEADING + n], row[LEADING + n :]
+        others = np.isnan(before)
+        before[others] = after[others] = now[others]
+        now = after
+    return table
