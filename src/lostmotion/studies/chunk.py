@@ -13,7 +13,7 @@ from .axis_rows import run_axes
 from .columns import tabulate, units_of
 from .file import from_json
 from .in_core import core_can, run_in_core
-from .row_by_row import run_drives, run_trains
+from .row_by_row import run_each, run_trains, together
 from .runs import Runs
 from .study import Study
 from .wanted import DERIVED, channels, needed, reductions
@@ -51,7 +51,7 @@ def pieces(study: Study, first: int, last: int) -> list[tuple[int, int]]:
 def _arrays(study: Study) -> int:
     """How many variables of each run are held at once."""
     wanted = needed(study)
-    if isinstance(study.scenario, TrainScenario):
+    if isinstance(study.scenario, TrainScenario) and together(study):
         return 0 if reductions(study) else len(channels(study))
     if core_can(study) and reductions(study):
         return 0
@@ -74,9 +74,9 @@ def run_piece(study: Study, first: int, last: int, threads: int) -> Runs:
     parameters = study.parameters(first, last)
     if study.axis is not None:
         return run_axes(study, parameters, threads)
-    if isinstance(study.scenario, TrainScenario):
+    if together(study):
         return run_trains(study, parameters, threads)
-    return run_in_core(study, parameters, threads) if core_can(study) else run_drives(study, parameters)
+    return (run_in_core if core_can(study) else run_each)(study, parameters, threads)
 
 
 def as_table(text: str, first: int, last: int, runs: Runs, threads: int) -> pa.Table:

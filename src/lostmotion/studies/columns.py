@@ -63,7 +63,7 @@ def _with_derived(study: Study, runs: Runs) -> dict[str, np.ndarray]:
     if not isinstance(study.scenario, Scenario) or not wanted & DERIVED:
         return runs.samples
     samples = study.scenario.simulation.samples
-    whole = {c: runs.samples.get(c, np.zeros((len(runs.errors), samples))) for c in CHANNEL_NAMES}
+    whole = runs.samples | {c: runs.samples.get(c, np.zeros((len(runs.errors), samples))) for c in CHANNEL_NAMES}
     add_derived(whole, runs.ratio[:, None])
     return {name: whole[name] for name in wanted | set(runs.samples)}
 

@@ -1,18 +1,20 @@
-"""Runs in which any key may vary: each is a scenario of its own. Those of drive trains run together in the core."""
+"""Runs in which any key may vary: each is a scenario of its own. Those of plain drive trains run together in the core."""
 
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 from .. import _core
 from ..errors import InputError
-from ..simulation.results import ENERGY
-from ..simulation.run import simulate
+from ..simulation.pointing_error import pointing_errors
+from ..simulation.run import run
 from ..simulation.scenario import Scenario
+from ..simulation.train_parts import parts_of
 from ..simulation.train_results import add_derived_of_train, core_case
-from ..simulation.train_scenario import TrainScenario, need_open_loop
+from ..simulation.train_scenario import TrainScenario
 from .check import COLUMNS, check_columns
 from .functions import REDUCTIONS
 from .runs import Runs, spread
@@ -20,44 +22,66 @@ from .study import Study
 from .wanted import asks_for, channels, checks_drives, needed, reductions
 
 
-def run_drives(study: Study, parameters: np.ndarray) -> Runs:
-    """Drives, one after the other."""
-    assert isinstance(study.scenario, Scenario)
-    n, samples, sampled = len(parameters), study.scenario.simulation.samples, channels(study)
+def run_each(study: Study, parameters: np.ndarray, threads: int) -> Runs:
+    """Each as a run of its own, several at a time: drives, what has controllers, and trains of several parts."""
+    drives = isinstance(study.scenario, Scenario)
+    n, samples = len(parameters), study.scenario.simulation.samples
+    sampled = channels(study) if drives else sorted(needed(study))
     energy, checked = asks_for(study, "energy"), checks_drives(study)
+    entries = study.vocabulary.energies if energy else ()
     runs = Runs(
         parameters=parameters,
         samples={c: np.full((n, samples), np.nan) for c in sampled},
         kept={},
-        energy={e: np.full(n, np.nan) for e in ENERGY},
+        energy={name: np.full(n, np.nan) for name, _ in entries},
         checks={name: [empty] * n for name, empty in COLUMNS.items()} if checked else {},
         switchings=np.zeros(n),
         errors=[""] * n,
-        ratio=np.full(n, study.scenario.gearbox.ratio),
+        ratio=np.full(n, study.scenario.gearbox.ratio if isinstance(study.scenario, Scenario) else np.nan),
     )
-    for k, row in enumerate(parameters):
+
+    def make(k: int) -> None:
         try:
-            scenario = study.drive_at(row)
-            result = simulate(scenario, energy=energy)
+            scenario = study.scenario_at(parameters[k])
+            result = run(scenario, energy=energy)
             checks = check_columns(scenario) if checked else {}
         except (RuntimeError, ValueError) as error:
             runs.errors[k] = str(error)
-            continue
+            return
+        values = result.values | pointing_errors(scenario, result)
         for c in sampled:
-            runs.samples[c][k] = result[c].values
+            runs.samples[c][k] = values[c]
         if energy:
-            for e, value in json.loads(result.attrs["energy"]).items():
-                runs.energy[e][k] = value
+            ledger = json.loads(result.attrs["energy"])
+            for name, entry in entries:
+                runs.energy[name][k] = ledger[entry]
         for name, value in checks.items():
             runs.checks[name][k] = value
         runs.switchings[k] = result.attrs["switching_count"]
-        runs.ratio[k] = scenario.gearbox.ratio
+        if isinstance(scenario, Scenario):
+            runs.ratio[k] = scenario.gearbox.ratio
+
+    if threads == 1:
+        for k in range(n):
+            make(k)
+        return runs
+    with ThreadPoolExecutor(max_workers=threads) as pool:
+        try:
+            list(pool.map(make, range(n)))
+        except BaseException:  # Ctrl-C: what has not begun is left
+            pool.shutdown(cancel_futures=True)
+            raise
     return runs
 
 
+def together(study: Study) -> bool:
+    """Whether its runs are of trains that the core can take at once."""
+    scenario = study.scenario
+    return isinstance(scenario, TrainScenario) and not scenario.axes() and len(parts_of(scenario)) == 1
+
+
 def run_trains(study: Study, parameters: np.ndarray, threads: int) -> Runs:
-    """Drive trains: made here, run in the core on several threads, the GIL released."""
-    need_open_loop(study.scenario, "study")
+    """Drive trains without controllers, of one part: made here, run in the core on several threads, the GIL released."""
     n, table = len(parameters), study.scenario.simulation
     sampled, reduced = channels(study), reductions(study)
     entries = study.vocabulary.energies if asks_for(study, "energy") else ()
@@ -99,16 +123,16 @@ def run_trains(study: Study, parameters: np.ndarray, threads: int) -> Runs:
 def _checks_of(trains: dict[int, TrainScenario], errors: list[str]) -> dict[str, list[float | str]]:
     """The drive check of each run; where there is none, the run's error says why."""
     checks = {name: [empty] * len(errors) for name, empty in COLUMNS.items()}
-    for run, scenario in trains.items():
-        if errors[run]:
+    for k, scenario in trains.items():
+        if errors[k]:
             continue
         try:
             found = check_columns(scenario)
         except (RuntimeError, ValueError) as error:
-            errors[run] = str(error)
+            errors[k] = str(error)
             continue
         for name, value in found.items():
-            checks[name][run] = value
+            checks[name][k] = value
     return checks
 
 
@@ -123,11 +147,11 @@ def _samples(
     table = study.scenario.simulation
     time = np.arange(table.samples) * table.sample_interval
     out = {name: np.full((len(errors), table.samples), np.nan) for name in wanted}
-    for place, (run, scenario) in enumerate(trains.items()):
-        if errors[run]:
+    for place, (k, scenario) in enumerate(trains.items()):
+        if errors[k]:
             continue
         data = {name: values[place] for name, values in made.items()}
         add_derived_of_train(scenario.train(), data, time)
         for name in wanted:
-            out[name][run] = data[name]
+            out[name][k] = data[name]
     return out

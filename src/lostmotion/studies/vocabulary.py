@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
+from ..simulation.pointing_error import pointing_names
 from ..simulation.results import ENERGY
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
-from ..simulation.train_variables import train_variables
+from ..simulation.train_variables import axis_variables, train_variables
 from ..simulation.variables import CHANNEL_NAMES, VARIABLES
 
 OF_THE_RUN = ("energy", "time", "ideal_speed", "bandwidth")
@@ -35,18 +37,29 @@ OF_DRIVES = Vocabulary(
 )
 
 
+def _controlled(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str]]:
+    """What controllers add: their signals, and by how much each axis misses its reference."""
+    drive = isinstance(scenario, Scenario)
+    for variable in axis_variables({"" if drive else motor: c for motor, c in scenario.axes().items()}):
+        yield variable.name, variable.unit
+    for _, name in pointing_names(scenario):
+        yield name, "rad"
+
+
 def vocabulary_of(scenario: Scenario | TrainScenario) -> Vocabulary:
     """What expressions may name of a run of this scenario.
 
     An entry of a train's ledger, such as ``first_gear: mesh``, is called ``first_gear_mesh``.
     """
     if isinstance(scenario, Scenario):
-        return OF_DRIVES
+        if scenario.controller is None:
+            return OF_DRIVES
+        return OF_DRIVES._replace(variables=(*OF_DRIVES.variables, *_controlled(scenario)))
     core = scenario.core()
     variables = train_variables(scenario.train(), core)
     entries = core.ledger_names()
     return Vocabulary(
-        tuple((v.name, v.unit) for v in variables),
+        (*((v.name, v.unit) for v in variables), *_controlled(scenario)),
         tuple(v.name for v in variables if not v.derived),
         tuple((entry.replace(": ", "_").replace(" ", "_"), entry) for entry in entries),
         ("energy", "time"),
