@@ -610,6 +610,34 @@ def test_a_command_that_delays_cannot_shift_is_refused(command: Any, delays: dic
     assert message in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("command", "reached"),
+    [
+        (8.0, "8"),
+        ({"steps": [{"height": 1}, {"height": 1, "time": 0.5}]}, "2"),
+        ({"mean": 0.2, "ramps": [{"rise": 1, "duration": 0.1}]}, "1.2"),
+        ({"mean": 0.5, "amplitude": 0.6, "frequency": 1}, "1.1"),
+        ({"samples": {"times": [0, 0.1, 0.2], "values": [0, 1.5, 0]}}, "1.5"),
+    ],
+)
+def test_a_brake_is_commanded_up_to_its_full_torque(command: Any, reached: str) -> None:
+    """Such as a torque of 8 N·m in the place of a share."""
+    with pytest.raises(lm.InputError) as refused:
+        braked(command)
+    message = f"key command.b: may reach {reached}; it is a share, and 1 is the full torque, 4 N*m"
+    assert message in str(refused.value)
+
+
+def test_a_brake_may_swing_from_open_to_full_torque() -> None:
+    tenths = {"steps": [{"height": 0.1, "time": 0.1 * k} for k in range(10)]}  # their sum is 1 up to rounding
+    for command in ({"mean": 0.5, "amplitude": 0.5, "frequency": 1}, tenths):
+        assert float(lm.simulate(braked(command)).wheel_speed[-1]) < 10.0
+    simulation = lm.Simulation(braked(1.0))
+    with pytest.raises(lm.InputError, match=r"b_command 2\.0 is a share, and 1 is the full torque"):
+        simulation.advance(0.1, b_command=2.0)
+    simulation.advance(0.1, b_command=(1.0, 0.0))
+
+
 def test_a_safety_clutch_has_no_delays() -> None:
     clutch = {"kind": "safety", "input": "a", "output": "b", "torque": 1.0, "release_delay": 0.1}
     with pytest.raises(lm.InputError, match="is a safety clutch, which has no command; remove engagement_delay"):

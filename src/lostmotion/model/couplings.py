@@ -10,12 +10,15 @@ from ..inputs.part import Part
 from ..inputs.quantities import NotNegative, Positive, Time, Torque
 from .signals import CommandSignal
 
+FULL_COMMAND = 1.0 + 1e-9
+"""Greatest command of a brake or clutch: the full torque, up to the rounding of a sum of signals."""
+
 
 class Commanded(Part):
     """Dry friction with a capacity that its command applies, with the delays of a data sheet."""
 
     torque: Annotated[Torque, Positive]
-    """capacity while it slips, at command 1; between 0 (open) and 1 in proportion"""
+    """capacity while it slips, at command 1; between 0 and 1 in proportion, below 0 it is open"""
     breakaway_torque: Annotated[Torque, Positive] | None = None
     """capacity at rest, at command 1; left out, the same"""
 
@@ -30,8 +33,11 @@ class Commanded(Part):
         Raises
         ------
         ValueError
-            With delays, the command is not made of steps, or a step would act before the one that precedes it.
+            It exceeds 1. With delays, the command is not made of steps, or a step would act before the one that
+            precedes it.
         """
+        if (greatest := command.upper_bound()) > FULL_COMMAND:
+            raise ValueError(f"may reach {greatest:.6g}; it is a share, and 1 is the full torque, {self.torque:g} N*m")
         return command.delayed(self.engagement_delay, self.release_delay)
 
     @model_validator(mode="after")

@@ -216,6 +216,13 @@ class Signal(TimeFunction[V], Generic[V]):
                 )
         return self.model_copy(update={"steps": tuple(later)})
 
+    def upper_bound(self) -> float:
+        """Which the signal never exceeds: of all but the sines the greatest value, and their amplitudes beyond."""
+        lines = self.breakpoint_list()
+        values = [value for _, value, _ in lines]
+        values += [value + slope * (end - begin) for (begin, value, slope), (end, *_) in itertools.pairwise(lines)]
+        return max(values) + sum(abs(amplitude) for amplitude, *_ in self.sine_list())
+
     def mirrored(self) -> Self:
         """The same signal with the other sign."""
         return self.scaled(-1.0)

@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Time
 from ..inputs.validation import did_you_mean, shown
+from ..model.couplings import FULL_COMMAND
 from ..model.drive import Drive
 from ..model.train import DriveTrain
 from .run import start_state
@@ -93,6 +94,7 @@ class Simulation:
         self._core: _core.Simulation | _core.TrainSimulation
         self._input_places: dict[str, int] | None = None  # of a train
         self._loaded: tuple[str, ...] = ()
+        self._shares: set[str] = set()  # inputs that are commands of brakes and clutches
         self._scenario: TrainScenario | None = None
         self._core_train: _core.Train | None = None
         self._variables: tuple[Variable, ...] = VARIABLES
@@ -125,6 +127,7 @@ class Simulation:
         self._loaded = tuple(shafts)
         given = {f"{name}_load_torque" for name in shafts} | self._controlled()
         self._required = {name for name in core.input_names() if name not in given}
+        self._shares = {f"{name}_command" for name in train.commanded() if name not in train.motors}
         self._variables = train_variables(train, core)
         self._channel = {name: k for k, (name, _, _) in enumerate(core.channels())}
         self._derived = self._derived_of(train)
@@ -253,6 +256,8 @@ class Simulation:
                 raise InputError(f"{name} {shown(value)} must be a number (SI), or a pair of numbers") from None
             if not finite:
                 raise InputError(f"{name} {shown(value)} must be finite (SI)")
+            if name in self._shares and max(first, last) > FULL_COMMAND:
+                raise InputError(f"{name} {shown(value)} is a share, and 1 is the full torque; give at most that")
         if missing := self._required - inputs.keys():
             raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
         try:

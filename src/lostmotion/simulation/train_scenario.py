@@ -69,7 +69,7 @@ class TrainScenario(TrainElements):
     title: str = ""
     shafts: Elements[ShaftTable] = Field(min_length=1)
     command: Elements[CommandSignal] = Field(default_factory=nothing)
-    """of each motor (1 is rated voltage, or with a torque source rated torque; left out, 0), brake and friction clutch (1 is the full torque, 0 none)"""
+    """of each motor (1 is rated voltage, or with a torque source rated torque; left out, 0), brake and friction clutch (0: open, 1: the full torque)"""
     controllers: Elements[AnyController] = Field(default_factory=nothing)
     """of motors, which then have no command"""
     initial: TrainInitial = TrainInitial()
