@@ -27,7 +27,7 @@ LAYERS = [
     {"simulation"},
     {"response", "test_rig"},
     {"sizing", "servo", "pointing"},
-    {"studies"},
+    {"studies", "identification"},
     {"reports"},
     {"paper"},
     {"cli"},

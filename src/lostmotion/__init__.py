@@ -43,6 +43,10 @@ if TYPE_CHECKING:
     from .data_sheets.sheet import Source as Source
     from .errors import InputError as InputError
     from .errors import MissingLibraryError as MissingLibraryError
+    from .identification.identify import IdentificationResult as IdentificationResult
+    from .identification.identify import identify as identify
+    from .identification.task import Identification as Identification
+    from .identification.task import load_identification as load_identification
     from .model.angle_torques import ErrorCurve as ErrorCurve
     from .model.angle_torques import ErrorHarmonic as ErrorHarmonic
     from .model.angle_torques import Gravity as Gravity
@@ -174,6 +178,8 @@ _HOMES = {
     "data_sheets.records": ("catalogue",),
     "data_sheets.sheet": ("Source",),
     "errors": ("InputError", "MissingLibraryError"),
+    "identification.identify": ("IdentificationResult", "identify"),
+    "identification.task": ("Identification", "load_identification"),
     "model.angle_torques": ("ErrorCurve", "ErrorHarmonic", "Gravity", "TorqueCurve", "TorqueHarmonic"),
     "model.couplings": ("Brake", "Clutch", "Freewheel"),
     "model.drive": ("Drive",),

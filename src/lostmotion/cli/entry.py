@@ -9,7 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from . import catalogue, drive, reproduce, response, rig, run, scenarios, select, servo, study, track
+from . import catalogue, drive, identify, reproduce, response, rig, run, scenarios, select, servo, study, track
 from .terminal import fail
 
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # of the parser that typer brings along
@@ -88,6 +88,7 @@ for command in (
     study.study,
     select.select,
     track.track,
+    identify.identify,
 ):
     app.command()(command)
 drive_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Check a drive against its task.")

@@ -39,8 +39,8 @@ class Source(Remark):
 
     data: tuple[str, ...]
     """keys of the record that it covers"""
-    status: Annotated[Literal["manufacturer", "transcription", "inferred"], BeforeValidator(current_word)]
-    """read in the manufacturer's own text, in somebody's transcription of it, or concluded from other data"""
+    status: Annotated[Literal["manufacturer", "transcription", "inferred", "identified"], BeforeValidator(current_word)]
+    """read in the manufacturer's own text, in somebody's transcription of it, concluded from other data, or identified from measured logs"""
     text: str
 
 

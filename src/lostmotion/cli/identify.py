@@ -1,0 +1,63 @@
+"""`lostmotion identify`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .targets import try_directory, writing
+from .terminal import busy, progress
+
+if TYPE_CHECKING:
+    from ..identification.identify import IdentificationResult
+
+
+def identify(
+    file: Annotated[Path, typer.Argument(metavar="IDENTIFY.toml", help="Identification file: logs, rig, parameters.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
+        "identified"
+    ),
+    profiles: Annotated[
+        bool, typer.Option("--profiles", help="Also intervals by the profile of the likelihood (takes longer).")
+    ] = False,
+) -> None:
+    """Identify a drive from measured logs: values with intervals, and what the logs cannot tell.
+
+    Writes identified.toml (the rig with the values that were found, a scenario), identified.html (one page), errors.csv (of each
+    log), parameters.csv and, with the key record, gearbox.toml (a data sheet). What was dropped of logs is listed.
+
+    \b
+    lostmotion identify servo/identify.toml -o servo
+    """
+    from ..errors import need
+
+    try_directory(output)
+    need("jinja2", "The page of an identification", "report")
+    from ..identification.identify import identify as run
+
+    with progress(1, "Identifying") as step, busy("Identifying"):
+        result = run(file, profiles=profiles)
+        step()
+    with writing(output), busy("Drawing"):
+        from ..reports.identification import write_identification
+
+        page = write_identification(output, file.stem, result)
+    _print_summary(result)
+    print(f"The page is at {page}")
+
+
+def _print_summary(result: IdentificationResult) -> None:
+    print(result.task.title or "Identification")
+    for k, rung in enumerate(result.rungs):
+        held_out = "" if math.isnan(rung.held_out) else f", held out {rung.held_out:.5g}"
+        print(f"  {'*' if k == result.chosen else ' '} {rung.name}: mean absolute error {rung.train:.5g}{held_out}")
+    for line in result.lines():
+        print(line)
+    if result.notes:
+        print(f"Notes on {len(result.notes)} logs:")
+        for name, notes in result.notes.items():
+            for note in notes:
+                print(f"  {name}: {note}")

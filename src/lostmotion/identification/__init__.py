@@ -1,0 +1,1 @@
+"""Identification: from measured logs to the values of a drive, their intervals, and what the logs cannot tell."""

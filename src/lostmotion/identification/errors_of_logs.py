@@ -1,0 +1,47 @@
+"""How far a run is from a log: MAE, RMSE and fit of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .prepare import Prepared
+
+
+@dataclass(frozen=True)
+class LogError:
+    """Of one measured channel of one log."""
+
+    log: str
+    channel: str
+    held_out: bool
+    mae: float
+    """mean absolute error, SI"""
+    rmse: float
+    """root mean square error, SI"""
+    fit: float
+    """1 - rmse/standard deviation of what was measured: 1 is perfect"""
+    samples: int
+
+
+def log_errors(logs: Sequence[Prepared], residuals: Sequence[np.ndarray]) -> list[LogError]:
+    """Of each log and each measured channel."""
+    found = []
+    for log, rows in zip(logs, residuals, strict=True):
+        for (name, measured), r in zip(log.measured.items(), rows, strict=True):
+            rmse = float(np.sqrt(np.mean(r**2)))
+            spread = float(np.std(measured))
+            fit = 1.0 - rmse / spread if spread > 0.0 else float("nan")
+            found.append(LogError(log.name, name, log.held_out, float(np.mean(np.abs(r))), rmse, fit, len(r)))
+    return found
+
+
+def total(errors: Sequence[LogError], *, held_out: bool, channel: str) -> tuple[float, float]:
+    """(MAE, RMSE) over all samples of some logs; NaN where there are none."""
+    own = [e for e in errors if e.held_out == held_out and e.channel == channel]
+    n = sum(e.samples for e in own)
+    if n == 0:
+        return float("nan"), float("nan")
+    return sum(e.mae * e.samples for e in own) / n, float(np.sqrt(sum(e.rmse**2 * e.samples for e in own) / n))

@@ -1,0 +1,146 @@
+"""Formulas of identification files: arithmetic of parameters and of what is known of a log, by a grammar of their own."""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ..inputs.validation import did_you_mean, shown
+
+MAX_LENGTH = 2000  # characters
+
+ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
+COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+}
+FUNCTIONS: dict[str, Callable[..., float]] = {
+    "sqrt": math.sqrt,
+    "exp": math.exp,
+    "sin": math.sin,
+    "cos": math.cos,
+    "tan": math.tan,
+    "abs": abs,
+    "min": min,
+    "max": max,
+}
+CONSTANTS = {"pi": math.pi}
+
+Values = Mapping[str, Any]
+
+
+class Formula:
+    """Arithmetic of named values: ``+ - * / **``, comparisons, ``and or not``, `FUNCTIONS` and `CONSTANTS`.
+
+    Nothing of it is ever run as Python.
+
+    Parameters
+    ----------
+    text
+        As written; a number is a constant.
+
+    Raises
+    ------
+    ValueError
+        It cannot be read, or has something else in it.
+    """
+
+    def __init__(self, text: str | float) -> None:
+        self.text = str(text)
+        if len(self.text) > MAX_LENGTH:
+            raise ValueError(f"{self.text[:40]!r}... is longer than {MAX_LENGTH} characters")
+        try:
+            self._tree = ast.parse(" ".join(self.text.split()), mode="eval").body
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            raise ValueError(f"{self.text!r} cannot be read as a formula") from None
+        self.names = frozenset(
+            node.id
+            for node in ast.walk(self._tree)
+            if isinstance(node, ast.Name) and node.id not in CONSTANTS and node.id not in FUNCTIONS
+        )
+        """all that it names"""
+        for node in ast.walk(self._tree):
+            _refuse(node, self.text)
+
+    def value(self, values: Values) -> Any:
+        """With the values of its names.
+
+        Raises
+        ------
+        ValueError
+            A name has no value, or the result is no finite number.
+        """
+        for name in sorted(self.names):
+            if name not in values:
+                meant = did_you_mean(name, values, f"known are {', '.join(sorted(values)) or 'none'}")
+                raise ValueError(f"{name!r} in {self.text!r} has no value; {meant}")
+        try:
+            found = _value(self._tree, values)
+        except (ArithmeticError, ValueError, TypeError) as error:
+            raise ValueError(f"{self.text!r} has no value ({error})") from None
+        if isinstance(found, complex) or (isinstance(found, float) and not math.isfinite(found)):
+            raise ValueError(f"{self.text!r} has the value {found}, which is no finite number")
+        return found
+
+
+def _refuse(node: ast.AST, text: str) -> None:
+    allowed = (
+        ast.Name,
+        ast.Load,
+        ast.BinOp,
+        ast.UnaryOp,
+        ast.USub,
+        ast.UAdd,
+        ast.Not,
+        ast.Compare,
+        ast.BoolOp,
+        ast.And,
+        ast.Or,
+        *ARITHMETIC,
+        *COMPARISONS,
+    )
+    if (isinstance(node, ast.Constant) and isinstance(node.value, int | float | str)) or isinstance(node, allowed):
+        return
+    if (
+        isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in FUNCTIONS
+        and not node.keywords
+    ):
+        return
+    raise ValueError(f"{text!r} has something else in it than + - * / **, comparisons, and {', '.join(FUNCTIONS)}")
+
+
+def _value(node: ast.expr, values: Values) -> Any:
+    match node:
+        case ast.Constant(value):
+            return value
+        case ast.Name(name):
+            return CONSTANTS[name] if name in CONSTANTS else values[name]
+        case ast.UnaryOp(op, inner):
+            found = _value(inner, values)
+            return not found if isinstance(op, ast.Not) else -found if isinstance(op, ast.USub) else found
+        case ast.BinOp(left, op, right):
+            return ARITHMETIC[type(op)](_value(left, values), _value(right, values))
+        case ast.BoolOp(op, parts):
+            together = all if isinstance(op, ast.And) else any
+            return together(_value(part, values) for part in parts)
+        case ast.Compare(left, ops, rights):
+            terms = [_value(left, values), *(_value(right, values) for right in rights)]
+            return all(COMPARISONS[type(op)](a, b) for op, a, b in zip(ops, terms, terms[1:], strict=False))
+        case ast.Call(ast.Name(name), inner):
+            return FUNCTIONS[name](*(_value(part, values) for part in inner))
+    raise ValueError(f"{shown(ast.dump(node))} is not part of a formula")

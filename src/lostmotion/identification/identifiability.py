@@ -1,0 +1,135 @@
+"""What the logs cannot tell, in words: the null directions of the scaled Jacobian."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .fit import Fit, slope_of
+from .formulas import Formula
+from .parameters import FreeParameter
+from .task import Identification
+
+LOOSE = 1.0  # relative change, of the values in a direction, that 95 % of equally good fits stay within: beyond, it is not determined
+PART = 0.25  # of the largest relative change in a direction, from which on a parameter has a part in it
+ALIKE = 0.3  # by which relative changes of parameters of one scale may differ
+
+# What determines a parameter, by the key of the scenario that it enters.
+REMEDIES: tuple[tuple[tuple[str, ...], str], ...] = (
+    (
+        ("drive_efficiency", "backdrive_efficiency", "losses"),
+        "give a stall torque, or a log with output torque in both directions of power flow",
+    ),
+    (("stiffness", "backlash", "hysteresis"), "give a slow torque ramp with the output locked"),
+    (("delay", "sample_time"), "give a log with steps of the reference"),
+    (("breakaway_torque", "stribeck_speed", "friction_curve"), "give slow reversals, and a log that creeps from rest"),
+    (
+        ("rotor_inertia", "inertia"),
+        "give a log with high acceleration and a known torque, or the inertia of the data sheet",
+    ),
+    (
+        ("gain", "limit", "rated_torque", "viscous_friction", "friction_torque"),
+        "give a stall torque, a log of the motor's torque or current, or a log in which the motor is off",
+    ),
+    (("angle",), "give a log at rest with the motor off"),
+)
+
+
+@dataclass(frozen=True)
+class Undetermined:
+    """A direction in the space of parameters in which the logs say little."""
+
+    changes: dict[str, float]
+    """relative changes of the parameters along it, the largest 1"""
+    width: float
+    """relative change of the largest of them within a 95 % interval; infinite if nothing holds it"""
+    text: str
+
+
+def undetermined(task: Identification, fit: Fit, parameters: Mapping[str, FreeParameter]) -> list[Undetermined]:
+    """Directions that the logs alone, without priors, leave wider than the values themselves."""
+    names = list(parameters)
+    if not names:
+        return []
+    # Relative changes: of a parameter near 0 its scale stands for its value.
+    size = np.array([max(abs(fit.point.values[n]), parameters[n].step) for n in names])
+    slopes = np.array([slope_of(parameters[n], fit.point.values[n]) for n in names])
+    H = fit.normal * np.outer(size / slopes, size / slopes)
+    values, vectors = np.linalg.eigh(H)
+    found = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        width = 1.96 / np.sqrt(value) if value > 1e-8 * values.max() else np.inf
+        largest = int(np.argmax(np.abs(vector)))
+        if width * abs(vector[largest]) < LOOSE:
+            continue
+        changes = {
+            n: float(x / vector[largest])
+            for n, x in zip(names, vector, strict=True)
+            if abs(x) >= PART * abs(vector[largest])
+        }
+        found.append(Undetermined(changes, float(width * abs(vector[largest])), _sentence(task, changes)))
+    return found
+
+
+def _sentence(task: Identification, changes: Mapping[str, float]) -> str:
+    names = sorted(changes, key=lambda n: -abs(changes[n]))
+    remedy = _remedy(task, names)
+    if len(names) == 1:
+        return f"{names[0]} is not determined by these logs; {remedy}"
+    a, b, *more = names
+    ratio = changes[b] / changes[a]
+    if not more and abs(abs(ratio) - 1.0) < ALIKE:
+        what = "product" if ratio < 0.0 else "ratio"
+        sign = "*" if ratio < 0.0 else "/"
+        return f"only the {what} {a}{sign}{b} is determined; {remedy}"
+    if all(abs(changes[n] - 1.0) < ALIKE for n in names):
+        return f"{', '.join(names)} have one scale in common, which is not determined, only their ratios are; {remedy}"
+    moves = ", ".join(f"{n} {10.0 * changes[n]:+.0f} %" for n in names)
+    return f"the logs stay the same if these change together: {moves}; {remedy}"
+
+
+def _remedy(task: Identification, names: Sequence[str]) -> str:
+    keys = [key for name in names for key in _keys(task, name)]
+    for ends, text in REMEDIES:
+        if any(end in key for key in keys for end in ends):
+            return text
+    return "give a value with a tolerance as a prior, or a log in which they act apart"
+
+
+def _keys(task: Identification, name: str) -> list[str]:
+    """Keys of the scenario, and of channels, that a parameter enters."""
+    tables = [task.set, *(rung.set for rung in task.ladder), *(phase.set for phase in task.phases)]
+    found = [key for table in tables for key, value in table.items() if name in _names(value)]
+    for entry in (*task.inputs.values(), *task.measured.values()):
+        found += [
+            key for key in ("delay", "scale", "offset", "filter_time") if name in _names(getattr(entry, key, None))
+        ]
+    return found
+
+
+def _names(value: object) -> frozenset[str]:
+    if isinstance(value, list | tuple):
+        return frozenset().union(*map(_names, value))
+    if isinstance(value, dict):
+        return frozenset().union(*map(_names, value.values()))
+    if not isinstance(value, str):
+        return frozenset()
+    try:
+        return Formula(value).names
+    except ValueError:
+        return frozenset()
+
+
+def at_bounds(fit: Fit, parameters: Mapping[str, FreeParameter]) -> list[str]:
+    """Sentences on parameters that have ended at a bound."""
+    found = []
+    for name, p in parameters.items():
+        value = fit.point.values[name]
+        for bound, word in ((p.min, "least"), (p.max, "largest")):
+            if abs(value - bound) <= 1e-6 * p.step:
+                found.append(
+                    f"{name} is at its {word} value {bound:.6g}: the logs would have it beyond, or it has no part in them"
+                )
+    return found

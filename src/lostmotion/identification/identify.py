@@ -1,0 +1,216 @@
+"""From an identification file to the answer."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..inputs.arguments import checked
+from ..simulation.train_scenario import TrainScenario
+from .engine import Engine
+from .errors_of_logs import LogError, total
+from .fit import Fit, Problem
+from .identifiability import Undetermined, at_bounds, undetermined
+from .intervals import Interval, bootstrap, profile
+from .ladder import RungResult, chosen, climb, free_on, problem_of, start_point
+from .prepare import Prepared, prepared, read_all
+from .record import gear_sheet, scenario_text, sheet_text
+from .rig import Rig
+from .task import Identification, load_identification
+
+Notify = Callable[[str, int, float], None]
+
+
+@dataclass
+class IdentificationResult:
+    """What the logs say of the rig."""
+
+    task: Identification
+    rungs: list[RungResult]
+    """of the ladder, from the lowest"""
+    chosen: int
+    """the rung that is taken"""
+    intervals: dict[str, Interval]
+    """95 % intervals of the parameters, SI"""
+    undetermined: list[Undetermined]
+    """what the logs cannot tell"""
+    at_bounds: list[str]
+    """parameters that have ended at a bound"""
+    notes: dict[str, tuple[str, ...]]
+    """by log: what was dropped of it, and what looks wrong"""
+    scenario: TrainScenario
+    """the rig with the values that were found, of the first log"""
+    profiles: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    """by parameter, (value, rise of the loss)"""
+    rig: Rig | None = field(default=None, repr=False)
+    logs: list[Prepared] = field(default_factory=list, repr=False)
+
+    @property
+    def fit(self) -> Fit:
+        """Of the rung that is taken."""
+        return self.rungs[self.chosen].fit
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Of all parameters, SI."""
+        return dict(self.fit.point.values)
+
+    @property
+    def errors(self) -> list[LogError]:
+        """Of each log and channel."""
+        return self.rungs[self.chosen].errors
+
+    def error(self, channel: str | None = None, *, held_out: bool = False) -> tuple[float, float]:
+        """(MAE, RMSE) of a channel over all logs fitted, or held out [SI]; NaN without such."""
+        name = channel or next(iter(self.task.measured))
+        return total(self.errors, held_out=held_out, channel=name)
+
+    def values_for(self, log: str) -> dict[str, float]:
+        """Values of all parameters, and of the nuisances of one log by its name."""
+        return self.values | self.fit.point.nuisance.get(log, {})
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+    def lines(self) -> list[str]:
+        """The answer as text."""
+        lines = [f"{self.rungs[self.chosen].name}: the rung that is taken"]
+        for name, p in self.task.parameters.items():
+            if name not in self.intervals:
+                continue
+            i = self.intervals[name]
+            unit = f" {p.unit}" if p.unit else ""
+            lines.append(f"  {name} = {self.values[name]:.5g} ({i.low:.5g} to {i.high:.5g}){unit}")
+        for channel in self.task.measured:
+            for held_out, what in ((False, "fitted"), (True, "held out")):
+                mae, rmse = self.error(channel, held_out=held_out)
+                if not math.isnan(mae):
+                    n = sum(e.held_out == held_out and e.channel == channel for e in self.errors)
+                    lines.append(f"  {channel}, {n} logs {what}: MAE {mae:.5g}, RMSE {rmse:.5g}")
+        return lines + [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
+
+    def source(self) -> str:
+        """What the values were identified from, for records."""
+        fitted = sum(not log.held_out for log in self.logs)
+        mae, rmse = self.error(held_out=any(log.held_out for log in self.logs))
+        return f"identified from {fitted} logs ({', '.join(self.task.logs.files)}), {self.rungs[self.chosen].name}; error of other logs: MAE {mae:.4g}, RMSE {rmse:.4g}"
+
+    def scenario_text(self) -> str:
+        """The identified rig as a scenario file."""
+        return scenario_text(self.scenario, "\n".join([self.source(), *self.lines()]))
+
+    def record_text(self) -> str:
+        """The gear that the key `record` names, as a data sheet with the status "identified".
+
+        Raises
+        ------
+        InputError
+            There is no such gear.
+        """
+        table, _, name = self.task.record.partition(".")
+        if table != "gear" or name not in self.scenario.gears:
+            raise InputError(
+                f"key record: {self.task.record!r} must be gear.NAME with one of {', '.join(self.scenario.gears) or 'no gear'}"
+            )
+        plain = "".join(c if c.isalnum() else "-" for c in name.lower()).strip("-")
+        return sheet_text(
+            gear_sheet(self.scenario.gears[name], f"{plain}-identified", self.task.title or name, self.source())
+        )
+
+
+def _no_notice(what: str, iteration: int, cost: float) -> None:
+    """Nobody asks."""
+
+
+@checked
+def identify(
+    source: str | Path,
+    *,
+    threads: int | None = None,
+    profiles: bool = False,
+    notify: Any = None,
+) -> IdentificationResult:
+    """Identify the values of a rig from measured logs.
+
+    Parameters
+    ----------
+    source
+        The identification file (TOML).
+    threads
+        Runs at the same time; left out, as many as there are processors.
+    profiles
+        Also intervals by the profile of the likelihood, which takes as long as the fit again for each parameter.
+    notify
+        Is called with the name of the rung, the iteration and the cost.
+
+    Raises
+    ------
+    InputError
+        The file, a log or the rig cannot be used; the message names file, key, value and remedy.
+    """
+    task, directory = load_identification(source)
+    try:
+        return identify_task(task, directory, threads=threads, profiles=profiles, notify=notify or _no_notice)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
+
+
+def identify_task(
+    task: Identification,
+    directory: Path,
+    *,
+    threads: int | None = None,
+    profiles: bool = False,
+    notify: Notify = _no_notice,
+) -> IdentificationResult:
+    """As `identify`, of a task that has been read."""
+    rig = Rig(task, directory)
+    logs = [prepared(task, log, rig.units) for log in read_all(task, directory)]
+    return identify_logs(rig, logs, threads=threads, profiles=profiles, notify=notify)
+
+
+def identify_logs(
+    rig: Rig, logs: list[Prepared], *, threads: int | None = None, profiles: bool = False, notify: Notify = _no_notice
+) -> IdentificationResult:
+    """As `identify`, of logs that have been prepared."""
+    task, engine = rig.task, Engine(rig, threads)
+    rungs = climb(rig, engine, logs, start_point(task, logs), notify)
+    best = chosen(rungs)
+    fit, free = rungs[best].fit, free_on(task, best)
+    train = [log for log in logs if not log.held_out]
+    problem: Problem = problem_of(rig, engine, train, best)
+    intervals = bootstrap(problem, fit)
+    found = {}
+    if profiles:
+        for name in free:
+            intervals[name], found[name] = profile(problem, fit, name)
+    first = logs[0]
+    return IdentificationResult(
+        task,
+        rungs,
+        best,
+        intervals,
+        undetermined(task, fit, free),
+        at_bounds(fit, free),
+        {log.name: log.log.notes for log in logs if log.log.notes},
+        rig.scenario_at(first, fit.point.of(first), best),
+        found,
+        rig,
+        logs,
+    )
+
+
+def residual_table(result: IdentificationResult, variables: tuple[str, ...] = ()) -> dict[str, dict[str, np.ndarray]]:
+    """By log: time, measured and computed channels, and variables of the rig along the run."""
+    assert result.rig is not None
+    out = {}
+    for log in result.logs:
+        run = result.rig.run(log, result.values_for(log.name), result.chosen, variables)
+        out[log.name] = {"time": log.time, **{f"measured {n}": v for n, v in log.measured.items()}, **run}
+    return out

@@ -1,0 +1,100 @@
+"""Intervals of identified values: by a block bootstrap, and by the profile of the likelihood."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .fit import Fit, Problem, moved, search, slope_of
+
+RESAMPLES = 2000
+LEVEL = 0.95
+CHI_SQUARE = 1.920729  # half the 95 % point of chi-square with one degree of freedom
+
+
+@dataclass(frozen=True)
+class Interval:
+    """95 % interval of a value, SI."""
+
+    low: float
+    high: float
+    method: str
+    """``bootstrap`` or ``profile``"""
+
+
+def bootstrap(problem: Problem, fit: Fit, seed: int = 0) -> dict[str, Interval]:
+    """By resampling blocks of the residuals, with one Gauss-Newton step for each sample.
+
+    The pieces of the gradient of half a second each are drawn anew with replacement, so that errors that last, as those of a
+    model that is not quite right do, widen the interval. Directions that the logs do not determine get their own width from the
+    priors alone, or none: then the interval is that of the bounds.
+    """
+    names = list(problem.parameters)
+    if not names:
+        return {}
+    H = fit.normal.copy()
+    slopes = np.array([slope_of(problem.parameters[name], fit.point.values[name]) for name in names])
+    for k, name in enumerate(names):
+        if (deviation := problem.parameters[name].deviation) is not None:
+            H[k, k] += (slopes[k] / deviation) ** 2
+    blocks = np.vstack(fit.scores)
+    blocks = blocks - blocks.mean(axis=0)
+    loose = np.zeros(len(names), dtype=bool)
+    values, vectors = np.linalg.eigh(H)
+    weak = values < 1e-8 * max(float(values.max()), 1e-300)
+    if weak.any():
+        loose = np.abs(vectors[:, weak]).max(axis=1) > 0.1
+    inverse = vectors[:, ~weak] @ np.diag(1.0 / values[~weak]) @ vectors[:, ~weak].T
+    draw = np.random.default_rng(seed)
+    count = draw.multinomial(len(blocks), np.full(len(blocks), 1.0 / len(blocks)), size=RESAMPLES)
+    steps = (count @ blocks) @ inverse * math.sqrt(len(blocks) / max(1, len(blocks) - len(names)))
+    low, high = np.percentile(steps, [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)], axis=0)
+    found = {}
+    for k, name in enumerate(names):
+        p, value = problem.parameters[name], fit.point.values[name]
+        ends = (p.min, p.max) if loose[k] else (moved(p, value, low[k]), moved(p, value, high[k]))
+        found[name] = Interval(*ends, "bootstrap")
+    return found
+
+
+def profile(problem: Problem, fit: Fit, name: str, points: int = 3) -> tuple[Interval, list[tuple[float, float]]]:
+    """By the values at which the loss, all other parameters fitted again, has risen by that of a 95 % interval.
+
+    Returns
+    -------
+    tuple
+        The interval, and (value, rise of the loss) of the points that were fitted.
+    """
+    p, value = problem.parameters[name], fit.point.values[name]
+    names = list(problem.parameters)
+    k = names.index(name)
+    width = math.sqrt(max(np.linalg.pinv(fit.normal)[k, k], 1e-12))
+    others = {n: q for n, q in problem.parameters.items() if n != name}
+    rest = replace(problem, parameters=others, given=fit.deviations)
+    found = [(value, 0.0)]
+    ends = []
+    for sign in (-1.0, 1.0):
+        reach, last = 2.0 * width, (0.0, 0.0)
+        end = p.min if sign < 0.0 else p.max
+        for _ in range(points):
+            there = moved(p, value, sign * reach)
+            start = replace(fit.point, values=fit.point.values | {name: there})
+            again = search(rest, start, iterations=3)
+            residuals = problem.engine.residuals(problem.logs, again.point, problem.rung)
+            before = problem.engine.residuals(problem.logs, fit.point, problem.rung)
+            rise = problem.cost(residuals, fit.deviations, again.point, fit.correlation) - problem.cost(
+                before, fit.deviations, fit.point, fit.correlation
+            )
+            found.append((there, rise))
+            if rise >= CHI_SQUARE:
+                a, b = math.sqrt(max(last[1], 0.0)), math.sqrt(rise)
+                share = (math.sqrt(CHI_SQUARE) - a) / max(b - a, 1e-12)
+                end = moved(p, value, sign * (last[0] + share * (reach - last[0])))
+                break
+            if there in (p.min, p.max):
+                break
+            last, reach = (reach, rise), 2.0 * reach
+        ends.append(end)
+    return Interval(ends[0], ends[1], "profile"), sorted(found)

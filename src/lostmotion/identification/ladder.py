@@ -1,0 +1,157 @@
+"""The ladder of models: each rung fitted from the one below, the one with the least held-out error taken."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import InputError
+from .engine import Engine, Point
+from .errors_of_logs import LogError, log_errors
+from .fit import Fit, Problem, search
+from .parameters import FreeParameter
+from .prepare import Prepared
+from .rig import Rig, number
+from .task import Identification
+
+GAIN = 0.01  # of the held-out error, by which a higher rung must be better to be taken
+Notify = Callable[[str, int, float], None]
+
+
+@dataclass
+class RungResult:
+    """One rung: its fit and its errors."""
+
+    name: str
+    fit: Fit
+    errors: list[LogError]
+    train: float
+    """mean absolute error in units of the deviations, or SI of the only channel"""
+    held_out: float
+    """the same of the logs held out; NaN without such"""
+
+
+def free_on(task: Identification, rung: int) -> dict[str, FreeParameter]:
+    """Parameters that are sought on a rung."""
+    names = [name for entry in task.rungs()[: rung + 1] for name in entry.free]
+    return {name: p for name, p in task.parameters.items() if name in names and not p.fixed}
+
+
+def start_point(task: Identification, logs: Sequence[Prepared]) -> Point:
+    """Start values; parameters of higher rungs are off."""
+    first = free_on(task, 0)
+    values = {
+        name: p.start if name in first or p.fixed or p.off is None else p.off for name, p in task.parameters.items()
+    }
+    own = {name: p.start for name, p in task.nuisance.items()}
+    return Point(values, {log.name: dict(own) for log in logs})
+
+
+def problem_of(rig: Rig, engine: Engine, logs: Sequence[Prepared], rung: int) -> Problem:
+    """The fit of a rung to logs."""
+    task = rig.task
+    given = [m.deviation for m in task.measured.values()]
+    deviations = None if None in given else np.array(given, dtype=float)
+    resolution = np.array([number(m.resolution, {}, "measured.resolution") for m in task.measured.values()])
+    return Problem(engine, logs, rung, free_on(task, rung), task.nuisance, task.fit, deviations, resolution)
+
+
+def several(logs: Sequence[Prepared], count: int) -> list[Prepared]:
+    """Some of the logs, spread evenly over their list as sorted by their conditions."""
+    if len(logs) <= count:
+        return list(logs)
+    ordered = sorted(
+        logs,
+        key=lambda log: repr(sorted((k, v) for k, v in log.log.header.items() if isinstance(v, int | float | str))),
+    )
+    return [ordered[round(k * (len(ordered) - 1) / (count - 1))] for k in range(count)] if count > 1 else ordered[:1]
+
+
+def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, notify: Notify) -> list[RungResult]:
+    """All rungs of the ladder.
+
+    Raises
+    ------
+    InputError
+        No log is left to fit, or the rig has no motion at the start.
+    """
+    task = rig.task
+    train = [log for log in logs if not log.held_out]
+    if not train:
+        raise InputError(
+            "key logs.held_out: holds for every log, so that none is left to fit; make the condition narrower"
+        )
+    found: list[RungResult] = []
+    point = start
+    for rung, entry in enumerate(task.rungs()):
+        added = {n: p for n, p in free_on(task, rung).items() if rung == 0 or n not in free_on(task, rung - 1)}
+        if rung > 0:
+            point = replace(point, values=point.values | {n: p.start for n, p in added.items()})
+        best: Fit | None = None
+        for tried in _starts(point, entry.multi_start):
+            fit = _one(rig, engine, train, rung, tried, entry.name, notify)
+            if best is None or fit.cost < best.cost:
+                best = fit
+        assert best is not None
+        if found and found[-1].fit.cost < best.cost * (1.0 - 1e-9) and not entry.set:
+            # The rung contains that below: begin there, with what is new switched off.
+            below = {n: p.off if p.off is not None else p.start for n, p in added.items()}
+            again = _one(
+                rig,
+                engine,
+                train,
+                rung,
+                replace(found[-1].fit.point, values=found[-1].fit.point.values | below),
+                entry.name,
+                notify,
+            )
+            best = min(best, again, key=lambda f: f.cost)
+        point = best.point
+        residuals = engine.residuals(logs, point, rung)
+        errors = log_errors(logs, residuals)
+        found.append(RungResult(entry.name, best, errors, *_means(task, errors, best)))
+    return found
+
+
+def _starts(point: Point, tried: dict[str, tuple[float, ...]]) -> Iterator[Point]:
+    for values in itertools.product(*tried.values()):
+        yield replace(point, values=point.values | dict(zip(tried, values, strict=True)))
+
+
+def _one(rig: Rig, engine: Engine, train: list[Prepared], rung: int, start: Point, name: str, notify: Notify) -> Fit:
+    """Some logs first, then all."""
+    options = rig.task.fit
+    few = several(train, options.first_logs)
+
+    def tell(iteration: int, cost: float) -> None:
+        notify(name, iteration, cost)
+
+    fit = search(problem_of(rig, engine, few, rung), start, iterations=options.iterations, notify=tell)
+    if len(few) == len(train):
+        return fit
+    return search(problem_of(rig, engine, train, rung), fit.point, iterations=min(3, options.iterations), notify=tell)
+
+
+def _means(task: Identification, errors: list[LogError], fit: Fit) -> tuple[float, float]:
+    """Mean absolute errors of the logs fitted and held out, over all channels."""
+    units = dict(zip(task.measured, fit.deviations if len(task.measured) > 1 else np.ones(1), strict=True))
+    means = []
+    for held_out in (False, True):
+        own = [e for e in errors if e.held_out == held_out]
+        n = sum(e.samples for e in own)
+        means.append(sum(e.mae / units[e.channel] * e.samples for e in own) / n if n else math.nan)
+    return means[0], means[1]
+
+
+def chosen(rungs: Sequence[RungResult]) -> int:
+    """The lowest rung that no higher one betters by more than `GAIN` of the held-out error, or of the error where none is held out."""
+    errors = [r.train if math.isnan(r.held_out) else r.held_out for r in rungs]
+    taken = 0
+    for k, error in enumerate(errors):
+        if error < errors[taken] * (1.0 - GAIN):
+            taken = k
+    return taken

@@ -1,0 +1,68 @@
+"""A log: channels over time in SI units, what its header says, and what was dropped of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..inputs.validation import did_you_mean
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Samples of one quantity, one for each instant of the log."""
+
+    values: np.ndarray
+    unit: str = ""
+    """as its file says; empty where it says nothing"""
+
+
+@dataclass(frozen=True)
+class Log:
+    """What was measured in one run."""
+
+    name: str
+    """of its file"""
+    time: np.ndarray
+    """[s]"""
+    channels: Mapping[str, Channel]
+    header: Mapping[str, Any] = field(default_factory=dict)
+    """numbers and words that hold for the whole log, such as the mass that was moved"""
+    notes: tuple[str, ...] = ()
+    """what was dropped or looks wrong, one line each"""
+
+    def values(self, name: str) -> np.ndarray:
+        """Of a channel, as the file has them.
+
+        Raises
+        ------
+        InputError
+            There is none of that name.
+        """
+        if name not in self.channels:
+            meant = did_you_mean(name, self.channels, f"its channels are {', '.join(self.channels)}")
+            raise InputError(f"{self.name}: has no channel {name}; {meant}")
+        return self.channels[name].values
+
+    def only(self, kept: np.ndarray, note: str) -> Log:
+        """The log with some of its samples, and why the others are not there."""
+        channels = {name: replace(c, values=c.values[kept]) for name, c in self.channels.items()}
+        return replace(self, time=self.time[kept], channels=channels, notes=(*self.notes, note))
+
+    def noted(self, note: str) -> Log:
+        """The same log with one more note."""
+        return replace(self, notes=(*self.notes, note))
+
+    @property
+    def duration(self) -> float:
+        """[s]"""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def interval(self) -> float:
+        """Median time between two samples [s]."""
+        return float(np.median(np.diff(self.time)))

@@ -1,0 +1,180 @@
+"""Logs as the fit takes them: channels in SI, what the formulas may name, phases, and which logs are held out."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..units.conversion import si_value
+from .formulas import Formula
+from .logs import Log
+from .readers import find_logs, read_log
+from .screening import screened
+from .task import Identification
+
+KINDS = ("rad", "rad/s", "N*m", "A", "V", "N", "m", "m/s", "s", "K", "rad/s^2", "m/s^2", "W", "Pa")
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Samples ``begin`` to ``end`` of a log, in one phase of the rig (-1: as it is)."""
+
+    begin: int
+    end: int
+    phase: int
+
+
+@dataclass
+class Prepared:
+    """A log that is compared with runs of the rig."""
+
+    log: Log
+    time: np.ndarray
+    """[s], from 0"""
+    inputs: dict[str, np.ndarray]
+    measured: dict[str, np.ndarray]
+    facts: dict[str, Any]
+    """what formulas may name: its header, and ``first_CHANNEL`` and ``mean_CHANNEL``"""
+    segments: tuple[Segment, ...]
+    held_out: bool
+    cache: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def name(self) -> str:
+        """Of its file."""
+        return self.log.name
+
+
+def channel_factor(written: str, of_file: str, unit: str, where: str) -> float:
+    """What one of the unit of a channel is in SI.
+
+    Parameters
+    ----------
+    written
+        As the identification file says; if empty, `of_file` holds, and if that is empty, the channel is in SI.
+    unit
+        SI unit of what it is compared with; units of another kind are read as what they are, for a `scale` to turn them.
+
+    Raises
+    ------
+    InputError
+        The unit is not known.
+    """
+    text = (written or of_file).strip()
+    if text in ("", "-", "1", "bool"):
+        return 1.0
+    problem: ValueError | None = None
+    for kind in dict.fromkeys((unit, *KINDS)):
+        if kind in ("", "1"):
+            continue
+        try:
+            return si_value(f"1 {text}", kind)
+        except ValueError as error:
+            problem = problem or error
+    raise InputError(f"{where}: the unit {text!r} is not known ({problem}); write it with measured or inputs ... unit")
+
+
+def read_all(task: Identification, directory: Path, notify: Callable[[], None] = lambda: None) -> list[Log]:
+    """All logs of a task.
+
+    Raises
+    ------
+    InputError
+        One of them cannot be read.
+    """
+    found = []
+    for path in find_logs(task.logs.files, directory):
+        found.append(read_log(path, time=task.logs.time))
+        notify()
+    return found
+
+
+def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepared:
+    """A log of the task, screened.
+
+    Parameters
+    ----------
+    units
+        SI units of inputs and measured variables of the rig by name.
+
+    Raises
+    ------
+    InputError
+        It lacks a channel, or nothing of it can be used.
+    """
+    measured = {name: m.channel for name, m in task.measured.items()}
+    inputs = {name: i.channel for name, i in task.inputs.items()}
+    header = {**task.logs.header, **log.header}
+    log = screened(
+        Log(log.name, log.time, log.channels, header, log.notes), measured.values(), inputs.values(), task.logs.stated
+    )
+    keep = log.time - log.time[0] >= task.logs.first
+    if task.logs.last is not None:
+        keep &= log.time - log.time[0] <= task.logs.last
+    if keep.sum() < 10:
+        raise InputError(
+            f"{log.name}: lasts {log.duration:.4g} s, and logs.first and logs.last leave {keep.sum()} samples of it"
+        )
+    if not keep.all():
+        log = log.only(keep, f"{np.sum(~keep)} samples before logs.first or after logs.last are left out")
+    facts = {key: value for key, value in header.items() if isinstance(value, int | float | str)}
+    for name, channel in log.channels.items():
+        key = "".join(c if c.isalnum() else "_" for c in name)
+        facts[f"first_{key}"] = float(channel.values[0])
+        facts[f"mean_{key}"] = float(np.mean(channel.values))
+
+    def in_si(channel: str, unit: str, variable: str, where: str) -> np.ndarray:
+        factor = channel_factor(unit, log.channels[channel].unit, units.get(variable, ""), f"{log.name}: {where}")
+        return np.asarray(log.values(channel) * factor, dtype=float)
+
+    held_out = task.logs.held_out is not None and bool(_fact(task.logs.held_out, facts, log, "logs.held_out"))
+    return Prepared(
+        log,
+        log.time - log.time[0],
+        {name: in_si(i.channel, i.unit, name, f"inputs.{name}") for name, i in task.inputs.items()},
+        {name: in_si(m.channel, m.unit, m.variable, f"measured.{name}") for name, m in task.measured.items()},
+        facts,
+        _segments(task, log, facts),
+        held_out,
+    )
+
+
+def _fact(text: Any, facts: Mapping[str, Any], log: Log, key: str) -> Any:
+    try:
+        return Formula(text).value(facts)
+    except ValueError as problem:
+        raise InputError(f"{log.name}: key {key}: {problem}") from None
+
+
+def _segments(task: Identification, log: Log, facts: Mapping[str, Any]) -> tuple[Segment, ...]:
+    """Where the rig is in which phase."""
+    n = len(log.time)
+    phase = np.full(n, -1)
+    for k, entry in enumerate(task.phases):
+        formula = Formula(entry.when)
+        names = [name for name in formula.names if name in log.channels]
+        columns = {name: log.values(name) for name in names}
+        if not names:
+            phase[:] = k if _fact(entry.when, facts, log, f"phases[{k}].when") else phase
+            continue
+        rows = np.array([columns[name] for name in names]).T
+        distinct, which = np.unique(rows, axis=0, return_inverse=True)
+        if len(distinct) > 1000:
+            raise InputError(
+                f"{log.name}: key phases[{k}].when: {entry.when!r} names a channel with {len(distinct)} values; name one that switches"
+            )
+        holds = np.array(
+            [
+                bool(_fact(entry.when, {**facts, **dict(zip(names, row, strict=True))}, log, "phases"))
+                for row in distinct
+            ]
+        )
+        phase[holds[which.ravel()]] = k
+    edges = [0, *(np.flatnonzero(np.diff(phase)) + 1).tolist(), n]
+    return tuple(Segment(a, b, int(phase[a])) for a, b in itertools.pairwise(edges))

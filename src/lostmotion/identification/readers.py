@@ -1,0 +1,74 @@
+"""Log files: which reader takes which, and the list of them that a pattern names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from ..errors import InputError
+from ..inputs.validation import did_you_mean
+from .binary_logs import read_mat_log, read_mdf_log, read_parquet_log, read_tdms_log
+from .csv_log import read_csv_log
+from .logs import Log
+from .servo_json import read_servo_json
+
+TABLES: dict[str, Callable[..., Log]] = {
+    ".csv": read_csv_log,
+    ".txt": read_csv_log,
+    ".tsv": read_csv_log,
+    ".mat": read_mat_log,
+    ".parquet": read_parquet_log,
+    ".mf4": read_mdf_log,
+    ".tdms": read_tdms_log,
+}
+ENDINGS = (".json", *TABLES)
+
+
+def read_log(path: str | Path, *, time: str = "") -> Log:
+    """Read a log: CSV, MATLAB, Parquet, MDF 4, TDMS, or JSON of a servo recorder, by the ending of its name.
+
+    Parameters
+    ----------
+    time
+        Name of the channel of the time, where it is not found by itself.
+
+    Raises
+    ------
+    InputError
+        With one line that names the file and the remedy.
+    MissingLibraryError
+        The library of the format is not installed.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; check the name")
+    ending = path.suffix.lower()
+    if ending == ".json":
+        return read_servo_json(path)
+    if ending not in TABLES:
+        raise InputError(f"{path}: {did_you_mean(ending, ENDINGS, 'logs end in ' + ', '.join(ENDINGS))}")
+    return TABLES[ending](path, time=time)
+
+
+def find_logs(patterns: Sequence[str], directory: Path) -> list[Path]:
+    """Files by names or patterns (``*``, ``**``) relative to a directory; a directory stands for all logs in it.
+
+    Raises
+    ------
+    InputError
+        One of them names no file.
+    """
+    found: list[Path] = []
+    for pattern in patterns:
+        path = directory / pattern
+        if path.is_dir():
+            named = sorted(p for p in path.iterdir() if p.suffix.lower() in ENDINGS)
+        elif any(c in pattern for c in "*?["):
+            anchor = Path(path.anchor) if Path(pattern).is_absolute() else directory
+            named = sorted(anchor.glob(str(path.relative_to(anchor)) if anchor == Path(path.anchor) else pattern))
+        else:
+            named = [path] if path.is_file() else []
+        if not named:
+            raise InputError(f"key logs.files: {pattern!r} names no log in {directory.resolve()}; check the name")
+        found += named
+    return list(dict.fromkeys(found))

@@ -1,0 +1,192 @@
+"""Screening of logs: what cannot be used is dropped or refused, and what looks wrong is noted, each with its reason."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..errors import InputError
+from .logs import Log
+
+GLITCH = 8.0  # times the usual change between samples (99th percentile), there and back within two samples
+CLOCK = 0.3  # share of repeated time stamps from which on the clock is taken to be coarse
+PAUSE = 5.0  # times the usual interval between samples, that is noted as a pause
+LIMIT = 0.2  # share of samples at the largest value, from which on a channel is taken to saturate
+STALL = 0.1  # share of the samples in which no channel changes, from which on it is noted
+SLOW = 10.0  # samples for each change of a channel that otherwise changes, from which on it is called slow
+CONTRADICTION = 0.03  # share by which the mean of a channel may depart from what the header says
+
+
+def screened(log: Log, measured: Iterable[str], inputs: Iterable[str], stated: dict[str, str] | None = None) -> Log:
+    """A log that can be compared with a run: its time rises, its channels are numbers.
+
+    Parameters
+    ----------
+    measured
+        Channels that are compared: glitches and missing values in them are dropped.
+    inputs
+        Channels that act on the rig: where they are missing the log ends.
+    stated
+        Keys of the header, and the channels that ought to agree with them.
+
+    Raises
+    ------
+    InputError
+        Nothing is left that could be used; the message says why.
+    """
+    measured, inputs = list(measured), list(inputs)
+    for name in (*measured, *inputs):
+        log.values(name)
+    if len(log.time) < 10:
+        raise InputError(f"{log.name}: has {len(log.time)} samples; 10 at least are needed, leave the file out")
+    log = _rising(log)
+    log = _numbers(log, measured, inputs)
+    for name in measured:
+        log = _without_glitches(log, name)
+        if np.ptp(log.values(name)) == 0.0:
+            log = log.noted(f"{name} stays at {log.values(name)[0]:.6g} all through; it says nothing of the motion")
+    for name in measured:
+        log = _noted(log, name)
+    log = _stalls(log)
+    for key, channel in (stated or {}).items():
+        log = _compared(log, key, channel)
+    return log
+
+
+def _rising(log: Log) -> Log:
+    """Time stamps that rise: those not finite or going back are dropped, those of a coarse clock spread."""
+    finite = np.isfinite(log.time)
+    if not finite.all():
+        log = log.only(finite, f"dropped {np.sum(~finite)} samples without a time")
+    if len(log.time) < 10:
+        raise InputError(f"{log.name}: has times in {len(log.time)} samples only; 10 at least are needed")
+    step = np.diff(log.time)
+    back = step < 0.0
+    if back.any():
+        highest = np.maximum.accumulate(log.time)
+        kept = log.time >= highest
+        if np.mean(kept) < 0.9:
+            raise InputError(
+                f"{log.name}: its time goes back at sample {int(np.argmax(back)) + 1} ({log.time[int(np.argmax(back)) + 1]:.6g} s) and "
+                f"{np.mean(~kept):.0%} of the samples lie before earlier ones; sort or split the file"
+            )
+        log = log.only(
+            kept,
+            f"dropped {np.sum(~kept)} samples whose time goes back, the first near {log.time[int(np.argmax(back))]:.6g} s",
+        )
+    same = np.diff(log.time) == 0.0
+    share = float(np.mean(same))
+    if share == 1.0:
+        raise InputError(f"{log.name}: all samples have the time {log.time[0]:.6g} s; the clock stood still")
+    if share >= CLOCK:
+        return _spread(log)
+    if same.any():
+        kept = np.concatenate([[True], ~same])
+        log = log.only(kept, f"dropped {np.sum(same)} samples with the time stamp of the sample before")
+    long = np.diff(log.time) > PAUSE * np.median(np.diff(log.time))
+    if long.any():
+        k = int(np.argmax(np.diff(log.time)))
+        log = log.noted(
+            f"{np.sum(long)} pauses in the samples, the longest of {np.diff(log.time)[k]:.4g} s at {log.time[k]:.4g} s"
+        )
+    return log
+
+
+def _spread(log: Log) -> Log:
+    """Samples between two ticks of a coarse clock, at equal distances."""
+    first = np.concatenate([[True], np.diff(log.time) > 0.0])
+    starts = np.flatnonzero(first)
+    tick = float(np.median(np.diff(log.time[starts])))
+    ends = np.append(log.time[starts][1:], log.time[starts][-1] + tick)
+    index = np.cumsum(first) - 1
+    within = np.arange(len(log.time)) - starts[index]
+    count = np.diff(np.append(starts, len(log.time)))
+    time = (
+        log.time[starts][index]
+        + (np.minimum(ends, log.time[starts] + tick) - log.time[starts])[index] * within / count[index]
+    )
+    return Log(log.name, time, log.channels, log.header, log.notes).noted(
+        f"the clock moves in steps of {tick:.4g} s with {np.mean(count):.1f} samples each; the samples are spread over them"
+    )
+
+
+def _numbers(log: Log, measured: list[str], inputs: list[str]) -> Log:
+    """Without samples in which a channel that is needed is no number."""
+    for name in dict.fromkeys((*inputs, *measured)):
+        bad = ~np.isfinite(log.values(name))
+        if bad.all():
+            raise InputError(
+                f"{log.name}: channel {name} has no number in any sample; leave the file out, or name another channel"
+            )
+        if np.mean(bad) > 0.5:
+            raise InputError(
+                f"{log.name}: channel {name} has no number in {np.mean(bad):.0%} of the samples; leave the file out"
+            )
+        if bad.any():
+            log = log.only(~bad, f"dropped {np.sum(bad)} samples in which {name} is no number")
+    return log
+
+
+def _without_glitches(log: Log, name: str) -> Log:
+    """Without single samples that jump away and back."""
+    x = log.values(name)
+    step = np.diff(x)
+    usual = float(np.percentile(np.abs(step), 99.0))
+    if usual == 0.0:
+        return log
+    there, back = step[:-1], step[1:]
+    away = np.minimum(np.abs(there), np.abs(back))
+    glitch = np.zeros(len(x), dtype=bool)
+    glitch[1:-1] = (there * back < 0.0) & (away > GLITCH * usual) & (np.abs(there + back) < 0.5 * away)
+    if not glitch.any():
+        return log
+    k = int(np.argmax(glitch))
+    count = int(np.sum(glitch))
+    return log.only(
+        ~glitch,
+        f"dropped {count} glitch{'es' if count > 1 else ''} of {name}, the first at {log.time[k]:.4g} s ({x[k]:.6g})",
+    )
+
+
+def _noted(log: Log, name: str) -> Log:
+    """Notes on a channel that ends at a limit, or is slower than its samples."""
+    x = log.values(name)
+    changes = int(np.sum(np.diff(x) != 0.0))
+    if changes <= SLOW:
+        return log
+    at_top = np.abs(x) == np.max(np.abs(x))
+    plateaus = int(np.sum(at_top[1:] & ~at_top[:-1]))
+    if np.mean(at_top) > LIMIT and plateaus > 2:
+        text = f"{name} is at its largest value {np.max(np.abs(x)):.6g} in {np.mean(at_top):.0%} of the samples, {plateaus} times; it may saturate"
+        log = log.noted(text)
+    moved = np.flatnonzero(np.diff(x) != 0.0)
+    if len(x) > SLOW * changes and np.max(np.diff(moved), initial=0) < 3.0 * np.median(np.diff(moved)):
+        text = f"{name} changes only {changes / log.duration:.3g} times in a second, and is sampled {1 / log.interval:.4g} times"
+        log = log.noted(text)
+    return log
+
+
+def _stalls(log: Log) -> Log:
+    """A note where no channel at all changes for long."""
+    moved = np.zeros(len(log.time) - 1, dtype=bool)
+    for channel in log.channels.values():
+        moved |= np.diff(channel.values) != 0.0
+    edges = np.concatenate([[-1], np.flatnonzero(moved), [len(moved)]])
+    longest = int(np.argmax(np.diff(edges)))
+    count = int(np.diff(edges)[longest])
+    if moved.any() and count > STALL * len(log.time) and count > 20:
+        return log.noted(
+            f"no channel changes in {count} samples from {log.time[edges[longest] + 1]:.4g} s on; the recorder may have stalled"
+        )
+    return log
+
+
+def _compared(log: Log, key: str, channel: str) -> Log:
+    """A note where the header contradicts a channel."""
+    if key not in log.header or channel not in log.channels:
+        return log
+    said, mean = log.header[key], float(np.nanmean(log.values(channel)))
+    if not isinstance(said, int | float) or abs(mean - said) <= CONTRADICTION * max(abs(mean), abs(said)):
+        return log
+    return log.noted(f"the header says {key} = {said:.6g}, the channel {channel} is {mean:.6g} on average")

@@ -1,0 +1,195 @@
+"""Identification files: logs, the rig as a scenario, what is sought, what is compared."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from ..errors import InputError
+from ..inputs.arguments import checked
+from ..inputs.named import nothing
+from ..inputs.part import Part
+from ..inputs.quantities import NotNegative, Number, Positive, Time, Whole
+from ..inputs.toml_files import read_toml
+from ..inputs.validation import did_you_mean
+from ..model.train import Elements
+from .formulas import Formula
+from .parameters import FreeParameter
+
+FormulaText = str | float
+Setting = FormulaText | tuple["Setting", ...] | dict[str, Any]
+
+
+class LogFiles(Part):
+    """Which logs, and which of them are kept from the fit."""
+
+    files: tuple[str, ...] = Field(min_length=1)
+    """names or patterns, relative to the identification file; a directory stands for all logs in it"""
+    time: str = ""
+    """channel of the time, where it is not found by itself"""
+    held_out: FormulaText | None = None
+    """condition on the header, such as ``kp == 8``; logs that meet it are compared, not fitted"""
+    header: Elements[Any] = Field(default_factory=nothing)
+    """of logs that lack it: values by key, such as ``arm_mass = 0``"""
+    stated: Elements[str] = Field(default_factory=nothing)
+    """keys of the header, and the channels that ought to agree with them, such as ``vin = "input_volts"``"""
+    first: Annotated[Time, NotNegative] = 0.0
+    """left out at the beginning of each log"""
+    last: Annotated[Time, Positive] | None = None
+    """after which a log is not used; left out, to its end"""
+
+
+class InputChannel(Part):
+    """A channel that acts on the rig."""
+
+    channel: str
+    unit: str = ""
+    """of the channel; left out, as its file says, else SI"""
+    scale: FormulaText = 1.0
+    """factor on it"""
+    offset: FormulaText = 0.0
+    """added to it after the factor"""
+    delay: FormulaText = 0.0
+    """by which it acts later: dead time [s]"""
+    interpolation: Literal["hold", "linear"] = "hold"
+    """between samples"""
+
+
+class MeasuredChannel(Part):
+    """A channel that is compared with a result variable: ``scale * variable(t - delay) + offset``, filtered."""
+
+    channel: str
+    variable: str
+    """result variable of the rig"""
+    unit: str = ""
+    """of the channel; left out, as its file says, else SI"""
+    scale: FormulaText = 1.0
+    offset: FormulaText = 0.0
+    """SI"""
+    delay: FormulaText = 0.0
+    """from the quantity until its sample [s]"""
+    filter_time: FormulaText = 0.0
+    """time constant of the first-order filter of the channel [s]"""
+    resolution: FormulaText = 0.0
+    """step of its quantisation, SI"""
+    deviation: Annotated[Number, Positive] | None = None
+    """standard deviation of its errors, SI: the weight against other channels; needed where there are several"""
+
+
+class Phase(Part):
+    """A part of a log in which the rig is another: motor off, brake on."""
+
+    when: FormulaText
+    """condition on the channels of a sample, such as ``torque_enable == 0``"""
+    set: dict[str, Any] = Field(default_factory=dict)
+    """values of the scenario by dotted key"""
+
+
+class Rung(Part):
+    """One rung of the ladder of models: that below, and more free parameters."""
+
+    name: str
+    free: tuple[str, ...] = ()
+    """parameters, beside those of the rungs below"""
+    set: dict[str, Any] = Field(default_factory=dict)
+    """values of the scenario by dotted key, beside those of the rungs below"""
+    multi_start: Elements[tuple[Number, ...]] = Field(default_factory=nothing)
+    """of parameters that the motion does not depend on smoothly: the values that are tried"""
+
+
+class FitOptions(Part):
+    """How the search is made."""
+
+    loss: Literal["huber", "linear"] = "huber"
+    """of a residual; huber: linear beyond `outlier` standard deviations"""
+    outlier: Annotated[Number, Positive] = 1.345
+    iterations: Annotated[Whole, Field(ge=1, le=500)] = 30
+    first_logs: Annotated[Whole, Field(ge=1)] = 12
+    """of which the search begins, before it takes all"""
+    horizon: tuple[Annotated[Time, Positive], ...] = ()
+    """lengths of windows with which the search begins; each window starts from the measured state"""
+    sample_interval: Annotated[Time, Positive] | None = None
+    """of the runs; left out, that of the log, at most 2 ms"""
+
+
+class Identification(Part):
+    """All of an identification file."""
+
+    title: str = ""
+    scenario: str
+    """file or name of the rig, which the values below change"""
+    logs: LogFiles
+    inputs: Elements[InputChannel] = Field(default_factory=nothing)
+    """by the result variable of what acts: ``servo_command``, ``arm_load_torque``, ``servo_reference``"""
+    measured: Elements[MeasuredChannel] = Field(min_length=1)
+    set: dict[str, Any] = Field(default_factory=dict)
+    """formulas of parameters and of the header of a log, by dotted key of the scenario"""
+    phases: tuple[Phase, ...] = ()
+    parameters: Elements[FreeParameter] = Field(min_length=1)
+    nuisance: Elements[FreeParameter] = Field(default_factory=nothing)
+    """one value for each log, with a tolerance: initial state, offset, delay"""
+    ladder: tuple[Rung, ...] = ()
+    """left out, one rung with all parameters"""
+    fit: FitOptions = FitOptions()
+    record: str = ""
+    """``gear.NAME``, ``motor.NAME`` or ``shaft.NAME`` of the rig, of which a record is written"""
+
+    @model_validator(mode="after")
+    def _hangs_together(self) -> Self:
+        for where, formulas in self._formulas():
+            for text in formulas:
+                try:
+                    Formula(text)
+                except ValueError as problem:
+                    raise ValueError(f"has {where}: {problem}") from None
+        known = [name for name, p in self.parameters.items() if not p.fixed]
+        for k, rung in enumerate(self.ladder):
+            for name in (*rung.free, *rung.multi_start):
+                if name not in known:
+                    meant = did_you_mean(name, known, f"the parameters are {', '.join(known)}")
+                    raise ValueError(f"has ladder[{k}] with {name!r}, which is no free parameter; {meant}")
+        for name in self.nuisance:
+            if name in self.parameters:
+                raise ValueError(f"has {name} as a parameter and as a nuisance; leave one of them out")
+            if self.nuisance[name].tolerance is None:
+                raise ValueError(f"has nuisance.{name} without a tolerance; a value for each log needs one")
+        if len(self.measured) > 1 and (loose := [n for n, m in self.measured.items() if m.deviation is None]):
+            raise ValueError(
+                f"has several measured channels, and measured.{loose[0]} without deviation; give each one, they are the weights"
+            )
+        return self
+
+    def _formulas(self) -> list[tuple[str, list[FormulaText]]]:
+        found = [
+            (f"{table}.{name}.{key}", [getattr(entry, key)])
+            for table in ("inputs", "measured")
+            for name, entry in getattr(self, table).items()
+            for key in ("scale", "offset", "delay", "filter_time", "resolution")
+            if hasattr(entry, key)
+        ]
+        found += [(f"phases[{k}].when", [phase.when]) for k, phase in enumerate(self.phases)]
+        return found + ([("logs.held_out", [self.logs.held_out])] if self.logs.held_out is not None else [])
+
+    def rungs(self) -> tuple[Rung, ...]:
+        """The ladder; without one, a rung of all free parameters."""
+        free = tuple(name for name, p in self.parameters.items() if not p.fixed)
+        return self.ladder or (Rung(name="all parameters", free=free),)
+
+
+@checked
+def load_identification(path: str | Path) -> tuple[Identification, Path]:
+    """Read an identification file; with it comes the directory that its names are relative to.
+
+    Raises
+    ------
+    InputError
+        With one line that names the file, the key, the value and the remedy.
+    """
+    path = Path(path)
+    data = read_toml(path, "an identification")
+    try:
+        return Identification(**data), path.parent
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None

@@ -1,0 +1,85 @@
+"""Logs of a virtual rig: what an axis with given values would show, with noise and quantisation."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .logs import Channel, Log
+from .prepare import Prepared, prepared
+from .rig import Rig, number
+
+
+def virtual_log(
+    rig: Rig,
+    plan: Log,
+    values: Mapping[str, float],
+    *,
+    rung: int = -1,
+    noise: Mapping[str, float] | None = None,
+    seed: int = 0,
+) -> Log:
+    """The log that an experiment would give.
+
+    Parameters
+    ----------
+    rig
+        What is measured.
+    plan
+        Time, header and inputs of the experiment; the measured channels need not be there, but for what formulas take of them,
+        such as ``first_position``.
+    values
+        Of the parameters and nuisances, SI; others have their start values.
+    rung
+        Of the ladder; -1: the highest.
+    noise
+        Standard deviations of the measured channels by name, SI.
+    seed
+        Of the noise.
+
+    Raises
+    ------
+    InputError
+        The values make no rig.
+    """
+    task = rig.task
+    known = {name: p.start for name, p in {**task.parameters, **task.nuisance}.items()} | dict(values)
+    zeros = {
+        m.channel: Channel(np.zeros(len(plan.time)), m.unit)
+        for m in task.measured.values()
+        if m.channel not in plan.channels
+    }
+    log = prepared(task, replace(plan, channels={**zeros, **plan.channels}), rig.units)
+    run = rig.run(log, known, rung % len(rig.rungs()))
+    draw = np.random.default_rng(seed)
+    channels = dict(plan.channels)
+    for name, m in task.measured.items():
+        x = run[name] + draw.normal(size=len(log.time)) * (noise or {}).get(name, 0.0)
+        step = number(m.resolution, {}, f"measured.{name}.resolution")
+        x = step * np.round(x / step) if step > 0.0 else x
+        factor = _factor(log, name, m.channel)
+        channels[m.channel] = Channel(x / factor, m.unit)
+    return replace(plan, channels=channels)
+
+
+def _factor(log: Prepared, name: str, channel: str) -> float:
+    """SI per unit of a channel."""
+    raw, si = log.log.values(channel), log.measured[name]
+    k = int(np.argmax(np.abs(raw)))
+    return float(si[k] / raw[k]) if raw[k] != 0.0 else 1.0
+
+
+def write_servo_json(path: Path, log: Log) -> None:
+    """A log as JSON in the layout of servo recorders."""
+    names = list(log.channels)
+    rows = np.array([log.channels[name].values for name in names]).T
+    entries: list[dict[str, Any]] = [
+        {**dict(zip(names, map(float, row), strict=True)), "timestamp": float(t)}
+        for t, row in zip(log.time, rows, strict=True)
+    ]
+    path.write_text(json.dumps({**log.header, "entries": entries}), encoding="utf-8")

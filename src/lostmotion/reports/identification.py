@@ -1,0 +1,273 @@
+"""The page of an identification: overlays, residuals, correlations, profiles, friction; tables as CSV."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..identification.identify import IdentificationResult, residual_table
+from ..identification.ladder import free_on
+from . import plots
+from .pages import embed, panels_csv, render_page, save_figure, table_csv, write_text
+from .panels import Curve, Panel
+
+MEASURED: dict[str, Any] = {"color": "0.45", "linestyle": "-", "linewidth": 1.0}
+COMPUTED: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.2}
+DOTS: dict[str, Any] = {"color": "#0b3c5d", "linestyle": "", "marker": ".", "markersize": 1.5, "alpha": 0.35}
+LINE: dict[str, Any] = {"color": "#0b3c5d", "linestyle": "-", "linewidth": 1.4}
+COLUMNS = 4
+PER_FIGURE = 24  # overlays
+MANY = 20_000  # points of a cloud of residuals
+
+
+def write_identification(directory: Path, name: str, result: IdentificationResult) -> Path:
+    """Figures (PNG, SVG), tables (CSV), the rig as a scenario, and ``identified.html`` in a directory, made if missing.
+
+    Returns
+    -------
+    Path
+        Of the page.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    figures = []
+    for drawn, title, caption, panels, columns in _figures(result):
+        rows = -(-len(panels) // columns)
+        png = save_figure(plots.draw(panels, columns, (10.0, 0.6 + 2.4 * rows)), directory, drawn)
+        write_text(directory / f"{drawn}.csv", panels_csv(panels))
+        figures.append(embed(png, title, caption, drawn))
+    write_text(directory / "identified.toml", result.scenario_text())
+    if result.task.record:
+        write_text(directory / "gearbox.toml", result.record_text())
+    errors = [
+        [
+            e.log,
+            e.channel,
+            "held out" if e.held_out else "fitted",
+            f"{e.mae:.6g}",
+            f"{e.rmse:.6g}",
+            f"{100 * e.fit:.4g}",
+        ]
+        for e in result.errors
+    ]
+    header = ["log", "channel", "part", "MAE", "RMSE", "fit [%]"]
+    write_text(directory / "errors.csv", table_csv(header, errors))
+    parameters = parameter_rows(result)
+    write_text(
+        directory / "parameters.csv", table_csv(["parameter", "value", "low", "high", "unit", "method"], parameters)
+    )
+    page = directory / "identified.html"
+    context = {
+        "title": result.task.title or name,
+        "rungs": [
+            [r.name, f"{r.train:.5g}", "" if math.isnan(r.held_out) else f"{r.held_out:.5g}", k == result.chosen]
+            for k, r in enumerate(result.rungs)
+        ],
+        "parameters": parameters,
+        "undetermined": [u.text for u in result.undetermined],
+        "bounds": result.at_bounds,
+        "header": header,
+        "errors": errors,
+        "notes": result.notes,
+        "figures": figures,
+        "source": result.source(),
+    }
+    write_text(page, render_page("reports/identification.html.jinja", **context))
+    return page
+
+
+def parameter_rows(result: IdentificationResult) -> list[list[str]]:
+    """Values with intervals, as text in SI."""
+    rows = []
+    for name, p in result.task.parameters.items():
+        value, interval = result.values[name], result.intervals.get(name)
+        ends = (
+            ["", "", p.unit, "given"]
+            if interval is None
+            else [f"{interval.low:.5g}", f"{interval.high:.5g}", p.unit, interval.method]
+        )
+        rows.append([name, f"{value:.5g}", *ends])
+    return rows
+
+
+def _figures(result: IdentificationResult) -> list[tuple[str, str, str, list[Panel], int]]:
+    """(name, title, caption, panels, columns) of all pictures."""
+    variables = _variables(result)
+    table = residual_table(result, tuple(variables))
+    found = []
+    overlays = [panel for log in result.logs for panel in _overlays(result, log.name, log.held_out, table[log.name])]
+    for k in range(0, len(overlays), PER_FIGURE):
+        number = "" if len(overlays) <= PER_FIGURE else f"-{k // PER_FIGURE + 1}"
+        found.append(
+            (
+                f"overlays{number}",
+                "Logs",
+                "What was measured, and the run of the identified rig.",
+                overlays[k : k + PER_FIGURE],
+                COLUMNS,
+            )
+        )
+    panels = _clouds(result, table, variables)
+    if panels:
+        found.append(
+            (
+                "residuals",
+                "Residuals",
+                "Measured less computed, all logs: what has a shape here, the model lacks.",
+                panels,
+                min(3, len(panels)),
+            )
+        )
+    found.append(
+        (
+            "correlation",
+            "Correlations",
+            "Of the errors of the parameters, from the logs alone.",
+            [_correlation(result)],
+            1,
+        )
+    )
+    if result.profiles:
+        panels = [_profile(result, name) for name in result.profiles]
+        found.append(
+            (
+                "profiles",
+                "Profiles",
+                "Rise of the loss with one parameter given and all others fitted again; 1.92 is the 95 % interval.",
+                panels,
+                COLUMNS,
+            )
+        )
+    if laws := _laws(result, table):
+        found.append(("laws", "Friction and torsion", "Of the identified rig.", laws, min(2, len(laws))))
+    return found
+
+
+def _variables(result: IdentificationResult) -> dict[str, str]:
+    """Variables of the rig that residuals are shown over, with their labels."""
+    assert result.rig is not None
+    units, found = result.rig.units, {}
+    measured = next(iter(result.task.measured.values())).variable
+    shaft = measured.removesuffix("_angle").removesuffix("_speed")
+    for name in (f"{shaft}_speed", f"{shaft}_angle"):
+        if name in units:
+            found[name] = f"{name} [{units[name]}]"
+    for name in units:
+        if name.endswith(("_output_torque", "_twist")):
+            found[name] = f"{name} [{units[name]}]"
+    return found
+
+
+def _overlays(result: IdentificationResult, log: str, held_out: bool, run: dict[str, np.ndarray]) -> list[Panel]:
+    panels = []
+    for channel in result.task.measured:
+        curves = (
+            Curve("measured", run["time"], run[f"measured {channel}"], MEASURED),
+            Curve("computed", run["time"], run[channel], COMPUTED),
+        )
+        panels.append(Panel(f"{Path(log).stem[-28:]}{' (held out)' if held_out else ''}", "time [s]", channel, curves))
+    return panels
+
+
+def _clouds(
+    result: IdentificationResult, table: dict[str, dict[str, np.ndarray]], variables: dict[str, str]
+) -> list[Panel]:
+    panels = []
+    channel = next(iter(result.task.measured))
+    residual = np.concatenate([run[f"measured {channel}"] - run[channel] for run in table.values()])
+    step = max(1, len(residual) // MANY)
+    for name, label in variables.items():
+        x = np.concatenate([run[name] for run in table.values()])
+        panels.append(
+            Panel(
+                f"over {name}", label, f"residual of {channel}", (Curve("residual", x[::step], residual[::step], DOTS),)
+            )
+        )
+    return panels
+
+
+def _correlation(result: IdentificationResult) -> Panel:
+    """The largest correlations as bars, pair by pair."""
+    names = list(free_on(result.task, result.chosen))
+    C = np.linalg.pinv(result.fit.normal) if names else np.zeros((0, 0))
+    d = np.sqrt(np.maximum(np.diag(C), 1e-300))
+    pairs = sorted(
+        (
+            (abs(C[i, j] / d[i] / d[j]), C[i, j] / d[i] / d[j], f"{a}, {names[j]}")
+            for i, a in enumerate(names)
+            for j in range(i)
+        ),
+        reverse=True,
+    )[:8]
+    curves = tuple(
+        Curve(
+            f"{text}: {value:+.2f}",
+            np.array([0.0, value]),
+            np.array([k, k], float),
+            {"color": _shade(k), "linewidth": 5.0},
+        )
+        for k, (_, value, text) in enumerate(pairs)
+    )
+    return Panel(
+        "strongest pairs",
+        "correlation [-]",
+        "pair",
+        curves or (Curve("none", np.zeros(2), np.zeros(2), LINE),),
+        x_range=(-1.05, 1.05),
+        y_range=(-1.0, max(8.0, len(pairs))),
+    )
+
+
+def _shade(k: int) -> str:
+    """A colour that is readable in grey."""
+    return ("#0b3c5d", "#d9730d", "#7fae3f", "#8a4f9e", "#b8b8b8", "#444444", "#c2a33a", "#5b9bd5")[k % 8]
+
+
+def _profile(result: IdentificationResult, name: str) -> Panel:
+    values, rise = np.array(result.profiles[name]).T
+    unit = result.task.parameters[name].unit or "-"
+    return Panel(
+        name,
+        f"{name} [{unit}]",
+        "rise of the loss",
+        (
+            Curve("rise", values, rise, {**LINE, "marker": "o"}),
+            Curve("95 %", values, np.full(len(values), 1.92), MEASURED),
+        ),
+    )
+
+
+def _laws(result: IdentificationResult, table: dict[str, dict[str, np.ndarray]]) -> list[Panel]:
+    """Friction of the shafts over speed, and the loops of gears with a twist."""
+    panels = []
+    for name, shaft in result.scenario.shafts.items():
+        slipping, at_rest, speeds, torques = shaft.friction()
+        top = max([5.0, *speeds]) if len(speeds) else 10.0
+        w = np.linspace(1e-3, top, 200)
+        dry = np.interp(w, speeds, torques) if len(speeds) else np.full(200, slipping)
+        if max(float(np.max(dry)), at_rest, shaft.viscous_friction) > 0.0:
+            panels.append(
+                Panel(
+                    f"friction of {name}",
+                    "speed [rad/s]",
+                    "torque [N·m]",
+                    (Curve("dry and viscous", w, dry + shaft.viscous_friction * w, LINE),),
+                )
+            )
+    for name in result.scenario.gears:
+        if any(f"{name}_twist" in run for run in table.values()):
+            runs = list(table.values())[:3]
+            curves = tuple(
+                Curve(
+                    f"log {k + 1}",
+                    1e3 * r[f"{name}_twist"],
+                    r[f"{name}_output_torque"],
+                    {"color": _shade(k), "linewidth": 1.0},
+                )
+                for k, r in enumerate(runs)
+                if f"{name}_output_torque" in r
+            )
+            panels.append(Panel(f"torsion of {name}", "twist [mrad]", "output torque [N·m]", curves))
+    return panels

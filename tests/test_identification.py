@@ -1,0 +1,174 @@
+"""Identification: a servo whose values are known is found again; what the logs cannot tell is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from conftest import ROOT
+from identification_logs import NOISE, SERVO, TRUTH, servo_task, write_servo_logs
+from lostmotion.data_sheets.records import read_sheets
+from lostmotion.identification.engine import Engine
+from lostmotion.identification.formulas import Formula
+from lostmotion.identification.identify import IdentificationResult, identify_task
+from lostmotion.identification.ladder import free_on, start_point
+from lostmotion.identification.prepare import prepared, read_all
+from lostmotion.identification.rig import Rig
+from lostmotion.identification.task import Identification
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Six logs of a servo with load- and direction-dependent friction."""
+    directory = tmp_path_factory.mktemp("logs")
+    write_servo_logs(directory, TRUTH, rung=2, count=6)
+    return directory
+
+
+@pytest.fixture(scope="module")
+def found(logs: Path) -> IdentificationResult:
+    task = servo_task(logs)
+    return identify_task(task.model_copy(update={"ladder": task.ladder[:3]}), SERVO)
+
+
+def test_the_ladder_leaves_a_model_without_load_dependent_friction(found: IdentificationResult) -> None:
+    errors = [rung.held_out for rung in found.rungs]
+    assert found.chosen >= 1
+    assert errors[0] > 2.0 * errors[1]
+
+
+def test_a_run_with_the_values_found_is_as_near_as_the_noise_allows(found: IdentificationResult) -> None:
+    # Noise and a step of 2 pi/4096 leave sqrt(0.5^2 + 1.534^2/12) = 0.67 mrad; the first sample, from which the run begins, adds its own.
+    for held_out in (False, True):
+        assert found.error(held_out=held_out)[1] < 1.1 * np.hypot(NOISE, 2 * np.pi / 4096 / np.sqrt(12))
+
+
+def test_values_that_the_logs_determine_are_those_of_the_servo(found: IdentificationResult) -> None:
+    # Torque constant: back-e.m.f. and stall torque in proportion to the voltage. Dead time: steps, sampled 100 times in a second.
+    assert found.values["torque_constant"] == pytest.approx(TRUTH["torque_constant"], rel=5e-3)
+    assert found.values["dead_time"] == pytest.approx(TRUTH["dead_time"], abs=2e-4)
+    assert found.values["coulomb_friction"] == pytest.approx(TRUTH["coulomb_friction"], rel=0.1)
+
+
+def test_the_answer_is_a_scenario_and_a_data_sheet(found: IdentificationResult, tmp_path: Path) -> None:
+    path = tmp_path / "identified.toml"
+    path.write_text(found.scenario_text())
+    again = lm.load(path)
+    assert isinstance(again, lm.TrainScenario)
+    assert again.motors["servo"].rotor_inertia == pytest.approx(found.values["armature"], rel=1e-12)
+    sheet = tmp_path / "gearbox.toml"
+    sheet.write_text(found.record_text())
+    (record,) = read_sheets(sheet)
+    source = record.source_of("losses")
+    assert source is not None and source.status == "identified"
+
+
+def test_a_product_that_alone_is_determined_is_named(logs: Path) -> None:
+    """In the gain and the limit stands error_gain/max_duty beside torque_constant/resistance; back-e.m.f. goes into the viscous friction."""
+    task = servo_task(logs)
+    data = task.model_dump()
+    data["set"]["shafts.rotor.viscous_friction"] = "viscous_friction"  # without the back-e.m.f. only K/R is left
+    data["phases"] = ()
+    data["logs"]["files"] = [str(logs / "00[01].json")]
+    data["logs"]["held_out"] = None
+    data["ladder"] = [{"name": "two", "free": ["torque_constant", "resistance"]}]
+    data["fit"]["iterations"] = 3
+    result = identify_task(Identification(**data), SERVO, threads=1)
+    assert any(
+        "only the ratio" in u.text and "torque_constant" in u.text and "stall torque" in u.text
+        for u in result.undetermined
+    )
+
+
+def test_the_jacobian_is_that_of_a_larger_difference(logs: Path) -> None:
+    """Of a motion without impacts, differences of another step agree to their second order."""
+    task = servo_task(logs)
+    rig = Rig(task, SERVO)
+    log = [prepared(task, log, rig.units) for log in read_all(task, SERVO)][1]
+    point = start_point(task, [log])
+    engine, free = Engine(rig, threads=1), free_on(task, 0)
+    (J,) = engine.jacobians([log], point, 0, {"viscous_friction": free["viscous_friction"]})
+    h = 0.05 * free["viscous_friction"].step
+    values = point.of(log)
+    up, down = (
+        engine.residual(log, values | {"viscous_friction": values["viscous_friction"] + s * h}, 0) for s in (1, -1)
+    )
+    assert J[..., 0] == pytest.approx((up - down) / (2 * h), abs=5e-3 * float(np.max(np.abs(J))))
+
+
+def test_the_command_writes_the_page(logs: Path, tmp_path: Path) -> None:
+    from typer.testing import CliRunner
+
+    from lostmotion.cli.entry import app
+
+    text = (
+        (SERVO / "identify.toml")
+        .read_text()
+        .replace("logs/*.json", str(logs / "00[01].json"))
+        .replace("kp == 8", "kp == 99")
+    )
+    text = text.replace('scenario = "servo.toml"', f'scenario = "{SERVO / "servo.toml"}"')
+    head = text[: text.index("[[ladder]]")]
+    file = tmp_path / "identify.toml"
+    file.write_text(
+        head + '[[ladder]]\nname = "friction"\nfree = ["coulomb_friction", "dead_time"]\n[fit]\niterations = 2\n'
+    )
+    run = CliRunner().invoke(app, ["identify", str(file), "-o", str(tmp_path / "out")])
+    assert run.exit_code == 0, run.output
+    page = (tmp_path / "out" / "identified.html").read_text()
+    assert "coulomb_friction" in page and page.count("<figure") >= 3
+    assert (tmp_path / "out" / "errors.csv").read_text().count("\n") == 3
+    assert lm.load(tmp_path / "out" / "identified.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("2*a + b**2", 13.0),
+        ("-a/b", -2.0 / 3.0),
+        ("max(a, b) - pi/pi", 2.0),
+        ("a < b and not b == 2", True),
+        ("word == 'x'", True),
+    ],
+)
+def test_formulas_compute(text: str, value: object) -> None:
+    assert Formula(text).value({"a": 2.0, "b": 3.0, "word": "x"}) == value
+
+
+@pytest.mark.parametrize(
+    "text", ["__import__('os')", "a.b", "[x for x in y]", "lambda: 0", "a +", "f'{a}'", "a[0]", "open(a)"]
+)
+def test_formulas_refuse_what_is_no_arithmetic(text: str) -> None:
+    with pytest.raises(ValueError, match=r"cannot be read|something else"):
+        Formula(text)
+
+
+def test_mistakes_of_the_file_are_one_line(tmp_path: Path) -> None:
+    text = (
+        (SERVO / "identify.toml").read_text().replace('scenario = "servo.toml"', f'scenario = "{SERVO / "servo.toml"}"')
+    )
+    for old, new, said in (
+        ('variable = "arm_angle"', 'variable = "arm_angel"', "did you mean arm_angle"),
+        ("[inputs.servo_reference]", "[inputs.servo_referense]", "did you mean servo_reference"),
+        ('"direction"]', '"directoin"]', "did you mean direction"),
+        ("logs/*.json", "nowhere/*.json", "names no log"),
+        ("dead_time = { start", "dead_time = { begin", "begin"),
+    ):
+        file = tmp_path / "identify.toml"
+        file.write_text(text.replace(old, new))
+        with pytest.raises(lm.InputError, match=said) as refused:
+            lm.identify(file)
+        assert str(file) in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_the_example_reads(tmp_path: Path) -> None:
+    task, directory = lm.load_identification(ROOT / "examples" / "servo_logs" / "identify.toml")
+    assert directory == SERVO and len(task.rungs()) == 4
+    # Every rung makes a rig with its start values.
+    rig = Rig(task, SERVO)
+    header = {"mass": 0.5, "arm_mass": 0.1, "length": 0.1, "kp": 8, "vin": 15.0, "first_position": 0.0}
+    for k in range(4):
+        rig.built(rig.changes({**header, **{n: p.start for n, p in task.parameters.items()}}, k, -1))

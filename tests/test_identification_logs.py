@@ -1,0 +1,228 @@
+"""Logs of all formats read alike; what is wrong with one is dropped and listed, or refused in one line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from lostmotion.identification.logs import Channel, Log
+from lostmotion.identification.prepare import channel_factor
+from lostmotion.identification.readers import find_logs, read_log
+from lostmotion.identification.screening import screened
+
+TIME = np.arange(200) * 0.01
+ANGLE = np.sin(3.0 * TIME)
+
+
+def entries(**changes: Any) -> list[dict[str, Any]]:
+    return [{"timestamp": float(t), "position": float(x)} for t, x in zip(TIME, ANGLE, strict=True)]
+
+
+def written(directory: Path, name: str, write: Callable[[Path], Any]) -> Path:
+    write(directory / name)
+    return directory / name
+
+
+def as_csv(path: Path) -> None:
+    rows = "\n".join(f"{1e3 * t:.6f};{np.degrees(x):.12g}" for t, x in zip(TIME, ANGLE, strict=True))
+    path.write_text(f"# mass: 0.5\n# unit position: deg\ntime [ms];position\n{rows}\n")
+
+
+def as_mat5(path: Path) -> None:
+    import scipy.io
+
+    scipy.io.savemat(path, {"t": TIME[:, None], "position": ANGLE[:, None], "mass": 0.5})
+
+
+def as_mat73(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["t"], file["position"], file["mass"] = TIME[None], ANGLE[None], [[0.5]]
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file")
+
+
+def as_parquet(path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    field = pa.field("position", pa.float64(), metadata={"unit": "deg"})
+    schema = pa.schema([pa.field("time", pa.float64()), field], metadata={"mass": "0.5"})
+    pq.write_table(pa.table([pa.array(TIME), pa.array(np.degrees(ANGLE))], schema=schema), path)
+
+
+def as_tdms(path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    channel = nptdms.ChannelObject(
+        "run",
+        "position",
+        np.degrees(ANGLE),
+        properties={"unit_string": "deg", "wf_increment": 0.01, "wf_start_offset": 0.0},
+    )
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([nptdms.RootObject({"mass": 0.5}), channel])
+
+
+def as_mdf(path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(np.degrees(ANGLE), TIME, unit="deg", name="position")])
+        file.save(path)
+
+
+def as_json(path: Path) -> None:
+    path.write_text(json.dumps({"mass": 0.5, "entries": entries()}))
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "headed"),
+    [
+        ("log.csv", as_csv, True),
+        ("log5.mat", as_mat5, True),
+        ("log73.mat", as_mat73, True),
+        ("log.parquet", as_parquet, True),
+        ("log.tdms", as_tdms, True),
+        ("log.mf4", as_mdf, False),
+        ("log.json", as_json, True),
+    ],
+)
+def test_every_format_gives_the_same_log(tmp_path: Path, name: str, write: Callable[[Path], Any], headed: bool) -> None:
+    log = read_log(written(tmp_path, name, write))
+    assert log.time == pytest.approx(TIME, abs=1e-9)
+    channel = log.channels["position"]
+    assert channel.values * channel_factor("", channel.unit, "rad", name) == pytest.approx(ANGLE, abs=1e-9)
+    if headed:
+        assert log.header["mass"] == 0.5
+
+
+def test_a_pattern_that_names_no_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(lm.InputError, match="names no log"):
+        find_logs(["*.json"], tmp_path)
+
+
+def log_of(time: np.ndarray = TIME, header: dict[str, Any] | None = None, **channels: np.ndarray) -> Log:
+    values = {"position": ANGLE, "goal": ANGLE} | channels
+    return Log("log.json", time, {name: Channel(np.asarray(x, float)) for name, x in values.items()}, header or {})
+
+
+def changed(values: np.ndarray, place: Any, to: Any) -> np.ndarray:
+    out = values.copy()
+    out[place] = to
+    return out
+
+
+SCREENED: dict[str, tuple[Log, str]] = {
+    "glitch": (log_of(position=changed(ANGLE, 50, 9.0)), "dropped 1 glitch of position, the first at 0.5 s"),
+    "repeated time": (
+        log_of(changed(TIME, 50, TIME[49])),
+        "dropped 1 samples with the time stamp of the sample before",
+    ),
+    "time goes back": (log_of(changed(TIME, 50, 0.2)), "dropped 1 samples whose time goes back"),
+    "time is no number": (log_of(changed(TIME, 50, np.nan)), "dropped 1 samples without a time"),
+    "coarse clock": (
+        log_of(np.floor(TIME / 0.04 + 1e-9) * 0.04),
+        "the clock moves in steps of 0.04 s with 4.0 samples each",
+    ),
+    "pause": (log_of(np.where(TIME > 1.0, TIME + 0.5, TIME)), "1 pauses in the samples, the longest of 0.51 s"),
+    "values missing": (
+        log_of(position=changed(ANGLE, slice(20, 25), np.nan)),
+        "dropped 5 samples in which position is no number",
+    ),
+    "stall": (
+        log_of(
+            position=np.where((TIME > 0.5) & (TIME < 1.0), ANGLE[51], ANGLE),
+            goal=np.where((TIME > 0.5) & (TIME < 1.0), ANGLE[51], ANGLE),
+        ),
+        "no channel changes",
+    ),
+    "saturation": (log_of(position=np.clip(np.sin(20 * TIME), -0.6, 0.6)), "it may saturate"),
+    "contradiction": (
+        log_of(header={"vin": 7.4}, volts=np.full(200, 6.1)),
+        "the header says vin = 7.4, the channel volts is 6.1",
+    ),
+    "slow channel": (log_of(position=np.floor(TIME / 0.15)), "position changes only"),
+    "constant": (log_of(position=np.full(200, 0.3)), "position stays at 0.3 all through"),
+}
+
+
+@pytest.mark.parametrize("what", SCREENED)
+def test_what_is_wrong_with_a_log_is_listed(what: str) -> None:
+    log, note = SCREENED[what]
+    out = screened(log, ["position"], ["goal"], {"vin": "volts"})
+    assert any(note in text for text in out.notes), out.notes
+    assert np.all(np.diff(out.time) > 0.0)
+
+
+def test_a_good_log_is_left_as_it_is() -> None:
+    log = log_of(header={"vin": 7.4}, volts=np.full(200, 7.4))
+    out = screened(log, ["position"], ["goal"], {"vin": "volts"})
+    assert out.notes == () and len(out.time) == 200
+
+
+def test_samples_of_a_coarse_clock_are_spread_evenly() -> None:
+    out = screened(log_of(np.floor(TIME / 0.04 + 1e-9) * 0.04), ["position"], ["goal"])
+    assert out.time == pytest.approx(TIME, abs=1e-9)
+
+
+REFUSED: dict[str, tuple[Log, str]] = {
+    "clock stands": (log_of(np.zeros(200)), "the clock stood still"),
+    "no number at all": (log_of(position=np.full(200, np.nan)), "has no number in any sample"),
+    "mostly missing": (log_of(position=changed(ANGLE, slice(0, 150), np.nan)), "no number in 75% of the samples"),
+    "time in disorder": (log_of(np.random.default_rng(0).permutation(TIME)), "goes back at sample"),
+    "too short": (log_of(TIME[:5], position=ANGLE[:5], goal=ANGLE[:5]), "5 samples; 10 at least"),
+    "channel missing": (
+        Log("log.json", TIME, {"positoin": Channel(ANGLE), "goal": Channel(ANGLE)}),
+        "did you mean positoin",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_a_log_that_cannot_be_used_is_refused_in_one_line(what: str) -> None:
+    log, text = REFUSED[what]
+    with pytest.raises(lm.InputError, match=text) as refused:
+        screened(log, ["position"], ["goal"])
+    assert str(refused.value).startswith("log.json: ") and "\n" not in str(refused.value)
+
+
+FILES: dict[str, tuple[str, bytes | str, str]] = {
+    "cut off": ("a.json", '{"entries": [{"timestamp": 0.0, "posi', "is not JSON"),
+    "no entries": ("b.json", "{}", "has no list entries"),
+    "empty entries": ("c.json", '{"entries": []}', "is empty"),
+    "entry without a channel": (
+        "d.json",
+        '{"entries": [{"timestamp": 0, "x": 1}, {"timestamp": 1}]}',
+        r"entries\[1\] lacks x",
+    ),
+    "text for a number": (
+        "e.json",
+        '{"entries": [{"timestamp": 0, "x": 1}, {"timestamp": 1, "x": "fast"}]}',
+        "is no number",
+    ),
+    "no heading": ("f.csv", "0,1\n1,2\n2,3\n", "has no heading"),
+    "cut line": ("g.csv", "time,x\n0,1\n1\n", "line 3: has 1 values for 2 columns"),
+    "word in a column": ("h.csv", "time,x\n0,1\n1,fast\n", "'fast' in column x is no number"),
+    "column twice": ("i.csv", "time,x,x\n0,1,1\n1,2,2\n", "twice"),
+    "unit of the time": ("j.csv", "time [fortnight],x\n0,1\n1,2\n", "the unit 'fortnight' of the time"),
+    "not text": ("k.csv", b"\xff\xfe\x00\x01", "is not UTF-8"),
+    "not MATLAB": ("l.mat", b"something else", "is not a MATLAB file"),
+    "not Parquet": ("m.parquet", b"something else", "is not a Parquet file"),
+    "unknown ending": ("n.xyz", "", "logs end in"),
+}
+
+
+@pytest.mark.parametrize("what", FILES)
+def test_a_file_that_cannot_be_read_is_refused_in_one_line(what: str, tmp_path: Path) -> None:
+    name, content, text = FILES[what]
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(lm.InputError, match=text) as refused:
+        read_log(path)
+    assert str(refused.value).startswith(str(path)) and "\n" not in str(refused.value)
