@@ -203,6 +203,7 @@ def test_help_names_every_command() -> None:
         "drive",
         "servo",
         "track",
+        "identify",
         "study",
         "schema",
     ):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import InputError
 from ..units.conversion import si_value
 from .formulas import Formula
-from .logs import Log
+from .logs import Channel, Log
 from .readers import find_logs, read_log
 from .screening import screened
 from .task import Identification
@@ -111,6 +111,13 @@ def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepar
     measured = {name: m.channel for name, m in task.measured.items()}
     inputs = {name: i.channel for name, i in task.inputs.items()}
     header = {**task.logs.header, **log.header}
+    header |= {key: float(channel in log.channels) for key, channel in task.logs.channels.items()}
+    absent = {
+        i.channel: Channel(np.full(len(log.time), i.default))
+        for i in task.inputs.values()
+        if i.default is not None and i.channel not in log.channels
+    }
+    log = replace(log, channels={**log.channels, **absent})
     log = screened(
         Log(log.name, log.time, log.channels, header, log.notes), measured.values(), inputs.values(), task.logs.stated
     )

@@ -33,6 +33,8 @@ class LogFiles(Part):
     """condition on the header, such as ``kp == 8``; logs that meet it are compared, not fitted"""
     header: Elements[Any] = Field(default_factory=nothing)
     """of logs that lack it: values by key, such as ``arm_mass = 0``"""
+    channels: Elements[str] = Field(default_factory=nothing)
+    """further values of the header: 1 where a log has the channel, 0 where it has not"""
     stated: Elements[str] = Field(default_factory=nothing)
     """keys of the header, and the channels that ought to agree with them, such as ``vin = "input_volts"``"""
     first: Annotated[Time, NotNegative] = 0.0
@@ -45,6 +47,8 @@ class InputChannel(Part):
     """A channel that acts on the rig."""
 
     channel: str
+    default: Number | None = None
+    """value in logs that lack the channel; left out, such logs are refused"""
     unit: str = ""
     """of the channel; left out, as its file says, else SI"""
     scale: FormulaText = 1.0
