@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from ..errors import InputError, need
 from ..inputs.part import Part
@@ -16,9 +16,12 @@ from ..inputs.quantities import Acceleration, Angle, Jerk, NotNegative, Positive
 from ..inputs.validation import shown
 from ..model.signals import Breakpoint, Samples, TimeFunction, taylor
 from .profiles import segments
-from .targets import Target
+from .satellites import Satellite
+from .targets import Circle, FlyBy, Star, Track, Weave
 
 V = TypeVar("V")  # the value of the reference, with its unit
+
+Target = Annotated[FlyBy | Weave | Circle | Track | Star | Satellite, Field(discriminator="path")]
 
 SHORTEST = 1e-6  # share of a move that the rounding of its instants may be
 

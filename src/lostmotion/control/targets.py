@@ -233,6 +233,3 @@ class Star(TargetPath):
         one = straight(1.0, 0.0, t)
         # East, north, up.
         return -cd * sin, cl * sd * one - sl * cd * cos, sl * sd * one + cl * cd * cos
-
-
-Target = Annotated[FlyBy | Weave | Circle | Track | Star, Field(discriminator="path")]
