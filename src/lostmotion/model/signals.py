@@ -17,6 +17,7 @@ from pydantic import Field, model_validator
 from .. import _core
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Frequency, NotNegative, Number, Positive, Time, Torque, Whole
+from .wind import AnyWind
 
 V = TypeVar("V")  # the value of the signal, with its unit
 N = TypeVar("N", float, np.ndarray)
@@ -285,3 +286,18 @@ class CommandSignal(Signal[Number]):
 
 class TorqueSignal(Signal[Torque]):
     """A torque [N·m] over time: the sum of all that is given."""
+
+    wind: AnyWind | None = None
+
+    def _pieces(self) -> list[list[Breakpoint]]:
+        return [*super()._pieces(), *([] if self.wind is None else [self.wind.breakpoints()])]
+
+    def scaled(self, factor: float) -> Self:
+        """All values times `factor`; a wind as the samples that it is made of."""
+        if self.wind is None:
+            return super().scaled(factor)
+        time, torque = (tuple(row.tolist()) for row in self.wind.samples())
+        if self.samples is not None:
+            raise ValueError("has wind and samples, which cannot be scaled together; give one of them")
+        plain = self.model_copy(update={"wind": None, "samples": Samples[Torque](times=time, values=torque)})
+        return super(TorqueSignal, plain).scaled(factor)

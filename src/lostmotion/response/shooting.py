@@ -85,9 +85,9 @@ def _period(signals: Iterable[Signal[Any]]) -> float:
     """
     frequencies = []
     for s in signals:
-        if s.steps or s.ramps or s.chirp is not None or s.samples is not None:
+        if s.steps or s.ramps or s.chirp is not None or s.samples is not None or getattr(s, "wind", None) is not None:
             raise InputError(
-                "a periodic motion needs signals of mean and sines only; leave out steps, ramps, chirp, samples"
+                "a periodic motion needs signals of mean and sines only; leave out steps, ramps, chirp, samples, wind"
             )
         frequencies += [f for _, f, _ in s.sine_list()]
     if not frequencies:

@@ -43,7 +43,14 @@ def core_can(study: Study) -> bool:
                 return False
             if key.startswith(("command.", "load.torque.")):
                 signal = s.command if key.startswith("command.") else s.load.torque
-                plain = not (signal.sines or signal.steps or signal.ramps or signal.chirp or signal.samples)
+                plain = not (
+                    signal.sines
+                    or signal.steps
+                    or signal.ramps
+                    or signal.chirp
+                    or signal.samples
+                    or getattr(signal, "wind", None)
+                )
                 if not plain:
                     return False
     return True

@@ -1,0 +1,189 @@
+"""Wind on a load: a torque with the spectrum of the gusts, seeded, so that it is the same each time."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Area,
+    Density,
+    Frequency,
+    Length,
+    Limit,
+    LinearSpeed,
+    NotNegative,
+    Number,
+    Positive,
+    Time,
+    TorqueSpectrum,
+    Whole,
+)
+
+MAX_POINTS = 2**17
+KARMAN = 0.4
+
+
+class Wind(Part):
+    """Random torque of a given one-sided spectrum S, made of sines: ``sum of sqrt(2 S(f_k)/D) cos(2 pi f_k t + phase_k)``, f_k = k/D.
+
+    The phases are uniform, from the seed (Shinozuka and Deodatis 1991). It repeats after the duration D; its variance is that of the lines of
+    the spectrum up to ``max_frequency``, in every realisation. Between its points, ``1/(points_per_period max_frequency)`` apart, it is straight.
+    """
+
+    duration: Annotated[Time, Positive]
+    """D, after which it is constant; its lowest frequency is 1/D"""
+    max_frequency: Annotated[Frequency, Positive]
+    points_per_period: Annotated[Whole, Field(ge=4, le=100)] = 16
+    seed: Annotated[Whole, Field(ge=0, le=2**53)] = 0
+
+    def spectrum(self, frequency: np.ndarray) -> np.ndarray:
+        """S, one-sided [(N m)^2/Hz], at frequencies above 0 [Hz]."""
+        raise NotImplementedError
+
+    def mean(self) -> float:
+        """Torque [N·m] that the gusts are about."""
+        return 0.0
+
+    @model_validator(mode="after")
+    def _has_lines(self) -> Self:
+        points = self.duration * self.max_frequency * self.points_per_period
+        if points > MAX_POINTS:
+            raise ValueError(
+                f"asks for {points:.3g} points, more than {MAX_POINTS}; lower max_frequency or the duration"
+            )
+        if self.lines().size == 0:
+            raise ValueError("has no line of the spectrum up to max_frequency; raise it to 1/duration at least")
+        return self
+
+    def lines(self) -> np.ndarray:
+        """Frequencies f_k [Hz]."""
+        return np.arange(1, math.floor(self.duration * self.max_frequency * (1.0 + 1e-12)) + 1) / self.duration
+
+    def samples(self) -> tuple[np.ndarray, np.ndarray]:
+        """Instants [s] from 0 to the duration, and the torque there [N·m]."""
+        f = self.lines()
+        n = f.size * self.points_per_period
+        # Raw bits of a counter-based generator, whose order is that of the frequencies: a longer spectrum keeps the phases.
+        phase = 2.0 * math.pi * (np.random.Philox(key=self.seed).random_raw(f.size) >> np.uint64(11)) * 2.0**-53
+        amplitudes = np.zeros(n // 2 + 1, complex)
+        amplitudes[1 : f.size + 1] = 0.5 * n * np.sqrt(2.0 * self.spectrum(f) / self.duration) * np.exp(1j * phase)
+        gusts = np.fft.irfft(amplitudes, n)
+        return self.duration / n * np.arange(n + 1), self.mean() + np.append(gusts, gusts[0])
+
+    def breakpoints(self) -> list[tuple[float, ...]]:
+        """(time, value, slope) of each line between two points."""
+        time, torque = self.samples()
+        slopes = np.append(np.diff(torque) / np.diff(time), 0.0)
+        return list(map(tuple, np.column_stack([time, torque, slopes]).tolist()))
+
+
+class WindOfTable(Wind):
+    """A measured spectrum, linear in the logarithms of frequency and density between its points, zero outside."""
+
+    kind: Literal["table"]
+    frequencies: tuple[Annotated[Frequency, Positive], ...] = Field(min_length=2)
+    densities: tuple[Annotated[TorqueSpectrum, Positive], ...]
+    """one-sided [(N·m)²/Hz]"""
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if len(self.frequencies) != len(self.densities):
+            raise ValueError(
+                f"has {len(self.frequencies)} frequencies and {len(self.densities)} densities; give as many of each"
+            )
+        if np.any(np.diff(self.frequencies) <= 0.0):
+            raise ValueError("has frequencies that do not rise; sort them, and give each once")
+        return self
+
+    def spectrum(self, frequency: np.ndarray) -> np.ndarray:
+        log = np.interp(np.log(frequency), np.log(self.frequencies), np.log(self.densities))
+        inside = (frequency >= self.frequencies[0]) & (frequency <= self.frequencies[-1])
+        return np.where(inside, np.exp(log), 0.0)
+
+
+class WindOnArea(Wind):
+    """Drag on an area with a lever: M = rho c A r (V + v)^2/2, linear in the gusts v, so that S_M = (rho c A r V)^2 S_v.
+
+    The gusts over the area are taken as one.
+    """
+
+    speed: Annotated[LinearSpeed, Positive]
+    """V, mean over ten minutes, at the height of the load"""
+    drag_coefficient: Annotated[Number, Positive]
+    area: Annotated[Area, Positive]
+    lever: Length
+    """r of the centre of pressure from the axis, against the motion forward"""
+    density: Annotated[Density, Positive] = 1.225
+    """rho of the air"""
+
+    def gusts(self, frequency: np.ndarray) -> np.ndarray:
+        """S_v, one-sided [(m/s)²/Hz]."""
+        raise NotImplementedError
+
+    def mean(self) -> float:
+        return 0.5 * self.density * self.drag_coefficient * self.area * self.lever * self.speed**2
+
+    def spectrum(self, frequency: np.ndarray) -> np.ndarray:
+        return (2.0 * self.mean() / self.speed) ** 2 * self.gusts(frequency)
+
+
+class Davenport(WindOnArea):
+    """f S_v/u*^2 = 4 x^2/(1 + x^2)^(4/3), x = 1200 m f/V_10 (Davenport 1961)."""
+
+    kind: Literal["davenport"]
+    surface_drag: Annotated[Number, Limit(gt=0.0, le=0.1)] = 0.005
+    """K = u*^2/V_10^2; 0.005 open country, 0.015 suburbs, 0.05 cities"""
+    speed_at_10_m: Annotated[LinearSpeed, Positive] | None = None
+    """V_10; left out, that at the load"""
+
+    def gusts(self, frequency: np.ndarray) -> np.ndarray:
+        V = self.speed if self.speed_at_10_m is None else self.speed_at_10_m
+        x = 1200.0 * frequency / V
+        return np.asarray(4.0 * self.surface_drag * V**2 * x**2 / (1.0 + x**2) ** (4.0 / 3.0) / frequency)
+
+
+class VonKarman(WindOnArea):
+    """f S_v/sigma^2 = 4 x/(1 + 70.8 x^2)^(5/6), x = f L/V (von Karman 1948)."""
+
+    kind: Literal["von_karman"]
+    turbulence: Annotated[Number, Limit(gt=0.0, le=1.0)]
+    """sigma/V"""
+    length_scale: Annotated[Length, Positive]
+    """L, along the wind"""
+
+    def gusts(self, frequency: np.ndarray) -> np.ndarray:
+        x = frequency * self.length_scale / self.speed
+        return np.asarray(
+            4.0 * (self.turbulence * self.speed) ** 2 * x / (1.0 + 70.8 * x**2) ** (5.0 / 6.0) / frequency
+        )
+
+
+class Kaimal(WindOnArea):
+    """f S_v/u*^2 = 105 x/(1 + 33 x)^(5/3), x = f z/V, u* = 0.4 V/log(z/z_0) (Kaimal et al. 1972)."""
+
+    kind: Literal["kaimal"]
+    height: Annotated[Length, Positive]
+    """z above ground"""
+    roughness_length: Annotated[Length, NotNegative] = 0.03
+    """z_0; 0.03 m open country"""
+
+    @model_validator(mode="after")
+    def _above_the_roughness(self) -> Self:
+        if not 0.0 < self.roughness_length < self.height:
+            raise ValueError(
+                f"has roughness_length = {self.roughness_length:g} m, which must lie between 0 and its height, {self.height:g} m"
+            )
+        return self
+
+    def gusts(self, frequency: np.ndarray) -> np.ndarray:
+        friction = KARMAN * self.speed / math.log(self.height / self.roughness_length)
+        x = frequency * self.height / self.speed
+        return np.asarray(105.0 * friction**2 * x / (1.0 + 33.0 * x) ** (5.0 / 3.0) / frequency)
+
+
+AnyWind = Annotated[WindOfTable | Davenport | VonKarman | Kaimal, Field(discriminator="kind")]
