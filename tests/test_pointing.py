@@ -72,7 +72,7 @@ def test_a_motor_encoder_errs_by_torque_over_stiffness_in_steady_motion() -> Non
     data = s.model_dump(exclude_none=True) | {"controller": controller}
     data["gearbox"] |= {"stiffness": {"kind": "linear", "stiffness": k}, "hysteresis": None}
     scenario = lm.Scenario(**data).replace(**{"simulation.duration": 7.9})
-    budget = lm.pointing_budget(scenario, after=6.0)
+    budget = lm.pointing_budget(scenario, after=6.0, robustness=False)
     # Reference less load: the twist, and what the position loop takes a sample too late.
     error = budget.whole["motor"]
     assert error.mean == pytest.approx(b * w / k, abs=w * 2e-4)
@@ -81,7 +81,7 @@ def test_a_motor_encoder_errs_by_torque_over_stiffness_in_steady_motion() -> Non
 
 
 def test_causes_are_those_that_the_scenario_has() -> None:
-    budget = lm.pointing_budget(FLY_BY, after=2.0)
+    budget = lm.pointing_budget(FLY_BY, after=2.0, robustness=False)
     assert set(budget.without) == set(budget.alone)
     assert "backlash" not in budget.without
     assert {"hysteresis", "losses of the gears", "encoder steps", "dry friction"} <= set(budget.without)
@@ -89,17 +89,83 @@ def test_causes_are_those_that_the_scenario_has() -> None:
     assert left.peak < 0.05 * whole.peak  # what a constant efficiency does not know
     assert budget.alone["losses of the gears"]["motor"].peak > 0.5 * whole.peak
     assert budget.ideal["motor"].peak < 0.01 * whole.peak
-    again = lm.pointing_budget(FLY_BY, after=2.0)
+    again = lm.pointing_budget(FLY_BY, after=2.0, robustness=False)
     assert again.whole == budget.whole
     assert again.without == budget.without
 
 
 def test_a_cause_that_is_taken_away_is_the_scenario_without_it() -> None:
-    budget = lm.pointing_budget(FLY_BY)
+    budget = lm.pointing_budget(FLY_BY, robustness=False)
     by_hand = FLY_BY.replace(**{"gearbox.hysteresis": None})
     r = lm.simulate(by_hand)
     error = by_hand.controller.reference.at(r.time.values)[0] - r.load_angle.values
     assert budget.without["hysteresis"]["motor"].peak == pytest.approx(np.abs(error).max(), rel=1e-9)
+
+
+CAMERA = lm.load("tracking-camera", {"simulation.duration": 4.0, "initial": {"on_reference": True}})
+
+
+def rms_of(scenario: Any) -> float:
+    """From 1 s on."""
+    r = lm.simulate(scenario, energy=False)
+    e = scenario.controller.reference.at(r.time.values)[0] - r.load_angle.values
+    return float(np.sqrt(np.mean(e[r.time.values >= 1.0] ** 2)))
+
+
+def test_contributions_add_up_and_the_last_one_leaves_what_all_leave() -> None:
+    budget = lm.pointing_budget(CAMERA, after=1.0, robustness=False)
+    assert list(budget.successive) == list(budget.without) == list(budget.alone)
+    assert {"latency of the camera", "noise of the camera", "pixels"} <= set(budget.successive)
+    parts, whole, ideal = budget.contributions("motor"), budget.whole["motor"], budget.ideal["motor"]
+    assert sum(parts.values()) == pytest.approx(whole.rms**2 - ideal.rms**2, rel=1e-12)
+    first = next(iter(parts))
+    assert budget.successive[first] == budget.without[first]
+    assert whole.rms == pytest.approx(rms_of(CAMERA), rel=1e-6)
+    for name, key in (("noise of the camera", "noise"), ("latency of the camera", "latency")):
+        alone = rms_of(CAMERA.replace(**{f"controller.camera.{key}": 0.0}))
+        assert budget.without[name]["motor"].rms == pytest.approx(alone, rel=1e-6)
+    assert budget.pixels == {"motor": 2e-4}
+    assert budget.view is not None  # the camera's own
+    r = lm.simulate(CAMERA, energy=False)
+    missed = (CAMERA.controller.reference.at(r.time.values)[0] - r.position_reference.values)[r.time.values >= 1.0]
+    assert whole.measured_rms == pytest.approx(np.sqrt(np.mean(missed**2)), rel=1e-6)
+
+
+def test_another_day_is_the_scenario_with_other_values_and_the_controller_does_not_know() -> None:
+    s = lm.load("tracking-loss-map", {"simulation.duration": 3.0})
+    ideal = {
+        "encoder": IDEAL,
+        "position_encoder": IDEAL | {"shaft": "load"},
+    }  # of whose steps rounding would decide some
+    s = s.replace(controller=s.controller.model_dump(exclude_none=True) | ideal)
+    budget = lm.pointing_budget(s, after=1.0)
+    gearbox, motor, k = s.gearbox, s.motor, s.motor.armature_voltage_constant
+    lubricant, copper, flux = math.exp(-0.015 * 20.0), 1.0 + 20.0 * 3.93e-3, 1.0 - 20.0 * 2e-3
+    warm, no_load = k * flux / copper, motor.rated_speed * k / (k - 1.0)
+    knows = "controller.inverse_model."
+    by_hand: dict[str, dict[str, Any]] = {
+        "+20 K": {
+            "gearbox.losses.values": [[lubricant * v for v in row] for row in gearbox.losses.values],
+            "gearbox.viscous_friction": lubricant * gearbox.viscous_friction,
+            "motor.friction_torque": lubricant * motor.friction_torque,
+            "motor.armature_voltage_constant": warm,
+            "motor.electrical_time_constant": motor.electrical_time_constant / copper,
+            "motor.rated_speed": no_load / flux * (warm - 1.0) / warm,
+            f"{knows}loss_factor": 1.0 / lubricant,
+            f"{knows}friction_torque": motor.friction_torque,
+        },
+        "losses in the controller x 0.6": {f"{knows}loss_factor": 0.6},
+        "wear: 1 arcmin more backlash": {
+            "gearbox.stiffness.backlash": math.radians(1.0 / 60.0),
+            f"{knows}twist_rate": 0.5,
+        },
+    }
+    assert len(budget.robustness) == 12
+    for name, change in by_hand.items():
+        assert budget.robustness[name]["motor"].rms == pytest.approx(rms_of(s.replace(**change)), rel=1e-5), name
+    assert list(budget.speeds) == [0.25, 0.5, 1.0, 1.5, 2.0]
+    fast = s.replace(**{"controller.reference.target.speed": 200.0, "initial": {"on_reference": True}})
+    assert budget.speeds[2.0]["motor"].rms == pytest.approx(rms_of(fast), rel=1e-5)
 
 
 def test_a_gap_is_taken_out_of_the_torsion_curve() -> None:
@@ -108,13 +174,13 @@ def test_a_gap_is_taken_out_of_the_torsion_curve() -> None:
            "controller.inverse_model": None, "simulation.duration": 3.0}
     )  # fmt: skip
     closed = gap.replace(**{"gearbox.stiffness.slopes": (2e4, 3e4), "gearbox.stiffness.breaks": (1e-3,)})
-    found = lm.pointing_budget(gap).without["backlash"]["motor"]
-    assert found.peak == pytest.approx(lm.pointing_budget(closed).whole["motor"].peak, rel=1e-12)
+    found = lm.pointing_budget(gap, robustness=False).without["backlash"]["motor"]
+    assert found.peak == pytest.approx(lm.pointing_budget(closed, robustness=False).whole["motor"].peak, rel=1e-12)
 
 
 def test_the_field_of_view_counts_time_and_probability() -> None:
     angle = 2.0 * 4e-4
-    budget = lm.pointing_budget(FLY_BY, after=2.0, view={"motor": angle})
+    budget = lm.pointing_budget(FLY_BY, after=2.0, view={"motor": angle}, robustness=False)
     e = budget.errors["motor"][budget.time >= 2.0]
     assert budget.view is not None
     assert budget.view.share == np.mean(np.abs(e) < 4e-4)
@@ -151,7 +217,8 @@ def test_the_command_writes_its_sheet(tmp_path: Path) -> None:
     assert "without hysteresis" in done.output
     assert "in view 100 %" in done.output
     made = {p.name for p in (tmp_path / "sheet").iterdir()}
-    assert made == {"track.html", "errors.png", "errors.svg", "errors.csv", "budget.csv"}
+    figures = {f"{what}.{kind}" for what in ("errors", "speed", "robustness") for kind in ("png", "svg", "csv")}
+    assert made == {"track.html", "budget.csv", "contributions.csv"} | figures
     assert "http" not in (tmp_path / "sheet" / "track.html").read_text().replace("http://www.w3.org", "")
 
 

@@ -26,13 +26,18 @@ def track(
     ] = None,
     view: Annotated[
         list[str] | None,
-        typer.Option("--view", metavar="MOTOR=ANGLE", help='Whole angle of view of an axis, e.g. "motor=6.65 deg".'),
+        typer.Option(
+            "--view",
+            metavar="MOTOR=ANGLE",
+            help='Whole angle of view of an axis, e.g. "motor=6.65 deg"; left out, that of its camera.',
+        ),
     ] = None,
     overrides: Overrides = None,
 ) -> None:
     """Pointing sheet: how far axes miss the direction that they follow, and what each cause contributes.
 
-    Writes track.html (one page), the errors over time as PNG and SVG, and errors and budget as CSV.
+    Writes track.html (one page) and its figures and tables: errors over time, over the speed of the target, and with wrong losses, at other temperatures, with
+    wear; what each cause contributes.
 
     \\b
     lostmotion track tracking-loss-map --after "2 s"
@@ -66,14 +71,14 @@ def _print_summary(title: str, budget: PointingBudget) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from ..reports.pointing import HEADER, budget_rows, view_line
+    from ..reports.pointing import budget_rows, header, view_line
 
     print(title)
     table = Table(box=None, pad_edge=False)
-    for k, name in enumerate(HEADER):
+    for k, name in enumerate(header(budget)):
         table.add_column(name, justify="left" if k < 2 else "right")
     for row in budget_rows(budget):
         table.add_row(*row)
-    Console(width=140).print(table)
+    Console(width=160).print(table)
     if budget.view is not None:
         print(f"  {view_line(budget)}")

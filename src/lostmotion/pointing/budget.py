@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +15,12 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import argument
 from ..inputs.validation import did_you_mean, shown
-from ..simulation.run import simulate
+from ..simulation.pointing_error import pointing_errors, pointing_names
+from ..simulation.run import run
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, in_long_form
 from .causes import CAUSES, VARIANTS, present, without
+from .robustness import ROBUSTNESS, SPEEDS
 
 PROBABLE = 0.6744897501960817  # of a normal distribution, in standard deviations: half of all errors are smaller
 
@@ -30,7 +35,8 @@ class PointingError:
     probable: float
     """0.6745 standard deviations"""
     measured_rms: float
-    """of the direction that the encoder says, against that of the load"""
+    """of the measured direction: with a camera, where the target is less where its tracker expects it; else the angle of the load less what the
+    encoder says"""
 
 
 @dataclass(frozen=True)
@@ -41,6 +47,10 @@ class View:
     """of the time"""
     probability: float
     """product over the axes of normal distributions of these means and deviations"""
+
+
+Errors = Mapping[str, PointingError]
+"""by the motor of the axis"""
 
 
 @dataclass(frozen=True)
@@ -54,18 +64,36 @@ class PointingBudget:
     """[s]"""
     errors: Mapping[str, np.ndarray]
     """reference less angle of the load [rad] over time, by the motor of the axis"""
-    whole: Mapping[str, PointingError]
+    measured: Mapping[str, np.ndarray]
+    """error of the measured direction [rad] over time, as in `PointingError`"""
+    whole: Errors
     """of the scenario as it is"""
-    without: Mapping[str, Mapping[str, PointingError]]
+    without: Mapping[str, Errors]
     """with one cause taken away, by its name"""
-    alone: Mapping[str, Mapping[str, PointingError]]
+    alone: Mapping[str, Errors]
     """with that cause alone"""
-    ideal: Mapping[str, PointingError]
+    successive: Mapping[str, Errors]
+    """with that cause and all before it taken away; the decreases of the mean square from line to line add up"""
+    ideal: Errors
     """with none of them: what the controller itself leaves"""
-    variants: Mapping[str, Mapping[str, PointingError]]
+    variants: Mapping[str, Errors]
     """with another controller"""
+    robustness: Mapping[str, Errors]
+    """at other temperatures, with wear, with losses in the controller that are wrong by a factor"""
+    speeds: Mapping[float, Errors]
+    """by the factor on the speed of the targets, 1 included; empty where the references are no targets with a speed"""
+    pixels: Mapping[str, float]
+    """angle of a pixel [rad] of the axes with a camera"""
     view: View | None = None
-    """where a field of view is given"""
+    """where a field of view is given, or cameras have one"""
+
+    def contributions(self, axis: str) -> dict[str, float]:
+        """By how much the mean square error of an axis falls [rad²] with each cause as all are taken away one after another.
+
+        They add up to ``whole[axis].rms**2 - ideal[axis].rms**2``; one that is negative hides another.
+        """
+        squares = [self.whole[axis].rms ** 2, *(found[axis].rms ** 2 for found in self.successive.values())]
+        return {name: a - b for name, a, b in zip(self.successive, squares, squares[1:], strict=False)}
 
 
 @checked
@@ -74,13 +102,15 @@ def pointing_budget(
     *,
     after: float | str = 0.0,
     view: Mapping[str, float | str] | None = None,
+    robustness: bool = True,
     progress: Callable[[], None] | None = None,
 ) -> PointingBudget:
     """How far axes miss the direction that they are to follow, and what each cause contributes.
 
-    All motions are simulated: the scenario as it is; with each of backlash, the zone of low stiffness, hysteresis, dry friction, losses of the
-    gears, encoder steps and delay taken away; with each of them alone; and with other controllers. A controller with an inverse
-    model knows the drive as it is in each run. A cause that the scenario does not have is left out.
+    All motions are simulated, several at a time: the scenario as it is; with each of backlash, the zone of low stiffness, hysteresis, dry friction,
+    losses of the gears, encoder steps, delay, wind, and latency, noise and pixels of cameras taken away; with each of them alone; with one after another taken away;
+    with other controllers, temperatures, wear and target speeds. A controller with an inverse
+    model knows the drive as it is in each run, but for temperature. A cause that the scenario does not have is left out.
 
     Parameters
     ----------
@@ -89,7 +119,9 @@ def pointing_budget(
     after
         Time [s] from which errors count.
     view
-        Whole angle of view [rad] of each axis, by the name of its motor.
+        Whole angle of view [rad] of each axis, by the name of its motor; left out, those of the cameras.
+    robustness
+        Also runs at other temperatures, target speeds, with wear, and with losses in the controller that are wrong.
     progress
         Called after each run.
 
@@ -103,36 +135,67 @@ def pointing_budget(
     start = argument("after", after, "s")
     _check(loaded, start)
     angles = _view(loaded, view or {})
-    time, errors, whole = _run(loaded, start)
-    if progress is not None:
-        progress()
+    cases = _cases(loaded, robustness=robustness)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        runs = {case: pool.submit(_case, loaded, list(changes), start, progress) for case, changes in cases.items()}
+        try:
+            found = {case: run.result() for case, run in runs.items()}
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    time, errors, measured, whole = found["whole", ""]
+    of = {case: errors_of[3] for case, errors_of in found.items()}
 
-    def made(changes: list[Callable[..., None]]) -> Mapping[str, PointingError]:
-        changed = without(loaded, changes)
-        found = whole if changed is None else _run(changed, start)[2]
-        if progress is not None:
-            progress()
-        return found
+    def group(kind: str) -> dict[Any, Errors]:
+        return {name: value for (own, name), value in of.items() if own == kind}
 
-    causes = present(loaded, CAUSES)
+    causes = list(group("without"))
+    ideal = of["successive", causes[-1]] if causes else whole
+    speeds = group("speed")
     return PointingBudget(
         scenario,
         start,
         time,
         errors,
+        measured,
         whole,
-        {name: made([change]) for name, change in causes.items()},
-        {name: made([c for other, c in causes.items() if other != name]) for name in causes},
-        made(list(causes.values())),
-        {name: made([change]) for name, change in present(loaded, VARIANTS).items()},
+        group("without"),
+        group("alone"),
+        group("successive"),
+        ideal,
+        group("variant"),
+        group("robustness"),
+        dict(sorted((speeds | {1.0: whole}).items())) if speeds else {},
+        {m: c.camera.pixel for m, c in loaded.axes().items() if c.camera is not None and c.camera.pixel is not None},
         _in_view(time >= start, errors, angles) if angles else None,
     )
 
 
+Case = tuple[str, Any]
+"""what a run is for, and its name there"""
+
+
+def _cases(scenario: TrainScenario, *, robustness: bool = True) -> dict[Case, Sequence[Callable[..., None]]]:
+    """The runs of a budget, with what each changes."""
+    causes = present(scenario, CAUSES)
+    names = list(causes)
+    cases: dict[Case, Sequence[Callable[..., None]]] = {("whole", ""): ()}
+    for k, name in enumerate(names):
+        cases["without", name] = (causes[name],)
+        cases["alone", name] = [causes[other] for other in names if other != name]
+        cases["successive", name] = [causes[other] for other in names[: k + 1]]
+    tables: dict[str, Mapping[Any, Callable[..., None]]] = {"variant": VARIANTS}
+    if robustness:
+        tables |= {"robustness": ROBUSTNESS, "speed": SPEEDS}
+    for kind, table in tables.items():
+        for key, change in present(scenario, table).items():
+            cases[kind, key] = (change,)
+    return cases
+
+
 def runs_of(scenario: Scenario | TrainScenario) -> int:
     """How many runs a budget makes."""
-    loaded = in_long_form(scenario) if isinstance(scenario, Scenario) else scenario
-    return 2 + 2 * len(present(loaded, CAUSES)) + len(present(loaded, VARIANTS))
+    return len(_cases(in_long_form(scenario) if isinstance(scenario, Scenario) else scenario))
 
 
 def _check(scenario: TrainScenario, after: float) -> None:
@@ -156,6 +219,8 @@ def _view(scenario: TrainScenario, view: Mapping[str, float | str]) -> dict[str,
             names = ", ".join(scenario.axes())
             meant = did_you_mean(motor, scenario.axes(), f"the motors with a controller are {names}")
             raise InputError(f"view: {shown(motor)} is the motor of no axis; {meant}")
+    cameras = {motor: c.camera.field for motor, c in scenario.axes().items() if c.camera is not None}
+    view = view or {motor: angle for motor, angle in cameras.items() if angle is not None}
     angles = {motor: argument(f"view[{motor}]", angle, "rad") for motor, angle in view.items()}
     for motor, angle in angles.items():
         if not angle > 0.0:
@@ -163,27 +228,43 @@ def _view(scenario: TrainScenario, view: Mapping[str, float | str]) -> dict[str,
     return angles
 
 
-def _run(scenario: TrainScenario, after: float) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, PointingError]]:
-    result = simulate(scenario, energy=False)
-    time = result["time"].to_numpy()
+Found = tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray], Errors]
+
+
+def _case(
+    scenario: TrainScenario, changes: list[Callable[..., None]], after: float, progress: Callable[[], None] | None
+) -> Found:
+    found = _run((without(scenario, changes) if changes else None) or scenario, after)
+    if progress is not None:
+        progress()
+    return found
+
+
+def _run(scenario: TrainScenario, after: float) -> Found:
+    """Instants, errors of the true and of the measured direction by axis, and what is made of them."""
+    result = run(scenario, energy=False)
+    time = result.time
     counted = time >= after
-    errors, found = {}, {}
-    for motor, controller in scenario.axes().items():
-        shaft = controller.shaft or list(scenario.shafts)[-1]
-        angle = result[f"{shaft}_angle"].to_numpy()
-        wanted = controller.reference.at(time)[0]
-        error = wanted - angle
-        said = result[f"{motor}_measured_position"].to_numpy() - angle
+    found, measured, numbers = {}, {}, {}
+    true = pointing_errors(scenario, result)
+    for motor, name in pointing_names(scenario):
+        found[motor] = error = true[name]
+        controller = scenario.axes()[motor]
+        target = controller.reference.at(time)[0]
+        # The load is at the reference less its error.
+        truth, said = (
+            (target - error, "measured_position") if controller.camera is None else (target, "position_reference")
+        )
+        measured[motor] = truth - result[f"{motor}_{said}"]
         e = error[counted]
-        errors[motor] = error
-        found[motor] = PointingError(
+        numbers[motor] = PointingError(
             rms=float(np.sqrt(np.mean(e**2))),
             peak=float(np.abs(e).max()),
             mean=float(e.mean()),
             probable=PROBABLE * float(e.std()),
-            measured_rms=float(np.sqrt(np.mean(said[counted] ** 2))),
+            measured_rms=float(np.sqrt(np.mean(measured[motor][counted] ** 2))),
         )
-    return time, errors, found
+    return time, found, measured, numbers
 
 
 def _in_view(counted: np.ndarray, errors: Mapping[str, np.ndarray], angles: Mapping[str, float]) -> View:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 from ..simulation.train_scenario import TrainScenario
 
 Tables = dict[str, Any]
+K = TypeVar("K")
 
 
 def _backlash(data: Tables) -> None:
@@ -65,6 +66,25 @@ def _delay(data: Tables) -> None:
                 controller[key]["delay"] = 0
 
 
+def _of_camera(**values: Any) -> Callable[[Tables], None]:
+    def change(data: Tables) -> None:
+        for controller in data["controllers"].values():
+            if "camera" in controller:
+                for key, value in values.items():
+                    if value is None:
+                        controller["camera"].pop(key, None)
+                    else:
+                        controller["camera"][key] = value
+
+    return change
+
+
+def _wind(data: Tables) -> None:
+    for shaft in data["shafts"].values():
+        if shaft.get("torque", {}).get("wind") is not None:
+            shaft["torque"].pop("wind")
+
+
 CAUSES: dict[str, Callable[[Tables], None]] = {
     "backlash": _backlash,
     "low stiffness": _low_stiffness,
@@ -73,6 +93,10 @@ CAUSES: dict[str, Callable[[Tables], None]] = {
     "losses of the gears": _losses,
     "encoder steps": _quantisation,
     "delay": _delay,
+    "latency of the camera": _of_camera(latency=0.0),
+    "noise of the camera": _of_camera(noise=0.0),
+    "pixels": _of_camera(pixel=None, pixel_parts=1),
+    "wind": _wind,
 }
 """how each is taken out of the tables of a scenario"""
 
@@ -83,25 +107,13 @@ def _on_motor(data: Tables) -> None:
         controller.pop("blend_time", None)
 
 
-def _scaled_losses(factor: float) -> Callable[[Tables], None]:
-    def change(data: Tables) -> None:
-        for controller in data["controllers"].values():
-            if "inverse_model" in controller:
-                model = controller["inverse_model"]
-                model["loss_factor"] = factor * model.get("loss_factor", 1.0)
-
-    return change
-
-
 VARIANTS: dict[str, Callable[[Tables], None]] = {
     "encoders on the motors": _on_motor,
-    "losses in the controller x 0.6": _scaled_losses(0.6),
-    "losses in the controller x 1.5": _scaled_losses(1.5),
 }
 """other controllers of the same axes"""
 
 
-def present(scenario: TrainScenario, table: dict[str, Callable[[Tables], None]]) -> dict[str, Callable[[Tables], None]]:
+def present(scenario: TrainScenario, table: Mapping[K, Callable[[Tables], None]]) -> dict[K, Callable[[Tables], None]]:
     """Those changes of a table that change the scenario at all."""
     return {name: change for name, change in table.items() if _changed(scenario, [change]) is not None}
 

@@ -333,8 +333,8 @@ def in_long_form(scenario: Scenario) -> TrainScenario:
     start = scenario.initial
     load = {key: getattr(train.shafts["load"], key) for key in Shaft.model_fields}
     initial = TrainInitial(
-        speeds={"motor": start.motor_speed, "load": start.load_speed},
-        angles={"load": start.load_angle},
+        speeds={} if start.on_reference else {"motor": start.motor_speed, "load": start.load_speed},
+        angles={} if start.on_reference else {"load": start.load_angle},
         twists={"gearbox": start.twist} if start.twist else {},
         motor_torques={"motor": start.motor_torque} if start.motor_torque else {},
         hysteresis_capacities={"gearbox": start.hysteresis_capacity} if start.hysteresis_capacity else {},

@@ -1,0 +1,125 @@
+"""The same axes as they are on another day: with another target speed, temperature or wear, or under a controller that is wrong about them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from .causes import Tables
+
+COPPER, MAGNETS, LUBRICANT = (
+    3.93e-3,
+    -2.0e-3,
+    -1.5e-2,
+)  # [1/K], relative: resistance, flux of ferrite, friction and losses
+
+MAP_FACTORS = (0.6, 0.8, 1.25, 1.5)
+TEMPERATURES = (-40.0, -20.0, 20.0, 40.0)  # [K], from that of the data
+WEAR = (0.5, 1.0, 2.0, 5.0)  # [arcmin]
+SPEED_FACTORS = (0.25, 0.5, 1.5, 2.0)
+
+Change = Callable[[Tables], None]
+
+
+def scaled_losses(factor: float) -> Change:
+    """The losses that the controllers know, times a factor."""
+
+    def change(data: Tables) -> None:
+        for controller in data["controllers"].values():
+            if "inverse_model" in controller:
+                model = controller["inverse_model"]
+                model["loss_factor"] = factor * model.get("loss_factor", 1.0)
+
+    return change
+
+
+def warmer(difference: float) -> Change:
+    """Dry and viscous friction and losses of gears by exp(-0.015 difference), windings of DC motors and their magnets; the controllers do not know of it."""
+    lubricant = math.exp(LUBRICANT * difference)
+
+    def change(data: Tables) -> None:
+        _keep_knowledge(data, lubricant)
+        for motor in data["motors"].values():
+            motor["friction_torque"] = lubricant * motor.get("friction_torque", 0.0)
+            if motor.get("kind", "dc") == "dc":
+                _warm_winding(motor, 1.0 + COPPER * difference, 1.0 + MAGNETS * difference)
+        for gear in data["gears"].values():
+            gear["viscous_friction"] = lubricant * gear.get("viscous_friction", 0.0)
+            gear["losses"] = _scaled(gear["losses"], lubricant)
+
+    return change
+
+
+def _keep_knowledge(data: Tables, factor: float) -> None:
+    """The inverse models go on with the friction and losses that they had."""
+    for name, controller in data["controllers"].items():
+        if "inverse_model" in controller:
+            model, motor = controller["inverse_model"], data["motors"][name]
+            shaft = data["shafts"][motor["shaft"]]
+            own = motor.get("friction_torque", 0.0) + shaft.get("friction_torque", 0.0)
+            model.setdefault("friction_torque", own)
+            if "efficiency" not in model:
+                model["loss_factor"] = model.get("loss_factor", 1.0) / factor
+
+
+def _warm_winding(motor: Tables, resistance: float, flux: float) -> None:
+    """Of (2): stall torque with flux/resistance, no-load speed with 1/flux, time constant with 1/resistance."""
+    k = motor["armature_voltage_constant"]
+    no_load = motor["rated_speed"] * k / (k - 1.0) if k > 1.0 else math.inf
+    motor["armature_voltage_constant"] = warm = k * flux / resistance
+    motor["electrical_time_constant"] = motor["electrical_time_constant"] / resistance
+    if warm > 1.0:
+        motor["rated_speed"] = no_load / flux * (warm - 1.0) / warm
+
+
+def _scaled(losses: Tables, factor: float) -> Tables:
+    if losses["kind"] == "constant_efficiency":
+        return losses | {"efficiency": max(0.0, 1.0 - factor * (1.0 - losses["efficiency"]))}
+    if losses["kind"] == "map":
+        return losses | {"values": tuple(tuple(factor * v for v in row) for row in losses["values"])}
+    return losses
+
+
+def worn(arcmin: float) -> Change:
+    """Gears with a torsion curve get so much more backlash."""
+    gap = math.radians(arcmin / 60.0)
+
+    def change(data: Tables) -> None:
+        for gear in data["gears"].values():
+            stiffness = gear["stiffness"]
+            if stiffness["kind"] == "linear":
+                stiffness = {"kind": "curve", "slopes": (stiffness["stiffness"],), "breaks": ()}
+            if stiffness["kind"] == "curve":
+                gear["stiffness"] = stiffness | {"backlash": stiffness.get("backlash", 0.0) + gap, "preload": 0.0}
+        for controller in data["controllers"].values():
+            if "inverse_model" in controller:
+                controller["inverse_model"].setdefault("twist_rate", 0.5)
+
+    return change
+
+
+def faster(factor: float) -> Change:
+    """All targets at so many times their speed; each axis begins on its reference."""
+
+    def change(data: Tables) -> None:
+        targets = [c["reference"].get("target") for c in data["controllers"].values()]
+        if not all(target is not None and "speed" in target for target in targets):
+            return
+        for target in targets:
+            target["speed"] = factor * target["speed"]
+        start: dict[str, Any] = data["initial"]
+        start |= {"angles": {}, "speeds": {}, "on_reference": True}
+
+    return change
+
+
+ROBUSTNESS: dict[str, Change] = {
+    **{f"losses in the controller x {factor:g}": scaled_losses(factor) for factor in MAP_FACTORS},
+    **{f"{difference:+g} K": warmer(difference) for difference in TEMPERATURES},
+    **{f"wear: {arcmin:g} arcmin more backlash": worn(arcmin) for arcmin in WEAR},
+}
+"""what axes may become, or their controllers take them for"""
+
+SPEEDS: dict[float, Change] = {factor: faster(factor) for factor in SPEED_FACTORS}
+"""by the factor on the speed of the targets"""
