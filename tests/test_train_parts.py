@@ -92,3 +92,12 @@ def test_what_joins_shafts_makes_them_one_part() -> None:
     hold = {"hold": MASSES["command"]["hold"]}
     assert groups(controllers=elsewhere, command=hold) == [["a", "b"], ["x", "y"], ["alone"]]
     assert parts_of(lm.load("two-motors-one-ring")) == [lm.load("two-motors-one-ring")]
+
+
+def test_speeds_are_shown_in_terms_of_the_last_shaft_of_their_own_part() -> None:
+    from lostmotion.reports.train_figures import train_overview
+
+    figure = train_overview(lm.simulate(lm.load("direction-finder", {"simulation.duration": 0.02})))
+    shown = {a.get_ylabel(): [line.get_label() for line in a.get_lines()] for a in figure.axes}
+    for axis in ("traverse", "elevation"):
+        assert shown[f"speed at {axis} [rad/s]"] == [f"{axis}_motor / 100", axis]

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from ..model.train import DriveTrain
 from ..simulation.results import scenario_of
+from ..simulation.train_parts import parts_of
 from ..simulation.train_scenario import TrainScenario
 from .panels import COMMAND_STYLE, STYLES, Curve, Panel
 from .plots import draw
@@ -29,14 +30,11 @@ def train_overview(result: xarray.Dataset) -> Figure:
     scenario = scenario_of(result)
     assert isinstance(scenario, TrainScenario)
     train = scenario.train()
-    last = list(train.shafts)[-1]
-    ratios = ratios_to(train, last)
-    speeds = [(f"{name}_speed", f"{name} / {ratios[name]:.4g}", 1.0 / ratios[name]) for name in ratios]
     torques = [(f"{name}_torque", name, 1.0) for name in train.motors]
     panels = [
         ("command [-]", [(f"{name}_command", name, 1.0) for name in scenario.commanded()]),
         ("torque of motor [N·m]", torques),
-        (f"speed at {last} [rad/s]", [(name, label.removesuffix(" / 1"), factor) for name, label, factor in speeds]),
+        *(_speeds(part.train()) for part in parts_of(scenario)),
         (
             "torque at output of gear, of load [N·m]",
             [(f"{name}_output_torque", name, 1.0) for name in train.gears]
@@ -57,10 +55,22 @@ def train_overview(result: xarray.Dataset) -> Figure:
     ]
     shown = [Panel("", "time [s]", label, _curves(result, curves)) for label, curves in panels]
     note = result.attrs.get("warning", "") or result.attrs.get("note", "")
-    figure = draw([panel for panel in shown if panel.curves], 2, (10.0, 8.0), note=note)
+    panels_shown = [panel for panel in shown if panel.curves]
+    rows = max(3, -(-len(panels_shown) // 2))
+    figure = draw(panels_shown, 2, (10.0, 8.0 * rows / 3), note=note)
     if result.attrs.get("title"):
         figure.suptitle(result.attrs["title"])
     return figure
+
+
+def _speeds(train: DriveTrain) -> tuple[str, list[tuple[str, str, float]]]:
+    """Label and curves of the panel of speeds of a train that hangs together, all in terms of its last shaft."""
+    last = list(train.shafts)[-1]
+    curves = [
+        (f"{name}_speed", f"{name} / {ratio:.4g}".removesuffix(" / 1"), 1.0 / ratio)
+        for name, ratio in ratios_to(train, last).items()
+    ]
+    return f"speed at {last} [rad/s]", curves
 
 
 def _curves(result: xarray.Dataset, curves: list[tuple[str, str, float]]) -> tuple[Curve, ...]:
