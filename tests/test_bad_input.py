@@ -133,7 +133,7 @@ BROKEN = [
     ("rigid start that does not fit", "[simulation]", "[initial]\nhysteresis_capacity = -1\n[simulation]", ["initial.hysteresis_capacity"]),
     ("broken TOML", "ratio = 90", "ratio = = 90", ["not valid TOML", "line"]),
     ("key given twice", "ratio = 90", "ratio = 90\nratio = 91", ["not valid TOML"]),
-    ("base that does not exist", "[command]", 'base = "nowhere.toml"\n[command]', ["nowhere.toml", "no such file"]),
+    ("base that does not exist", "[command]", 'base = "nowhere.toml"\n[command]', ["key base: ", "nowhere.toml: there is no such file"]),
     ("base that is no name", "[command]", "base = 3\n[command]", ["base"]),
     ("base that leads back", "[command]", 'base = "broken.toml"\n[command]', ["base", "circle"]),
 ]  # fmt: skip

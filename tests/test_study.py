@@ -450,7 +450,7 @@ peak = "peak(load_speed)"
     ("old", "new", "match"),
     [
         ('base = "{base}"', "", "key base"),
-        ('base = "{base}"', 'base = "none.toml"', "no such file"),
+        ('base = "{base}"', 'base = "none.toml"', "key base: .*none.toml: there is no such file"),
         ('"list"', '"lists"', "design"),
         ("load.inertia", "load.inertai", "does not know"),
         ("load.inertia", "simulation.duration", "same samples"),

@@ -275,6 +275,8 @@ values = [1.0, 1.2]
         ('key = "gearbox"\ncatalogue = {}\nvalues = ["schaeffler-rt1-h-20-100"]', "give one of the two"),
         ('key = "load.inertia"\ncatalogue = {}', "which only gearbox"),
         ('key = "load.inertia"\nvalues = ["schaeffler-rt1-h-20-100"]', "load.inertia"),
+        ('key = "load.inertai"\nvalues = ["1.5 kg*m^2"]', "does not know .*; did you mean load.inertia"),
+        ('key = "load.inertia"\nrelative = "no"\nvalues = [1, 2]', 'relative: "no"'),
     ],
 )
 def test_what_cannot_vary_ends_in_one_clear_line(tmp_path: Path, text: str, match: str):

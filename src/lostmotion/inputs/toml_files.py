@@ -12,6 +12,13 @@ from ..errors import InputError
 RESULTS = (".nc", ".csv", ".parquet")  # endings of saved results
 
 
+def no_such_file(path: Path) -> InputError:
+    """Says that there is no such file, and what may have been meant."""
+    near = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.toml")], n=1)
+    hint = f"; did you mean {path.parent / near[0]}?" if near else "; check the name"
+    return InputError(f"{path}: there is no such file{hint}")
+
+
 def read_toml(path: Path, what: str) -> dict[str, Any]:
     """The contents of a TOML file that is meant to hold `what`.
 
@@ -27,9 +34,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     except IsADirectoryError:
         raise InputError(f"{path}: is a directory; name a file of {what} (.toml)") from None
     except FileNotFoundError:
-        near = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.toml")], n=1)
-        hint = f"; did you mean {path.parent / near[0]}?" if near else "; check the name"
-        raise InputError(f"{path}: there is no such file{hint}") from None
+        raise no_such_file(path) from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); {what} is a TOML file") from None
     except OSError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from ..inputs.part import Part
-from ..inputs.quantities import Angle, Positive, Temperature, Time
+from ..inputs.quantities import Angle, Positive, Switch, Temperature, Time
 
 
 class Task(Part):
@@ -16,5 +16,5 @@ class Task(Part):
     ambient_temperature: Temperature = 25.0
     max_lost_motion: Annotated[Angle, Positive] | None = None
     """largest permissible lost motion at 3 % of the rated torque, total at the output"""
-    hold_without_power: bool = True
+    hold_without_power: Switch = True
     """whether the load must stay at rest against its torque with command 0; false where a brake or a controller holds it"""

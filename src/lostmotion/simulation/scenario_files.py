@@ -12,7 +12,7 @@ from ..data_sheets.components import gearbox_table
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import follow, unit_in_schema
-from ..inputs.toml_files import RESULTS, read_toml
+from ..inputs.toml_files import RESULTS, no_such_file, read_toml
 from ..inputs.validation import did_you_mean, shown
 from ..model.gearbox import Gearbox
 from .keys import parse_override, set_values
@@ -49,6 +49,23 @@ def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
         return path
     hint = did_you_mean(str(name), shipped, f"the scenarios that come with the package are {', '.join(shipped)}")
     raise InputError(f"{name}: there is no such file (.toml) and no such scenario; {hint}")
+
+
+def find_base(base: str, path: Path) -> Path:
+    """The file that the key `base` of another file means.
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
+    try:
+        found = find_scenario(base, path.parent)
+        if not found.exists():
+            raise no_such_file(found)
+    except InputError as error:
+        raise InputError(f"{path}: key base: {error}") from None
+    return found
 
 
 def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario | TrainScenario:
@@ -131,7 +148,7 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
             f"{path}: key base: {shown(base)} has the ending of a saved result; name a scenario file (.toml), or change the result by "
             f"`lostmotion run {base} --set KEY=VALUE`"
         )
-    based = _read(find_scenario(base, path.parent), (*including, path.resolve()))
+    based = _read(find_base(base, path), (*including, path.resolve()))
     try:
         _change_voltages(based, data)
     except InputError as error:

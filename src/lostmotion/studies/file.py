@@ -11,7 +11,7 @@ from ..inputs.arguments import checked
 from ..inputs.toml_files import read_toml
 from ..simulation.result_files import FORMATS
 from ..simulation.scenario import Scenario
-from ..simulation.scenario_files import find_scenario, read_tables
+from ..simulation.scenario_files import find_base, read_tables
 from ..simulation.sources import load
 from ..simulation.train_scenario import TrainScenario, is_train
 from .records import kind_of_record
@@ -35,7 +35,7 @@ def load_study(path: str | Path) -> Study:
     changes = data.pop("set", {})
     if not isinstance(changes, dict):
         raise InputError(f'{path}: key set: must be a table, such as set = {{ "load.inertia" = 2 }}')
-    where = find_scenario(base, path.parent)
+    where = find_base(base, path)
     scenario = load(where, changes)
     written = {} if where.suffix in FORMATS else read_tables(where, changes)  # a result has all values written out
     for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:

@@ -7,6 +7,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from ..inputs.part import Part
+from ..inputs.quantities import Switch
 from ..sizing.finding import RULES
 from .units import in_si
 
@@ -56,7 +57,7 @@ class Selection(Part):
     """columns, each to be least or largest; the first ranks the runs, the first two make the Pareto plot"""
     limits: dict[str, Bound] = Field(default={})
     """columns and their permissible values"""
-    drive_check: bool = True
+    drive_check: Switch = True
     """each run must also pass the drive check"""
 
     def named(self) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from .expressions import Expression, read_expression
 from .records import is_condition, kind_of_record, name_key, names_a_record, owner_of, with_records
 from .select import SHARES, USE, Selection, check_bounds
 from .units import unit_in, unit_of_key
-from .vary import Vary, base_value, check_key, scaled
+from .vary import Vary, base_value, check_key, check_spelling, scaled
 from .vocabulary import Vocabulary, vocabulary_of
 
 MAX_RUNS = 100_000_000
@@ -70,10 +70,12 @@ class Study(Part):
     @classmethod
     def _read_scenario(cls, data: Any) -> Any:
         base = data.get("scenario") if isinstance(data, dict) else None
-        if not isinstance(base, dict):
-            return data
-        kind = TrainScenario if is_train(base) else Scenario
-        return data | {"scenario": kind.model_validate(base)}
+        if isinstance(base, dict):
+            base = (TrainScenario if is_train(base) else Scenario).model_validate(base)
+            data = data | {"scenario": base}
+        if isinstance(base, Scenario | TrainScenario):
+            check_spelling(base, data.get("vary"))
+        return data
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

@@ -15,6 +15,7 @@ from pydantic import BaseModel, Field, model_validator
 from ..errors import InputError
 from ..inputs.named import Named
 from ..inputs.part import Part
+from ..inputs.quantities import Switch
 from ..inputs.validation import shown
 from ..model.signals import Signal
 from ..simulation.keys import list_index
@@ -49,7 +50,7 @@ class Vary(Part):
     """several keys that all get the value"""
     name: str = ""
     """column in the result; the first key if left out"""
-    relative: bool = False
+    relative: Switch = False
     """the value multiplies what the base scenario has (of a list, each entry)"""
     values: tuple[float | str, ...] | None = None
     """as they are, or names of records; in a random design each is as likely"""
@@ -220,6 +221,25 @@ def _keys(table: Mapping[str, Any], before: str) -> Iterator[str]:
         yield f"{before}{name}"
         if isinstance(value, dict):
             yield from _keys(value, f"{before}{name}.")
+
+
+def check_spelling(scenario: Scenario | TrainScenario, entries: Any) -> None:
+    """Sees, before the units of their values are asked for, that the keys of a study are known.
+
+    Raises
+    ------
+    ValueError
+        One is not; the message says what may have been meant.
+    """
+    for entry in entries if isinstance(entries, list | tuple) else ():
+        for key in [entry.get("key"), *(entry.get("keys") or ())] if isinstance(entry, dict) else ():
+            if (
+                isinstance(key, str)
+                and key
+                and unit_of_key(key) is None
+                and not (kind_of_record(key) or is_condition(key))
+            ):
+                base_value(scenario, key)
 
 
 def check_key(scenario: Scenario | TrainScenario, key: str, *, relative: bool) -> None:
