@@ -15,13 +15,13 @@ from .panels import Curve, Panel
 DARK = {"color": "#0b3c5d", "linewidth": 1.2}
 LIGHT = {"color": "#d9730d", "linewidth": 0.9, "linestyle": "--"}
 POINTS = {"color": "#0b3c5d", "linewidth": 1.3, "marker": "o", "markersize": 4.0}
-NUMBERS = ("rms", "peak", "probable error", "mean", "measured direction, rms")
+NUMBERS = ("rms", "peak", "probable", "mean", "measured, rms")
 
 
 def header(budget: PointingBudget) -> list[str]:
     """Of the table; in pixels too where there are any."""
     units = [f"{name} [mrad]" for name in NUMBERS]
-    return ["axis", "run", *units, *(["rms [pixel]", "peak [pixel]"] if budget.pixels else [])]
+    return ["axis", "run", *units, *(["rms [px]", "peak [px]"] if budget.pixels else [])]
 
 
 def budget_rows(budget: PointingBudget) -> list[list[str]]:
@@ -102,7 +102,7 @@ def speed_panels(budget: PointingBudget) -> list[Panel]:
             "speed of the target, times that of the scenario",
             "error [mrad]",
             (curve(axis, "rms", POINTS), curve(axis, "peak", LIGHT | {"marker": "s", "markersize": 4.0})),
-            log_y=True,
+            y_range=(0.0, 1.1e3 * max(found[axis].peak for found in budget.speeds.values()) or 1.0),
         )
         for axis in budget.whole
     ]
@@ -130,7 +130,7 @@ def robustness_panels(budget: PointingBudget) -> list[Panel]:
                 Curve(axis, np.array(list(points)), np.array([1e3 * e[axis].rms for e in points.values()]), style)
                 for axis, style in zip(budget.whole, styles * len(budget.whole), strict=False)
             )
-            top = 1.1 * max(float(c.y.max()) for c in curves)
+            top = 1.1 * max(float(c.y.max()) for c in curves) or 1.0
             panels.append(Panel(title, label, "rms error [mrad]", curves, y_range=(0.0, top)))
     return panels
 
@@ -161,7 +161,9 @@ def write_pointing(directory: Path, name: str, budget: PointingBudget) -> Path:
         ),
     ):
         if panels:
-            png = save_figure(plots.draw(panels, len(panels), (4.0 * len(panels) + 1.5, 3.6)), directory, what)
+            png = save_figure(
+                plots.draw(panels, len(panels), (max(9.0, 4.0 * len(panels) + 1.5), 3.6)), directory, what
+            )
             write_text(directory / f"{what}.csv", panels_csv(panels))
             figures.append(embed(png, title, caption, what))
     rows, parts = budget_rows(budget), contribution_rows(budget)
