@@ -11,7 +11,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT
-from lostmotion.control.gains import gains_by_rule
+from lostmotion.control.tuning import TwoInertias, suited
 from lostmotion.simulation.scenario import LoadTable
 from lostmotion.sizing.duty_cycle import DutyCycle
 from lostmotion.sizing.required_motion import check_motor, input_demand, required_motion
@@ -147,20 +147,29 @@ def test_a_required_motion_has_the_losses_of_the_run():
 
 def test_identical_damping_damps_both_pole_pairs_alike():
     J_M, J_L, k = 2.5e-4, 4.2e-3, 36.0
-    gains = gains_by_rule(J_M, J_L, k, 0.0, 1e-5, 1e-4)
+    gains = suited(TwoInertias(J_M, J_L, k), 1.5e-5, 1e-4)
     w2, R = k / J_L, J_L / J_M
-    s4 = [1.0, gains.speed / J_M, (1 + R) * w2 + gains.speed_integral / J_M, gains.speed / J_M * w2]
-    poles = np.roots([*s4, gains.speed_integral / J_M * w2])
+    s4 = [1.0, gains.speed.gain / J_M, (1 + R) * w2 + gains.speed.integral_gain / J_M, gains.speed.gain / J_M * w2]
+    poles = np.roots([*s4, gains.speed.integral_gain / J_M * w2])
     assert gains.rule == "identical damping"
     assert -poles.real / np.abs(poles) == pytest.approx(np.full(4, 0.7), rel=1e-9)
 
 
 @pytest.mark.parametrize(("stiffness", "load"), [(math.inf, 1e-3), (36.0, 1e-4), (1e9, 1e-3)])
 def test_a_rigid_or_a_light_load_gets_the_symmetrical_optimum(stiffness: float, load: float):
-    gains = gains_by_rule(2e-4, load, stiffness, 2e-4, 1e-4, 1e-3)
+    gains = suited(TwoInertias(2e-4, load, stiffness), 3.5e-4, 1e-3)
     assert gains.rule == "symmetrical optimum"
-    assert gains.speed == pytest.approx((2e-4 + load) / (2 * 3.5e-4))
-    assert gains.speed / gains.speed_integral == pytest.approx(4 * 3.5e-4)
+    assert gains.speed.gain == pytest.approx((2e-4 + load) / (2 * 3.5e-4))
+    assert gains.speed.gain / gains.speed.integral_gain == pytest.approx(4 * 3.5e-4)
+
+
+def test_a_pair_has_the_gains_of_the_rule_of_tune(task: Study):
+    scenario = task.axis_at(task.parameters(0, 1)[0], 2)
+    tuned, controller = lm.tune(scenario, rule="suited"), scenario.controller
+    assert tuned.gain == pytest.approx(controller.speed.gain, rel=1e-12)
+    assert tuned.integral_gain == pytest.approx(controller.speed.k_i, rel=1e-12)
+    assert tuned.position_gain == pytest.approx(controller.position.gain, rel=1e-12)
+    assert tuned.filter_time == 0.0
 
 
 # --- the cycle ---

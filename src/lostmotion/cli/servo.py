@@ -39,7 +39,7 @@ def servo(
         typer.Option(
             "--tune",
             metavar="RULE",
-            help="Tune first: symmetrical_optimum, identical_damping, identical_radius, identical_real_part, margins or search.",
+            help="Tune first: suited, symmetrical_optimum, identical_damping, identical_radius, identical_real_part, margins or search.",
         ),
     ] = None,
     overrides: Overrides = None,

@@ -10,6 +10,8 @@ from ..errors import InputError
 CRITICAL = 4.0
 """times the gain of the position loop that the speed loop's bandwidth must be, so that with a lag of first order it just does not
 overshoot"""
+ALIKE = 0.7  # damping of both pole pairs, by the rule that suits a drive
+HELD = 1.5  # sample times of the position loop: one until a result acts, and half of one since it is held
 
 
 @dataclass(frozen=True)
@@ -130,3 +132,43 @@ def identical_real_part(drive: TwoInertias, damping: float) -> SpeedGains:
 def position_gain(bandwidth: float) -> float:
     """K_v [1/s] for a speed loop of that bandwidth [Hz]: a quarter of its angular frequency."""
     return 2.0 * math.pi * bandwidth / CRITICAL
+
+
+@dataclass(frozen=True)
+class CascadeGains:
+    """Gains of speed and position loop, and the rule that gave them."""
+
+    rule: str
+    speed: SpeedGains
+    position: float
+    """K_v [1/s]"""
+
+
+def suited(drive: TwoInertias, lag: float, position_time: float) -> CascadeGains:
+    """The rule that suits a drive.
+
+    Where load and motor are so far apart that both pole pairs can be damped alike, they are, with 0.7; where they are not, or
+    where that takes more gain than the sampling allows since the drive is as good as rigid, the symmetrical optimum with
+    a = 2, its reference not filtered. The position loop gets half of the reciprocal of the speed loop's equivalent time.
+
+    Parameters
+    ----------
+    drive
+        Of infinite stiffness where it is rigid.
+    lag
+        Sum of the lags in the speed loop [s].
+    position_time
+        Sample time of the position loop [s].
+    """
+    optimum = symmetrical_optimum(drive.motor_inertia + drive.load_inertia, lag)
+    if math.isfinite(drive.stiffness) and drive.inertia_ratio >= 4.0 * ALIKE**2:
+        alike = identical_damping(drive, ALIKE)
+        if alike.gain <= optimum.gain:
+            # w_1 w_2 = w_a^2, w_1 + w_2 = K_p/(2 zeta J_M)
+            w_a, both = drive.antiresonance, alike.gain / (2.0 * ALIKE * drive.motor_inertia)
+            slow = 2.0 * w_a**2 / (both + math.sqrt(both**2 - 4.0 * w_a**2))
+            wait = 2.0 * ALIKE / slow + HELD * position_time
+            return CascadeGains("identical damping", alike, 0.5 / wait)
+    wait = optimum.filter_time + HELD * position_time
+    unfiltered = SpeedGains(optimum.gain, optimum.integral_gain)
+    return CascadeGains("symmetrical optimum", unfiltered, 0.5 / wait)

@@ -12,6 +12,7 @@ from ..control.loops import Difference, FirstOrderCurrent, Observer, SampledCurr
 from ..control.tuning import TwoInertias
 from ..errors import InputError
 from ..model.gear import Gear
+from ..model.gearbox import Gearbox
 from ..model.torsion import Rigid
 from .regimes import Axis
 
@@ -36,9 +37,10 @@ def inertias(axis: Axis, beyond: str | None = None) -> tuple[float, float]:
     return near, far
 
 
-def secant(gear: Gear) -> float:
+def secant(gear: Gear | Gearbox) -> float:
     """Stiffness of a gear up to its rated torque, without its gap [N·m/rad]; without a rated torque that of its last piece."""
-    assert not isinstance(gear.stiffness, Rigid)
+    if isinstance(gear.stiffness, Rigid):
+        return math.inf
     breaks, slopes = gear.stiffness.pieces()
     if gear.rated_output_torque is None:
         return slopes[-1]

@@ -12,10 +12,12 @@ import numpy as np
 from ..control.filters import LowPass
 from ..control.tuning import (
     SpeedGains,
+    TwoInertias,
     identical_damping,
     identical_radius,
     identical_real_part,
     position_gain,
+    suited,
     symmetrical_optimum,
 )
 from ..errors import InputError, need
@@ -30,7 +32,15 @@ from .motion import with_controller
 from .regimes import Axis, Regime, axis_of, regimes
 from .sampled import SampledLoop
 
-RULES = ("symmetrical_optimum", "identical_damping", "identical_radius", "identical_real_part", "margins", "search")
+RULES = (
+    "suited",
+    "symmetrical_optimum",
+    "identical_damping",
+    "identical_radius",
+    "identical_real_part",
+    "margins",
+    "search",
+)
 GOALS = ("bandwidth", "stiffness")
 GAIN_MARGIN = 2.0  # that the rule `margins` keeps beside the phase margin
 ZERO = 4.0  # K_p/J over the zero K_i/K_p of the PI controller, by `margins`
@@ -107,11 +117,12 @@ def tune(
     scenario
         With a controller whose loops, sample times, filters and encoders are those that are to be tuned; its gains do not count.
     rule
-        ``"symmetrical_optimum"`` of the total inertia and the sum of the lags; of two inertias and the spring between them
-        ``"identical_damping"``, ``"identical_radius"`` or ``"identical_real_part"`` of their poles; ``"margins"``, the greatest gain
+        ``"suited"``, that by which `select` tunes: identical damping where the inertias and the sampling permit it, else the
+        symmetrical optimum; ``"symmetrical_optimum"`` of the total inertia and the sum of the lags; of two inertias and the spring
+        between them ``"identical_damping"``, ``"identical_radius"`` or ``"identical_real_part"`` of their poles; ``"margins"``, the greatest gain
         that keeps a phase margin and a gain margin of 2 in all regimes of the exact sampled loop; ``"search"``, an optimum of the
-        exact sampled response. Each but the last sets K_v to a quarter of the speed loop's bandwidth, the lowest of all
-        regimes.
+        exact sampled response. suited sets K_v to half of the reciprocal of the speed loop's equivalent time, each other but search
+        to a quarter of the speed loop's bandwidth, the lowest of all regimes.
     damping
         zeta of the poles, for identical_damping and identical_real_part.
     phase_margin
@@ -153,6 +164,8 @@ def tune(
     }
     if rule == "search":
         gains, why, K_v = _by_search(axis, goal, sensitivity_peak)
+    elif rule == "suited":
+        gains, why, K_v = _suited(axis)
     else:
         gains, why = by[rule]()
         K_v = (
@@ -164,6 +177,13 @@ def tune(
 
 
 # --- rules ---
+
+
+def _suited(axis: Axis) -> tuple[SpeedGains, str, float | None]:
+    main, position = axis.main_gear(), axis.controller.position
+    drive = TwoInertias(*inertias(axis), math.inf) if main is None else two_inertias(axis)
+    found = suited(drive, lag_sum(axis.controller), axis.controller.loop_time("position"))
+    return found.speed, f"{found.rule}, which suits this drive", None if position is None else found.position
 
 
 def _by_lags(axis: Axis) -> tuple[SpeedGains, str]:

@@ -67,9 +67,8 @@ def _rise(m: Motor, cycle: DutyCycle, torque: float, ambient: float) -> float | 
     steady, bodies = rms_rise(m, torque, ambient), TwoBodies.of(m, ambient)
     if steady is None or bodies is None or cycle.held_longer:
         return steady
-    time, torques = cycle.repeated_torque()
-    start = bodies.repeated(time, torques)
-    return math.inf if start is None else float(bodies.course(time, torques, start)[0].max()) - ambient
+    course = bodies.repeated(*cycle.repeated_torque())
+    return math.inf if course is None else float(course[0].max()) - ambient
 
 
 def rms_rise(m: Motor, torque: float, ambient: float) -> float | None:

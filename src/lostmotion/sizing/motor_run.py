@@ -153,18 +153,20 @@ def temperatures(
     time = result["time"].values
     if len(time) < 2:
         raise InputError("temperatures: the result has a single sample; shorten simulation.sample_interval")
-    start: tuple[float, float] | None = (ambient if winding is None else winding, ambient if case is None else case)
     if repeated:
         if (winding, case) != (None, None):
             raise InputError(
                 "temperatures: a motion that has been repeated for ever has no beginning; leave winding and case out"
             )
-        start = bodies.repeated(time, heating)
-    if start is None:
+        course = bodies.repeated(time, heating)
+    else:
+        start = (ambient if winding is None else winding, ambient if case is None else case)
+        course = bodies.course(time, heating, start)
+    if course is None:
         raise InputError(
             "temperatures: repeated, the winding has no end to its heat: its loss grows faster than it is carried off"
         )
-    of_winding, of_case = bodies.course(time, heating, start)
+    of_winding, of_case = course
     loss = bodies.loss * heating**2 * (1.0 + bodies.alpha * (of_winding - bodies.reference))
     hottest = float(of_winding.max())
     found: dict[str, tuple[Any, str, str]] = {

@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..model.motor import Motor
 
 COPPER = 0.00393  # relative rise of a winding's resistance [1/K]
+ROUNDING = 1e-18  # of a term over the first, from which on it is left out
 SERIES = 0.1  # below it the divided difference of the exponential loses digits, and its series does not
 
 
@@ -78,25 +79,21 @@ class TwoBodies:
 
     def course(self, time: np.ndarray, torque: np.ndarray, start: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
         """Temperatures of winding and case [°C] at the samples, from those at the first."""
-        F, g = self.steps(time, torque)
-        w, c = start[0] - self.ambient, start[1] - self.ambient
-        found = [(w, c)]
-        for ((f11, f12), (f21, f22)), (g1, g2) in zip(F.tolist(), g.tolist(), strict=True):
-            w, c = f11 * w + f12 * c + g1, f21 * w + f22 * c + g2
-            found.append((w, c))
-        x = np.array(found) + self.ambient
-        return x[:, 0], x[:, 1]
+        return self._follow(*_from_start(*self.steps(time, torque)), np.subtract(start, self.ambient))
 
-    def repeated(self, time: np.ndarray, torque: np.ndarray) -> tuple[float, float] | None:
-        """Temperatures of winding and case [°C] at the beginning of a cycle that has been repeated for ever.
+    def repeated(self, time: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """The same, of a cycle that has been repeated for ever.
 
         x = F x + g over the whole cycle, solved for x. None if the heat that grows with the temperature has no end.
         """
-        F, g = _whole(*self.steps(time, torque))
-        if max(abs(np.linalg.eigvals(F))) >= 1.0:
+        F, g = _from_start(*self.steps(time, torque))
+        if max(abs(np.linalg.eigvals(F[-1]))) >= 1.0:
             return None
-        w, c = np.linalg.solve(np.eye(2) - F, g) + self.ambient
-        return float(w), float(c)
+        return self._follow(F, g, np.linalg.solve(np.eye(2) - F[-1], g[-1]))
+
+    def _follow(self, F: np.ndarray, g: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        every = self.ambient + np.vstack([x, F @ x + g])
+        return every[:, 0], every[:, 1]
 
     def error_bound(self, time: np.ndarray, torque: np.ndarray, hottest: float) -> float:
         """Of the temperatures [K], through the mean of M² over each interval.
@@ -147,14 +144,21 @@ def rms(time: np.ndarray, torque: np.ndarray) -> float:
     return float(np.sqrt(np.sum(mean_square(torque) * np.diff(time)) / (time[-1] - time[0])))
 
 
-def _whole(F: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All steps x -> F x + g in one, by joining neighbours."""
-    while len(F) > 1:
-        if len(F) % 2:
-            F, g = np.concatenate([F, np.eye(2)[None]]), np.concatenate([g, np.zeros((1, 2))])
-        first, second = F[0::2], F[1::2]
-        F, g = second @ first, (second @ g[0::2, :, None])[:, :, 0] + g[1::2]
-    return F[0], g[0]
+def _from_start(F: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of steps x -> F x + g the maps from the start to the end of each: within blocks first, all of them side by side."""
+    n = len(F)
+    size = math.isqrt(n - 1) + 1
+    blocks = -(-n // size)
+    P, q = np.empty((blocks, size, 2, 2)), np.zeros((blocks, size, 2))
+    P[:] = np.eye(2)
+    P.reshape(-1, 2, 2)[:n], q.reshape(-1, 2)[:n] = F, g
+    for k in range(1, size):
+        q[:, k] += (P[:, k] @ q[:, k - 1, :, None])[:, :, 0]
+        P[:, k] = P[:, k] @ P[:, k - 1]
+    for k in range(1, blocks):
+        q[k] += P[k] @ q[k - 1, -1]
+        P[k] = P[k] @ P[k - 1, -1]
+    return P.reshape(-1, 2, 2)[:n], q.reshape(-1, 2)[:n]
 
 
 def _integral(rate: np.ndarray, h: np.ndarray) -> np.ndarray:
@@ -166,12 +170,17 @@ def _integral(rate: np.ndarray, h: np.ndarray) -> np.ndarray:
 def _divided(l_1: np.ndarray, l_2: np.ndarray, h: np.ndarray) -> np.ndarray:
     """Divided difference of `_integral` over two rates."""
     plain = (_integral(l_1, h) - _integral(l_2, h)) / (l_1 - l_2)
-    series, power, total = np.zeros_like(h), h * h / 2.0, np.ones_like(h)
+    reach = np.maximum(np.abs(l_1), np.abs(l_2)) * h
+    near = reach < SERIES
+    series, power, total, last = np.zeros_like(h), h * h / 2.0, np.ones_like(h), np.ones_like(h)
+    most = float(reach[near].max(initial=0.0))
     for k in range(2, 12):
         series += power * total  # h^k/k! times the sum of l_1^i l_2^j with i + j = k - 2
-        power = power * h / (k + 1.0)
-        total = total * l_1 + l_2 ** (k - 1.0)
-    return np.where(np.maximum(np.abs(l_1), np.abs(l_2)) * h < SERIES, series, plain)
+        if most ** (k - 1) < ROUNDING:
+            break
+        power, last = power * h / (k + 1.0), last * l_2
+        total = total * l_1 + last
+    return np.where(near, series, plain)
 
 
 def need_two_bodies(motor: Motor, ambient: float, alpha: float, where: str) -> TwoBodies:

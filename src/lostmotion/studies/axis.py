@@ -10,22 +10,19 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..control.controller import Controller
-from ..control.gains import gains_by_rule
-from ..control.loops import Feedforward, FirstOrderCurrent, SampledCurrent
+from ..control.loops import Feedforward
 from ..control.references import Move, PositionReference
+from ..control.tuning import TwoInertias, suited
 from ..inputs.quantities import Angle, Number, Positive, Time, Whole
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..model.signals import TimeFunction, TorqueSignal
 from ..model.task import Task
-from ..model.torsion import Rigid
+from ..servo.data import lag_sum, secant
 from ..simulation.scenario import Initial, Scenario, SimulationTable
 from ..sizing.motion_check import INERTIA_RATIO
 from .select import Bound
 
-CURRENT_LAG = (
-    3.0  # sample times: what a current loop g/(z (z - 1)) with g = 1/3 lags behind at low frequency, beyond its delay
-)
 REPEATS = 0.01  # relative difference of two cycles, within which the motion repeats
 FEWEST = 2  # cycles
 WHOLE = 1e-9  # relative, within which periods fit into a cycle
@@ -201,12 +198,16 @@ def tuned(base: Scenario, motor: Motor, g: Gearbox) -> Controller:
     assert controller.position is not None
     assert controller.speed is not None
     J_M, J_L = motor.rotor_inertia + g.inertia, base.load.inertia / g.ratio**2
-    stiffness = math.inf if isinstance(g.stiffness, Rigid) else max(g.stiffness.pieces()[1]) / g.ratio**2
-    gains = gains_by_rule(J_M, J_L, stiffness, _lag(controller), *map(controller.loop_time, ("speed", "position")))
+    drive = TwoInertias(J_M, J_L, secant(g) / g.ratio**2)
+    gains = suited(drive, lag_sum(controller), controller.loop_time("position"))
     feedforward = controller.feedforward
     if feedforward == Feedforward():
         feedforward = Feedforward(inertia=J_M + J_L)
-    speed = {"gain": gains.speed, "integral_gain": gains.speed_integral, "integral_time": None}
+    speed: dict[str, Any] = {
+        "gain": gains.speed.gain,
+        "integral_gain": gains.speed.integral_gain,
+        "integral_time": None,
+    }
     if controller.speed.torque_limit is None:
         speed["torque_limit"] = torque_limit(motor)
     return controller.model_copy(
@@ -227,9 +228,3 @@ def torque_limit(motor: Motor) -> float | None:
     if limits is None or limits.max_current is None or limits.torque_constant is None:
         return None
     return limits.max_current * limits.torque_constant
-
-
-def _lag(controller: Controller) -> float:
-    if isinstance(controller.current, FirstOrderCurrent):
-        return controller.current.time_constant
-    return CURRENT_LAG * controller.loop_time("current") if isinstance(controller.current, SampledCurrent) else 0.0

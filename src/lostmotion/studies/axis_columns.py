@@ -77,11 +77,8 @@ def temperatures_of(motor: Motor, duty: DutyCycle, ambient: float) -> tuple[floa
     time constants the winding alone, by the rms torque; NaN where nothing is known."""
     bodies = TwoBodies.of(motor, ambient)
     if bodies is not None:
-        start = bodies.repeated(duty.time, duty.motor_torque)
-        if start is None:
-            return math.inf, math.inf
-        winding, case = bodies.course(duty.time, duty.motor_torque, start)
-        return float(winding.max()), float(case.max())
+        course = bodies.repeated(duty.time, duty.motor_torque)
+        return (math.inf, math.inf) if course is None else (float(course[0].max()), float(course[1].max()))
     rise = rms_rise(motor, rms(duty.motor_torque), ambient)
     return math.nan if rise is None else ambient + rise, math.nan
 
