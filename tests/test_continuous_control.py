@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 import json
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -495,3 +497,63 @@ def test_the_period_is_the_shortest_one() -> None:
     found = [lm.limit_cycle(hunting.replace(**{key: k}), causes=False).frequency for k in (7.5, 8.615384615384617, 9.5)]
     assert np.diff(found).min() > 0.0
     assert found[1] == pytest.approx(0.157284, rel=1e-5)
+
+
+# --- in the short form ---
+
+SHORT = """
+base = "paper-2dof-nl-small"
+
+[controller]
+kind = "continuous"
+limit = "1 N*m"
+reference = { kind = "position", steps = [{ time = "10 ms", height = "0.02 rad" }] }
+
+[controller.position]
+gain = "20 N*m/rad"
+integral_gain = "40 N*m/rad/s"
+derivative_gain = "1 N*m*s/rad"
+filter_time = "2 ms"
+
+[simulation]
+duration = "0.5 s"
+sample_interval = "1 ms"
+"""
+
+
+def test_in_the_short_form_it_makes_a_train_of_the_drive(tmp_path: Path) -> None:
+    """The same, element by element, as the drive written out as a train."""
+    path = tmp_path / "short.toml"
+    path.write_text(SHORT)
+    short, drive = lm.load(path, ["controller.position.gain=30"]), lm.load("paper-2dof-nl-small")
+    assert isinstance(short, lm.TrainScenario)
+    controller = tomllib.loads(SHORT)["controller"]
+    controller["position"]["gain"] = 30.0
+    controller["shaft"] = "load"
+    train = drive.drive().train()
+    long = lm.TrainScenario(
+        shafts={name: dict(shaft) for name, shaft in train.shafts.items()},
+        motors=train.motors,
+        gears=train.gears,
+        controllers={"motor": controller},
+        simulation={"duration": 0.5, "sample_interval": 1e-3},
+    )
+    a, b = lm.simulate(short, energy=False), lm.simulate(long, energy=False)
+    assert float(a["load_angle"][-1]) == pytest.approx(0.02, rel=0.2)  # it follows
+    for name in ("load_angle", "motor_command", "motor_integral", "gearbox_twist"):
+        assert np.array_equal(a[name], b[name]), name
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (SHORT.replace('limit = "1 N*m"', "limit = -1"), r"short.toml: key controller.limit: "),
+        (SHORT.replace("[simulation]", "[command]\namplitude = 0.1\n[simulation]"), "keys command, controller: both turn the motor"),
+        (SHORT + '[task]\nambient_temperature = "30 degC"', "keys task, controller: "),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_in_the_short_form_has_its_key(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "short.toml"
+    path.write_text(text)
+    with pytest.raises(lm.InputError, match=message):
+        lm.load(path)

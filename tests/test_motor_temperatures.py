@@ -152,6 +152,29 @@ def test_current_and_voltage_of_a_synchronous_motor() -> None:
     assert lm.motor_current(source)["current"].values == pytest.approx(source["motor_torque"].values / 0.06)
 
 
+@pytest.mark.parametrize("tau", [0.0, 2e-3])
+def test_voltage_under_a_current_loop_is_what_torque_and_speed_need(tau: float) -> None:
+    """u_q = R i_q + L_q i_q' + p psi w, of first order with i_q' = i_q*/tau e^(-t/tau); none of it is the torque's command."""
+    motor = lm.Motor(**motor_table("siemens-1ft7044-ak7", {"dc_voltage": "600 V", "friction_torque": 0.0}))
+    current = {"kind": "first_order", "time_constant": tau} if tau else {"kind": "ideal"}
+    controller = {"sample_time": 1e-3, "delay": 0, "reference": {"kind": "torque", "mean": 4.0}, "current": current}
+    scenario = run(0.0, duration=0.02, interval=1e-3)
+    result = lm.simulate(
+        lm.Scenario(**{**scenario.model_dump(), "command": 0.0, "motor": motor, "controller": controller})
+    )
+    found, phase = lm.motor_current(result), motor.winding.phase_values()
+    decay = np.exp(-result["time"].values / tau) if tau else np.zeros(result.sizes["time"])
+    i, speed = 4.0 / phase.torque_constant * (1.0 - decay), result["motor_speed"].values
+    rise = 4.0 / phase.torque_constant * decay / tau if tau else 0.0
+    u_q = phase.resistance * i + phase.inductance_q * rise + phase.pole_pairs * phase.flux_linkage * speed
+    u_d = phase.pole_pairs * speed * phase.inductance_q * i
+    assert speed[-1] > 10.0
+    assert found["current"].values == pytest.approx(i, rel=1e-9)
+    assert found["voltage"].values == pytest.approx(np.hypot(u_q, u_d), rel=1e-9)
+    use = next(f.use for f in check_drive(lm.scenario_of(result)) if f.rule == "voltage")
+    assert use == pytest.approx(float(found["voltage"].max()) / found.attrs["voltage_limit"], rel=1e-3)
+
+
 def test_a_brushless_motor_of_the_catalogue_with_field_orientation() -> None:
     """The same magnets, K_M = (3 sqrt(3)/pi) p psi: with a sine 9/pi² of the heat to the same torque, since all three phases
     carry it, and 3/pi of the no-load speed, since a phase ends at u_dc/sqrt(3)."""

@@ -318,7 +318,7 @@ def test_tuning_by_margins_keeps_them_and_one_of_them_exactly(position_axis: Any
 
 
 def test_tuning_refuses_what_it_cannot_do(position_axis: Any) -> None:
-    with pytest.raises(lm.InputError, match='rule: "best" is not known; take one of symm'):
+    with pytest.raises(lm.InputError, match='rule: "best" is not known; take one of suited, symm'):
         lm.tune(position_axis, rule="best")
     with pytest.raises(
         lm.InputError, match="identical radius needs an inertia ratio of load to motor of at most 4, and it is 16"

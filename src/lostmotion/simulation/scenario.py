@@ -113,8 +113,8 @@ class Scenario(Part):
             isinstance(controller, Mapping) and controller.get("kind") == "continuous"
         ):
             raise InputError(
-                "key controller.kind: a continuous controller is part of a drive train; write the drive in the long form, "
-                "[shafts.motor] [shafts.load] [motors.motor] [gears.gearbox], with [controllers.motor]"
+                "key controller.kind: a continuous controller makes a drive train of the drive, since its states are states of the "
+                'train; read the scenario by lm.load from a file, or make a TrainScenario with controllers={"motor": ...}'
             )
         return data
 

@@ -18,7 +18,9 @@ from ..model.gearbox import Gearbox
 from .keys import parse_override, set_values
 from .scenario import Scenario, from_tables
 from .series_files import read_series
-from .train_scenario import TrainScenario, file_schema, is_train, train_from_tables
+from .train_scenario import TrainScenario, file_schema, in_long_form, is_train, train_from_tables
+
+MOTOR = "motor"  # its name in the long form of a drive
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -97,9 +99,38 @@ def changed(tables: dict[str, Any], path: Path) -> Scenario | TrainScenario:
         With one line that names the file, the key, the value and the remedy.
     """
     try:
-        return train_from_tables(tables) if is_train(tables) else from_tables(tables)
+        return scenario_from(tables)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def scenario_from(tables: Mapping[str, Any]) -> Scenario | TrainScenario:
+    """The scenario of such tables. A drive in the short form with a continuous controller is a drive train, since the states of the
+    controller are states of the train.
+
+    Raises
+    ------
+    InputError
+        A record is unknown or lacks what a run needs; a value cannot be used.
+    """
+    if is_train(tables):
+        return train_from_tables(tables)
+    controller = tables.get("controller")
+    if not isinstance(controller, Mapping) or controller.get("kind") != "continuous":
+        return from_tables(tables)
+    for key in ("command", "task"):
+        if key in tables:
+            why = (
+                "both turn the motor"
+                if key == "command"
+                else "a continuous controller is simulated, not judged for a task"
+            )
+            raise InputError(f"keys {key}, controller: {why}; leave one of them out")
+    drive = in_long_form(from_tables({key: value for key, value in tables.items() if key != "controller"}))
+    try:
+        return TrainScenario(**{**dict(drive), "command": {}, "controllers": {MOTOR: controller}})
+    except InputError as error:
+        raise InputError(str(error).replace(f"controllers.{MOTOR}", "controller")) from None
 
 
 def read_tables(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> dict[str, Any]:

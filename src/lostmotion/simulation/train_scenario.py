@@ -323,6 +323,7 @@ def train_schema() -> dict[str, Any]:
 def file_schema() -> dict[str, Any]:
     """JSON Schema of scenario files, in the short or the long form."""
     of_drive, of_train = json_schema(), json.loads(json.dumps(train_schema()).replace('"#/$defs/', '"#/$defs/train_'))
+    of_drive["properties"]["controller"]["anyOf"].append({"$ref": "#/$defs/train_ContinuousController"})
     definitions = of_drive.pop("$defs") | {f"train_{name}": node for name, node in of_train.pop("$defs").items()}
     return {"title": "Scenario file", "anyOf": [of_drive, of_train], "$defs": definitions}
 

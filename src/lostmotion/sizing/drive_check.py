@@ -16,7 +16,8 @@ from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
 from .finding import Finding
 from .gearbox_check import input_speeds, loads, locks, loss_map, lost_motion
 from .motion_check import dead_zone, holdings, inertia, load_torques, resonance, resonances
-from .motor_check import current, heat, largest_speed, voltage
+from .motor_check import command_of_run, current, heat, largest_speed, voltage
+from .motor_run import oriented_amplitudes
 from .train_check import check_train
 
 if TYPE_CHECKING:
@@ -49,12 +50,14 @@ def check_drive(scenario: Scenario | TrainScenario) -> tuple[Finding, ...]:
     cycle = duty_cycle(result, scenario.task.cycle)
     g, m, task = scenario.gearbox, scenario.motor, scenario.task
     command, torque, speed = (result[name].values for name in ("command", "motor_torque", "motor_speed"))
+    command = command_of_run(m, scenario.controller, command, torque, speed)
+    oriented = oriented_amplitudes(result, "motor")
     findings = [
         *loads(g, float(abs(result["output_torque"]).max()), cycle),
         *input_speeds(g, cycle),
         largest_speed(m, float(abs(speed).max())),
         *heat(m, cycle, task.ambient_temperature),
-        voltage(m, command, torque, speed),
+        voltage(m, command, torque, speed, oriented=None if oriented is None else oriented[1]),
         current(m, torque),
         inertia(scenario),
         *resonance(scenario),

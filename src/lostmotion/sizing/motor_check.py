@@ -6,6 +6,10 @@ import math
 
 import numpy as np
 
+from ..control.axis import driven
+from ..control.continuous import ContinuousController
+from ..control.controller import Controller
+from ..control.loops import FirstOrderCurrent
 from ..model.motor import Motor
 from ..units.practical import RPM
 from .duty_cycle import DutyCycle
@@ -81,16 +85,56 @@ def rms_rise(m: Motor, torque: float, ambient: float) -> float | None:
     return steady_rise(loss * torque**2, resistance, ambient, reference)
 
 
-def voltage(m: Motor, command: np.ndarray, torque: np.ndarray, speed: np.ndarray, where: str = "motor") -> Finding:
-    """The largest that the command asks for, or that torque [N·m] and speed [rad/s] need."""
+def needed_command(motor: Motor, torque: np.ndarray, speed: np.ndarray, rate: np.ndarray | float = 0.0) -> np.ndarray:
+    """E_C of (2) under which a motor gives a torque [N·m] that changes at `rate` [N·m/s] at a speed [rad/s]; of a torque source its
+    relative torque."""
+    motor = motor.as_dc()
+    share = torque / motor.rated_torque
+    if motor.armature_voltage_constant is None or motor.rated_speed is None:
+        return share
+    assert motor.electrical_time_constant is not None
+    k_N = motor.armature_voltage_constant
+    rising = motor.electrical_time_constant * rate / motor.rated_torque
+    return np.asarray((share + rising + (k_N - 1.0) * speed / motor.rated_speed) / k_N)
+
+
+def command_of_run(
+    m: Motor,
+    controller: Controller | ContinuousController | None,
+    command: np.ndarray,
+    torque: np.ndarray,
+    speed: np.ndarray,
+) -> np.ndarray:
+    """E_C over a run [-]: its command, or where that is of a current loop whose voltage the run does not contain, what torque
+    [N·m] and speed [rad/s] need, under one of first order with the inductance, under any other without."""
+    law = None if controller is None else driven(controller)
+    if law is None:  # u_q ends at the amplifier
+        return np.clip(command, -1.0, 1.0) if m.kind == "synchronous" else command
+    loop = None if controller is None else controller.current
+    if isinstance(loop, FirstOrderCurrent):
+        return needed_command(m, torque, speed, (m.rated_torque * command - torque) / loop.time_constant)
+    return needed_command(m, torque, speed)
+
+
+def voltage(
+    m: Motor,
+    command: np.ndarray,
+    torque: np.ndarray,
+    speed: np.ndarray,
+    where: str = "motor",
+    *,
+    oriented: np.ndarray | None = None,
+) -> Finding:
+    """The largest that the command asks for, or that torque [N·m] and speed [rad/s] need; under field-oriented control the one
+    that a phase had [V]."""
     limits = m.limits
     if m.winding is not None:
         phase = m.winding.phase_values()
         if m.kind == "synchronous":
-            u_q = m.phase_voltage * np.clip(command, -1.0, 1.0)
+            u_q = m.phase_voltage * command
         else:
             u_q = phase.resistance * torque / phase.torque_constant + phase.voltage_constant * speed
-        peak = float(phase.voltage(u_q, torque, speed).max())
+        peak = float((phase.voltage(u_q, torque, speed) if oriented is None else oriented).max())
         limit = None if m.dc_voltage is None else m.phase_voltage
         what = "voltage of a phase, largest amplitude"
         return within("voltage", what, peak, limit, "V", "dc voltage / √3", key=f"{where}.dc_voltage")

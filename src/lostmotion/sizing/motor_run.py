@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..control.continuous import ContinuousController
+from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Temperature
 from ..inputs.validation import did_you_mean
 from ..model.motor import Motor
 from ..model.task import Task
-from ..simulation.results import scenario_of
+from ..simulation.results import RawResult, scenario_of
 from ..simulation.train_scenario import TrainScenario
+from .motor_check import command_of_run
 from .thermal import COPPER, need_two_bodies, rms
 
 if TYPE_CHECKING:
@@ -37,7 +40,8 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
     xarray.Dataset
         Over ``time`` [s], of a motor with a winding: `current` [A], i_q, the amplitude of a phase with the sign of the torque;
         `current_rms` [A]; `voltage` [V], the amplitude of a phase with that of the decoupling, which may exceed `voltage_limit`
-        since only u_q ends there. Under field-oriented control the amplitudes of both axes together, as they were in the run.
+        since only u_q ends there. Under a current loop of kind ideal or first_order it is the voltage that torque and speed need, of
+        first_order with that of the inductance, which jumps without bounds in an ideal one. Under field-oriented control the amplitudes of both axes together, as they were in the run.
         Of any other motor `current` alone, torque / torque constant.
 
     Raises
@@ -46,7 +50,8 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
         The motor has neither a winding nor `limits.torque_constant`, or `motor` names none.
     """
     m, where, (command, torque, speed) = _motor_of(result, motor)
-    oriented = _amplitudes(result, where)
+    oriented = oriented_amplitudes(result, where)
+    command = command_of_run(m, _controller_of(result, where), command, torque, speed)
     current, voltage = oriented or current_voltage_power(m, command, torque, speed)[:2]
     attributes: dict[str, Any] = {}
     if m.winding is None:
@@ -64,14 +69,21 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
     return _dataset(result, found, attributes)
 
 
-def _amplitudes(result: xarray.Dataset, where: str) -> tuple[np.ndarray, np.ndarray] | None:
+def oriented_amplitudes(result: xarray.Dataset | RawResult, where: str) -> tuple[np.ndarray, np.ndarray] | None:
     """Current [A], with the sign of the torque, and voltage [V] under field-oriented control; None without."""
     prefix = "" if where == "motor" else f"{where.removeprefix('motors.')}_"
     names = [f"{prefix}{axis}_{what}" for what in ("current", "voltage") for axis in ("direct", "quadrature")]
     if any(name not in result for name in names):
         return None
-    i_d, i_q, u_d, u_q = _read(result, *names)
+    i_d, i_q, u_d, u_q = (np.asarray(result[name]) for name in names)
     return np.copysign(np.hypot(i_d, i_q), i_q), np.hypot(u_d, u_q)
+
+
+def _controller_of(result: xarray.Dataset, where: str) -> Controller | ContinuousController | None:
+    scenario = scenario_of(result)
+    if isinstance(scenario, TrainScenario):
+        return scenario.controllers.get(where.removeprefix("motors."))
+    return scenario.controller
 
 
 def current_voltage_power(
@@ -84,7 +96,7 @@ def current_voltage_power(
         phase = m.winding.phase_values()
         i = torque / phase.torque_constant
         if m.kind == "synchronous":
-            u_q = m.phase_voltage * np.clip(command, -1.0, 1.0)
+            u_q = m.phase_voltage * command
         else:  # a torque source gives what it takes, but for the voltage of L_q di_q/dt
             u_q = phase.resistance * i + phase.voltage_constant * speed
         return i, np.asarray(phase.voltage(u_q, torque, speed)), 1.5 * u_q * i
@@ -144,7 +156,7 @@ def temperatures(
     """
     m, where, (_, torque, _) = _motor_of(result, motor)
     heating = torque
-    if m.winding is not None and (oriented := _amplitudes(result, where)) is not None:
+    if m.winding is not None and (oriented := oriented_amplitudes(result, where)) is not None:
         heating = m.winding.phase_values().torque_constant * oriented[0]  # with all of the current across the magnets
     if ambient is None:
         scenario = scenario_of(result)

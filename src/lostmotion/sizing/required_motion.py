@@ -18,7 +18,7 @@ from .duty_cycle import DutyCycle
 from .finding import Finding
 from .gearbox_check import input_speeds, loads
 from .motion_check import inertia_ratio
-from .motor_check import current, heat, largest_speed, rms_rise, voltage
+from .motor_check import current, heat, largest_speed, needed_command, rms_rise, voltage
 
 POINTS = 1000  # of a cycle at least
 WITHIN = 1e-9  # of an interval: so close to its ends, values are those on this side of a jump
@@ -126,18 +126,7 @@ def check_motor(
     return [
         largest_speed(motor, cycle.peak_input_speed),
         *heat(motor, cycle, ambient, rise=rise),
-        voltage(motor, command(motor, torque, demand.speed), torque, demand.speed),
+        voltage(motor, needed_command(motor, torque, demand.speed), torque, demand.speed),
         current(motor, torque),
         inertia_ratio(motor, demand.gearbox, load_inertia, largest),
     ]
-
-
-def command(motor: Motor, torque: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """E_C of (2) under which a motor gives a torque [N·m] at a speed [rad/s], its inductance left out; of a torque source its
-    relative torque."""
-    motor = motor.as_dc()
-    share = torque / motor.rated_torque
-    if motor.armature_voltage_constant is None or motor.rated_speed is None:
-        return share
-    k_N = motor.armature_voltage_constant
-    return np.asarray((share + (k_N - 1.0) * speed / motor.rated_speed) / k_N)

@@ -12,7 +12,8 @@ from ..simulation.train_scenario import TrainScenario
 from .duty_cycle import duty_cycle
 from .finding import Finding
 from .gearbox_check import input_speeds, loads, locks, loss_map
-from .motor_check import current, heat, largest_speed, voltage
+from .motor_check import command_of_run, current, heat, largest_speed, voltage
+from .motor_run import oriented_amplitudes
 
 if TYPE_CHECKING:
     import xarray
@@ -88,10 +89,12 @@ def _motor(scenario: TrainScenario, name: str, result: xarray.Dataset) -> list[F
     torque, speed = f"{name}_torque", f"{motor.shaft}_speed"
     cycle = duty_cycle(result, None, speed=speed, motor_torque=torque, output_torque=torque)
     command, T, w = (result[key].values for key in (f"{name}_command", torque, speed))
+    command = command_of_run(motor, scenario.controllers.get(name), command, T, w)
+    oriented = oriented_amplitudes(result, where)
     findings = [
         largest_speed(motor, float(abs(w).max()), where),
         *heat(motor, cycle, Task().ambient_temperature, where),
-        voltage(motor, command, T, w, where),
+        voltage(motor, command, T, w, where, oriented=None if oriented is None else oriented[1]),
         current(motor, T, where),
     ]
     return _named(name, findings)

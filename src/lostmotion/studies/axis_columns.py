@@ -10,8 +10,8 @@ from ..model.motor import Motor
 from ..simulation.results import RawResult
 from ..simulation.scenario import Scenario
 from ..sizing.duty_cycle import DutyCycle
-from ..sizing.motor_check import rms_rise
-from ..sizing.motor_run import current_voltage_power
+from ..sizing.motor_check import command_of_run, rms_rise
+from ..sizing.motor_run import current_voltage_power, oriented_amplitudes
 from ..sizing.thermal import TwoBodies
 from .axis import AxisTask, reference_of
 
@@ -88,8 +88,7 @@ def row_of(scenario: Scenario, task: AxisTask, result: RawResult, count: int) ->
     here = last_cycle(result, count)
     time = result.time[here]
     duty = duty_cycle_of(result, here, task.cycle)
-    electrical = (result[name][here] for name in ("command", "motor_torque", "motor_speed"))
-    current, voltage, power = current_voltage_power(scenario.motor, *electrical)
+    current, voltage, power = _electrical(scenario, result, here)
     winding, case = temperatures_of(scenario.motor, duty, task.ambient_temperature)
     power = power[:-1]
     step = time[1] - time[0]
@@ -124,6 +123,20 @@ def row_of(scenario: Scenario, task: AxisTask, result: RawResult, count: int) ->
         "cycles": float(count),
         "change": change(result, count),
     }
+
+
+def _electrical(scenario: Scenario, result: RawResult, here: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Current [A], voltage [V] and power [W] of the motor."""
+    m = scenario.motor
+    command, torque, speed = (result[name][here] for name in ("command", "motor_torque", "motor_speed"))
+    oriented = oriented_amplitudes(result, "motor")
+    if oriented is None:
+        command = command_of_run(m, scenario.controller, command, torque, speed)
+        return current_voltage_power(m, command, torque, speed)
+    i_d, i_q, u_d, u_q = (
+        result[f"{axis}_{what}"][here] for what in ("current", "voltage") for axis in ("direct", "quadrature")
+    )
+    return oriented[0][here], oriented[1][here], 1.5 * (u_d * i_d + u_q * i_q)
 
 
 def _at_rest(scenario: Scenario, task: AxisTask, time: np.ndarray, error: np.ndarray, count: int) -> dict[str, float]:

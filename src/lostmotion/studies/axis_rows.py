@@ -19,7 +19,8 @@ from ..simulation.scenario import Scenario
 from ..sizing.finding import Finding
 from ..sizing.gearbox_check import input_speeds, loads, lost_motion
 from ..sizing.motion_check import inertia_ratio
-from ..sizing.motor_check import current, heat, largest_speed, voltage
+from ..sizing.motor_check import command_of_run, current, heat, largest_speed, voltage
+from ..sizing.motor_run import oriented_amplitudes
 from ..sizing.required_motion import (
     InputDemand,
     RequiredMotion,
@@ -136,6 +137,8 @@ class Axes:
         here, task = last_cycle(result, count), self.task
         duty, g, m = duty_cycle_of(result, here, task.cycle), scenario.gearbox, scenario.motor
         command, torque, speed = (result[name][here] for name in ("command", "motor_torque", "motor_speed"))
+        command = command_of_run(m, scenario.controller, command, torque, speed)
+        oriented = oriented_amplitudes(result, "motor")
         found = [
             *loads(g, float(np.abs(duty.output_torque).max()), duty),
             *input_speeds(g, duty),
@@ -146,7 +149,7 @@ class Axes:
                 task.ambient_temperature,
                 rise=None if math.isnan(winding) else winding - task.ambient_temperature,
             ),
-            voltage(m, command, torque, speed),
+            voltage(m, command, torque, speed, oriented=None if oriented is None else oriented[1][here]),
             current(m, torque),
             inertia_ratio(m, g, scenario.load.inertia, task.max_inertia_ratio),
         ]

@@ -14,8 +14,9 @@ from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import unit_in_schema
 from ..inputs.validation import shown
-from ..simulation.scenario import Scenario, from_tables
-from ..simulation.train_scenario import TrainScenario, is_train, train_from_tables
+from ..simulation.scenario import Scenario
+from ..simulation.scenario_files import scenario_from
+from ..simulation.train_scenario import TrainScenario
 from .units import in_si
 
 # Of keys that take the name of a record: the part that the record describes, and what kind of record it is.
@@ -158,7 +159,7 @@ def with_records(written: Mapping[str, Any], changes: Mapping[str, Any]) -> Scen
             tables[table] = {**tables[table], name: _changed(tables, f"{table}.{name}", key, changes[key])}
         else:
             tables[table] = _changed(tables, table, key, changes[key])
-    return train_from_tables(tables) if is_train(tables) else from_tables(tables)
+    return scenario_from(tables)
 
 
 def _changed(tables: Mapping[str, Any], part: str, key: str, value: Any) -> dict[str, Any]:
