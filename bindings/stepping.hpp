@@ -104,6 +104,15 @@ void bind_state(Class& c) {
                             [&](auto& in) { set_state(in, time, x, memory, regime, input, started, course, control); });
             },
             "time"_a, "state"_a, "memory"_a, "regime"_a, "input"_a, "started"_a, "course"_a, "control"_a)
+        .def(
+            "control_signals",
+            [](S& s) {
+                return with_kernel(s, [&](auto& in) {
+                    in.find_regime();
+                    return in.control_signals();
+                });
+            },
+            "Of each controller what axis_signals() and winding_signals() name, one controller after the other.")
         .def("time", [](const S& s) { return s.time(); });
 }
 

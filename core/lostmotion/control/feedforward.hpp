@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "reference.hpp"
 #include "slots.hpp"
 
 namespace lostmotion::control {
@@ -15,8 +16,7 @@ struct TorqueFeedforward {
     double friction_torque = 0.0;   // T_c [N m]
     double load_torque = 0.0;       // T_L [N m], against the motion forward
     double operator()(double speed, double acceleration) const {
-        const double sign = speed > 0.0 ? 1.0 : speed < 0.0 ? -1.0 : 0.0;
-        return inertia * acceleration + viscous_friction * speed + friction_torque * sign + load_torque;
+        return inertia * acceleration + viscous_friction * speed + friction_torque * sign_of(speed) + load_torque;
     }
 };
 
@@ -29,7 +29,7 @@ struct BacklashCompensation {
     double operator()(double reference_rate, double sample_time, double* slot) const {
         if (backlash == 0.0) return 0.0;
         double& offset = slot[first_];
-        const double way = reference_rate > 0.0 ? 1.0 : reference_rate < 0.0 ? -1.0 : 0.0;
+        const double way = sign_of(reference_rate);
         if (way != 0.0) {
             const double step = rate * sample_time, target = way * 0.5 * backlash;
             offset += std::clamp(target - offset, -step, step);

@@ -17,8 +17,6 @@
 
 namespace lostmotion::control {
 
-inline double sign_of(double v) { return v > 0.0 ? 1.0 : v < 0.0 ? -1.0 : 0.0; }
-
 // How fast a parameter follows the error, and where it has to stay.
 struct Adaptation {
     double rate = 0.0;

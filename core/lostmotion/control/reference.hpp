@@ -9,6 +9,9 @@
 
 namespace lostmotion::control {
 
+// Which way a speed goes: 1, -1, or 0 at rest.
+inline double sign_of(double v) { return v > 0.0 ? 1.0 : v < 0.0 ? -1.0 : 0.0; }
+
 // A value and its time derivatives.
 struct ReferencePoint {
     double value = 0.0, rate = 0.0, second = 0.0, third = 0.0;

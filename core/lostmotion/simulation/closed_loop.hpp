@@ -44,10 +44,28 @@ struct Control {
     }
 };
 
+// When the controllers run. An instant that only rounding parts from a tick is that of the tick.
+struct Ticks {
+    double length = 1e-3;          // [s]
+    double sample_interval = 0.0;  // [s] of a run's record, whose instants are ticks where both fall together; 0: none
+
+    double time(std::int64_t tick) const {
+        const double t = static_cast<double>(tick) * length;
+        if (sample_interval == 0.0) return t;
+        const double sample = std::round(t / sample_interval) * sample_interval;
+        return std::fabs(sample - t) < rounding() ? sample : t;
+    }
+    // Of two times: whether the first lies before the second by more than rounding.
+    bool before(double first, double second) const { return first < second - rounding(); }
+
+ private:
+    double rounding() const { return 1e-9 * length; }
+};
+
 // The controllers of a run, all at the same base tick. Parameters only.
 template <class D>
 struct ClosedLoop {
-    double tick = 1e-3;  // [s]
+    Ticks ticks;
     std::span<const control::Axis> axes;
     std::vector<AxisPlace<D>> places;  // of each axis
 
@@ -112,7 +130,7 @@ class ClosedLoopRun {
     using D = typename Solver::D;
 
     ClosedLoopRun(Solver& solver, const ClosedLoop<D>& loop)
-        : solver_(solver), loop_(loop), windings_(solver, loop.tick, loop.axes, loop.places) {}
+        : solver_(solver), loop_(loop), windings_(solver, loop.ticks.length, loop.axes, loop.places) {}
 
     const ControlCourse& course() const { return course_; }
     // Goes on from what the controllers were, at the time and state that the solver has.
@@ -143,7 +161,7 @@ class ClosedLoopRun {
         course_.next = 0;
         course_.slots.assign(static_cast<std::size_t>(loop_.slots()), 0.0);
         each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
-            a.start(sample(p, x, memory, 0.0), loop_.tick, slot);
+            a.start(sample(p, x, memory, 0.0), loop_.ticks.length, slot);
             return true;
         });
         if (!run_tick(x, memory)) return Status::controller;
@@ -157,12 +175,12 @@ class ClosedLoopRun {
     template <class Observer, class Record>
     Status advance(double t_end, Observer& observer, Record&& record) {
         while (true) {
-            const double tick = static_cast<double>(course_.next) * loop_.tick;
-            const bool last = !(tick < t_end);
-            if (!windings_.present()) record(last ? std::numeric_limits<double>::infinity() : tick);
+            const double tick = loop_.ticks.time(course_.next);
+            const bool last = !loop_.ticks.before(tick, t_end);
+            if (!windings_.present()) record(last ? t_end : tick);
             if (last || tick > solver_.time()) {
                 Passing<Observer> passing{observer, last};
-                const Status status = windings_.present() ? advance_windings(tick, t_end, observer, record)
+                const Status status = windings_.present() ? advance_windings(tick, t_end, last, observer, record)
                                                           : solver_.advance(last ? t_end : tick, passing);
                 if (status != Status::done || last) return status;
             }
@@ -171,6 +189,13 @@ class ClosedLoopRun {
             if (changed_)
                 if (const Status found = solver_.inputs_changed(observer); found != Status::done) return found;
         }
+    }
+    // At the end of a run: the tick that falls on it, for what the controllers show there.
+    template <class Observer>
+    Status show_end(Observer& observer) {
+        if (loop_.ticks.before(solver_.time(), loop_.ticks.time(course_.next))) return Status::done;
+        if (!flushed(observer)) return Status::interrupted;
+        return run_tick(solver_.state(), solver_.memory()) ? Status::done : Status::controller;
     }
 
  private:
@@ -212,16 +237,18 @@ class ClosedLoopRun {
     }
     // With windings, by the parts of a tick.
     template <class Observer, class Record>
-    Status advance_windings(double tick, double t_end, Observer& observer, Record& record) {
-        const double to = std::fmin(tick, t_end);
+    Status advance_windings(double tick, double t_end, bool last_tick, Observer& observer, Record& record) {
+        const double to = last_tick ? t_end : tick;
         while (true) {
-            if (!(windings_.end(course_.slots) > solver_.time()) && solver_.time() < to) {
+            if (const double now = solver_.time();
+                !loop_.ticks.before(now, windings_.end(course_.slots)) && loop_.ticks.before(now, to)) {
                 if (!flushed(observer)) return Status::interrupted;
                 if (const Status s = windings_.plan(tick, course_.slots, observer); s != Status::done) return s;
             }
-            const double end = std::fmin(windings_.end(course_.slots), to);
-            const bool last = !(tick < t_end) && !(end < t_end);
-            record(last ? std::numeric_limits<double>::infinity() : end);
+            double end = windings_.end(course_.slots);
+            if (!loop_.ticks.before(end, to)) end = to;
+            const bool last = last_tick && !(end < t_end);
+            record(end);
             Passing<Observer> passing{observer, last};
             if (const Status s = solver_.advance(end, passing); s != Status::done) return s;
             if (!(end < to)) return Status::done;
@@ -255,7 +282,7 @@ class ClosedLoopRun {
         const bool well = each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
             const double before =
                 a.field_orientation ? a.winding_torque(solver_.time(), slot) / a.rated_torque : a.command(slot);
-            if (!a.step(course_.next, loop_.tick, sample(p, x, memory, before), slot)) return false;
+            if (!a.step(course_.next, loop_.ticks.length, sample(p, x, memory, before), slot)) return false;
             if (a.field_orientation || (a.command(slot) == before && course_.next > 0)) return true;
             solver_.set_ramp(p.input, a.command(slot), 0.0);
             changed_ = true;
@@ -284,13 +311,18 @@ Status run_recorded(Solver& solver, const StartOf<typename Solver::D>& start, co
         return begun == Status::done ? solver.advance(options.duration, observer) : begun;
     }
     const std::vector<control::Axis> laws = options.control.laws();
-    const auto loop = make_loop(laws);
+    auto loop = make_loop(laws);
+    loop.ticks.sample_interval = options.sample_interval;
     ClosedLoopRun<Solver> run(solver, loop);
     ControlRecord record(options.sample_interval, options.control_out == nullptr ? 0 : options.samples,
                          options.control.signals(), options.control_out);
     const Status begun = run.begin(start.x, start.memory);
     if (begun != Status::done) return begun;
-    return run.advance(options.duration, observer, [&](double end) { record.hold_until(end, loop, run.course()); });
+    const auto hold_until = [&](double end) { record.hold_until(end, loop, run.course()); };
+    if (const Status s = run.advance(options.duration, observer, hold_until); s != Status::done) return s;
+    const Status ended = run.show_end(observer);
+    if (ended == Status::done) hold_until(std::numeric_limits<double>::infinity());
+    return ended;
 }
 
 }  // namespace lostmotion

@@ -17,7 +17,7 @@ inline ClosedLoop<DriveDims> closed_loop_of(const Drive& drive, const Control& c
     const double i = drive.gearbox.ratio;
     const LinearForm of_motor = LinearForm::unit(load_angle, i) + LinearForm::unit(twist, i),
                      of_load = LinearForm::unit(load_angle);
-    ClosedLoop<DriveDims> loop{control.tick, laws, {}};
+    ClosedLoop<DriveDims> loop{{control.tick}, laws, {}};
     for (const ControlledAxis& axis : control.axes)
         loop.places.push_back({only_motor(axis.motor), axis.position_shaft == 0 ? of_motor : of_load,
                                axis.speed_shaft == 0 ? of_motor : of_load,

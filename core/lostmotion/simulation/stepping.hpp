@@ -52,6 +52,18 @@ class SimulationOf {
     }
     // How many numbers the controllers remember.
     int control_slots() const { return loop_.slots(); }
+    // What the controllers show at the present instant, axis by axis, each with its winding's signals behind.
+    std::vector<double> control_signals() const {
+        std::vector<double> out;
+        const double* slot = now_.control.slots.data();
+        for (const control::Axis& a : laws_) {
+            for (int s = 0; s < control::n_axis_signals; ++s) out.push_back(a.signal(s, slot));
+            for (int s = 0; s < control::n_winding_signals; ++s)
+                out.push_back(a.field_orientation ? a.winding_signal(s, now_.time, slot) : 0.0);
+            slot += a.slots();
+        }
+        return out;
+    }
 
     double time() const { return now_.time; }
     typename D::Contact stopped_at() const { return solver_.stopped_at(); }

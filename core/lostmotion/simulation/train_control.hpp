@@ -44,7 +44,7 @@ inline std::string check_control(const model::Assembly& a, const Control& contro
 template <class D>
 ClosedLoop<D> closed_loop_of(const model::Assembly& a, const Control& control, const std::vector<control::Axis>& laws) {
     const model::Layout& n = a.layout();
-    ClosedLoop<D> loop{control.tick, laws, {}};
+    ClosedLoop<D> loop{{control.tick}, laws, {}};
     for (const ControlledAxis& axis : control.axes) {
         const model::MotorPlace& motor = a.places().motors[static_cast<std::size_t>(axis.motor)];
         const auto packed = [&](const model::Row& row) { return model::pack<D>(row, n); };
