@@ -50,6 +50,44 @@ def section(report: Report, programs: dict[str, list[list[str]]]) -> None:
             [(case, f"{float(ms):.1f}", f"{float(ms) / exact:.0f}", gap) for _, case, ms, gap in compared],
         )
 
+    two_masses(report)
+
+
+def two_masses(report: Report) -> None:
+    """Sampled field-oriented control against motulator, a sampled speed loop against PathSim."""
+    import two_mass
+    from lostmotion.simulation.windings import errors_of
+
+    oriented, mechanics = two_mass.axis(), two_mass.axis(torque_source=True)
+    ours = best(5, lambda: lm.simulate(oriented, energy=False))
+    bounds = errors_of(lm.simulate(oriented, energy=False))
+    rows = [
+        (
+            "lostmotion, Python to dataset, with its error bound",
+            f"{ours:.1f}",
+            "",
+            f"{bounds['m_quadrature_current']:.0e}",
+        )
+    ]
+    for name, rtol in (("motulator as it comes", None), ("motulator, DOP853 at 1e-7", 1e-7)):
+        time = best(2, lambda rtol=rtol: two_mass.by_motulator(rtol)())  # type: ignore[misc]
+        rows.append((name, f"{time:.0f}", f"{time / ours:.0f}", ""))
+    report.add(
+        "", "motulator's two-mass drive with a salient synchronous motor, 1 s at 4 kHz, each under its own loops:", ""
+    )
+    report.table(("", "time [ms]", "ratio to lostmotion", "error of i_q at most [A]"), rows)
+    exact = lm.simulate(mechanics, energy=False)["motor_speed"].values
+    ours = best(5, lambda: lm.simulate(mechanics, energy=False))
+    rows = [("lostmotion, Python to dataset", f"{ours:.1f}", "", "exact")]
+    for rtol in (1e-4, 1e-8):
+        time = best(1, lambda rtol=rtol: two_mass.by_pathsim(rtol))  # type: ignore[misc]
+        speeds = two_mass.by_pathsim(rtol)
+        n = min(len(speeds), len(exact))
+        gap = abs(speeds[:n] - exact[:n]).max() / abs(exact).max()
+        rows.append((f"PathSim at {rtol:.0e}", f"{time:.0f}", f"{time / ours:.0f}", f"{gap:.0e}"))
+    report.add("", "The same two masses under a sampled speed loop alone:", "")
+    report.table(("", "time [ms]", "ratio to lostmotion", "largest error of the speed"), rows)
+
 
 def axis(**changes: Any) -> lm.Scenario:
     """The cascade as a scenario; with law = true its loops are given to `simulate`."""

@@ -32,6 +32,25 @@ def same(a: Any, b: Any, share: float = 0.0, sign: float = 1.0) -> None:
         assert np.abs(x - y).max() <= share * np.abs(x).max(), name
 
 
+@pytest.mark.parametrize(("tick", "interval"), [(1e-4, 1e-3), (3e-4, 1e-4), (1e-4, 1e-4), (7e-5, 7e-4)])
+def test_what_a_controller_shows_is_of_the_tick_at_the_sample(tick: float, interval: float) -> None:
+    """k times the interval and n times the tick differ by rounding where they are the same instant, also at the end."""
+    scenario = lm.load("speed-axis").replace(
+        **{
+            "controller.sample_time": tick,
+            "controller.reference": {"kind": "speed", "sines": [{"amplitude": 3.0, "frequency": 2.0}]},
+            "simulation.duration": 300 * max(tick, interval),
+            "simulation.sample_interval": interval,
+        }
+    )
+    result = lm.simulate(scenario, energy=False)
+    samples = np.arange(result.sizes["time"])
+    ticks = tick * np.floor(samples * interval / tick + 1e-6)
+    wanted = scenario.gearbox.ratio * scenario.controller.reference.at(ticks)[0]
+    assert result["speed_reference"].to_numpy() == pytest.approx(wanted, abs=1e-9)
+    assert samples[-1] == round(300 * max(tick, interval) / interval)
+
+
 def test_the_record_changes_nothing(axis: lm.Scenario) -> None:
     coarse = lm.simulate(axis, sample_interval=6e-3)
     fine = lm.simulate(axis, sample_interval=1e-3, energy=False)

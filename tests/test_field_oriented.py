@@ -298,7 +298,15 @@ def test_steps_of_any_length_are_the_run_and_a_state_goes_on_bit_for_bit() -> No
     a = random_axis(np.random.default_rng([7, 11]), 11)
     a.load_torque = ((0.0, 0.3),)
     one = scenario(a, TICKS)
-    names = ("motor_speed", "load_angle", "twist")
+    names = (
+        "motor_speed",
+        "load_angle",
+        "twist",
+        "direct_current",
+        "quadrature_current",
+        "motor_torque",
+        "copper_heat",
+    )
     whole = lm.simulate(one)
     stepped = lm.Simulation(one)
     for k in range(2 * TICKS):
@@ -420,6 +428,9 @@ def test_a_law_must_give_both_voltages() -> None:
     assert len(read[0]) == 5
     assert [m[3] for m in read] == pytest.approx(result["direct_current"].to_numpy()[: len(read)], abs=1e-12)
     assert "error_bound" not in result.attrs
+    again = lm.simulate(one, law=lm.Law(lambda *_: (1.0, 2.0), repeatable=True))
+    assert np.array_equal(again["direct_current"], result["direct_current"])
+    assert 0.0 < json.loads(again.attrs["error_bound"])["direct_current"] < 1e-3
 
 
 def test_the_bound_is_in_the_summary_and_the_heat_is_that_of_both_currents() -> None:

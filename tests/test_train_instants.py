@@ -14,7 +14,6 @@ import scipy.linalg
 import lostmotion as lm
 from conftest import CONTROLLED, SCENARIOS, TRAINS
 from lostmotion.simulation.train_scenario import in_long_form
-from lostmotion.simulation.train_variables import axis_variables
 
 WORM = lm.load("worm-lowering")
 RING = lm.load("two-motors-one-ring")
@@ -68,11 +67,8 @@ def test_a_train_stepped_follows_its_run(path: Path) -> None:
             controller = f"controllers.{name.removesuffix('_reference')}.reference"
             changes[controller] = changes.pop(key) | {"kind": scenario.controllers["servo"].reference.kind}
     run = lm.simulate(scenario.replace(**changes))
-    run = run.drop_vars([v.name for v in axis_variables(scenario.axes())])  # what controllers hold is of runs
     assert set(simulation.read()) == {str(name) for name in run}
-    # Of a winding, a step shows the straight line that stands for its torque, a run the torque itself.
-    lines = {f"{name}_torque" for name, c in scenario.axes().items() if c.current.kind == "field_oriented"}
-    for name in set(run) - lines:
+    for name in run:
         size = float(abs(run[name]).max())
         assert simulation[str(name)] == pytest.approx(float(run[name][-1]), rel=1e-9, abs=1e-9 * size), name
 

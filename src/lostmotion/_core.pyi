@@ -968,6 +968,11 @@ class Simulation:
 
     def set_state(self, time: float, state: Sequence[float], memory: Sequence[float], regime: Sequence[int], input: Sequence[float], started: bool, course: Sequence[float], control: Sequence[float]) -> None: ...
 
+    def control_signals(self) -> list[float]:
+        """
+        Of each controller what axis_signals() and winding_signals() name, one controller after the other.
+        """
+
     def time(self) -> float: ...
 
 class TrainSimulation:
@@ -986,6 +991,11 @@ class TrainSimulation:
     def get_state(self) -> tuple[float, list[float], list[float], list[int], list[float], bool, list[float], list[float]]: ...
 
     def set_state(self, time: float, state: Sequence[float], memory: Sequence[float], regime: Sequence[int], input: Sequence[float], started: bool, course: Sequence[float], control: Sequence[float]) -> None: ...
+
+    def control_signals(self) -> list[float]:
+        """
+        Of each controller what axis_signals() and winding_signals() name, one controller after the other.
+        """
 
     def time(self) -> float: ...
 

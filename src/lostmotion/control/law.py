@@ -37,6 +37,9 @@ class Law:
     """how many numbers it keeps from call to call; they begin at 0, and belong to the state of the run"""
     data: Any = None
     """of a compiled function: a ctypes object or a contiguous numpy array, whose address it is given"""
+    repeatable: bool = False
+    """whether a run may be made again with it, as the error bound of field-oriented control needs: it then keeps nothing from call to
+    call but its `states`"""
 
     def set(self, axis: _core.Axis) -> None:
         """Makes it the law of an axis of the solver.

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -84,16 +86,22 @@ def respond_closed(
     harmonics: int,
     max_periods: int,
     law: Any,
+    threads: int,
     progress: Callable[[], None] | None,
 ) -> dict[str, Any]:
     """What `respond` returns of open loops: arrays with a row for each amplitude and window."""
     assert plant.closed is not None
     signals = list(axis_signals(plant.closed))
+
+    def row(point: tuple[float, Window]) -> dict[str, Any]:
+        amplitude, window = point
+        found = Search(ClosedLoop(plant, source, amplitude, window, law), signals, max_periods).find()
+        return _row(plant, (source, amplitude), window, found, harmonics)
+
     rows = []
-    for amplitude in amplitudes:
-        for window in windows:
-            found = Search(ClosedLoop(plant, source, amplitude, window, law), signals, max_periods).find()
-            rows.append(_row(plant, (source, amplitude), window, found, harmonics))
+    with ThreadPoolExecutor(1 if law is not None else threads) as pool:  # a law may keep something of its own
+        for found in pool.map(row, itertools.product(amplitudes, windows)):
+            rows.append(found)
             if progress is not None:
                 progress()
     return {key: np.array([row[key] for row in rows]) for key in rows[0]}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -74,7 +75,7 @@ def frequency_response(
         decibels (and ten times as many degrees) of the straight line through its neighbours, or the grid is sixteen
         times as fine.
     threads
-        All cores, if left out; with controllers always one.
+        All cores, if left out; with a law of your own always one, since it may keep something of its own.
     law
         The law of a controller with ``law = true``, as of `simulate`.
     progress
@@ -113,6 +114,7 @@ def frequency_response(
             harmonics=harmonics,
             max_periods=max_periods,
             law=law,
+            threads=threads or os.cpu_count() or 1,
             progress=progress,
         )
     else:

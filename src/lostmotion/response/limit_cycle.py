@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..control.axis import OPEN_LOOP
 from ..errors import InputError
-from ..simulation.train_results import core_case
+from ..simulation.train_results import core_case, core_run
 from ..simulation.train_scenario import TrainScenario
 from .shooting import PERIODICITY, SAMPLES_PER_PERIOD, reason_of
 
@@ -90,19 +89,8 @@ class Loop:
 
     def run(self, duration: float, samples: int) -> dict[str, Any]:
         """From the start."""
-        return _core.run_train(
-            self.core,
-            self.inputs,
-            self.start,
-            self.capacities,
-            duration,
-            duration / samples,
-            samples,
-            False,
-            0.0,
-            MAX_SWITCHINGS,
-            OPEN_LOOP,
-        )
+        case = (self.core, self.inputs, self.start, self.capacities)
+        return core_run(case, (duration, duration / samples, samples, False, 0.0, MAX_SWITCHINGS))
 
     def rests(self, run: Mapping[str, Any]) -> bool:
         """Whether no state moves in the last quarter of a run."""

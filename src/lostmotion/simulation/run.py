@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Literal
 
 from .. import _core
@@ -32,6 +33,7 @@ TOLERANCE = 1e-8  # of the adaptive solver, if none is given
 TOLERANCES = (1e-15, 1e-3)  # beyond rounding, and beyond what finds the switching instants
 
 MAX_SWITCHINGS = 100_000  # kept with a result; beyond it they are only counted
+SIDE_BY_SIDE = 1_000_000  # ticks: the longest run that has its coarser one beside it, which Ctrl-C does not end
 BYTES_PER_SAMPLE = 170  # of a result while it is made, measured
 
 
@@ -140,10 +142,18 @@ def run(
     )
     laws = as_laws(law, scenario.axes())
     control = scenario.control(laws)
-    result = whole_run(scenario, options, how, control)
-    if any(oriented(scenario)) and not laws:
-        again = whole_run(scenario, (*options[:3], False, *options[4:]), how, coarser(control))
-        result.attrs[ERROR_BOUND] = json.dumps(error_bound(scenario, result.values, again.values))
+    if not any(oriented(scenario)) or not all(one.repeatable for one in laws.values()):
+        return whole_run(scenario, options, how, control)
+    again = (scenario, (*options[:3], False, *options[4:]), how, coarser(scenario.control(laws)))
+    if laws or table.duration > SIDE_BY_SIDE * control[0]:
+        result = whole_run(scenario, options, how, control)
+        coarse = whole_run(*again)
+    else:
+        with ThreadPoolExecutor(1) as beside:
+            waiting = beside.submit(whole_run, *again)
+            result = whole_run(scenario, options, how, control)
+            coarse = waiting.result()
+    result.attrs[ERROR_BOUND] = json.dumps(error_bound(scenario, result.values, coarse.values))
     return result
 
 

@@ -20,13 +20,23 @@ from ..inputs.quantities import Time
 from ..inputs.validation import did_you_mean, shown
 from ..model.couplings import FULL_COMMAND
 from ..model.drive import Drive
+from ..model.synchronous_motor import PhaseValues
 from ..model.train import DriveTrain
 from .run import start_state
 from .scenario import Initial, Scenario, drive_of
 from .train_scenario import TrainInitial, TrainScenario, loaded_train
 from .train_state import start_capacities, start_values
-from .train_variables import angle_through, angles_through_gears, train_variables
+from .train_variables import (
+    ALL_SIGNALS,
+    WINDING_SIGNALS,
+    angle_through,
+    angles_through_gears,
+    axis_variables,
+    signals_of,
+    train_variables,
+)
 from .variables import CHANNEL_NAMES, VARIABLES, Variable
+from .windings import oriented
 
 MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 """Of a step [s]: below, it is lost in the rounding of the time; above, in that of a motion's phase."""
@@ -98,6 +108,7 @@ class Simulation:
         self._scenario: TrainScenario | None = None
         self._core_train: _core.Train | None = None
         self._variables: tuple[Variable, ...] = VARIABLES
+        self._signals: dict[str, int] = {}  # of the controllers
         self._channel = _CHANNEL
         self._derived: dict[str, Derived]
         self._initial: Initial | TrainInitial
@@ -115,7 +126,33 @@ class Simulation:
             self._core = _core.Simulation(core, step, self._control)
             self._derived = {"efficiency": self._efficiency, "motor_power": self._motor_power}
             self._initial = drive.start() if isinstance(drive, Scenario) else Initial()
+        self._add_signals(scenario)
         self.reset(initial)
+
+    def _add_signals(self, scenario: Scenario | TrainScenario | None) -> None:
+        """What the controllers show, and in the place of the straight line that drives the mechanics the torque of a winding."""
+        if scenario is None or not self._controllers:
+            return
+        short = isinstance(scenario, Scenario)
+        names = (*ALL_SIGNALS, *WINDING_SIGNALS)
+        for k, (motor, controller) in enumerate(self._controllers.items()):
+            prefix = "" if short else f"{motor}_"
+            shown_here = set(signals_of(controller))
+            self._signals |= {
+                f"{prefix}{name}": k * len(names) + n for n, name in enumerate(names) if name in shown_here
+            }
+        for prefix, _, phase in oriented(scenario):
+            self._derived[f"{prefix or 'motor_'}torque"] = self._torque_of(prefix, phase)
+            self._channel = {n: c for n, c in self._channel.items() if n != f"{prefix or 'motor_'}torque"}
+        named = {"" if short else name: c for name, c in self._controllers.items()}
+        self._variables += axis_variables(named)
+
+    def _torque_of(self, prefix: str, phase: PhaseValues) -> Derived:
+        def torque(values: list[float]) -> float:
+            i_d, i_q = (self._value(f"{prefix}{axis}_current", values) for axis in ("direct", "quadrature"))
+            return float(phase.torque(i_d, i_q))
+
+        return torque
 
     def _of_train(self, what: DriveTrain | TrainScenario, step: float, loaded: Sequence[str] | None) -> None:
         train, shafts = loaded_train(what, loaded)
@@ -312,6 +349,8 @@ class Simulation:
     def _value(self, name: str, values: list[float]) -> float:
         try:
             channel = self._channel.get(name)
+            if channel is None and name in self._signals:
+                return self._core.control_signals()[self._signals[name]]
             return values[channel] if channel is not None else self._derived[name](values)
         except (KeyError, TypeError):  # unknown, or nothing that could be a name
             known = ", ".join(v.name for v in self._variables)
@@ -325,7 +364,7 @@ class Simulation:
     # The array functions of `results` take ten times as long for a single number.
 
     def _motor_power(self, values: list[float]) -> float:
-        return values[_CHANNEL["motor_torque"]] * values[_CHANNEL["motor_speed"]]
+        return self._value("motor_torque", values) * values[_CHANNEL["motor_speed"]]
 
     def _efficiency(self, values: list[float]) -> float:
         speed = values[_CHANNEL["motor_speed"]]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from .. import _core
-from ..control.axis import Bound
+from ..control.axis import OPEN_LOOP, Bound
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from .results import RawResult, installed_version
@@ -54,8 +55,18 @@ def _core_result(
             names = {"channels": [name for name, _, _ in core.channels()], "contacts": core.contact_names()}
             results.append(result | names)
         return scenario.core(), joined_results(scenario, parts, results, options[-1])
-    core, inputs, start, capacities = core_case(scenario)
-    return core, _core.run_train(core, inputs, start, capacities, *(*options, control))
+    case = core_case(scenario)
+    return case[0], core_run(case, options, control)
+
+
+Case = tuple[_core.Train, Sequence[_core.Signal], Mapping[str, float], Mapping[str, float]]
+"""train, inputs, state and hysteresis capacities by name"""
+
+
+def core_run(case: Case, options: tuple[Any, ...], control: Bound = OPEN_LOOP) -> dict[str, Any]:
+    """One run of the core, with options as of `run_train`."""
+    core, inputs, start, capacities = case
+    return _core.run_train(core, inputs, start, capacities, *(*options, control))
 
 
 def core_case(
