@@ -43,8 +43,13 @@ if TYPE_CHECKING:
     from .data_sheets.sheet import Source as Source
     from .errors import InputError as InputError
     from .errors import MissingLibraryError as MissingLibraryError
+    from .identification.design import Candidate as Candidate
+    from .identification.design import design_experiment as design_experiment
     from .identification.identify import IdentificationResult as IdentificationResult
     from .identification.identify import identify as identify
+    from .identification.logs import Channel as Channel
+    from .identification.logs import Log as Log
+    from .identification.readers import read_log as read_log
     from .identification.task import Identification as Identification
     from .identification.task import load_identification as load_identification
     from .model.angle_torques import ErrorCurve as ErrorCurve
@@ -178,7 +183,10 @@ _HOMES = {
     "data_sheets.records": ("catalogue",),
     "data_sheets.sheet": ("Source",),
     "errors": ("InputError", "MissingLibraryError"),
+    "identification.design": ("Candidate", "design_experiment"),
     "identification.identify": ("IdentificationResult", "identify"),
+    "identification.logs": ("Channel", "Log"),
+    "identification.readers": ("read_log",),
     "identification.task": ("Identification", "load_identification"),
     "model.angle_torques": ("ErrorCurve", "ErrorHarmonic", "Gravity", "TorqueCurve", "TorqueHarmonic"),
     "model.couplings": ("Brake", "Clutch", "Freewheel"),

@@ -223,7 +223,7 @@ def search(
         if better is None:
             break
         moved_by = max(
-            (abs(better[0].values[n] - point.values[n]) / problem.parameters[n].step for n in names), default=0.0
+            (abs(better[0].values[n] - point.values[n]) / problem.parameters[n].step for n in names), default=1.0
         )
         point, residuals = better[0], better[1]
         damping = max(damping / 10.0, 1e-9)

@@ -28,7 +28,7 @@ def bootstrap(problem: Problem, fit: Fit, seed: int = 0) -> dict[str, Interval]:
     """By resampling blocks of the residuals, with one Gauss-Newton step for each sample.
 
     The pieces of the gradient of half a second each are drawn anew with replacement, so that errors that last, as those of a
-    model that is not quite right do, widen the interval. Directions that the logs do not determine get their own width from the
+    model that is not quite right do, widen the interval. It is at least that of independent errors: a few blocks say little. Directions that the logs do not determine get their own width from the
     priors alone, or none: then the interval is that of the bounds.
     """
     names = list(problem.parameters)
@@ -51,6 +51,8 @@ def bootstrap(problem: Problem, fit: Fit, seed: int = 0) -> dict[str, Interval]:
     count = draw.multinomial(len(blocks), np.full(len(blocks), 1.0 / len(blocks)), size=RESAMPLES)
     steps = (count @ blocks) @ inverse * math.sqrt(len(blocks) / max(1, len(blocks) - len(names)))
     low, high = np.percentile(steps, [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)], axis=0)
+    normal = 1.96 * np.sqrt(np.diag(inverse))  # of independent errors
+    low, high = np.minimum(low, -normal), np.maximum(high, normal)
     found = {}
     for k, name in enumerate(names):
         p, value = problem.parameters[name], fit.point.values[name]

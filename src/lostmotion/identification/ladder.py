@@ -111,6 +111,11 @@ def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, noti
             )
             best = min(best, again, key=lambda f: f.cost)
         point = best.point
+        if task.nuisance and any(log.held_out for log in logs):
+            # What a log that is held out has of its own, such as its zero, is fitted to it; the parameters stay.
+            own = replace(problem_of(rig, engine, [log for log in logs if log.held_out], rung), parameters={})
+            point = search(own, point, iterations=10).point
+            best.point = point
         residuals = engine.residuals(logs, point, rung)
         errors = log_errors(logs, residuals)
         found.append(RungResult(entry.name, best, errors, *_means(task, errors, best)))

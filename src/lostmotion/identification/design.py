@@ -1,0 +1,83 @@
+"""The next best experiment, by the information that candidate runs would give."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from .engine import Engine, Point
+from .fit import slope_of
+from .identify import IdentificationResult
+from .ladder import free_on
+from .logs import Log
+from .prepare import prepared
+from .virtual import virtual_log
+
+PRIOR = 1e-3  # information on a scaled parameter that nothing else is known of: it may change by about 30 of its scales
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """What an experiment would add to the logs that there are."""
+
+    name: str
+    gain: float
+    """how many nats of information on all parameters: half the change of the log-determinant of the information"""
+    widths: dict[str, float]
+    """by parameter, width of its interval after it over that before"""
+
+
+def design_experiment(
+    result: IdentificationResult, plans: Sequence[Log], *, deviation: Mapping[str, float] | None = None
+) -> list[Candidate]:
+    """Rank experiments by what they would tell of the parameters, beside the logs that there are.
+
+    Parameters
+    ----------
+    result
+        Of an identification.
+    plans
+        Candidate experiments: time, header and inputs of each, as in a log; measured channels need not be there.
+    deviation
+        Standard deviations of the measured channels by name, SI; left out, those of the residuals of the fit.
+
+    Returns
+    -------
+    list
+        The most informative first.
+
+    Raises
+    ------
+    InputError
+        There is no plan, or one of them lacks a channel.
+    """
+    if not plans:
+        raise InputError("plans: is empty; give at least one experiment, as a log with its time, header and inputs")
+    assert result.rig is not None
+    rig, engine = result.rig, Engine(result.rig, threads=1)
+    free, names = free_on(result.task, result.chosen), list(free_on(result.task, result.chosen))
+    sigma = np.array(
+        [(deviation or {}).get(n, s) for n, s in zip(result.task.measured, result.fit.deviations, strict=True)]
+    )
+    before = result.fit.normal + PRIOR * np.eye(len(names))
+    found = []
+    for plan in plans:
+        log = prepared(result.task, virtual_log(rig, plan, result.values, rung=result.chosen), rig.units)
+        point = Point(result.values, {log.name: {n: p.start for n, p in result.task.nuisance.items()}})
+        (J,) = engine.jacobians([log], point, result.chosen, free)
+        slopes = np.array([slope_of(free[n], result.values[n]) for n in names])
+        A = J * slopes / sigma[:, None, None]
+        after = before + np.einsum("cti,ctj->ij", A, A) / result.fit.correlation
+        gain = 0.5 * (np.linalg.slogdet(after)[1] - np.linalg.slogdet(before)[1])
+        was, will = (np.sqrt(np.diag(np.linalg.inv(H))) for H in (before, after))
+        found.append(
+            Candidate(plan.name, float(gain), {n: float(b / a) for n, a, b in zip(names, was, will, strict=True)})
+        )
+    if any(math.isnan(c.gain) for c in found):
+        bad = next(c.name for c in found if math.isnan(c.gain))
+        raise InputError(f"plans: the rig has no motion in {bad}; check its inputs and header")
+    return sorted(found, key=lambda c: -c.gain)
