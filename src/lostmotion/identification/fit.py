@@ -15,7 +15,7 @@ from .prepare import Prepared
 from .task import FitOptions
 
 NORMAL = 1.2533  # of the mean of the magnitude of normally distributed errors, to their standard deviation
-SMALL = 1e-3  # relative change of the cost at which the search ends, if it comes twice in a row
+SMALL = 1e-4  # relative change of the cost at which the search ends, if it comes twice in a row
 LARGEST_DAMPING = 1e8
 
 
