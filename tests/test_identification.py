@@ -191,6 +191,6 @@ def test_an_experiment_with_the_motor_off_tells_friction_from_back_emf(found: Id
 
 
 def test_intervals_of_random_servos_hold_the_truth() -> None:
-    """Two of the hundred of `identification_round_trips.py`: of ten intervals of 95 % fewer than seven hold with probability 1e-3."""
+    """The first two of `identification_round_trips.py`: of ten intervals of 95 % fewer than seven hold with probability 1e-3."""
     held = [inside for seed in range(2) for inside in round_trip(seed).values()]
     assert sum(held) >= 7
