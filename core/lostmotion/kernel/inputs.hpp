@@ -373,17 +373,18 @@ class InputState {
             Inputs out = begin;
             for (int q = 0; q < sines_end_[n_inputs - 1]; q += 2) out[basis_[q].input] += term(q);
             return out;
+        } else {
+            Inputs out;
+            int q = 0;
+            const auto add = [&](std::size_t i) __attribute__((always_inline)) {
+                double sum = begin[i];
+                for (; q < sines_end_[i]; q += 2) sum += term(q);
+                out[i] = sum;
+            };
+            [&]<std::size_t... i>(std::index_sequence<i...>)
+                __attribute__((always_inline)) { (add(i), ...); }(std::make_index_sequence<n_inputs>{});
+            return out;
         }
-        Inputs out;
-        int q = 0;
-        const auto add = [&](std::size_t i) __attribute__((always_inline)) {
-            double sum = begin[i];
-            for (; q < sines_end_[i]; q += 2) sum += term(q);
-            out[i] = sum;
-        };
-        [&]<std::size_t... i>(std::index_sequence<i...>)
-            __attribute__((always_inline)) { (add(i), ...); }(std::make_index_sequence<n_inputs>{});
-        return out;
     }
 
     const Signals* signals_;

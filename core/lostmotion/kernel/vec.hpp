@@ -98,6 +98,14 @@ struct Pack {
     [[gnu::always_inline]] Pack spread() const {
         const Part v = part[k / width];
         constexpr int at = k % width;
+#if defined __AVX512DQ__ && defined __AVX512VL__
+        if constexpr (width == 8) {  // first its half: a choice among all eight would need its index in a register
+            const __m512d half = _mm512_maskz_shuffle_f64x2(0xff, v, v, at < 4 ? 0x44 : 0xee);
+            Pack out;
+            for (Part& p : out.part) p = _mm512_maskz_permutex_pd(0xff, half, 0x55 * (at % 4));
+            return out;
+        }
+#endif
         Pack all;
         for (Part& p : all.part) {
             if constexpr (width == 8)
