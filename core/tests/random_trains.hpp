@@ -114,6 +114,8 @@ class RandomTrains {
                 {"gravity", pick(0, shafts - 1), chords(spread(0.2, 2.0), 1, uniform(0.0, 6.0), 0.05)});
         if (coin(0.1)) t.angle_torques.push_back({"cogging", pick(0, shafts - 1), chords(0.1, 6, 0.0, 0.02)});
         put_housings(t);
+        for (Gear& g : t.gears)
+            if (g.housing >= 0) g.law.viscous_friction = 0.02 * g.law.ratio;
         return t;
     }
 
@@ -252,8 +254,6 @@ class RandomTrains {
             while (g.housing == g.input || g.housing == g.output);
             g.efficiencies.reset();
             g.law.losses = Gearbox::constant_efficiency;
-            g.law.viscous_friction = 0.0;
-            g.transmission_error = {};
         }
     }
 

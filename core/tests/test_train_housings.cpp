@@ -120,6 +120,68 @@ TEST_CASE("gears on housings that turn keep momentum and energy") {
     }
 }
 
+// A transmission error over the angle of the sun relative to the ring, and viscous friction between the two.
+Train with_error(bool free) {
+    Train t;
+    for (const double inertia : {0.2, 1.5, 0.7}) t.shafts.push_back(shaft(inertia));
+    t.shafts[1].loaded = true;
+    Gear g = spring(0, 1, 3.0, TorsionCurve({0.05}, {20.0, 60.0}));
+    g.transmission_error = PeriodicCurve(1.0, {0.0, 0.3}, {0.0, 0.03});
+    g.law.viscous_friction = 0.02;
+    if (free) g.housing = 2;
+    t.gears = {g};
+    return t;
+}
+
+// Shafts that are free turn against one another in the same way, however fast all of them turn together. On a housing
+// of great inertia a gear moves as on the frame.
+TEST_CASE("a transmission error and viscous friction of a gear depend on what turns relative to its housing") {
+    const auto run = [](const Train& t, double sun, double carrier, double ring, double tolerance) {
+        const Assembly a(t);
+        std::vector<double> x(static_cast<std::size_t>(a.layout().states));
+        const double speed[] = {sun, carrier, ring};
+        for (std::size_t s = 0; s < t.shafts.size(); ++s)
+            x[static_cast<std::size_t>(a.places().shafts[s].speed)] = speed[s];
+        x[static_cast<std::size_t>(a.places().gears[0].twist)] = 0.2;
+        return Recorded(t, {constant(0.3)}, 4.0, 0.01, tolerance, x);
+    };
+    for (const double tolerance : {0.0, 1e-11}) {
+        CAPTURE(tolerance);
+        const double near = tolerance == 0.0 ? 1e-9 : 1e-7, together = 0.8;
+        const Recorded still = run(with_error(true), 2.0, -1.0, 0.5, tolerance),
+                       turning = run(with_error(true), 2.0 + together, -1.0 + together, 0.5 + together, tolerance);
+        REQUIRE(still.done());
+        REQUIRE(turning.done());
+        CHECK(still.report.switching_count > 20);
+        Train heavy = with_error(true), frame = with_error(false);
+        heavy.shafts[2].inertia = 1e12;
+        frame.shafts.pop_back();
+        const Recorded on_heavy = run(heavy, 2.0, -1.0, 0.0, tolerance),
+                       on_frame = run(frame, 2.0, -1.0, 0.0, tolerance);
+        REQUIRE(on_heavy.done());
+        REQUIRE(on_frame.done());
+        for (std::size_t k = 0; k < still.samples; k += 10)
+            for (const char* name : {"shaft0_speed", "shaft1_speed", "shaft2_speed"}) {
+                CHECK(turning.channel(name)[k] - together ==
+                      doctest::Approx(still.channel(name)[k]).scale(1.0).epsilon(near));
+                if (name[5] != '2')
+                    CHECK(on_heavy.channel(name)[k] ==
+                          doctest::Approx(on_frame.channel(name)[k]).scale(1.0).epsilon(near));
+            }
+        if (tolerance == 0.0)
+            for (const Recorded* r : {&still, &turning, &on_heavy})
+                CHECK(std::fabs(r->report.residual()) < 1e-9 * r->report.turned_over);
+        // All torques of the gear together are none.
+        const auto momentum = [&](std::size_t k) {
+            double sum = 0.0;
+            for (std::size_t s = 0; s < 3; ++s)
+                sum += with_error(true).shafts[s].inertia * still.channel("shaft" + std::to_string(s) + "_speed")[k];
+            return sum;
+        };
+        CHECK(momentum(still.samples - 1) == doctest::Approx(momentum(0) - 0.3 * 4.0).epsilon(near));
+    }
+}
+
 TEST_CASE("accelerations of trains with housings that turn are those of Gauss's principle of least constraint") {
     RandomTrains random(61, true);
     int housings = 0, at_rest = 0;
@@ -192,7 +254,6 @@ TEST_CASE("what is not possible with a housing that turns is refused in one line
     refused([](Train& w) { w.gears[0].housing = 1; }, "give the housing a shaft of its own");
     refused([](Train& w) { w.gears[0].housing = 7; }, "which the train does not have");
     refused([](Train& w) { w.gears[0].efficiencies.emplace(0.9, 0.8); }, "losses");
-    refused([](Train& w) { w.gears[0].law.viscous_friction = 0.1; }, "viscous friction");
     refused([](Train& w) { w.gears.push_back(planetary(0, 1, 2, 3.0)); }, "the same ratio");
     refused(
         [](Train& w) {

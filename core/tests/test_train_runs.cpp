@@ -263,6 +263,80 @@ TEST_CASE("a shaft at rest on a corner of a transmission error stays as either s
         }
 }
 
+// Between 9 and 11 N m from the gear, neither side of the corner holds it with less than 1 N m of friction, and each
+// pushes it to the other. Of all accelerations a, the principle of least constraint takes the one that makes
+// a^2/2 - 10 a + 0.5 |a| + (9 or 11) a least: none from 8.5 to 11.5 N m of the motor, beyond that what is left over.
+TEST_CASE("a shaft that both sides of a corner of a transmission error push back rests on it") {
+    const auto run = [](const Signal& motor, double angle, double tolerance, double duration) {
+        Train t;
+        t.shafts = {shaft(1.0), shaft(1.0)};
+        t.shafts[0].friction.torque = 0.5;
+        t.shafts[1].friction.torque = 1e3;
+        t.motors = {torque_motor(0)};
+        t.gears = {spring(0, 1, 1.0, TorsionCurve({}, {1e-3}))};
+        constexpr double h = 0.7;
+        t.gears[0].transmission_error = PeriodicCurve(2.0 * h, {0.0, h}, {0.0, 0.1 * h});
+        const Assembly a(t);
+        std::vector<double> x(static_cast<std::size_t>(a.layout().states));
+        x[static_cast<std::size_t>(a.places().gears[0].twist)] = 1e4;
+        x[static_cast<std::size_t>(a.places().shafts[0].angle)] = angle;
+        return Recorded(t, {motor}, duration, 1e-3 * duration, tolerance, x);
+    };
+    for (const double tolerance : {0.0, 1e-10}) {
+        CAPTURE(tolerance);
+        for (const double corner : {0.7, -0.7, 2.1})
+            for (const double motor : {8.6, 9.4, 9.6, 10.0, 10.4, 10.6, 11.4}) {
+                CAPTURE(motor);
+                const Recorded r = run(constant(motor), corner, tolerance, 0.5);
+                REQUIRE(r.done());
+                CHECK(r.channel("shaft0_speed")[r.samples - 1] == 0.0);
+                CHECK(r.channel("shaft0_contact")[r.samples - 1] == 0.0);
+            }
+        for (const double motor : {8.2, 11.8}) {
+            const Recorded r = run(constant(motor), 0.7, tolerance, 1e-3);
+            REQUIRE(r.done());
+            // The torque of the gear changes by 1e-3 N m/rad.
+            CHECK(r.channel("shaft0_speed")[r.samples - 1] ==
+                  doctest::Approx(1e-3 * (motor > 10.0 ? motor - 11.5 : motor - 8.5)).epsilon(1e-6));
+        }
+        // It breaks away where the motor has come to 11.5 N m, and goes on with what it has more.
+        const Recorded ramp = run(lines({{0.0, 10.0, 1.0}}), 0.7, tolerance, 2.0);
+        REQUIRE(ramp.done());
+        CHECK(ramp.channel("shaft0_speed")[749] == 0.0);
+        CHECK(ramp.channel("shaft0_speed")[1000] == doctest::Approx(0.5 * 0.5 * 0.5).epsilon(1e-4));
+    }
+}
+
+// It slides to the corner with 0.5 rad/s^2 and is braked behind it with 1.5: each time it goes a third as far, and
+// after infinitely many passages it rests there. The times are a geometric series.
+TEST_CASE("a shaft comes to rest on a corner of a transmission error that pushes it back from both sides") {
+    Train t;
+    t.shafts = {shaft(1.0), shaft(1.0)};
+    t.shafts[0].friction.torque = 0.5;
+    t.shafts[1].friction.torque = 1e3;
+    t.motors = {torque_motor(0)};
+    t.gears = {spring(0, 1, 1.0, TorsionCurve({}, {1e-6}))};
+    constexpr double h = 0.7, off = 0.01;
+    t.gears[0].transmission_error = PeriodicCurve(2.0 * h, {0.0, h}, {0.0, 0.1 * h});
+    const Assembly a(t);
+    std::vector<double> x(static_cast<std::size_t>(a.layout().states));
+    x[static_cast<std::size_t>(a.places().gears[0].twist)] = 1e7;
+    x[static_cast<std::size_t>(a.places().shafts[0].angle)] = h + off;
+    const Recorded r(t, {constant(10.0)}, 1.0, 1e-3, 0.0, x);
+    REQUIRE(r.done());
+    const double first = std::sqrt(2.0 * off / 0.5), back = std::sqrt(2.0 * off / 3.0 / 1.5),
+                 rest = (first + back) / (1.0 - std::sqrt(1.0 / 3.0));
+    for (std::size_t k = 0; k < r.samples; ++k) {
+        const double t_k = 1e-3 * static_cast<double>(k), w = r.channel("shaft0_speed")[k];
+        if (t_k < first) CHECK(w == doctest::Approx(-0.5 * t_k).epsilon(1e-5));
+        if (t_k > 1.001 * rest) CHECK(w == 0.0);
+        if (t_k > first && t_k < rest) CHECK(std::fabs(w) < 0.5 * first);
+    }
+    CHECK(r.report.x[static_cast<std::size_t>(a.places().shafts[0].angle)] == doctest::Approx(h).epsilon(1e-11));
+    // A third each time, until the angle is the corner to 3e-12: twenty passages, each with a crossing and a stop.
+    CHECK(r.report.switchings.size() > 35);
+}
+
 }  // namespace lostmotion::model
 
 TEST_SUITE_END();

@@ -51,7 +51,7 @@ class TrainSteps {
         }
         for (const Gear& g : train.gears) {
             inertia_[at(g.input)] += g.law.inertia;
-            viscous_[at(g.input)] += g.law.viscous_friction;
+            if (g.housing < 0) viscous_[at(g.input)] += g.law.viscous_friction;
         }
         place_contacts();
     }
@@ -167,18 +167,22 @@ class TrainSteps {
         f.c[at(shafts() + contact)] = 1.0;
         return f;
     }
+    // Of the input shaft of a gear to its housing.
+    double relative(int g, const std::vector<double>& of) const {
+        return of[at(gear(g).input)] - (gear(g).housing < 0 ? 0.0 : of[at(gear(g).housing)]);
+    }
     double error_slope(int g) const {
         const PeriodicCurve& e = gear(g).transmission_error;
         if (!e.present()) return 0.0;
         constexpr double small = 1e-7;
-        const double phi = angle[at(gear(g).input)] + 0.5 * h_ * speed[at(gear(g).input)];
+        const double phi = relative(g, angle) + 0.5 * h_ * relative(g, speed);
         return (e(phi + small) - e(phi - small)) / (2.0 * small);
     }
     Linear twist_rate(int g) const {
         Linear f;
         f.c[at(gear(g).input)] += 1.0 / gear(g).law.ratio - error_slope(g);
         f.c[at(gear(g).output)] -= 1.0;
-        if (gear(g).housing >= 0) f.c[at(gear(g).housing)] += 1.0 - 1.0 / gear(g).law.ratio;
+        if (gear(g).housing >= 0) f.c[at(gear(g).housing)] += 1.0 - 1.0 / gear(g).law.ratio + error_slope(g);
         return f;
     }
     bool has_gap(int g) const { return gear(g).law.curve.torque(1e-12) == 0.0; }
@@ -294,6 +298,10 @@ class TrainSteps {
             const double per_T_2 = (1.0 / gear(g).law.ratio - error_slope(g)) / efficiency;
             if (gear(g).input == s) row.add(T_2[at(g)], -per_T_2);
             if (gear(g).housing == s) row.add(T_2[at(g)], per_T_2 - 1.0);
+            if (gear(g).housing < 0 || (gear(g).input != s && gear(g).housing != s)) continue;
+            const double b = gear(g).input == s ? gear(g).law.viscous_friction : -gear(g).law.viscous_friction;
+            row.c[at(gear(g).input)] -= b;
+            row.c[at(gear(g).housing)] += b;
         }
         for (std::size_t k = 0; k < places_.size(); ++k) {
             if (places_[k].what == of_shaft && places_[k].element == s) row.add(torque_of(static_cast<int>(k)), -1.0);
@@ -472,8 +480,8 @@ class TrainSteps {
             if (gear(g).law.compliance == Gearbox::rigid) continue;
             if (gear_contact_[at(g)] >= 0) direction_[at(g)] = direction(g);
             const PeriodicCurve& e = gear(g).transmission_error;
-            const double phi = angle[at(gear(g).input)], turned = h_ * z_[at(gear(g).input)];
-            twist[at(g)] += turned / gear(g).law.ratio - h_ * z_[at(gear(g).output)];
+            const double phi = relative(g, angle), turned = h_ * relative(g, z_);
+            twist[at(g)] += h_ * z_[at(gear(g).input)] / gear(g).law.ratio - h_ * z_[at(gear(g).output)];
             if (gear(g).housing >= 0) twist[at(g)] += (1.0 - 1.0 / gear(g).law.ratio) * h_ * z_[at(gear(g).housing)];
             if (e.present()) twist[at(g)] -= e(phi + turned) - e(phi);
         }

@@ -43,8 +43,19 @@ inline std::vector<CapacityShare> contact_capacity(const Assembly& a, int contac
                                                    const double* T_2) {
     const ContactPlace& c = a.places().contacts[contact];
     const auto k = static_cast<std::size_t>(c.element);
-    if (c.kind == ContactPlace::shaft)
-        return shaft_capacity(a, c.a, r.at_rest[contact] ? 0.0 : now.x[a.places().shafts[k].speed], now, T_2);
+    if (c.kind == ContactPlace::shaft) {
+        std::vector<CapacityShare> shares =
+            shaft_capacity(a, c.a, r.at_rest[contact] ? 0.0 : now.x[a.places().shafts[k].speed], now, T_2);
+        for (std::size_t g = 0; g < a.train().gears.size(); ++g) {
+            const int corner = a.places().gears[g].error_corner;
+            const int side = corner == nowhere || a.train().gears[g].input != c.a ? 0 : r.key.branch[corner];
+            if (side == 0 || r.key.modes[contact] != 0) continue;
+            const double more =
+                side * evaluate(a.layout(), a.beyond_corner(static_cast<int>(g), r.key, r.output_torque[g]), now);
+            shares.push_back({a.train().gears[g].name, side > 0 ? more : 0.0, side < 0 ? more : 0.0});
+        }
+        return shares;
+    }
     if (c.kind == ContactPlace::gear) {
         const double h =
             c.bilateral ? std::numeric_limits<double>::infinity() : now.memory[a.places().gears[k].hysteresis];

@@ -75,12 +75,10 @@ class TrainCheck {
             if (g.housing == g.input || g.housing == g.output)
                 return name + " has its housing on " + shaft(g.housing) +
                        ", which it joins as well; give the housing a shaft of its own";
-            if (g.has_dry_losses() || g.law.viscous_friction > 0.0 || g.transmission_error.present())
-                return name + " has a housing that turns and " +
-                       (g.has_dry_losses()             ? "losses that depend on the direction of its motion"
-                        : g.law.viscous_friction > 0.0 ? "viscous friction"
-                                                       : "a transmission error") +
-                       ", which are solved against the frame only; leave one of them out";
+            if (g.has_dry_losses())
+                return name +
+                       " has a housing that turns and losses that depend on the direction of its motion, which " +
+                       "are solved against the frame only; leave one of them out";
         }
         return {};
     }

@@ -30,6 +30,7 @@ struct PeriodicAngle {
     struct Turn {
         int memory;
         double period;
+        double way = 1.0;  // -1: of the angle of a housing, which the other angle is relative to
     };
     int shaft, state;
     std::vector<Turn> turns;
@@ -41,7 +42,8 @@ struct PeriodicAngle {
         const double back = period > 0.0 ? period * std::round(x[state] / period) : 0.0;
         if (back == 0.0) return;
         x[state] -= back;
-        for (const Turn& t : turns) memory[t.memory] = t.period * std::round((memory[t.memory] - back) / t.period);
+        for (const Turn& t : turns)
+            memory[t.memory] = t.period * std::round((memory[t.memory] - t.way * back) / t.period);
     }
 };
 
@@ -54,9 +56,13 @@ inline std::vector<PeriodicAngle> periodic_angles(const Assembly& a) {
         for (std::size_t k = 0; k < train.angle_torques.size(); ++k)
             if (train.angle_torques[k].shaft == angle.shaft)
                 angle.turns.push_back({a.places().angle_torques[k].turn, train.angle_torques[k].torque.period()});
-        for (std::size_t g = 0; g < train.gears.size(); ++g)
-            if (train.gears[g].input == angle.shaft && train.gears[g].transmission_error.present())
-                angle.turns.push_back({a.places().gears[g].error_turn, train.gears[g].transmission_error.period()});
+        for (std::size_t g = 0; g < train.gears.size(); ++g) {
+            const Gear& gear = train.gears[g];
+            if (!gear.transmission_error.present()) continue;
+            const PeriodicAngle::Turn turn{a.places().gears[g].error_turn, gear.transmission_error.period()};
+            if (gear.input == angle.shaft) angle.turns.push_back(turn);
+            if (gear.housing == angle.shaft) angle.turns.push_back({turn.memory, turn.period, -1.0});
+        }
         std::vector<double> periods;
         for (const PeriodicAngle::Turn& t : angle.turns) periods.push_back(t.period);
         // A controller knows the angle itself, however often the shaft has turned.
@@ -88,7 +94,8 @@ inline std::vector<Row> geometric_constraints(const Assembly& a, const Key& key)
         Equation e;
         e.angle[static_cast<std::size_t>(gear.input)] = a.per_input(static_cast<int>(g), key);
         e.angle[static_cast<std::size_t>(gear.output)] = -1.0;
-        if (gear.housing != nowhere) e.angle[static_cast<std::size_t>(gear.housing)] = gear.per_housing();
+        if (gear.housing != nowhere)
+            e.angle[static_cast<std::size_t>(gear.housing)] = a.per_housing(static_cast<int>(g), key);
         if (!gear.rigid()) e.state = terms.state(a.places().gears[g].twist);
         equations.push_back(e);
     }

@@ -26,6 +26,25 @@ class ElementForms {
         const int k = places_.gears[gear].error_piece;
         return k == nowhere ? 1.0 / g.law.ratio : 1.0 / g.law.ratio - g.transmission_error.slope(key.branch[k]);
     }
+    // The same for the speed of the housing.
+    double per_housing(int gear, const Key& key) const { return 1.0 - per_input(gear, key); }
+    // The angle that the transmission error depends on: of the input, relative to the housing.
+    Row error_angle(int gear) const {
+        const Gear& g = train_.gears[gear];
+        Row angle = terms_.state(places_.shafts[g.input].angle);
+        if (g.housing != nowhere) angle -= terms_.state(places_.shafts[g.housing].angle);
+        return angle;
+    }
+    // Where the input shaft rests on a corner of the transmission error: by how much the torque that it takes on the
+    // other side differs from that of this piece, times the output torque T_2.
+    Row beyond_corner(int gear, const Key& key, const Row& T_2) const {
+        const Gear& g = train_.gears[gear];
+        const GearPlace& p = places_.gears[gear];
+        const PeriodicCurve& e = g.transmission_error;
+        const int k = key.branch[p.error_piece], n = e.pieces();
+        const double more = e.slope(k) - e.slope((k + key.branch[p.error_corner] + n) % n);
+        return more / (g.law.losses == Gearbox::constant_efficiency ? g.law.efficiency : 1.0) * T_2;
+    }
     // The speed of a contact, as a form.
     Row contact_speed(int contact) const {
         const ContactPlace& c = places_.contacts[contact];
@@ -37,7 +56,7 @@ class ElementForms {
         const Gear& g = train_.gears[gear];
         Row rate = terms_.state(places_.shafts[g.input].speed, per_input(gear, key)) -
                    terms_.state(places_.shafts[g.output].speed);
-        if (g.housing != nowhere) rate += terms_.state(places_.shafts[g.housing].speed, g.per_housing());
+        if (g.housing != nowhere) rate += terms_.state(places_.shafts[g.housing].speed, per_housing(gear, key));
         return rate;
     }
     // P(d) in its piece; 0 of a rigid gear.
@@ -67,6 +86,19 @@ class ElementForms {
                      terms_.memory(p.turn, curve.slope(piece));
         if (p.remainder != nowhere) torque += terms_.input(p.remainder);
         return torque;
+    }
+    // Viscous friction of a gear on a housing that turns, between that and its input shaft; 0 of others, whose shaft
+    // has it.
+    Row housing_friction(int gear, const Regime& r) const {
+        const Gear& g = train_.gears[gear];
+        if (g.housing == nowhere) return Row{};
+        return g.law.viscous_friction * (shaft_speed(g.input, r) - shaft_speed(g.housing, r));
+    }
+    // The speed of a shaft where it acts: 0 at rest, in terms of those that it follows where it is tied to others.
+    Row shaft_speed(int shaft, const Regime& r) const {
+        Row f;
+        r.ties.each_share(shaft, [&](int k, double share) { f.c[places_.shafts[k].speed] = share; });
+        return f;
     }
     // Torque against the motion of a shaft.
     Row drag_torque(int shaft, const Key& key) const {

@@ -32,12 +32,6 @@ class Equations {
     Row acceleration(int shaft, const Key& key, const Regime& r) const;
 
     int mode(const Key& key, int contact) const { return key.modes[contact]; }
-    // The speed of a shaft where it acts: 0 at rest, in terms of those that it follows where it is tied to others.
-    Row speed(int shaft, const Regime& r) const {
-        Row f;
-        r.ties.each_share(shaft, [&](int k, double share) { f.c[places_.shafts[k].speed] = share; });
-        return f;
-    }
     // What a stuck contact takes: found from its rest, or, where the motion does not determine it, as it was.
     Row held(int contact, const Regime& r) const {
         return r.ties.redundant[contact] ? terms_.memory(places_.contacts[contact].locked) : terms_.reaction(contact);
@@ -163,7 +157,7 @@ inline Row Equations::acceleration(int shaft, const Key& key, const Regime& r) c
         if (train_.couplings[k].output == shaft) sum += r.contact_torque[places_.couplings[k].contact];
     for (std::size_t k = 0; k < train_.angle_torques.size(); ++k)
         if (train_.angle_torques[k].shaft == shaft) sum += forms_.angle_torque(static_cast<int>(k), key);
-    sum -= p.viscous_friction * speed(shaft, r);
+    sum -= p.viscous_friction * forms_.shaft_speed(shaft, r);
     if (train_.shafts[shaft].has_drag() && !r.ties.at_rest[shaft]) sum -= forms_.drag_torque(shaft, key);
     if (p.load != nowhere) sum -= terms_.input(p.load);
     if (p.contact != nowhere) sum -= r.contact_torque[p.contact];
@@ -173,6 +167,12 @@ inline Row Equations::acceleration(int shaft, const Key& key, const Regime& r) c
         if (train_.couplings[k].input == shaft) sum -= r.contact_torque[places_.couplings[k].contact];
     for (std::size_t g = 0; g < train_.gears.size(); ++g)
         if (train_.gears[g].housing == shaft) sum -= r.output_torque[g] - r.input_torque[g];
+    for (std::size_t g = 0; g < train_.gears.size(); ++g) {
+        const Gear& gear = train_.gears[g];
+        if (gear.housing == nowhere || gear.law.viscous_friction == 0.0) continue;
+        if (gear.input == shaft) sum -= forms_.housing_friction(static_cast<int>(g), r);
+        if (gear.housing == shaft) sum += forms_.housing_friction(static_cast<int>(g), r);
+    }
     return sum / p.inertia;
 }
 

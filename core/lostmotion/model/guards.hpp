@@ -33,12 +33,15 @@ class RegimeGuards {
     void add_turning();
     void add_driver(int contact);
     double largest_share(const Row& torque) const;
+    bool turns(int shaft, int housing) const {
+        return !regime_.ties.at_rest[shaft] || (housing != nowhere && !regime_.ties.at_rest[housing]);
+    }
     bool moves(int state) const;
     void add_twist_pieces(int gear);
     void add_speed_pieces(int shaft);
     void add_input_limits();
     void add_output_limits();
-    void add_angle_pieces(int branch, int turn, int shaft, const PeriodicCurve& curve);
+    void add_angle_pieces(int branch, int turn, const Row& angle, const PeriodicCurve& curve);
 
     Guard& add(const Row& form, Guard::Kind kind, int contact, int branch, int neighbour) {
         regime_.guards.push_back(Guard{form, kind, contact, branch, neighbour});
@@ -66,12 +69,14 @@ inline void RegimeGuards::add_all() {
     add_output_limits();
     for (std::size_t g = 0; g < train_.gears.size(); ++g) {
         const GearPlace& p = places_.gears[g];
-        if (p.error_piece != nowhere)
-            add_angle_pieces(p.error_piece, p.error_turn, train_.gears[g].input, train_.gears[g].transmission_error);
+        if (p.error_piece != nowhere && turns(train_.gears[g].input, train_.gears[g].housing))
+            add_angle_pieces(p.error_piece, p.error_turn, forms_.error_angle(static_cast<int>(g)),
+                             train_.gears[g].transmission_error);
     }
     for (std::size_t k = 0; k < train_.angle_torques.size(); ++k)
-        add_angle_pieces(places_.angle_torques[k].piece, places_.angle_torques[k].turn, train_.angle_torques[k].shaft,
-                         train_.angle_torques[k].torque);
+        if (const AngleTorque& t = train_.angle_torques[k]; turns(t.shaft, nowhere))
+            add_angle_pieces(places_.angle_torques[k].piece, places_.angle_torques[k].turn,
+                             terms_.state(places_.shafts[t.shaft].angle), t.torque);
 }
 
 // Is a contact that "slips" kept at rest while its shafts turn, as in a loop of gears? Its speed is rounding.
@@ -126,6 +131,11 @@ inline void RegimeGuards::add_shaft_guards(int shaft) {
     for (const int s : {+1, -1}) {
         Row F = forms_.held_friction(shaft, regime_.key);
         each_gear([&](int g) { add_loss_cells(g, s, F); });
+        for (std::size_t g = 0; g < train_.gears.size(); ++g)
+            if (const int corner = places_.gears[g].error_corner;
+                corner != nowhere && train_.gears[g].input == shaft && regime_.key.branch[corner] == s)
+                F += static_cast<double>(s) *
+                     forms_.beyond_corner(static_cast<int>(g), regime_.key, regime_.output_torque[g]);
         add(F - static_cast<double>(s) * regime_.contact_torque[p.contact], Guard::capacity, p.contact, nowhere, s);
     }
 }
@@ -312,12 +322,11 @@ inline void RegimeGuards::add_output_limits() {
     }
 }
 
-// Where the angle of a shaft leaves its piece. The last and the first piece are neighbours: then the angle at which the
+// Where an angle leaves its piece. The last and the first piece are neighbours: then the angle at which the
 // present turn began, which is remembered, moves by a period.
-inline void RegimeGuards::add_angle_pieces(int branch, int turn, int shaft, const PeriodicCurve& curve) {
-    if (regime_.ties.at_rest[shaft]) return;
+inline void RegimeGuards::add_angle_pieces(int branch, int turn, const Row& angle, const PeriodicCurve& curve) {
     const int k = regime_.key.branch[branch], last = curve.pieces() - 1;
-    const Row within = terms_.state(places_.shafts[shaft].angle) - terms_.memory(turn);
+    const Row within = angle - terms_.memory(turn);
     const auto edge = [&](const Row& form, int neighbour, double shift) {
         Guard& g = add(form, Guard::edge, nowhere, branch, neighbour);
         g.memory = shift == 0.0 ? nowhere : turn;

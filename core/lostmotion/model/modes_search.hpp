@@ -56,8 +56,7 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const Gear& gear = train().gears[g];
         const GearPlace& p = places().gears[g];
-        if (p.error_turn != nowhere)
-            now.memory[p.error_turn] = gear.transmission_error.turn(now.x[places().shafts[gear.input].angle]);
+        if (p.error_turn != nowhere) now.memory[p.error_turn] = gear.transmission_error.turn(error_angle(now, gear));
         const int locked = p.contact == nowhere ? nowhere : places().contacts[p.contact].locked;
         event.gear[g] = locked != nowhere ? now.memory[locked] : 0.0;
         if (gear.rigid()) continue;

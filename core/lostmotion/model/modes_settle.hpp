@@ -60,8 +60,7 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
         const Gear& gear = train().gears[g];
         const GearPlace& p = places().gears[g];
         if (p.error_piece != nowhere)
-            set(p.error_piece,
-                gear.transmission_error.piece(now.x[places().shafts[gear.input].angle] - now.memory[p.error_turn]));
+            set(p.error_piece, gear.transmission_error.piece(error_angle(now, gear) - now.memory[p.error_turn]));
         if (gear.rigid()) continue;
         const double d = now.x[p.twist];
         const int piece = gear.law.curve.locate(d);
@@ -69,7 +68,8 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
         if (p.parted == nowhere) continue;
         const double w_in = now.x[places().shafts[gear.input].speed], w_out = now.x[places().shafts[gear.output].speed];
         double rate = assembly_.per_input(static_cast<int>(g), trial) * w_in - w_out;
-        if (gear.housing != nowhere) rate += gear.per_housing() * now.x[places().shafts[gear.housing].speed];
+        if (gear.housing != nowhere)
+            rate += assembly_.per_housing(static_cast<int>(g), trial) * now.x[places().shafts[gear.housing].speed];
         const double pressed = gear.law.curve.torque(d) + gear.mesh_damping * rate;
         set(p.parted, piece != 0 && piece * pressed < 0.0 ? 1 : 0);
     }
@@ -150,6 +150,9 @@ void SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
                     T_1 -= gear.transmission_error.slope(modes.branch[piece]) * T_2[g] / gear.law.efficiency;
                 if (gear.input == out) needed += T_1;
                 if (gear.housing == out) needed += T_2[g] - T_1;
+                if (gear.housing != nowhere && (gear.input == out || gear.housing == out))
+                    needed += (gear.input == out ? 1.0 : -1.0) * gear.law.viscous_friction *
+                              (now.x[places().shafts[gear.input].speed] - now.x[places().shafts[gear.housing].speed]);
             }
             for (std::size_t n = 0; n < train().couplings.size(); ++n) {
                 if (train().couplings[n].output == out && (is_gear || static_cast<int>(n) != c.element))
@@ -225,7 +228,8 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
 }
 
 // The torque that a transmission error lets an input shaft feel jumps at its corners. A shaft at rest on one may have
-// that of either side: does the piece on the other side of such a corner hold?
+// that of either side, or, where both sides push it back, any between: does the piece on the other side of such a
+// corner hold, or the corner itself?
 template <class Sizes>
 template <class Cache, class Now>
 bool SwitchedTrain<Sizes>::settle_on_corner(Cache& cache, Now& now, const Event& event, const Key& trial,
@@ -235,16 +239,24 @@ bool SwitchedTrain<Sizes>::settle_on_corner(Cache& cache, Now& now, const Event&
         const GearPlace& p = places().gears[g];
         if (p.error_piece == nowhere) continue;
         const PeriodicCurve& e = train().gears[g].transmission_error;
-        const double phi = now.x[places().shafts[train().gears[g].input].angle];
+        const double phi = error_angle(now, train().gears[g]);
         const int k = trial.branch[p.error_piece], last = e.pieces() - 1;
         for (const bool ahead : {false, true}) {
-            const double corner = now.memory[p.error_turn] + (ahead ? e.upper(k) : e.lower(k));
-            if (std::fabs(phi - corner) > on_corner * (std::fabs(phi) + e.period())) continue;
-            const bool turns = k == (ahead ? last : 0);
-            Key other = trial;
-            other.branch[p.error_piece] = static_cast<std::int16_t>(turns ? last - k : ahead ? k + 1 : k - 1);
-            if (turns) now.memory[p.error_turn] += ahead ? e.period() : -e.period();
-            if (walk(cache, now, event, other, key).found == Found::yes) return true;
+            const double corner = now.memory[p.error_turn] + (ahead ? e.upper(k) : e.lower(k)),
+                         off = std::fabs(phi - corner) / (std::fabs(phi) + e.period());
+            if (off <= on_corner) {
+                const bool turns = k == (ahead ? last : 0);
+                Key other = trial;
+                other.branch[p.error_piece] = static_cast<std::int16_t>(turns ? last - k : ahead ? k + 1 : k - 1);
+                if (turns) now.memory[p.error_turn] += ahead ? e.period() : -e.period();
+                if (walk(cache, now, event, other, key).found == Found::yes) return true;
+                now.memory = memory;
+            }
+            if (off > rounding || p.error_corner == nowhere) continue;
+            if (trial.modes[places().shafts[train().gears[g].input].contact] != 0) continue;
+            Key between = trial;
+            between.branch[p.error_corner] = ahead ? +1 : -1;
+            if (walk(cache, now, event, between, key).found == Found::yes) return true;
             now.memory = memory;
         }
     }

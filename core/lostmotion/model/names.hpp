@@ -98,6 +98,7 @@ inline std::vector<std::string> branch_names(const Assembly& a) {
         set(p.gears[k].cell_back, name + ": cell of the losses backward");
         set(p.gears[k].parted, name + ": flanks parted");
         set(p.gears[k].error_piece, name + ": piece of the transmission error");
+        set(p.gears[k].error_corner, name + ": rest on a corner of the transmission error");
     }
     for (std::size_t k = 0; k < t.brakes.size(); ++k)
         set(p.brakes[k].branch, t.brakes[k].name + ": limit of the command");

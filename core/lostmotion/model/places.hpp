@@ -39,7 +39,8 @@ struct GearPlace {
     int twist = nowhere, contact = nowhere;
     int hysteresis = nowhere;                                                                           // memory
     int piece = nowhere, cell = nowhere, cell_back = nowhere, parted = nowhere, error_piece = nowhere;  // branches
-    int error_turn = nowhere;                                                                           // memory
+    int error_corner = nowhere;  // branch: +1, -1: the input shaft rests on the upper, the lower end of that piece
+    int error_turn = nowhere;    // memory
 };
 struct BrakePlace {
     int input = nowhere, branch = nowhere;
@@ -104,7 +105,7 @@ inline Places::Places(const Train& train, bool with_remainders)
     }
     for (const Gear& g : train.gears) {
         shafts[g.input].inertia += g.law.inertia;
-        shafts[g.input].viscous_friction += g.law.viscous_friction;
+        if (g.housing == nowhere) shafts[g.input].viscous_friction += g.law.viscous_friction;
     }
     place_states(train);
     place_contacts(train);
@@ -119,7 +120,10 @@ inline void Places::place_states(const Train& train) {
     std::vector<bool> by_angle(shafts.size());
     for (const AngleTorque& t : train.angle_torques) by_angle[t.shaft] = true;
     for (const Gear& g : train.gears)
-        if (g.transmission_error.present()) by_angle[g.input] = true;
+        if (g.transmission_error.present()) {
+            by_angle[g.input] = true;
+            if (g.housing != nowhere) by_angle[g.housing] = true;
+        }
     std::size_t of_controllers = 0;
     for (const LinearController& c : train.controllers) {
         for (std::size_t s = 0; s < shafts.size(); ++s)
@@ -229,6 +233,7 @@ inline void Places::place_memory_and_branches(const Train& train) {
         if (g.parts_flanks()) gears[k].parted = next++;
         if (g.transmission_error.present()) {
             gears[k].error_piece = next++;
+            if (shafts[g.input].contact != nowhere && g.housing == nowhere) gears[k].error_corner = next++;
             gears[k].error_turn = layout.memory++;
         }
     }

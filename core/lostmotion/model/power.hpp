@@ -66,6 +66,9 @@ inline std::vector<PowerFlow> power_flows(const Assembly& a, const Regime& r) {
         if (gear.housing != nowhere) relative -= speed(gear.housing);
         flows.push_back({PowerFlow::loss, PowerFlow::gear, index(g), "mesh",
                          r.input_torque[g] - per_input * r.output_torque[g], relative});
+        if (gear.housing != nowhere && gear.law.viscous_friction > 0.0)
+            flows.push_back({PowerFlow::loss, PowerFlow::gear, index(g), "viscous friction",
+                             a.housing_friction(index(g), r), relative});
         if (gear.rigid() || a.twist_rests(index(g), r)) continue;
         // All of the output torque that is not the spring's.
         const Row rate = a.twist_rate(index(g), r.key);

@@ -169,6 +169,11 @@ class SwitchedTrain {
     template <class E, class Now>
     bool turns_the_other_way(const E& e, const Now& now, const Event& event) const;
     template <class Now>
+    double error_angle(const Now& now, const Gear& g) const {
+        const double phi = now.x[places().shafts[g.input].angle];
+        return g.housing == nowhere ? phi : phi - now.x[places().shafts[g.housing].angle];
+    }
+    template <class Now>
     void locate(const Now& now, Key& trial) const;
     template <class Now>
     void locate_losses(const Now& now, const std::array<double, max_contacts>& T_2, Key& trial) const;
