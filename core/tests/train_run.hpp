@@ -190,7 +190,8 @@ class TrainRun {
         for (int k = 0; k < 5; ++k) {
             const Instant x = at(0.5 * h * (1.0 + node[k]));
             for (const PowerFlow& f : flows) {
-                const double E = 0.5 * h * weight[k] * evaluate(layout(), f.torque, x) * evaluate(layout(), f.speed, x);
+                const double E =
+                    0.5 * h * weight[k] * evaluate(layout(), f.power.torque, x) * evaluate(layout(), f.power.speed, x);
                 gained += f.kind == PowerFlow::source ? E : -E;
                 turned_over += std::fabs(E);
                 if (f.kind == PowerFlow::loss) least_loss = std::min(least_loss, E);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "../drive/contact.hpp"
+#include "../parts/power.hpp"
 #include "energy_ledger.hpp"
 #include "power_integral.hpp"
 
@@ -35,22 +36,25 @@ class EnergyMeter {
             const int mode = r.key.modes[c];
             return LinearForm::unit(one, mode == absent ? 0.0 : mode * torque);
         };
-        factors.set(from_source, r.source_torque, w_M);
-        factors.set(in_input_damper, drive_.gearbox.viscous_friction * w_M, w_M);
-        factors.set(in_motor_friction, friction(input_contact, drive_.motor.friction_torque), w_M);
-        factors.set(in_gear, r.input_torque - r.output_torque / drive_.gearbox.ratio, w_M);
-        factors.set(in_hysteresis, r.at_rest[twist_contact] ? LinearForm{} : r.hysteresis_torque,
-                    drive_.contact_speed(twist_contact));
-        factors.set(in_load_damper, drive_.load.viscous_friction * w, w);
-        factors.set(in_load_friction, friction(load_contact, drive_.load.friction_torque), w);
-        factors.set(to_load, LinearForm::unit(load_torque), w);
+        const auto set = [&factors](EnergyFlow flow, const Power<LinearForm>& p) {
+            factors.set(flow, p.torque, p.speed);
+        };
+        set(from_source, {r.source_torque, w_M});
+        set(in_input_damper, viscous_power(drive_.gearbox.viscous_friction, w_M));
+        set(in_motor_friction, {friction(input_contact, drive_.motor.friction_torque), w_M});
+        set(in_gear, mesh_power(r.input_torque, r.output_torque, 1.0 / drive_.gearbox.ratio, w_M));
+        set(in_hysteresis,
+            {r.at_rest[twist_contact] ? LinearForm{} : r.hysteresis_torque, drive_.contact_speed(twist_contact)});
+        set(in_load_damper, viscous_power(drive_.load.viscous_friction, w));
+        set(in_load_friction, {friction(load_contact, drive_.load.friction_torque), w});
+        set(to_load, {LinearForm::unit(load_torque), w});
         factors.hold(m);
         return factors;
     }
 
     void measure(const State& x, double& kinetic, double& elastic) const {
-        kinetic = 0.5 * drive_.input_inertia() * x[motor_speed] * x[motor_speed] +
-                  0.5 * drive_.load.inertia * x[load_speed] * x[load_speed];
+        kinetic =
+            kinetic_energy(drive_.input_inertia(), x[motor_speed]) + kinetic_energy(drive_.load.inertia, x[load_speed]);
         elastic = drive_.rigid() ? 0.0 : drive_.gearbox.curve.energy(x[twist]);
     }
 

@@ -5,6 +5,7 @@
 
 #include "../solver/adaptive_solver.hpp"
 #include "../solver/components.hpp"
+#include "dense_samples.hpp"
 #include "drive_control.hpp"
 #include "energy.hpp"
 #include "sampler.hpp"
@@ -104,18 +105,19 @@ template <class Solver>
 class AdaptiveRecorder {
  public:
     AdaptiveRecorder(const Drive& drive, Solver& solver, const RunOptions& options, double* out, RunReport& report)
-        : drive_(drive), solver_(solver), options_(options), out_(out), report_(report) {}
+        : drive_(drive),
+          solver_(solver),
+          options_(options),
+          out_(out),
+          report_(report),
+          samples_(options.sample_interval, options.samples) {}
 
     void step(const Regime& r, const Memory& m, const DenseStepOf<DriveDims>& dense, bool last) {
         if (!r.in_data) report_.left_data_at = std::fmin(report_.left_data_at, dense.begin);
-        for (; next_ < options_.samples; ++next_) {
-            const double t = static_cast<double>(next_) * options_.sample_interval;
-            if (!(t < dense.end || (last && t <= dense.end * (1.0 + 1e-15)))) return;
-            const State x = dense(t);
-            const auto input = t < dense.end ? solver_.input_at(t, x) : solver_.input_before(t, x);
+        samples_.within(dense, last, solver_, [&](std::size_t k, const State& x, const InputsOf<DriveDims>& input) {
             const Reading reading = Reader(drive_, r, m)(x, input);
-            for (int c = 0; c < n_channels; ++c) out_[c * options_.samples + next_] = reading.value[c];
-        }
+            for (int c = 0; c < n_channels; ++c) out_[c * options_.samples + k] = reading.value[c];
+        });
     }
     bool wants_switching() const { return report_.switchings.size() < options_.max_switchings; }
     void switching(const Switching& s) { report_.switchings.push_back(s); }
@@ -126,7 +128,7 @@ class AdaptiveRecorder {
     const RunOptions& options_;
     double* out_;
     RunReport& report_;
-    std::size_t next_ = 0;
+    DenseSamples samples_;
 };
 
 inline RunReport run_adaptive(const Drive& drive, const Signals& signals, const Start& start, const RunOptions& options,

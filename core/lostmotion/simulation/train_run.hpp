@@ -12,6 +12,7 @@
 #include "../model/check.hpp"
 #include "../model/power.hpp"
 #include "../solver/adaptive_solver.hpp"
+#include "dense_samples.hpp"
 #include "power_integral.hpp"
 #include "result_names.hpp"
 #include "sampler.hpp"
@@ -133,7 +134,7 @@ class TrainMeter {
         for (std::size_t k = 0; k < names_.size(); ++k)
             factors.set(static_cast<int>(k), {}, {});  // none in this regime
         for (const model::PowerFlow& f : model::power_flows(assembly_, s.entry.regime.rows))
-            factors.set(place(f), model::pack<D>(f.torque, n), model::pack<D>(f.speed, n));
+            factors.set(place(f), model::pack<D>(f.power.torque, n), model::pack<D>(f.power.speed, n));
         factors.hold(s.memory);
         integral_.add(s, factors);
     }
@@ -176,7 +177,8 @@ class TrainRecorder {
           report_(report),
           channels_(options.channels ? *options.channels : all(m)),
           sampler_(m, 0.0, options.sample_interval, options.samples, out, channels_),
-          meter_(m.assembly) {
+          meter_(m.assembly),
+          dense_samples_(options.sample_interval, options.samples) {
         sampler_.interrupted = options.interrupted;
         sampler_.interrupted_context = options.interrupted_context;
     }
@@ -201,15 +203,12 @@ class TrainRecorder {
                 const DenseStepOf<D>& dense, bool last) {
         if (!r.in_data) report_.left_data_at = std::fmin(report_.left_data_at, dense.begin);
         InstantsOf<D> at;
-        for (; next_ < options_.samples; ++next_) {
-            const double t = static_cast<double>(next_) * options_.sample_interval;
-            if (!(t < dense.end || (last && t <= dense.end * (1.0 + 1e-15)))) return;
-            const StateOf<D> x = dense(t);
-            at.set(0, load(x), t < dense.end ? solver.input_at(t, x) : solver.input_before(t, x));
+        dense_samples_.within(dense, last, solver, [&](std::size_t k, const StateOf<D>& x, const InputsOf<D>& input) {
+            at.set(0, load(x), input);
             const TrainReader<D> reader(model_, r, m);
             for (std::size_t c = 0; c < channels_.size(); ++c)
-                out_[c * options_.samples + next_] = reader.read(channels_[c], at, 0)[0];
-        }
+                out_[c * options_.samples + k] = reader.read(channels_[c], at, 0)[0];
+        });
     }
     void end() {
         sampler_.write();
@@ -231,7 +230,7 @@ class TrainRecorder {
     std::vector<int> channels_;
     SamplerOf<System, TrainReader<D>, Model> sampler_;
     TrainMeter<D> meter_;
-    std::size_t next_ = 0;
+    DenseSamples dense_samples_;
 };
 
 // Why a run has not ended well, or empty.

@@ -1,0 +1,27 @@
+// Powers and energies of the elements. Each power is a product of two linear forms, a torque and a speed.
+#pragma once
+
+namespace lostmotion {
+
+template <class F>
+struct Power {
+    F torque, speed;  // [N m], [rad/s]
+};
+
+// Viscous friction b [N m s/rad] at this speed.
+template <class F>
+Power<F> viscous_power(double b, const F& speed) {
+    return {b * speed, speed};
+}
+
+// Losses of a mesh: (T_1 - T_2 r) w, where w is the speed of the input shaft relative to the housing and r that of the
+// twist's rate over w, 1/i but for a transmission error. Negative where a constant efficiency creates energy.
+template <class F>
+Power<F> mesh_power(const F& T_1, const F& T_2, double per_input, const F& speed) {
+    return {T_1 - per_input * T_2, speed};
+}
+
+// [J]
+inline double kinetic_energy(double inertia, double speed) { return 0.5 * inertia * speed * speed; }
+
+}  // namespace lostmotion
