@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..inputs.arguments import checked
 from .engine import Engine, Point
 from .fit import slope_of
 from .identify import IdentificationResult
@@ -31,6 +32,7 @@ class Candidate:
     """by parameter, width of its interval after it over that before"""
 
 
+@checked
 def design_experiment(
     result: IdentificationResult, plans: Sequence[Log], *, deviation: Mapping[str, float] | None = None
 ) -> list[Candidate]:

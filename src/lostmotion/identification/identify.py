@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.quantities import Count
 from ..simulation.train_scenario import TrainScenario
 from .engine import Engine
 from .errors_of_logs import LogError, total
@@ -132,9 +132,9 @@ def _no_notice(what: str, iteration: int, cost: float) -> None:
 def identify(
     source: str | Path,
     *,
-    threads: int | None = None,
+    threads: Count | None = None,
     profiles: bool = False,
-    notify: Any = None,
+    progress: Callable[[str, int, float], None] | None = None,
 ) -> IdentificationResult:
     """Identify the values of a rig from measured logs.
 
@@ -146,7 +146,7 @@ def identify(
         Runs at the same time; left out, as many as there are processors.
     profiles
         Also intervals by the profile of the likelihood, which takes as long as the fit again for each parameter.
-    notify
+    progress
         Is called with the name of the rung, the iteration and the cost.
 
     Raises
@@ -156,7 +156,7 @@ def identify(
     """
     task, directory = load_identification(source)
     try:
-        return identify_task(task, directory, threads=threads, profiles=profiles, notify=notify or _no_notice)
+        return identify_task(task, directory, threads=threads, profiles=profiles, notify=progress or _no_notice)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
 

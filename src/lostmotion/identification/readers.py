@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from ..errors import InputError
+from ..inputs.arguments import checked
 from ..inputs.validation import did_you_mean
 from .binary_logs import read_mat_log, read_mdf_log, read_parquet_log, read_tdms_log
 from .csv_log import read_csv_log
@@ -24,6 +25,7 @@ TABLES: dict[str, Callable[..., Log]] = {
 ENDINGS = (".json", *TABLES)
 
 
+@checked
 def read_log(path: str | Path, *, time: str = "") -> Log:
     """Read a log: CSV, MATLAB, Parquet, MDF 4, TDMS, or JSON of a servo recorder, by the ending of its name.
 

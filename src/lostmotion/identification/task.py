@@ -112,8 +112,6 @@ class FitOptions(Part):
     iterations: Annotated[Whole, Field(ge=1, le=500)] = 30
     first_logs: Annotated[Whole, Field(ge=1)] = 12
     """of which the search begins, before it takes all"""
-    horizon: tuple[Annotated[Time, Positive], ...] = ()
-    """lengths of windows with which the search begins; each window starts from the measured state"""
     sample_interval: Annotated[Time, Positive] | None = None
     """of the runs; left out, that of the log, at most 2 ms"""
 

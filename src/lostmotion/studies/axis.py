@@ -49,7 +49,7 @@ class AxisTask(Task):
     max_reversal_error: Annotated[Angle, Positive] | None = None
     """of the load: mean position at rest after motion in one direction, less that after the other"""
     settling_window: Annotated[Angle, Positive] | None = None
-    """half of it: how near the load must stay to where a move ends"""
+    """plus and minus this: how near the load must stay to where a move ends"""
     max_settling_time: Annotated[Time, Positive] | None = None
     """from the end of the reference's move until the load stays in the window"""
 
