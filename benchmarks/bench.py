@@ -12,6 +12,7 @@ from pathlib import Path
 import baseline
 import closed_loops
 import costs
+import gradients
 import one_run
 import studies
 import trains
@@ -84,6 +85,7 @@ def main() -> None:
     baseline.section(report, build, _instruction_set.builds())
     trains.section(report, programs)
     closed_loops.section(report, programs)
+    gradients.section(report)
     costs.section(report, scenario, build, programs)
     studies.section(report, scenario)
     start_up_section(report)

@@ -2,6 +2,7 @@
 #include "names.hpp"
 #include "responses.hpp"
 #include "runs.hpp"
+#include "sensitivities.hpp"
 #include "stepping.hpp"
 
 using namespace lostmotion::binding;
@@ -14,6 +15,7 @@ NB_MODULE(CORE_MODULE, m) {
     bind_runs(m);
     bind_control(m);
     bind_train(m);
+    bind_sensitivities(m);
     bind_instants(m);
     bind_stepping(m);
     bind_responses(m);

@@ -9,7 +9,7 @@ namespace lostmotion {
 #define LOSTMOTION_TRAIN_KERNEL(TEMPLATE, D)                                                                      \
     TEMPLATE TrainReport run_train_in<D>(const typename TrainReader<D>::Model&, const std::vector<Signal>&,       \
                                          std::span<const double>, std::span<const double>, const TrainOptions&,   \
-                                         double*);                                                                \
+                                         double*, TrainWatcher<D>*);                                              \
     TEMPLATE TrainReport reach_train_in<D>(const typename TrainReader<D>::Model&, const std::vector<Signal>&,     \
                                            std::span<const double>, std::span<const double>, const TrainOptions&, \
                                            TrainPoint&);                                                          \

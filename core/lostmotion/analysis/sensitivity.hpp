@@ -56,10 +56,10 @@ class SensitivityOf {
         const Regime &old = *regime_, &next = cache_.regime(w.after);
         input_->anchor_left(w.time);
         const auto u = input_->template jet<2>();
-        InputsOf<D> u_after = u[0];
+        std::array<InputsOf<D>, 2> u_after = u;
         if (w.input_jump) {
             input_->anchor(w.time);
-            u_after = input_->values();
+            u_after = input_->template jet<2>();
         }
         Jacobian jump = Jacobian::identity();
         const auto reset = laws_.reset({w, old, next, x_, memory_, u, u_after}, jump);

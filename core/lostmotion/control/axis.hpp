@@ -231,6 +231,7 @@ class Axis {
     }
     // What acts on the motor from this tick on, of an axis without a winding.
     double command(const double* slot) const { return slot[acting_command]; }
+    static int command_slot() { return acting_command; }
     static double signal(int s, const double* slot) { return slot[s]; }
 
     // Of the winding, from the last exchange of torque and speed on.

@@ -218,6 +218,33 @@ class ComponentLaws<model::TrainSystem<D>> {
         return rates;
     }
 
+    // Of a torque that the motion does not determine, after a switching: the form before it that it keeps the value of,
+    // or the guard of the regime after, a margin that it has used up; or neither.
+    struct Locked {
+        const LinearFormOf<D>* was = nullptr;
+        int limit = -1;
+    };
+    Locked locked_at(std::size_t c, const ResetOf<System>& r) const {
+        const model::ContactPlace& contact = contacts()[c];
+        const auto& was = contact.kind == model::ContactPlace::gear ? r.before.output_torque[contact.element]
+                                                                    : r.before.contact_torque[c];
+        const double size = magnitude_of(was, r.x, r.memory, r.input[0]);
+        const double before = evaluate<D>(was, r.x, r.memory, r.input[0]);
+        if (std::fabs(before - r.switching.memory[contact.locked]) <= rounding * size) return {&was, -1};
+        return {nullptr, limit_of(c, r.after, r.switching.x, r.switching.memory, r.input_after[0])};
+    }
+    // The margin of a contact that the locked torque has used up, a guard of this regime; -1: none.
+    int limit_of(std::size_t c, const typename System::Regime& after, const State& x, const Memory& m,
+                 const InputsOf<D>& u) const {
+        for (int g = 0; g < after.n_guards; ++g) {
+            const auto& guard = after.guards[g];
+            if (guard.kind != model::Guard::capacity) continue;
+            if (guard.form.c[D::first_memory + contacts()[c].locked] == 0.0) continue;
+            if (std::fabs(evaluate<D>(guard.form, x, m, u)) <= rounding * magnitude_of(guard.form, x, m, u)) return g;
+        }
+        return -1;
+    }
+
  private:
     const std::vector<model::ContactPlace>& contacts() const { return assembly_.places().contacts; }
     const std::vector<model::GearPlace>& gears() const { return assembly_.places().gears; }
@@ -232,44 +259,26 @@ class ComponentLaws<model::TrainSystem<D>> {
 
     // A torque that the motion does not determine stays as it was, or comes to lie at the limit of a contact.
     void lock(std::size_t c, bool used, const ResetOf<System>& r, JacobianOf<D>& jump, ResetRatesOf<D>& rates) const {
-        const model::ContactPlace& contact = contacts()[c];
-        const int k = D::states + contact.locked;
+        const int k = D::states + contacts()[c].locked;
         Components& row = jump.row[k];
         row = {};
         if (!used) return;
-        const auto& was = contact.kind == model::ContactPlace::gear ? r.before.output_torque[contact.element]
-                                                                    : r.before.contact_torque[c];
-        const double locked = r.switching.memory[contact.locked];
-        const double size = magnitude_of(was, r.x, r.memory, r.input[0]);
-        if (std::fabs(evaluate<D>(was, r.x, r.memory, r.input[0]) - locked) <= rounding * size) {
-            row = gradient<D>(was);
-            rates.by_time[k] = input_part<D>(was, r.input[1]);
+        const Locked at = locked_at(c, r);
+        if (at.was != nullptr) {
+            row = gradient<D>(*at.was);
+            rates.by_time[k] = input_part<D>(*at.was, r.input[1]);
             return;
         }
-        const auto* limit = limit_of(c, r);
-        rates.exact = rates.exact && limit != nullptr;
-        if (limit == nullptr) return;
-        const Components g = gradient<D>(*limit);
-        rates.by_time[k] = -input_part<D>(*limit, r.input[1]) / g[k];
+        rates.exact = rates.exact && at.limit >= 0;
+        if (at.limit < 0) return;
+        const LinearFormOf<D>& limit = r.after.guards[at.limit].form;
+        const Components g = gradient<D>(limit);
+        rates.by_time[k] = -input_part<D>(limit, r.input_after[1]) / g[k];
         for (int j = 0; j < component_count<D>; ++j) {
             if (j == k || g[j] == 0.0) continue;
             for (int i = 0; i < component_count<D>; ++i) row[i] -= g[j] / g[k] * jump.row[j][i];
             rates.by_time[k] -= g[j] / g[k] * rates.by_time[j];
         }
-    }
-    // The margin of a contact that the locked torque has used up.
-    const LinearFormOf<D>* limit_of(std::size_t c, const ResetOf<System>& r) const {
-        for (int g = 0; g < r.after.n_guards; ++g) {
-            const auto& guard = r.after.guards[g];
-            if (guard.kind != model::Guard::capacity) continue;
-            if (guard.form.c[D::first_memory + contacts()[c].locked] == 0.0) continue;
-            const StateOf<D>& x = r.switching.x;
-            const Memory& m = r.switching.memory;
-            if (std::fabs(evaluate<D>(guard.form, x, m, r.input_after)) <=
-                rounding * magnitude_of(guard.form, x, m, r.input_after))
-                return &guard.form;
-        }
-        return nullptr;
     }
     static double magnitude_of(const LinearFormOf<D>& f, const State& x, const Memory& m, const InputsOf<D>& u) {
         return lostmotion::magnitude<D>(f, x, m, u);

@@ -157,14 +157,15 @@ class ClosedLoopRun {
     }
 
     // The controllers at the start, with the drive at a state, and their first tick.
-    Status begin(const StateOf<D>& x, const typename D::Memory& memory) {
+    template <class Observer>
+    Status begin(const StateOf<D>& x, const typename D::Memory& memory, Observer& observer) {
         course_.next = 0;
         course_.slots.assign(static_cast<std::size_t>(loop_.slots()), 0.0);
         each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
             a.start(sample(p, x, memory, 0.0), loop_.ticks.length, slot);
             return true;
         });
-        if (!run_tick(x, memory)) return Status::controller;
+        if (!run_tick(x, memory, observer)) return Status::controller;
         each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double*) {
             if (a.field_orientation) solver_.set_ramp(p.input, 0.0, 0.0);
             return true;
@@ -185,7 +186,7 @@ class ClosedLoopRun {
                 if (status != Status::done || last) return status;
             }
             if (!flushed(observer)) return Status::interrupted;
-            if (!run_tick(solver_.state(), solver_.memory())) return Status::controller;
+            if (!run_tick(solver_.state(), solver_.memory(), observer)) return Status::controller;
             if (changed_)
                 if (const Status found = solver_.inputs_changed(observer); found != Status::done) return found;
         }
@@ -195,7 +196,7 @@ class ClosedLoopRun {
     Status show_end(Observer& observer) {
         if (loop_.ticks.before(solver_.time(), loop_.ticks.time(course_.next))) return Status::done;
         if (!flushed(observer)) return Status::interrupted;
-        return run_tick(solver_.state(), solver_.memory()) ? Status::done : Status::controller;
+        return run_tick(solver_.state(), solver_.memory(), observer) ? Status::done : Status::controller;
     }
 
  private:
@@ -277,7 +278,9 @@ class ClosedLoopRun {
         return true;
     }
     // All axes sample the same instant before any of them acts.
-    bool run_tick(const StateOf<D>& x, const typename D::Memory& memory) {
+    template <class Observer>
+    bool run_tick(const StateOf<D>& x, const typename D::Memory& memory, Observer& observer) {
+        if constexpr (requires { observer.tick(loop_, course_, x, memory); }) observer.tick(loop_, course_, x, memory);
         changed_ = course_.next == 0;
         const bool well = each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
             const double before =
@@ -316,11 +319,12 @@ Status run_recorded(Solver& solver, const StartOf<typename Solver::D>& start, co
     ClosedLoopRun<Solver> run(solver, loop);
     ControlRecord record(options.sample_interval, options.control_out == nullptr ? 0 : options.samples,
                          options.control.signals(), options.control_out);
-    const Status begun = run.begin(start.x, start.memory);
+    const Status begun = run.begin(start.x, start.memory, observer);
     if (begun != Status::done) return begun;
     const auto hold_until = [&](double end) { record.hold_until(end, loop, run.course()); };
     if (const Status s = run.advance(options.duration, observer, hold_until); s != Status::done) return s;
     const Status ended = run.show_end(observer);
+    if constexpr (requires { observer.finish(loop); }) observer.finish(loop);
     if (ended == Status::done) hold_until(std::numeric_limits<double>::infinity());
     return ended;
 }

@@ -141,7 +141,9 @@ void SimulationOf<System>::resume(Inputs& begin, Inputs& end, double interval) {
 
 template <class System>
 Status SimulationOf<System>::begin_motion() {
-    return controllers_ ? controllers_->begin(now_.x, now_.memory) : solver_.begin(now_.time, now_.x, now_.memory);
+    NoObserver nobody;
+    return controllers_ ? controllers_->begin(now_.x, now_.memory, nobody)
+                        : solver_.begin(now_.time, now_.x, now_.memory);
 }
 
 template <class System>

@@ -164,14 +164,32 @@ class TrainMeter {
     std::vector<model::PowerFlow::Kind> kinds_;
 };
 
+// What follows a run of the exact solver beside the record: each stretch of time, each switching, each tick of the
+// controllers before they compute.
+template <class D>
+class TrainWatcher {
+ public:
+    using System = model::TrainSystem<D>;
+
+    virtual ~TrainWatcher() = default;
+    virtual void begin(ExactSolver<System>& solver) = 0;
+    virtual void segment(const Segment<System>& s) = 0;
+    virtual void switching(const SwitchingOf<System>& s) = 0;
+    virtual void tick(const ClosedLoop<D>& loop, const ControlCourse& course, const StateOf<D>& x,
+                      const typename D::Memory& memory) = 0;
+    virtual void finish(const ClosedLoop<D>& loop) = 0;  // of controllers, at the end of the run
+};
+
 template <class D>
 class TrainRecorder {
  public:
     using System = model::TrainSystem<D>;
     using Model = typename TrainReader<D>::Model;
 
-    TrainRecorder(const Model& m, const TrainOptions& options, double* out, TrainReport& report)
-        : model_(m),
+    TrainRecorder(const Model& m, const TrainOptions& options, double* out, TrainReport& report,
+                  TrainWatcher<D>* watcher)
+        : watcher_(watcher),
+          model_(m),
           options_(options),
           out_(out),
           report_(report),
@@ -184,12 +202,22 @@ class TrainRecorder {
     }
 
     bool segment(const Segment<System>& s) {
+        if (watcher_ != nullptr) watcher_->segment(s);
         if (options_.energy) meter_.segment(s);
         return sampler_.segment(s);
     }
     bool flush() { return sampler_.write(); }
-    bool wants_switching() const { return report_.switchings.size() < options_.max_switchings; }
+    bool wants_switching() const { return watcher_ != nullptr || keeps_switching(); }
+    void tick(const ClosedLoop<D>& loop, const ControlCourse& course, const StateOf<D>& x,
+              const typename D::Memory& memory) {
+        if (watcher_ != nullptr) watcher_->tick(loop, course, x, memory);
+    }
+    void finish(const ClosedLoop<D>& loop) {
+        if (watcher_ != nullptr) watcher_->finish(loop);
+    }
     void switching(const SwitchingOf<System>& s) {
+        if (watcher_ != nullptr) watcher_->switching(s);
+        if (!keeps_switching()) return;
         int branch = -1;
         if (s.guard >= 0) {
             for (int b = 0; b < model_.assembly.layout().branches; ++b)
@@ -223,6 +251,9 @@ class TrainRecorder {
         return numbers;
     }
 
+    bool keeps_switching() const { return report_.switchings.size() < options_.max_switchings; }
+
+    TrainWatcher<D>* watcher_;
     const Model& model_;
     const TrainOptions& options_;
     double* out_;
@@ -274,11 +305,11 @@ inline Named named_end(const TrainReport& report, const model::Assembly& a) {
     return end;
 }
 
-// start: the states by the layout of the assembly, or nothing for rest.
+// start: the states by the layout of the assembly, or nothing for rest. watcher: of the exact solver, if any.
 template <class D>
 TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
                          std::span<const double> start, std::span<const double> memory, const TrainOptions& options,
-                         double* out) {
+                         double* out, TrainWatcher<D>* watcher = nullptr) {
     using System = model::TrainSystem<D>;
     const model::Assembly& a = model.assembly;
     const model::Layout& n = a.layout();
@@ -291,7 +322,7 @@ TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std:
         return a.places().motors[static_cast<std::size_t>(motor)].command;
     });
     const auto [x, m] = model::packed_start<D>(n, start, memory);
-    TrainRecorder<D> recorder(model, options, out, report);
+    TrainRecorder<D> recorder(model, options, out, report, watcher);
     const auto in_train = [&](const auto& laws) { return closed_loop_of<D>(a, options.control, laws); };
     const auto finish = [&](auto& solver) {
         report.ended(system, solver);
@@ -316,6 +347,7 @@ TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std:
         return report;
     }
     ExactSolver<System> solver(system, signals, options.sample_interval, system.balanced_scale());
+    if (watcher != nullptr) watcher->begin(solver);
     report.status = run_recorded(solver, {x, m}, options, recorder, in_train);
     recorder.end();
     report.steps = solver.event_checks();
@@ -347,6 +379,23 @@ TrainReport reach_train_in(const typename TrainReader<D>::Model& model, const st
     input.anchor(solver.time());
     point = point_of<D>(model, solver.regime(), solver.time(), solver.state(), solver.memory(), input.values());
     return report;
+}
+
+// States and memory by the layout of the assembly.
+inline std::pair<std::vector<double>, std::vector<double>> in_layout(const model::Assembly& a,
+                                                                     const TrainStart& start) {
+    std::vector<double> x, memory(static_cast<std::size_t>(a.layout().memory));
+    for (const std::string& name : model::state_names(a)) x.push_back(value_of(start.states, name));
+    const std::vector<model::Gear>& gears = a.train().gears;
+    for (std::size_t g = 0; g < gears.size(); ++g) {
+        const model::GearPlace& p = a.places().gears[g];
+        if (p.hysteresis == model::nowhere) continue;
+        memory[static_cast<std::size_t>(p.hysteresis)] = value_of(start.hysteresis_capacities, gears[g].name);
+        if (const int locked = a.places().contacts[static_cast<std::size_t>(p.contact)].locked;
+            locked != model::nowhere)
+            memory[static_cast<std::size_t>(locked)] = gears[g].law.curve.torque(x[static_cast<std::size_t>(p.twist)]);
+    }
+    return {x, memory};
 }
 
 // A train that has been checked and composed, in the narrowest kernel that holds it.
@@ -388,19 +437,7 @@ class TrainRun {
 
     // States and memory by the layout of the assembly.
     std::pair<std::vector<double>, std::vector<double>> in_layout(const TrainStart& start) const {
-        std::vector<double> x, memory(static_cast<std::size_t>(assembly_->layout().memory));
-        for (const std::string& name : model::state_names(*assembly_)) x.push_back(value_of(start.states, name));
-        const std::vector<model::Gear>& gears = assembly_->train().gears;
-        for (std::size_t g = 0; g < gears.size(); ++g) {
-            const model::GearPlace& p = assembly_->places().gears[g];
-            if (p.hysteresis == model::nowhere) continue;
-            memory[static_cast<std::size_t>(p.hysteresis)] = value_of(start.hysteresis_capacities, gears[g].name);
-            if (const int locked = assembly_->places().contacts[static_cast<std::size_t>(p.contact)].locked;
-                locked != model::nowhere)
-                memory[static_cast<std::size_t>(locked)] =
-                    gears[g].law.curve.torque(x[static_cast<std::size_t>(p.twist)]);
-        }
-        return {x, memory};
+        return lostmotion::in_layout(*assembly_, start);
     }
 
     // inputs: one signal each, as model::input_names. out: channels x samples, channel by channel.

@@ -57,8 +57,7 @@ struct ResetOf {
     const typename System::Regime &before, &after;
     const StateOf<D>& x;  // before it
     const typename D::Memory& memory;
-    const std::array<InputsOf<D>, 2>& input;  // values and rates, left limits
-    const InputsOf<D>& input_after;
+    const std::array<InputsOf<D>, 2>&input, &input_after;  // values and rates, left and right limits
 };
 
 // What a reset depends on.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -17,6 +18,7 @@ from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from .results import RawResult, raw_result
 from .scenario import Initial, LoadTable, Scenario, SimulationTable
+from .sensitivities import run_sensitivities
 from .train_results import run_train
 from .train_scenario import TrainScenario
 from .train_variables import axis_variables, train_variables
@@ -50,6 +52,7 @@ def simulate(
     relative_tolerance: Number | None = None,
     energy: bool = True,
     law: Any = None,
+    sensitivities: Sequence[str] | None = None,
 ) -> xarray.Dataset:
     """Simulate a drive, or a drive train.
 
@@ -74,6 +77,10 @@ def simulate(
         Whether to keep the energy ledger (it takes about as long as the motion).
     law
         The law of a controller with ``law = true``, a function or a `Law`; of several, by the names of their motors.
+    sensitivities
+        Keys of the scenario, such as ``load.inertia``: the derivative of each variable with respect to their values, exact
+        through switchings, as ``NAME_sensitivity`` over ``parameter`` and ``time``. NaN from an instant on at which it does
+        not exist; the attributes say when and why.
 
     Returns
     -------
@@ -102,7 +109,15 @@ def simulate(
         scenario = scenario_or_drive.replace(**new) if new else scenario_or_drive
     else:
         scenario = as_scenario(scenario_or_drive, **changes, **times)
-    return run(scenario, solver=solver, relative_tolerance=relative_tolerance, energy=energy, law=law).dataset()
+    result = run(scenario, solver=solver, relative_tolerance=relative_tolerance, energy=energy, law=law).dataset()
+    if sensitivities is None:
+        return result
+    if solver != "exact" or law is not None:
+        other = f"solver={solver!r}" if solver != "exact" else "law"
+        raise InputError(
+            f"sensitivities, {other}: derivatives are those of the exact solver, under controllers of the scenario"
+        )
+    return run_sensitivities(scenario, sensitivities).add_to(result)
 
 
 def run(

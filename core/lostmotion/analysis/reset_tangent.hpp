@@ -1,0 +1,122 @@
+// How what a switching sets anew depends on parameters, the motion up to it as it is: speeds that follow others, the
+// capacity of a hysteresis, torques that the motion leaves open, turns of angles.
+#pragma once
+
+#include <vector>
+
+#include "../model/components.hpp"
+#include "regime_tangent.hpp"
+
+namespace lostmotion {
+
+// Of the values that w stands for: a form, and its derivatives.
+class FormTangent {
+ public:
+    FormTangent(const model::Layout& n, const InputTangents& inputs) : n_(n), inputs_(inputs) {}
+
+    double value(const model::Row& f, const double* w) const {
+        double sum = 0.0;
+        inputs_.each_term([&](int at, int term) { sum += f.c[static_cast<std::size_t>(term)] * w[at]; });
+        return sum;
+    }
+    // to[p] += factor * (df/dp as far as the form itself changes)
+    void add_own(const Varied& forms, int row, const double* w, double factor, double* to) const {
+        inputs_.each_term([&](int at, int term) {
+            if (w[at] != 0.0) add_scaled(to, factor * w[at], forms.at(row, term), inputs_.parameters());
+        });
+    }
+    // to[p] += factor * (df/dp as far as what it depends on changes)
+    void add_motion(const model::Row& f, const double* derivative, double factor, double* to) const {
+        inputs_.each_term([&](int at, int term) { add_term(f, at, term, derivative, factor, to); });
+    }
+    // The same of the inputs alone.
+    void add_inputs(const model::Row& f, const double* derivative, double factor, double* to) const {
+        inputs_.each_term([&](int at, int term) {
+            if (term >= n_.first_input) add_term(f, at, term, derivative, factor, to);
+        });
+    }
+
+ private:
+    void add_term(const model::Row& f, int at, int term, const double* derivative, double factor, double* to) const {
+        const int P = inputs_.parameters();
+        if (const double c = f.c[static_cast<std::size_t>(term)]; c != 0.0)
+            add_scaled(to, factor * c, derivative + at * P, P);
+    }
+
+    const model::Layout& n_;
+    const InputTangents& inputs_;
+};
+
+// Derivatives of the states and of the memory after a switching, by the places of w; see ComponentLaws::reset for those
+// with respect to what they were.
+class ResetTangent {
+ public:
+    ResetTangent(const VariedTrain& trains, const FormTangent& form, int parameters)
+        : trains_(trains), form_(form), parameters_(parameters) {}
+
+    // Speeds that the contacts at rest tie to others. x: of before.
+    void tied_speeds(const std::int8_t* modes, const double* x, double* to) const {
+        const model::Assembly& a = trains_.base();
+        const model::Ties ties = tie(a, modes);
+        for (const auto& b : trains_.beside()) {
+            const model::Ties other = tie(b->assembly, modes);
+            for (std::size_t s = 0; s < a.train().shafts.size(); ++s) {
+                if (!ties.follows(static_cast<int>(s)) || ties.free[s] != other.free[s]) continue;
+                double& sum = to[a.places().shafts[s].speed * parameters_ + b->parameter];
+                ties.each_share(static_cast<int>(s), [&](int k, double share) {
+                    sum += b->weight * (other.share[s][static_cast<std::size_t>(k)] - share) *
+                           x[a.places().shafts[static_cast<std::size_t>(k)].speed];
+                });
+            }
+        }
+    }
+    // At a turning point of the twist of a gear.
+    void capacity(std::size_t gear, double twist, double* to) const {
+        const model::Assembly& a = trains_.base();
+        const int row = a.layout().first_memory + a.places().gears[gear].hysteresis;
+        const double own = a.train().gears[gear].law.hysteresis_capacity(twist);
+        for (const auto& b : trains_.beside())
+            to[row * parameters_ + b->parameter] +=
+                b->weight * (b->assembly.train().gears[gear].law.hysteresis_capacity(twist) - own);
+    }
+    // Where an angle begins another turn.
+    void turn(const RegimeTangent& before, std::size_t guard, double* to) const {
+        const model::Guard& g = before.regime.guards[guard];
+        if (g.memory == model::nowhere) return;
+        const int row = trains_.base().layout().first_memory + g.memory;
+        for (std::size_t k = 0; k < before.beside.size() && before.alike; ++k) {
+            const auto& b = *trains_.beside()[k];
+            to[row * parameters_ + b.parameter] += b.weight * (before.beside[k].guards[guard].shift - g.shift);
+        }
+    }
+    // A locked torque that keeps the value of a form.
+    void kept(int row, const model::Row& was, const Varied& forms, int at, const double* w, const double* derivative,
+              double* to) const {
+        form_.add_own(forms, at, w, 1.0, to + row * parameters_);
+        form_.add_inputs(was, derivative, 1.0, to + row * parameters_);
+    }
+    // One that has used up a margin: of what is set anew beside it, `to` has the derivatives already.
+    void at_limit(int row, const model::Row& limit, const Varied& forms, int at, const double* w,
+                  const double* derivative, double* to) const {
+        const model::Layout& n = trains_.base().layout();
+        const double own = limit.c[static_cast<std::size_t>(row)];
+        double* out = to + row * parameters_;
+        std::fill_n(out, parameters_, 0.0);
+        form_.add_own(forms, at, w, -1.0 / own, out);
+        form_.add_inputs(limit, derivative, -1.0 / own, out);
+        for (int k = 0; k < n.first_input; ++k)
+            if (k != row && limit.c[static_cast<std::size_t>(k)] != 0.0)
+                add_scaled(out, -limit.c[static_cast<std::size_t>(k)] / own, to + k * parameters_, parameters_);
+    }
+
+ private:
+    static model::Ties tie(const model::Assembly& a, const std::int8_t* modes) {
+        return model::tie(a.places().contacts, static_cast<int>(a.train().shafts.size()), modes);
+    }
+
+    const VariedTrain& trains_;
+    const FormTangent& form_;
+    int parameters_;
+};
+
+}  // namespace lostmotion

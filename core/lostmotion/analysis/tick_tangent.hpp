@@ -1,0 +1,219 @@
+// How what sampled controllers remember and command depends on parameters.
+//
+// What a tick makes of their numbers s, of what they measure y and of their own parameters is a smooth function but for
+// limits and rounding to whole increments. Its derivative is found by differences along ds/dp, dy/dp and the parameter
+// at once: of four values beside, those that no limit parts from the present one. What an encoder of finite resolution
+// reads does not depend on anything but at single instants: its derivative is 0.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "reset_tangent.hpp"
+
+namespace lostmotion {
+
+// df/dp from f at p - 2h, p - h, p, p + h, p + 2h; where one side is parted by a limit, from the other. False if both
+// are, by more than `noise`.
+inline bool difference_beside_limits(const std::array<double, 5>& f, double h, double noise, double& derivative) {
+    const double left = f[2] - 2.0 * f[1] + f[0], middle = f[3] - 2.0 * f[2] + f[1], right = f[4] - 2.0 * f[3] + f[2];
+    double size = 0.0, course = 0.0;
+    for (const double v : f) {
+        size = std::fmax(size, std::fabs(v));
+        course = std::fmax(course, std::fabs(v - f[2]));
+    }
+    const double alike = 1e-4 * course + 2e-13 * size + 1e-2 * std::fabs(middle);
+    if (std::fabs(middle - left) <= alike && std::fabs(right - middle) <= alike) {
+        derivative = (8.0 * (f[3] - f[1]) - (f[4] - f[0])) / (12.0 * h);
+        return true;
+    }
+    const bool to_left = std::fabs(left) < std::fabs(right);
+    derivative = to_left ? (3.0 * f[2] - 4.0 * f[1] + f[0]) / (2.0 * h) : (-3.0 * f[2] + 4.0 * f[3] - f[4]) / (2.0 * h);
+    return std::fmin(std::fabs(left), std::fabs(right)) <= 1e-2 * course + noise;
+}
+
+class TickTangent {
+ public:
+    TickTangent(int parameters, const std::vector<Variation>& variations, const Control& control)
+        : parameters_(parameters), variations_(variations), control_(control) {}
+
+    const std::string& error() const { return error_; }
+
+    // A tick that the controllers are about to run. w, derivative: as in InputTangents.
+    template <class D>
+    void step(const ClosedLoop<D>& loop, const ControlCourse& course, const FormTangent& form,
+              const VariedTrain& trains, const double* w, const double* derivative) {
+        if (beside_.empty()) place<D>(loop, trains);
+        const double time = loop.ticks.time(course.next);
+        int first = 0;
+        for (std::size_t a = 0; a < loop.axes.size(); ++a) {
+            const control::Axis& law = loop.axes[a];
+            const double* slots = course.slots.data() + first;
+            measure(a, law, form, w, derivative, time);
+            if (course.next == 0)
+                vary(a, first, law.slots(), law, slots,
+                     [&](const control::Axis& l, const control::Sampled& y, double* s) {
+                         l.start(y, loop.ticks.length, s);
+                     });
+            vary(a, first, law.slots(), law, slots, [&](const control::Axis& l, const control::Sampled& y, double* s) {
+                l.step(course.next, loop.ticks.length, y, s);
+            });
+            double* own = now_.data();
+            std::copy_n(slots, law.slots(), own);
+            law.step(course.next, loop.ticks.length, measured_, own);
+            commands_[a].value = law.command(own);
+            std::copy_n(&slots_[static_cast<std::size_t>((first + law.command_slot()) * parameters_)], parameters_,
+                        commands_[a].derivative.begin());
+            first += law.slots();
+        }
+    }
+    // The inputs that they give.
+    void hold(const InputTangents& inputs, double* w, double* derivative) const {
+        for (const Command& c : commands_) inputs.hold(c.input, c.value, c.derivative.data(), w, derivative);
+    }
+    // Derivatives of a signal of an axis whose numbers begin at `first`.
+    const double* signal(int first, int s) const {
+        return &slots_[static_cast<std::size_t>((first + s) * parameters_)];
+    }
+    bool begun() const { return !beside_.empty(); }
+
+ private:
+    static constexpr int n_measured = 7;
+    static constexpr double shrink = 0x1p-6;  // of a step that only the motion takes, so that few limits lie within
+    struct Command {
+        int input;
+        double value = 0.0;
+        std::vector<double> derivative;
+    };
+    using Forms = std::array<model::Row, n_measured>;
+    // At another value of a parameter.
+    struct Beside {
+        double offset, weight;
+        std::vector<control::Axis> laws;  // none: the same
+        std::vector<Forms> forms;         // of each axis; none: the same
+    };
+
+    template <class D>
+    static model::Row unpacked(const LinearFormOf<D>& f, const model::Layout& n) {
+        model::Row out;
+        std::copy_n(f.c.begin(), n.coupled, out.c.begin());
+        std::copy_n(f.c.begin() + D::coupled, n.angles, out.c.begin() + n.coupled);
+        out.c[static_cast<std::size_t>(n.one)] = f.c[D::one];
+        std::copy_n(f.c.begin() + D::first_memory, n.memory, out.c.begin() + n.first_memory);
+        std::copy_n(f.c.begin() + D::first_input, n.inputs, out.c.begin() + n.first_input);
+        return out;
+    }
+    template <class D>
+    static std::vector<Forms> forms_of(const ClosedLoop<D>& loop, const model::Layout& n) {
+        std::vector<Forms> out;
+        for (const AxisPlace<D>& p : loop.places) {
+            Forms& f = out.emplace_back();
+            int k = 0;
+            for (const auto* form : {&p.position_angle, &p.speed_angle, &p.speed, &p.motor_torque, &p.rotor_angle,
+                                     &p.rotor_speed, &p.shaft_angle})
+                f[static_cast<std::size_t>(k++)] = unpacked<D>(*form, n);
+        }
+        return out;
+    }
+    template <class D>
+    void place(const ClosedLoop<D>& loop, const VariedTrain& trains) {
+        const model::Layout& n = trains.base().layout();
+        forms_ = forms_of(loop, n);
+        auto beside = trains.beside().begin();
+        for (const Variation& v : variations_) {
+            std::vector<Beside>& all = beside_.emplace_back();
+            for (const Neighbour& at : v.neighbours) {
+                Beside& b = all.emplace_back(Beside{at.offset, at.weight, {}, {}});
+                if (at.control) b.laws = at.control->laws();
+                if (at.train) b.forms = forms_of(closed_loop_of<D>((*beside++)->assembly, control_, {}), n);
+            }
+        }
+        for (const AxisPlace<D>& p : loop.places)
+            commands_.push_back({p.input, 0.0, std::vector<double>(static_cast<std::size_t>(parameters_))});
+        slots_.resize(static_cast<std::size_t>(loop.slots() * parameters_));
+        measured_derivative_.resize(static_cast<std::size_t>(n_measured * parameters_));
+        for (auto* room : {&now_, &at_}) room->resize(static_cast<std::size_t>(loop.slots()));
+    }
+
+    // What an axis measures, and its derivatives.
+    void measure(std::size_t a, const control::Axis& law, const FormTangent& form, const double* w,
+                 const double* derivative, double time) {
+        std::array<double, n_measured> y;
+        std::fill(measured_derivative_.begin(), measured_derivative_.end(), 0.0);
+        for (int k = 0; k < n_measured; ++k) {
+            const model::Row& f = forms_[a][static_cast<std::size_t>(k)];
+            y[static_cast<std::size_t>(k)] = form.value(f, w);
+            const control::Encoder& encoder =
+                k == 0 && law.two_encoders ? law.position_sensor.encoder : law.speed_sensor.encoder;
+            if (k < 2 && encoder.resolution > 0.0) continue;
+            double* to = &measured_derivative_[static_cast<std::size_t>(k * parameters_)];
+            form.add_motion(f, derivative, 1.0, to);
+            for (int p = 0; p < parameters_; ++p)
+                for (const Beside& b : beside_[static_cast<std::size_t>(p)])
+                    if (!b.forms.empty())
+                        to[p] += b.weight * (form.value(b.forms[a][static_cast<std::size_t>(k)], w) -
+                                             y[static_cast<std::size_t>(k)]);
+        }
+        measured_ = {y[0], y[1], y[2], y[3], y[4], y[5], y[6], time};
+    }
+    control::Sampled measured(int p, double offset) const {
+        const auto d = [&](int k) {
+            return offset * measured_derivative_[static_cast<std::size_t>(k * parameters_ + p)];
+        };
+        const control::Sampled& y = measured_;
+        return {y.position_angle + d(0), y.speed_angle + d(1), y.speed + d(2),       y.motor_torque + d(3),
+                y.rotor_angle + d(4),    y.rotor_speed + d(5), y.shaft_angle + d(6), y.time};
+    }
+
+    // Derivatives of what `act` makes of the numbers of an axis.
+    template <class Act>
+    void vary(std::size_t a, int first, int count, const control::Axis& law, const double* slots, const Act& act) {
+        std::copy_n(slots, count, now_.begin());
+        act(law, measured_, now_.data());
+        double noise = 0.0;  // of what small numbers are differences of large ones
+        for (int k = 0; k < count; ++k) noise = std::fmax(noise, 1e-10 * std::fabs(slots[k]));
+        for (int p = 0; p < parameters_; ++p) {
+            const std::vector<Beside>& all = beside_[static_cast<std::size_t>(p)];
+            const bool own = std::any_of(all.begin(), all.end(), [](const Beside& b) { return !b.laws.empty(); });
+            const double factor = own ? 1.0 : shrink;
+            const bool central = all.size() == 4 && all[0].offset < 0.0 && all[3].offset > 0.0;
+            values_.assign(static_cast<std::size_t>(5 * count), 0.0);
+            for (std::size_t j = 0; j < all.size(); ++j) {
+                const double offset = factor * all[j].offset;
+                for (int k = 0; k < count; ++k)
+                    at_[static_cast<std::size_t>(k)] =
+                        slots[k] + offset * slots_[static_cast<std::size_t>((first + k) * parameters_ + p)];
+                act(all[j].laws.empty() ? law : all[j].laws[a], measured(p, offset), at_.data());
+                for (int k = 0; k < count; ++k)
+                    values_[static_cast<std::size_t>(5 * k) + j + (central && j > 1 ? 1 : 0)] =
+                        at_[static_cast<std::size_t>(k)];
+            }
+            for (int k = 0; k < count; ++k) {
+                double& out = slots_[static_cast<std::size_t>((first + k) * parameters_ + p)];
+                double* f = &values_[static_cast<std::size_t>(5 * k)];
+                const double here = now_[static_cast<std::size_t>(k)];
+                out = 0.0;
+                if (!central) {
+                    for (std::size_t j = 0; j < all.size(); ++j) out += all[j].weight / factor * (f[j] - here);
+                    continue;
+                }
+                if (!difference_beside_limits({f[0], f[1], here, f[3], f[4]}, factor * all[2].offset, noise, out))
+                    error_ = "a limit of a controller that it only touches";
+            }
+        }
+    }
+
+    int parameters_;
+    const std::vector<Variation>& variations_;
+    const Control& control_;
+    std::vector<Forms> forms_;
+    std::vector<std::vector<Beside>> beside_;
+    std::vector<Command> commands_;
+    std::vector<double> slots_;  // derivatives of the numbers of all axes
+    control::Sampled measured_;
+    std::vector<double> measured_derivative_, now_, at_, values_;
+    std::string error_;
+};
+
+}  // namespace lostmotion

@@ -1,0 +1,59 @@
+// Derivatives of runs with respect to parameters, through switchings and under controllers.
+#include <doctest/doctest.h>
+
+#include "random_sensitivities.hpp"
+
+TEST_SUITE_BEGIN("sensitivity");
+
+namespace lostmotion::model {
+
+// Differences of a run are rounded to some 1e-12 of its values over the step; where two steps agree to 1e-8, so must
+// they with the derivative.
+SensitivityTally compare_random(unsigned seed, int trains, bool closed_loop) {
+    SensitivityTally tally;
+    for (int n = 0; n < trains; ++n) {
+        CAPTURE(n);
+        RandomTrains random(seed + static_cast<unsigned>(n));
+        const SensitiveCase c = random_case(random, 5, 0.3, closed_loop);
+        compare_sensitivities(c, some_knobs(random, c, 1), 0.3, tally, 1e-8, "differs");
+    }
+    return tally;
+}
+
+TEST_CASE("derivatives of 300 random trains are those of differences of their runs") {
+    const SensitivityTally open = compare_random(5000, 200, false), closed = compare_random(7000, 100, true);
+    const long compared = open.compared + closed.compared, switchings = open.switchings + closed.switchings;
+    const double worst = std::fmax(open.worst, closed.worst);
+    MESSAGE(compared << " numbers compared, " << switchings << " switchings, largest difference " << worst);
+    CHECK(open.failed_runs + closed.failed_runs == 0);
+    CHECK(open.wrong + closed.wrong == 0);
+    CHECK(open.ended + closed.ended < 10);
+    CHECK(open.compared > 10000);
+    CHECK(closed.compared > 5000);
+}
+
+// x' = -a x + u from rest: dx/da and dx/du are known, also where exp(-a h) is lost in 1.
+TEST_CASE("the derivative of an exponential, over nine decades of time") {
+    for (const double a : {1e-6, 1.0, 1e3}) {
+        for (const double t : {1e-6, 1.0, 1e3}) {
+            Varied dM(2, 2, 2);
+            dM.at(0, 0)[0] = -1.0;  // by a
+            dM.at(0, 1)[1] = 1.0;   // by u
+            TangentPropagator propagator;
+            propagator.prepare(2, 1, 1, {-a, 3.0, 0.0, 0.0}, dM, 0.25 / std::fmax(a, 1.0));
+            std::vector<double> w{0.0, 1.0}, derivative(4);
+            propagator.advance(w.data(), derivative.data(), t);
+            const double e = std::expm1(-a * t);
+            CHECK(w[0] == doctest::Approx(-3.0 * e / a).epsilon(1e-12));
+            CHECK(derivative[1] == doctest::Approx(-e / a).epsilon(1e-12));
+            const double z = a * t;  // 1 - (1 + z) exp(-z), by its series where that cancels
+            const double by_a = z < 1e-2 ? z * z * (0.5 - z * (1.0 / 3.0 - z * (0.125 - z * (1.0 / 30.0 - z / 144.0))))
+                                         : 1.0 - (1.0 + z) * std::exp(-z);
+            CHECK(derivative[0] == doctest::Approx(-3.0 * by_a / (a * a)).epsilon(1e-11));
+        }
+    }
+}
+
+}  // namespace lostmotion::model
+
+TEST_SUITE_END();

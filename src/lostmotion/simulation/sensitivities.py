@@ -1,0 +1,301 @@
+"""Derivatives of runs with respect to values of their scenarios.
+
+The core propagates them exactly. What it needs of a parameter is how its own numbers change with it; these follow from the
+scenario by smooth formulas, of which the derivative is found by differences of fourth order.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import _core
+from ..control.axis import Bound
+from ..errors import InputError
+from ..inputs.validation import shown
+from .keys import list_index
+from .results import add_derived
+from .scenario import Scenario
+from .train_results import add_derived_of_train, core_case
+from .train_scenario import TrainScenario, in_long_form
+from .train_variables import axis_variables, named_signals
+
+if TYPE_CHECKING:
+    import xarray
+
+STEP = 2.0**-11  # of a value, relative: h^4 and the rounding of a difference over h are about 1e-12 of it
+STEP_AT_ZERO = 2.0**-11  # in SI units
+# Multiples of the step, and the weights of f(p + k h) - f(p), over h.
+CENTRAL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))
+ONE_SIDED = ((1, 4.0), (2, -3.0), (3, 4 / 3), (4, -1 / 4))
+
+SUFFIX = "_sensitivity"
+ENDS_AT, ENDS_BY = "sensitivities_end_at", "sensitivities_end_by"
+
+# The variables of a drive by those of the same drive as a train.
+OF_DRIVE = {
+    "motor_command": "command",
+    "load_load_torque": "load_torque",
+    "motor_torque": "motor_torque",
+    "motor_speed": "motor_speed",
+    "load_speed": "load_speed",
+    "load_angle": "load_angle",
+    "gearbox_twist": "twist",
+    "gearbox_output_torque": "output_torque",
+    "gearbox_input_torque": "input_torque",
+}
+
+AnyScenario = Scenario | TrainScenario
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """A scenario at another value of a parameter."""
+
+    offset: float
+    """of the value [SI unit]"""
+    weight: float
+    """df/dp = sum of weight (f - f at the value itself)"""
+    scenario: AnyScenario
+
+
+def value_at(scenario: AnyScenario, key: str) -> float:
+    """The number under a dotted key; 0 where a start or a command is left out.
+
+    Raises
+    ------
+    InputError
+        There is no number.
+    """
+    node: Any = scenario.model_dump()
+    for part in key.split("."):
+        try:
+            node = node[list_index(node, part)] if isinstance(node, list | tuple) else node[part]
+        except (KeyError, TypeError, ValueError):
+            node = None
+            break
+    if isinstance(node, Mapping) and "mean" in node:
+        node = node["mean"]
+    if node is None and key.partition(".")[0] in ("initial", "command"):
+        node = 0.0
+    if isinstance(node, bool) or not isinstance(node, int | float):
+        has = "has nothing of that name" if node is None else f"has {shown(node)} there"
+        raise InputError(
+            f"sensitivities: {key}: the scenario {has}, and a derivative needs a number; give its key and a value"
+        )
+    return float(node)
+
+
+def neighbours(scenario: AnyScenario, key: str) -> list[Neighbour]:
+    """Scenarios beside a value: on both sides of it or, at an end of its range, on one.
+
+    Raises
+    ------
+    InputError
+        There are none.
+    """
+    value = value_at(scenario, key)
+    step = STEP * abs(value) or STEP_AT_ZERO
+    name = f"{key}.mean" if _is_signal(scenario, key) else key
+    problem: InputError | None = None
+    for sign, stencil in ((1, CENTRAL), (1, ONE_SIDED), (-1, ONE_SIDED)):
+        h = sign * step
+        try:
+            return [Neighbour(k * h, weight / h, scenario.replace(**{name: value + k * h})) for k, weight in stencil]
+        except InputError as error:
+            problem = problem or error
+    raise InputError(f"sensitivities: {key}: cannot be varied about its value {value:g}: {problem}")
+
+
+def _is_signal(scenario: AnyScenario, key: str) -> bool:
+    node: Any = scenario.model_dump()
+    for part in key.split("."):
+        node = node.get(part) if isinstance(node, Mapping) else None
+    return isinstance(node, Mapping) and "mean" in node
+
+
+def as_train(scenario: AnyScenario) -> TrainScenario:
+    """A scenario in the long form, in which the core takes derivatives."""
+    return in_long_form(scenario) if isinstance(scenario, Scenario) else scenario
+
+
+_INPUT = re.compile(r"(command|(load|shafts\.[^.]+)\.torque)(\..*)?")
+
+
+def core_variation(scenario: TrainScenario, key: str, beside: Sequence[Neighbour]) -> tuple[str, list[Any]]:
+    """A parameter as the core takes it: of its neighbours what may differ from the scenario itself."""
+    of_start, of_inputs = key.startswith("initial."), _INPUT.fullmatch(key) is not None
+    out = []
+    for n in beside:
+        other = as_train(n.scenario)
+        core, inputs, start, capacities = core_case(other)
+        control = other.control() if scenario.controllers and not (of_start or of_inputs) else None
+        train = None if of_start or of_inputs else core
+        out.append((n.offset, n.weight, train, None if of_start else inputs, (start, capacities), control))
+    return key, out
+
+
+def sensitive_case(scenario: TrainScenario, variations: Sequence[Any], control: Bound) -> tuple[Any, ...]:
+    """A run as the core takes it."""
+    core, inputs, start, capacities = core_case(scenario)
+    table = scenario.simulation
+    return (
+        core,
+        inputs,
+        start,
+        capacities,
+        control,
+        list(variations),
+        table.duration,
+        table.sample_interval,
+        table.samples,
+    )
+
+
+def channels_of(core: _core.Train) -> list[str]:
+    """Names of the channels that have a derivative: all but the modes of the contacts."""
+    modes = set(core.contact_names())
+    return [name for name, _, _ in core.channels() if name not in modes]
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """Derivatives of the result variables of a run."""
+
+    parameters: tuple[str, ...]
+    values: dict[str, np.ndarray]
+    """by result variable: parameters x instants"""
+    ends_at: float
+    """from when on they do not exist [s]; infinite if they do throughout"""
+    ends_by: str
+
+    def add_to(self, result: xarray.Dataset) -> xarray.Dataset:
+        """The dataset with a variable NAME_sensitivity over parameter and time for each of its variables."""
+        new = {
+            f"{name}{SUFFIX}": (
+                ("parameter", "time"),
+                rows,
+                {
+                    "units": f"{result[name].attrs.get('units', '1')} per SI unit of the parameter",
+                    "long_name": f"derivative of {name} with respect to each parameter",
+                },
+            )
+            for name, rows in self.values.items()
+        }
+        out = result.assign(new).assign_coords(parameter=("parameter", list(self.parameters)))
+        if self.ends_by:
+            out.attrs |= {ENDS_AT: self.ends_at, ENDS_BY: self.ends_by}
+        return out
+
+
+@dataclass(frozen=True)
+class CoreDerivatives:
+    """What the core returns of one run."""
+
+    values: np.ndarray
+    """channels x instants"""
+    derivatives: np.ndarray
+    """parameters x channels x instants"""
+    signals: np.ndarray
+    """axes x signals x instants, of the controllers"""
+    signal_derivatives: np.ndarray
+    """parameters x axes x signals x instants"""
+    ends_at: float
+    """[s] from when on there are no derivatives; infinite if there are throughout"""
+    ends_by: str
+    error: str
+    """why the motion has no continuation; then there are no values"""
+
+
+def run_cases(cases: Sequence[tuple[Any, ...]], channels: Sequence[str], threads: int = 1) -> list[CoreDerivatives]:
+    """Runs with their derivatives, each as `sensitive_case` gives it, on several threads.
+
+    Raises
+    ------
+    InputError
+        What one of them asks for has no derivative.
+    """
+    out = []
+    for found in _core.run_sensitive_trains(list(cases), list(channels), threads):
+        problem, error, values, derivatives, signals, signal_derivatives, ends_at, ends_by = found
+        if problem:
+            raise InputError(f"sensitivities: {problem}")
+        out.append(CoreDerivatives(values, derivatives, signals, signal_derivatives, ends_at, ends_by, error))
+    return out
+
+
+def run_sensitivities(scenario: AnyScenario, keys: Sequence[str]) -> Sensitivities:
+    """The derivatives of all result variables of a run with respect to values of its scenario.
+
+    Raises
+    ------
+    InputError
+        A key names no number that can be varied, or the scenario has what has no derivative.
+    SolverError
+        The motion has no continuation.
+    """
+    keys = list(keys)
+    if not keys or len(set(keys)) < len(keys):
+        raise InputError(f"sensitivities: {shown(keys)}; give keys of the scenario, such as load.inertia, each once")
+    beside = {key: neighbours(scenario, key) for key in keys}
+    train = as_train(scenario)
+    variations = [core_variation(train, key, beside[key]) for key in keys]
+    channels = channels_of(train.core())
+    (found,) = run_cases([sensitive_case(train, variations, train.control())], channels)
+    if found.error:
+        raise _core.SolverError(found.error)
+    names = _own_names(scenario, train)
+    data = {names[c]: v for c, v in zip(channels, found.values, strict=True) if c in names}
+    derivatives = {names[c]: found.derivatives[:, k, :] for k, c in enumerate(channels) if c in names}
+    data |= {names[c]: v for c, v in named_signals(train.axes(), found.signals).items()}
+    for name, of_parameter in _of_signals(train, found.signal_derivatives).items():
+        derivatives[names[name]] = of_parameter
+    _add_derived(scenario, data, derivatives, [beside[key] for key in keys])
+    return Sensitivities(tuple(keys), derivatives, found.ends_at, found.ends_by)
+
+
+def _own_names(scenario: AnyScenario, train: TrainScenario) -> dict[str, str]:
+    """What the scenario calls the variables of its train; of a drive, those of them that it has."""
+    signals = [variable.name for variable in axis_variables(train.axes())]
+    if isinstance(scenario, TrainScenario):
+        return {name: name for name in (*channels_of(train.core()), *signals)}
+    return OF_DRIVE | {name: name.removeprefix("motor_") for name in signals}
+
+
+def _of_signals(train: TrainScenario, signals: np.ndarray) -> dict[str, np.ndarray]:
+    rows = [named_signals(train.axes(), of_parameter) for of_parameter in signals]
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+def _add_derived(
+    scenario: AnyScenario,
+    data: dict[str, np.ndarray],
+    derivatives: dict[str, np.ndarray],
+    beside: Sequence[Sequence[Neighbour]],
+) -> None:
+    """Adds the variables that follow from those of the solver, by differences along the derivatives of these."""
+    read = dict(derivatives)
+    here = _derived(scenario, data)
+    for name, values in here.items():
+        derivatives[name] = np.zeros((len(beside), len(values)))
+    for p, all_beside in enumerate(beside):
+        for n in all_beside:
+            there = _derived(n.scenario, {name: v + n.offset * read[name][p] for name, v in data.items()})
+            for name, values in here.items():
+                derivatives[name][p] += n.weight * (there[name] - values)
+
+
+def _derived(scenario: AnyScenario, data: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Those variables alone."""
+    out = dict(data)
+    some = next(iter(data.values()))
+    if isinstance(scenario, TrainScenario):
+        add_derived_of_train(scenario.train(), out, some)
+    else:
+        out.setdefault("twist", np.zeros_like(some))
+        add_derived(out, scenario.gearbox.ratio)
+    return {name: v for name, v in out.items() if name not in data}

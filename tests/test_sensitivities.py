@@ -1,0 +1,125 @@
+"""Derivatives of runs with respect to values of their scenarios: closed forms, differences of the runs themselves, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from refusals import refused
+
+# Of closed forms: the core's differences of its own numbers are good to 1e-11, what follows is rounding.
+EXACT = 1e-10
+
+
+def shaft(command: object, **values: float) -> lm.TrainScenario:
+    """One shaft of 0.02 kg m2, turned by a torque source of 2 N m for command 1, for one second."""
+    return lm.TrainScenario(
+        shafts={"table": {"inertia": 0.02, **values}},
+        motors={"motor": {"shaft": "table", "kind": "torque_source", "rated_torque": 2.0, "rotor_inertia": 0.0}},
+        command={"motor": command},
+        simulation={"duration": 1.0, "sample_interval": 0.01},
+    )
+
+
+def derivative(result: object, variable: str, parameter: str) -> np.ndarray:
+    return result[f"{variable}_sensitivity"].sel(parameter=parameter).to_numpy()
+
+
+def differences(scenario: lm.TrainScenario | lm.Scenario, key: str, value: float) -> dict[str, np.ndarray]:
+    """Central differences of sixth order."""
+    h = 2.0**-11 * value
+    weights = {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}
+    sums: dict[str, np.ndarray] = {}
+    for k, weight in weights.items():
+        up, down = (lm.simulate(scenario.replace(**{key: value + s * k * h}), energy=False) for s in (1, -1))
+        for name in up.data_vars:
+            sums[name] = sums.get(name, 0.0) + weight / h * (up[name] - down[name]).to_numpy()
+    return sums
+
+
+def check_against_differences(scenario: lm.TrainScenario | lm.Scenario, values: dict[str, float], near: float) -> None:
+    """Where the variables are smooth: at a tenth of the instants a switching may lie between the runs beside."""
+    result = lm.simulate(scenario, sensitivities=list(values))
+    assert "sensitivities_end_by" not in result.attrs
+    for key, value in values.items():
+        wanted = differences(scenario, key, value)
+        for name in wanted:
+            if f"{name}_sensitivity" not in result:
+                continue
+            got = derivative(result, name, key)
+            gap = np.abs(got - wanted[name])
+            size = max(np.nanmax(np.abs(got), initial=0.0), 1e-4 * np.nanmax(np.abs(result[name]), initial=0.0) / value)
+            assert np.nanquantile(gap, 0.9, method="lower") <= near * size, (key, name)
+
+
+def test_an_inertia_that_a_constant_torque_turns() -> None:
+    result = lm.simulate(
+        shaft(0.5), sensitivities=["shafts.table.inertia", "command.motor", "motors.motor.rated_torque"]
+    )
+    t, J, M = result.time.to_numpy(), 0.02, 1.0
+    by_inertia = derivative(result, "table_angle", "shafts.table.inertia")
+    assert by_inertia == pytest.approx(-M * t**2 / (2 * J**2), rel=EXACT)
+    assert derivative(result, "table_speed", "command.motor") == pytest.approx(2.0 * t / J, rel=EXACT)
+    assert derivative(result, "table_speed", "motors.motor.rated_torque") == pytest.approx(0.5 * t / J, rel=EXACT)
+
+
+def test_the_instant_of_break_away_shifts_with_the_friction() -> None:
+    J, T_f, rate = 0.02, 0.3, 2.0
+    ramp = {"ramps": [{"rise": 1.0, "duration": 1.0}]}
+    scenario = shaft(ramp, friction_torque=T_f)
+    result = lm.simulate(scenario, sensitivities=["shafts.table.friction_torque"])
+    slipping = np.maximum(result.time.to_numpy() - T_f / rate, 0.0)  # since it has broken away
+    assert result.table_angle.to_numpy() == pytest.approx(rate * slipping**3 / (6 * J), rel=1e-12, abs=1e-12)
+    got = derivative(result, "table_angle", "shafts.table.friction_torque")
+    assert got == pytest.approx(-(slipping**2) / (2 * J), rel=1e-9, abs=1e-9)
+    got = derivative(result, "table_speed", "shafts.table.friction_torque")
+    assert got == pytest.approx(-slipping / J, rel=1e-9, abs=1e-9)
+
+
+def test_where_a_shaft_stops_depends_on_its_speed_friction_and_inertia() -> None:
+    J, T_f, w = 0.02, 0.3, 5.0
+    scenario = shaft(0.0, friction_torque=T_f).replace(**{"initial.speeds.table": w})
+    keys = ["initial.speeds.table", "shafts.table.friction_torque", "shafts.table.inertia"]
+    result = lm.simulate(scenario, sensitivities=keys)
+    assert result.table_angle[-1] == pytest.approx(J * w**2 / (2 * T_f), rel=1e-12)
+    wanted = (J * w / T_f, -J * w**2 / (2 * T_f**2), w**2 / (2 * T_f))
+    for key, value in zip(keys, wanted, strict=True):
+        assert derivative(result, "table_angle", key)[-1] == pytest.approx(value, rel=EXACT)
+        assert derivative(result, "table_speed", key)[-1] == 0.0
+
+
+def test_a_step_that_comes_later() -> None:
+    scenario = shaft({"steps": [{"time": 0.25, "height": 0.5}]})
+    result = lm.simulate(scenario, sensitivities=["command.motor.steps.0.time"])
+    since = np.maximum(result.time.to_numpy() - 0.25, 0.0)
+    got = derivative(result, "table_angle", "command.motor.steps.0.time")
+    assert got == pytest.approx(-since / 0.02, rel=EXACT, abs=1e-12)
+
+
+def test_the_published_drive_with_play_and_hysteresis() -> None:
+    scenario = lm.load("paper-2dof-nl-small").replace(
+        **{"simulation.duration": 1.0, "simulation.sample_interval": 0.02}
+    )
+    values = {"load.inertia": scenario.load.inertia, "gearbox.ratio": scenario.gearbox.ratio}
+    check_against_differences(scenario, values, 1e-7)
+
+
+def test_a_parameter_that_sets_a_shaft_at_rest_in_motion_has_no_derivative() -> None:
+    result = lm.simulate(shaft(0.0, friction_torque=0.3), sensitivities=["initial.speeds.table"])
+    assert np.isnan(derivative(result, "table_angle", "initial.speeds.table")).all()
+    assert result.attrs["sensitivities_end_at"] == 0.0
+    assert "table_contact" in result.attrs["sensitivities_end_by"]
+
+
+def test_what_cannot_be_varied_is_refused_by_one_line() -> None:
+    scenario = shaft(0.5)
+    for keys, words in (
+        (["shafts.table.inerta"], "shafts.table.inerta: the scenario has nothing of that name"),
+        (["motors.motor.kind"], 'motors.motor.kind: the scenario has "torque_source" there'),
+        ([], "give keys of the scenario"),
+        (["shafts.table.inertia"] * 2, "each once"),
+    ):
+        assert words in refused(lambda keys=keys: lm.simulate(scenario, sensitivities=keys))
+    other = refused(lambda: lm.simulate(scenario, solver="dormand-prince", sensitivities=["shafts.table.inertia"]))
+    assert "derivatives are those of the exact solver" in other
