@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-FORMATTED := $(wildcard core/lostmotion/*/*.hpp core/tests/*.[ch]pp core/portable/*.cpp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.cpp examples/*.c benchmarks/*.[ch]pp)
+FORMATTED := $(wildcard core/lostmotion/*/*.hpp core/tests/*.[ch]pp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.[ch]pp bindings/fmu/*.[ch]pp examples/*.c benchmarks/*.[ch]pp)
 SOURCES := $(wildcard core/lostmotion/*/*.hpp bindings/*.cpp bindings/*.hpp scenarios/*.toml) CMakeLists.txt pyproject.toml
 
 .PHONY: demo test bench docs lint format clean
@@ -30,6 +30,15 @@ c-library: $(VENV)/tools
 	$(BIN)/cmake -S . -B build/c -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_C=ON -DLOSTMOTION_WERROR=ON >build/c.log
 	$(BIN)/cmake --build build/c
 	@echo 'cc -I$(abspath bindings/c) PROGRAM.c -L$(abspath build/c) -llostmotion -lm'
+
+# The same library as WebAssembly, and as the libraries of FMUs for all platforms, by the Zig compiler.
+.PHONY: wasm fmu
+wasm: $(VENV)/tools
+	$(BIN)/pip install -q --group portable
+	$(BIN)/python bindings/c/build.py wasm build/wasm/lostmotion.wasm
+fmu: $(VENV)/tools
+	$(BIN)/pip install -q --group portable
+	$(BIN)/python bindings/c/build.py fmu src/lostmotion/fmu_libraries
 
 # 100,000 random drives of each kind; CASES and SEED choose others.
 CASES ?= 100000

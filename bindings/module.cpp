@@ -1,4 +1,5 @@
 // Thin binding: the core as a Python module.
+#include "descriptions.hpp"
 #include "names.hpp"
 #include "responses.hpp"
 #include "runs.hpp"
@@ -19,4 +20,5 @@ NB_MODULE(CORE_MODULE, m) {
     bind_instants(m);
     bind_stepping(m);
     bind_responses(m);
+    bind_descriptions(m);
 }

@@ -28,6 +28,7 @@ LAYERS = [
     {"response", "test_rig"},
     {"sizing", "servo", "pointing"},
     {"studies", "identification"},
+    {"portable"},
     {"reports"},
     {"paper"},
     {"cli"},
@@ -69,7 +70,15 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 
 
 # The same for the rooms of the core.
-CORE_LAYERS = [{"kernel"}, {"solver", "parts"}, {"control"}, {"drive", "model"}, {"simulation"}, {"analysis"}]
+CORE_LAYERS = [
+    {"kernel"},
+    {"solver", "parts"},
+    {"control"},
+    {"drive", "model"},
+    {"simulation"},
+    {"analysis"},
+    {"scenario"},
+]
 
 
 @pytest.mark.parametrize("header", HEADERS, ids=lambda h: f"{h.parent.name}-{h.stem}")
@@ -90,7 +99,7 @@ def test_no_headers_include_each_other_in_a_circle() -> None:
 
 # What ties code to a platform: threads, exceptions, and functions of the mathematical library that it need not round
 # correctly, so that their last bits differ from system to system (sqrt, fma, floor, ldexp and the like are exact).
-PORTABLE = ("kernel", "solver", "parts", "control", "model", "drive", "simulation")
+PORTABLE = ("kernel", "solver", "parts", "control", "model", "drive", "simulation", "scenario")
 PLATFORM = (
     r"\b(thread_local|throw|try|catch)\b"
     r"|#include <(thread|mutex|atomic|condition_variable|future|exception|stdexcept|iostream)>"

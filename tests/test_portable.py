@@ -1,18 +1,19 @@
 """The core compiled to WebAssembly gives the bits that the extension gives, which golden.toml holds."""
 
-from collections.abc import Iterator
+import hashlib
+import json
+import shutil
+import subprocess
+from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import lostmotion as lm
-from conftest import ALL_SCENARIOS, CONTROLLED
-from lostmotion import _core
-from lostmotion.model.drive import _core_drive
-from lostmotion.model.signals import _core_signal
-from portable import PortableCore, Recorder
+from conftest import ALL_SCENARIOS
+from lostmotion.portable.description import description
+from portable import END_STATE, ENERGIES, MODULE, SAMPLES, PortableCore, bits, builder
 
 
 @pytest.fixture(scope="module")
@@ -20,53 +21,35 @@ def portable() -> PortableCore:
     return PortableCore()
 
 
-@pytest.fixture(scope="module")
-def recorder() -> Iterator[Recorder]:
-    for kept in (_core_drive, _core_signal):
-        kept.cache_clear()
-    with pytest.MonkeyPatch.context() as patch:
-        yield Recorder(patch)
+@cache
+def native(path: Path) -> dict[str, np.ndarray]:
+    """The same of the extension, by the names of `PortableCore.run`."""
+    result = lm.simulate(lm.load(path))
+    out = {f"{SAMPLES} {name}": result[name].values for name in result}
+    out |= {f"{ENERGIES} {name}": np.array([v]) for name, v in lm.energy_of(result).items()}
+    out |= {f"{END_STATE} {name}": np.array([v]) for name, v in json.loads(result.attrs["end_state"]).items()}
+    return out | {"instants": lm.switchings_of(result)["instant"].values}
 
 
-def bits(values: Any) -> bytes:
-    """Of the numbers; one NaN is like another."""
-    numbers = np.array(values, "<f8")
-    numbers[np.isnan(numbers)] = np.nan
-    return numbers.tobytes()
+@pytest.mark.parametrize("path", ALL_SCENARIOS, ids=lambda p: p.stem)
+def test_webassembly_gives_the_same_bits(path: Path, portable: PortableCore) -> None:
+    there, here = portable.run(description(lm.load(path), parameters=False)), native(path)
+    there["instants"] = there.pop("switchings")[:, 0]
+    assert here.keys() == there.keys()
+    assert [name for name in here if bits(here[name]) != bits(there[name])] == []
 
 
-def flat(*values: Any) -> np.ndarray:
-    return np.concatenate([np.ravel(np.asarray(v, float)) for v in values])
-
-
-def of_drive(result: Any) -> np.ndarray:
-    samples, switchings, _, energy, end, capacity, _, _, _ = result
-    return flat(end, capacity, energy, switchings, samples)
-
-
-def of_train(result: dict[str, Any]) -> np.ndarray:
-    return flat([*result["end_state"].values()], [*result["energy"].values()], result["switchings"], result["values"])
-
-
-@pytest.mark.parametrize("solver", ["exact", "dormand-prince"])
-@pytest.mark.parametrize("path", [p for p in ALL_SCENARIOS if p not in CONTROLLED], ids=lambda p: p.stem)
-def test_webassembly_gives_the_same_bits(path: Path, solver: Any, portable: PortableCore, recorder: Recorder) -> None:
-    compared = []
-
-    def checked(what: int, native: Any, of: Any) -> Any:
-        def run(*arguments: Any) -> Any:
-            result = native(*arguments)
-            status, time, *there = portable([what, *recorder.numbers(*arguments[:-1])])  # without controllers
-            assert status == 0.0
-            assert time == arguments[4 if what else 5]
-            assert bits(there) == bits(of(result))
-            compared.append(len(there))
-            return result
-
-        return run
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_core, "run", checked(0, _core.run, of_drive))
-        patch.setattr(_core, "run_train", checked(1, _core.run_train, of_train))
-        lm.simulate(lm.load(path), solver=solver)
-    assert sum(compared) > 1000
+@pytest.mark.skipif(shutil.which("node") is None, reason="without node")
+def test_node_gives_the_same_bits(tmp_path: Path) -> None:
+    builder().wasm(MODULE)
+    for path in ALL_SCENARIOS:
+        (tmp_path / f"{path.stem}.bin").write_bytes(
+            description(lm.load(path), parameters=False).astype("<f8").tobytes()
+        )
+    script = Path(__file__).with_name("portable.mjs")
+    done = subprocess.run(["node", str(script), str(MODULE), str(tmp_path)], capture_output=True, text=True, check=True)
+    told = json.loads(done.stdout)
+    for path in ALL_SCENARIOS:
+        here = native(path)
+        for name, digest in told[path.stem].items():
+            assert hashlib.sha256(bits(here[f"{SAMPLES} {name}"])).hexdigest() == digest, (path.stem, name)

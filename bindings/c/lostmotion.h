@@ -1,8 +1,11 @@
-/* lostmotion in C: drive trains, exactly.
+/* lostmotion in C: drives and drive trains, exactly.
  *
- * A train is built from its elements, checked, then run in one go or step by step. Units are SI; angles in rad. All
- * functions that can fail return 0 when they succeed and the number of a status otherwise; lm_error() gives the
- * sentence that Python would give. Names are those of scenario files and result variables (docs/drive-trains.md).
+ * A scenario is read from numbers that Python has written (lostmotion.description), controllers and references among
+ * them, its parameters are set by their keys, and it runs in one go or step by step. A train can also be built here,
+ * element by element. Units are SI; angles in rad. All functions that can fail return 0 when they succeed and the
+ * number of a status otherwise; lm_error() and the like give the sentence that Python would give. Names are those of
+ * scenario files and result variables (docs/drive-trains.md). A text that a function returns lives as long as its
+ * object.
  *
  * An object belongs to one thread at a time; different objects to as many threads as there are.
  */
@@ -17,12 +20,14 @@ extern "C" {
 
 #if defined _WIN32
 #define LM_API __declspec(dllexport)
+#elif defined __wasm__
+#define LM_API __attribute__((visibility("default"), used))
 #else
 #define LM_API __attribute__((visibility("default")))
 #endif
 
 /* Rises with every change that a caller has to know of. */
-#define LM_INTERFACE_VERSION 1
+#define LM_INTERFACE_VERSION 2
 LM_API int lm_interface_version(void);
 
 enum {
@@ -31,8 +36,72 @@ enum {
     LM_JAMMED = 2,       /* no combination of contact modes is consistent */
     LM_OUTSIDE = 3,      /* the motion left the data of a law, or the range of the arithmetic */
     LM_ACCUMULATION = 4, /* switching instants accumulate */
+    LM_CONTROLLER = 6,   /* the controller failed, or its command is no finite number */
     LM_INVALID = 100     /* a value, a name or a train that cannot be used */
 };
+
+/* --- a scenario --- */
+
+typedef struct lm_scenario lm_scenario;
+
+/* From the numbers of a description. NULL if they cannot be used; then `error`, of error_size bytes, says why. */
+LM_API lm_scenario* lm_scenario_read(const double* numbers, size_t n, char* error, size_t error_size);
+LM_API void lm_scenario_free(lm_scenario* scenario);
+/* What the last call on this scenario that failed found wrong. */
+LM_API const char* lm_scenario_error(const lm_scenario* scenario);
+LM_API const char* lm_scenario_title(const lm_scenario* scenario);
+LM_API double lm_scenario_duration(const lm_scenario* scenario); /* [s] */
+LM_API double lm_scenario_interval(const lm_scenario* scenario); /* of the samples [s] */
+LM_API int lm_scenario_set_times(lm_scenario* scenario, double duration, double interval);
+
+/* The parameters that can be set, by their keys in scenario files, such as "load.inertia"; values in SI. A value that
+ * cannot be used leaves the scenario as it was. */
+LM_API size_t lm_scenario_parameter_count(const lm_scenario* scenario);
+LM_API const char* lm_scenario_parameter_key(const lm_scenario* scenario, size_t k);
+LM_API const char* lm_scenario_parameter_unit(const lm_scenario* scenario, size_t k);
+LM_API double lm_scenario_get(const lm_scenario* scenario, size_t k);
+LM_API int lm_scenario_set(lm_scenario* scenario, size_t k, double value);
+
+/* Straight lines, each from a time on: value and slope; and sines: amplitude, frequency [Hz], phase [rad]. */
+typedef struct {
+    const double* breakpoints; /* n_breakpoints x (time, value, slope) */
+    size_t n_breakpoints;
+    const double* sines; /* n_sines x (amplitude, frequency, phase) */
+    size_t n_sines;
+} lm_signal;
+
+/* In the place of an input of a run, counted as those of the scenario's drive or train: commands, then load torques,
+ * then references of continuous controllers. The parameters of the signal that it replaces then change nothing. */
+LM_API int lm_scenario_set_signal(lm_scenario* scenario, size_t input, const lm_signal* signal);
+
+/* The value of an input at t = 0. */
+LM_API double lm_scenario_input_at_start(const lm_scenario* scenario, size_t input);
+
+/* A run in one go. energy: whether to keep the energies. Beyond max_switchings the switchings are only counted. NULL if
+ * nothing could run (lm_scenario_error); a motion that has no continuation gives a result with a status and an error.
+ */
+typedef struct lm_result lm_result;
+LM_API lm_result* lm_scenario_run(lm_scenario* scenario, int energy, size_t max_switchings);
+LM_API void lm_result_free(lm_result* result);
+LM_API int lm_result_status(const lm_result* result);
+LM_API const char* lm_result_error(const lm_result* result);
+LM_API double lm_result_time(const lm_result* result); /* reached [s] */
+LM_API double lm_result_left_data_at(
+    const lm_result* result); /* first use of a loss map outside its data [s], or inf */
+LM_API size_t lm_result_samples(const lm_result* result);
+LM_API size_t lm_result_switchings(const lm_result* result); /* how many are kept */
+LM_API size_t lm_result_switching_count(const lm_result* result);
+
+typedef enum {
+    LM_SAMPLES,   /* of the variables: one variable after the other, lm_result_samples() values each, from t = 0 on */
+    LM_ENERGIES,  /* [J], one value each */
+    LM_END_STATE, /* one value each */
+    LM_SWITCHINGS /* one switching after the other, with these columns: instant [s], number of the cause, contacts */
+} lm_part;
+LM_API size_t lm_result_count(const lm_result* result, lm_part part);
+LM_API const char* lm_result_name(const lm_result* result, lm_part part, size_t k);
+LM_API const char* lm_result_unit(const lm_result* result, size_t variable);
+LM_API const double* lm_result_values(const lm_result* result, lm_part part);
 
 /* --- a train --- */
 
@@ -116,19 +185,26 @@ typedef struct lm_simulation lm_simulation;
 /* step: the usual interval [s]; others are allowed, this one is fastest. NULL if the train cannot be run;
  * lm_train_error says why. The train may be freed or changed afterwards. */
 LM_API lm_simulation* lm_simulation_new(lm_train* train, double step);
+/* Of a scenario, from its start, with its controllers; lm_scenario_error says why not. Commands and load torques are
+ * given step by step. */
+LM_API lm_simulation* lm_simulation_from(lm_scenario* scenario, double step);
+/* The simulation goes on at its time, in its state, with the scenario as it is now: with other values of parameters.
+ * The contacts are found anew. */
+LM_API int lm_go_on_with(lm_simulation* simulation, lm_scenario* scenario, double step);
 LM_API void lm_simulation_free(lm_simulation* simulation);
 LM_API const char* lm_error(const lm_simulation* simulation);
 
 /* What there is to name and count. */
 typedef enum {
     LM_STATES,    /* speeds, twists, angles, torques of DC motors */
-    LM_INPUTS,    /* commands, then load torques */
-    LM_VARIABLES, /* all result variables */
+    LM_INPUTS,    /* commands that no sampled controller gives, load torques, references of continuous controllers */
+    LM_VARIABLES, /* all result variables, and what the controllers show */
     LM_CAPACITIES /* hysteresis capacities of gears, by the name of the gear */
 } lm_kind;
 LM_API size_t lm_count(const lm_simulation* simulation, lm_kind kind);
 LM_API const char* lm_name(const lm_simulation* simulation, lm_kind kind, size_t k);
-LM_API const char* lm_unit(const lm_simulation* simulation, lm_kind kind, size_t k); /* of variables; else "" */
+LM_API const char* lm_unit(const lm_simulation* simulation, lm_kind kind, size_t k);
+LM_API const char* lm_meaning(const lm_simulation* simulation, lm_kind kind, size_t k);
 
 /* To t = 0 at these states and capacities, in the order of their names; NULL: zeros. */
 LM_API int lm_reset(lm_simulation* simulation, const double* states, const double* capacities);
@@ -136,10 +212,15 @@ LM_API int lm_reset(lm_simulation* simulation, const double* states, const doubl
  * fails, the state is left as it was. */
 LM_API int lm_advance(lm_simulation* simulation, double interval, const double* begin, const double* end);
 LM_API double lm_time(const lm_simulation* simulation);
+/* What acts at t = 0, for what is read before the first step; later it changes nothing. */
+LM_API int lm_hold(lm_simulation* simulation, const double* inputs);
+/* Of an input of the simulation its number among those of the scenario, which has those of controllers too. */
+LM_API size_t lm_solver_input(const lm_simulation* simulation, size_t input);
 /* All variables at the present instant, with the inputs at their last values. */
 LM_API int lm_read(lm_simulation* simulation, double* variables);
 
-/* All that it takes to continue bit for bit, as lm_state_size() numbers. */
+/* All that it takes to continue bit for bit, as lm_state_size() numbers, the same on all machines. Numbers that did not
+ * come from such a simulation are refused. */
 LM_API size_t lm_state_size(const lm_simulation* simulation);
 LM_API int lm_get_state(const lm_simulation* simulation, double* state);
 LM_API int lm_set_state(lm_simulation* simulation, const double* state);
@@ -149,15 +230,7 @@ LM_API int lm_set_state(lm_simulation* simulation, const double* state);
 LM_API int lm_directional_derivative(lm_simulation* simulation, const double* states, const double* inputs,
                                      double* rates, double* variables);
 
-/* --- in one go --- */
-
-/* Straight lines, each from a time on: value and slope; and sines: amplitude, frequency [Hz], phase [rad]. */
-typedef struct {
-    const double* breakpoints; /* n_breakpoints x (time, value, slope) */
-    size_t n_breakpoints;
-    const double* sines; /* n_sines x (amplitude, frequency, phase) */
-    size_t n_sines;
-} lm_signal;
+/* --- a train in one go --- */
 
 /* Runs to `duration` from these states and capacities. inputs: one signal each. variables: at k * interval for
  * k < samples, one variable after the other. The simulation itself is then at t = 0, at these states. */

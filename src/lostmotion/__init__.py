@@ -93,6 +93,8 @@ if TYPE_CHECKING:
     from .pointing.budget import PointingError as PointingError
     from .pointing.budget import View as View
     from .pointing.budget import pointing_budget as pointing_budget
+    from .portable.description import description as description
+    from .portable.fmu import export_fmu as export_fmu
     from .reports.accessor import ResultAccessor as ResultAccessor
     from .response.bandwidth import bandwidth as bandwidth
     from .response.bandwidth import characteristics as characteristics
@@ -202,6 +204,8 @@ _HOMES = {
     "model.synchronous_motor": ("PhaseValues", "Winding"),
     "model.torsion": ("Hysteresis", "LinearStiffness", "Rigid", "TorsionCurve"),
     "model.train": ("DriveTrain",),
+    "portable.description": ("description",),
+    "portable.fmu": ("export_fmu",),
     "reports.accessor": ("ResultAccessor",),
     "pointing.budget": ("PointingBudget", "PointingError", "View", "pointing_budget"),
     "response.bandwidth": ("bandwidth", "characteristics"),

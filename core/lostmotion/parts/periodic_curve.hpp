@@ -12,12 +12,19 @@
 
 namespace lostmotion::model {
 
+// amplitude * sin(order * phi + phase) that a curve stands for, if its amplitude is not 0.
+struct SineOfAngle {
+    double amplitude = 0.0;
+    int order = 1;
+    double phase = 0.0;
+};
+
 class PeriodicCurve {
  public:
     PeriodicCurve() = default;
     // angles: [rad], rising from 0 and below the period; values there. The last piece leads back to the first value.
-    PeriodicCurve(double period, std::vector<double> angles, std::vector<double> values)
-        : period_(period), angles_(std::move(angles)), values_(std::move(values)) {
+    PeriodicCurve(double period, std::vector<double> angles, std::vector<double> values, const SineOfAngle& of = {})
+        : period_(period), angles_(std::move(angles)), values_(std::move(values)), sine_(of) {
         angles_.push_back(period_);
         values_.push_back(values_.front());
     }
@@ -43,9 +50,7 @@ class PeriodicCurve {
             angles.push_back(width / n * (k + 0.5));
             values.push_back(node(k + 0.5));
         }
-        PeriodicCurve chords(2.0 * std::numbers::pi / n, std::move(angles), std::move(values));
-        chords.sine_ = {amplitude, n, phase};
-        return chords;
+        return PeriodicCurve(2.0 * std::numbers::pi / n, std::move(angles), std::move(values), {amplitude, n, phase});
     }
 
     bool present() const { return !values_.empty(); }
@@ -55,8 +60,10 @@ class PeriodicCurve {
     double smooth_slope(double phi) const {
         return sine_.amplitude * sine_.order * sine_cosine(sine_.order * phi + sine_.phase).cos;
     }
+    const SineOfAngle& sine_of() const { return sine_; }
     double period() const { return period_; }
-    int pieces() const { return static_cast<int>(values_.size()) - 1; }
+    int pieces() const { return values_.empty() ? 0 : static_cast<int>(values_.size()) - 1; }
+    double value(int k) const { return values_[k]; }  // where piece k begins
     double lower(int k) const { return angles_[k]; }
     double upper(int k) const { return angles_[k + 1]; }
     double slope(int k) const { return (values_[k + 1] - values_[k]) / (angles_[k + 1] - angles_[k]); }
@@ -90,11 +97,7 @@ class PeriodicCurve {
  private:
     double period_ = 0.0;
     std::vector<double> angles_, values_;
-    struct {
-        double amplitude = 0.0;
-        int order = 1;
-        double phase = 0.0;
-    } sine_;  // that it stands for, if any
+    SineOfAngle sine_;
 };
 
 }  // namespace lostmotion::model

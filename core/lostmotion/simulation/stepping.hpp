@@ -141,9 +141,10 @@ void SimulationOf<System>::resume(Inputs& begin, Inputs& end, double interval) {
 
 template <class System>
 Status SimulationOf<System>::begin_motion() {
+    // Controllers that have begun go on.
     NoObserver nobody;
-    return controllers_ ? controllers_->begin(now_.x, now_.memory, nobody)
-                        : solver_.begin(now_.time, now_.x, now_.memory);
+    return controllers_ && now_.control.slots.empty() ? controllers_->begin(now_.x, now_.memory, nobody)
+                                                      : solver_.begin(now_.time, now_.x, now_.memory);
 }
 
 template <class System>

@@ -9,7 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from . import catalogue, drive, identify, reproduce, response, rig, run, scenarios, select, servo, study, track
+from . import catalogue, drive, fmu, identify, reproduce, response, rig, run, scenarios, select, servo, study, track
 from .terminal import fail
 
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # of the parser that typer brings along
@@ -80,6 +80,7 @@ def common(
 for command in (
     reproduce.reproduce,
     run.run,
+    fmu.fmu,
     response.response,
     rig.rig,
     catalogue.catalogue,

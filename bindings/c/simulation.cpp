@@ -1,0 +1,149 @@
+// The C interface: step by step.
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "lostmotion/analysis/train_linear.hpp"
+#include "lostmotion/scenario/linear.hpp"
+#include "objects.hpp"
+
+namespace lm = lostmotion;
+
+namespace {
+
+bool good_step(double step) { return std::isfinite(step) && step > 0.0; }
+
+struct Named {
+    std::string name, unit, meaning;
+};
+const std::vector<std::string>* names_of(const lm_simulation& s, lm_kind kind) {
+    const lm::ScenarioSimulation::Names& n = s.simulation.names();
+    return kind == LM_STATES       ? &n.states
+           : kind == LM_INPUTS     ? &n.inputs
+           : kind == LM_CAPACITIES ? &n.capacities
+                                   : nullptr;
+}
+// The variable of the same name, or nullptr.
+const lm::Variable* variable_of(const lm_simulation& s, lm_kind kind, std::size_t k) {
+    const auto* names = names_of(s, kind);
+    const lm::Variables& v = s.simulation.variables();
+    const int place = names == nullptr ? static_cast<int>(k) : v.place((*names)[k]);
+    return place < 0 ? nullptr : &v.all()[static_cast<std::size_t>(place)];
+}
+
+}  // namespace
+
+extern "C" {
+
+int lm_train_check(lm_train* train) {
+    return train->attempt([&] { return lm::TrainRun(train->description.train).error(); });
+}
+
+lm_simulation* lm_simulation_new(lm_train* train, double step) {
+    lm_simulation* made = nullptr;
+    train->attempt([&]() -> std::string {
+        if (!good_step(step)) return "the step must be > 0 and finite";
+        std::string wrong = lm::TrainRun(train->description.train).error();
+        if (wrong.empty()) made = new lm_simulation(train->description.train, step);
+        return wrong;
+    });
+    return made;
+}
+lm_simulation* lm_simulation_from(lm_scenario* scenario, double step) {
+    lm_simulation* made = nullptr;
+    scenario->error = attempted([&]() -> std::string {
+        if (!good_step(step)) return "the step must be > 0 and finite";
+        made = new lm_simulation(scenario->description.scenario(), step);
+        return "";
+    });
+    return made;
+}
+int lm_go_on_with(lm_simulation* simulation, lm_scenario* scenario, double step) {
+    if (!good_step(step)) return simulation->failed("the step must be > 0 and finite");
+    lm_simulation next(scenario->description.scenario(), step);
+    const auto &before = simulation->simulation.names(), &after = next.simulation.names();
+    if (before.states != after.states || before.inputs != after.inputs)
+        return simulation->failed("the scenario has other elements");
+    next.simulation.go_on_from(simulation->simulation);
+    std::swap(simulation->simulation, next.simulation);
+    return LM_OK;
+}
+void lm_simulation_free(lm_simulation* simulation) { delete simulation; }
+const char* lm_error(const lm_simulation* simulation) { return simulation->error.c_str(); }
+
+size_t lm_count(const lm_simulation* simulation, lm_kind kind) {
+    const auto* names = names_of(*simulation, kind);
+    return names != nullptr ? names->size() : simulation->simulation.variables().size();
+}
+const char* lm_name(const lm_simulation* simulation, lm_kind kind, size_t k) {
+    if (k >= lm_count(simulation, kind)) return nullptr;
+    const auto* names = names_of(*simulation, kind);
+    return names != nullptr ? (*names)[k].c_str() : simulation->simulation.variables().all()[k].name.c_str();
+}
+const char* lm_unit(const lm_simulation* simulation, lm_kind kind, size_t k) {
+    if (k >= lm_count(simulation, kind)) return nullptr;
+    if (kind == LM_CAPACITIES) return "N*m";
+    const lm::Variable* v = variable_of(*simulation, kind, k);
+    return v != nullptr ? v->unit.c_str() : "1";
+}
+const char* lm_meaning(const lm_simulation* simulation, lm_kind kind, size_t k) {
+    if (k >= lm_count(simulation, kind)) return nullptr;
+    if (kind == LM_CAPACITIES) return "hysteresis capacity";
+    const lm::Variable* v = variable_of(*simulation, kind, k);
+    return v != nullptr ? v->meaning.c_str() : "";
+}
+
+int lm_reset(lm_simulation* simulation, const double* states, const double* capacities) {
+    const auto& names = simulation->simulation.names();
+    if (states != nullptr && !finite(states, names.states.size())) return simulation->failed("a state is not finite");
+    if (capacities != nullptr && !finite(capacities, names.capacities.size()))
+        return simulation->failed("a hysteresis capacity is not finite");
+    std::vector<double> x = list(states, names.states.size()), h = list(capacities, names.capacities.size());
+    x.resize(names.states.size());
+    h.resize(names.capacities.size());
+    std::string wrong = simulation->simulation.reset(x, h);
+    return wrong.empty() ? int(LM_OK) : simulation->failed(std::move(wrong));
+}
+
+int lm_advance(lm_simulation* simulation, double interval, const double* begin, const double* end) {
+    const std::size_t n = simulation->simulation.names().inputs.size();
+    const double time = simulation->simulation.time();
+    if (!(std::isfinite(interval) && interval > 0.0 && time + interval > time))
+        return simulation->failed("the interval must be > 0, finite and longer than the rounding of the time");
+    if (n > 0 && !(finite(begin, n) && finite(end, n))) return simulation->failed("an input is missing or not finite");
+    return simulation->ended(simulation->simulation.advance(interval, {begin, n}, {end, n}));
+}
+double lm_time(const lm_simulation* simulation) { return simulation->simulation.time(); }
+
+size_t lm_solver_input(const lm_simulation* simulation, size_t input) {
+    return input < simulation->simulation.names().inputs.size() ? simulation->simulation.solver_input(input)
+                                                                : static_cast<size_t>(-1);
+}
+int lm_hold(lm_simulation* simulation, const double* inputs) {
+    const std::size_t n = simulation->simulation.names().inputs.size();
+    if (n > 0 && !finite(inputs, n)) return simulation->failed("an input is missing or not finite");
+    simulation->simulation.hold({inputs, n});
+    return LM_OK;
+}
+int lm_read(lm_simulation* simulation, double* variables) {
+    return simulation->ended(simulation->simulation.read(variables));
+}
+
+size_t lm_state_size(const lm_simulation* simulation) { return simulation->simulation.state_size(); }
+int lm_get_state(const lm_simulation* simulation, double* state) {
+    simulation->simulation.get_state(state);
+    return LM_OK;
+}
+int lm_set_state(lm_simulation* simulation, const double* state) {
+    if (state == nullptr || !simulation->simulation.set_state(state))
+        return simulation->failed("these numbers are not those of a state of this simulation");
+    return LM_OK;
+}
+
+int lm_directional_derivative(lm_simulation* simulation, const double* states, const double* inputs, double* rates,
+                              double* variables) {
+    return simulation->ended(lm::directional_derivative(simulation->simulation, states, inputs, rates, variables));
+}
+
+}  // extern "C"

@@ -1,0 +1,215 @@
+// The C interface: trains, element by element.
+#include "train.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <new>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lostmotion/drive/parameters.hpp"
+
+namespace lm = lostmotion;
+using lm::model::Coupling;
+
+namespace {
+
+std::string name_error(const lm_train& train, const char* name) {
+    if (name == nullptr || *name == '\0') return "an element has no name";
+    const auto taken = [&](const auto& elements) {
+        for (const auto& e : elements)
+            if (e.name == name) return true;
+        return false;
+    };
+    const auto& t = train.description.train;
+    if (taken(t.shafts) || taken(t.motors) || taken(t.gears) || taken(t.brakes) || taken(t.couplings) ||
+        taken(t.angle_torques))
+        return "the name '" + text(name) + "' is taken; use another one";
+    return {};
+}
+
+// "" if all numbers are finite and rise.
+std::string rising_error(const std::string& what, const std::vector<double>& v, double above) {
+    for (const double x : v) {
+        if (!(std::isfinite(x) && x > above)) return what + " must rise, from above " + std::to_string(above);
+        above = x;
+    }
+    return {};
+}
+std::string finite_error(const std::string& what, const std::vector<double>& v) {
+    for (const double x : v)
+        if (!std::isfinite(x)) return what + " must be finite";
+    return {};
+}
+
+// The curve, or what is wrong with it.
+std::string read(const lm_curve& c, const std::string& what, lm::TorsionCurve& to) {
+    if (c.slopes == nullptr || (c.n_breaks > 0 && c.breaks == nullptr)) return what + ": breaks or slopes are missing";
+    std::vector<double> breaks = list(c.breaks, c.n_breaks), slopes = list(c.slopes, c.n_breaks + 1);
+    if (auto e = rising_error(what + ": breaks", breaks, 0.0); !e.empty()) return e;
+    if (auto e = finite_error(what + ": slopes", slopes); !e.empty()) return e;
+    to = lm::TorsionCurve(std::move(breaks), std::move(slopes));
+    return {};
+}
+std::string read(const lm_periodic_curve& c, const std::string& what, lm::model::PeriodicCurve& to) {
+    if (c.n == 0 || c.angles == nullptr || c.values == nullptr) return what + ": angles or values are missing";
+    std::vector<double> angles = list(c.angles, c.n), values = list(c.values, c.n);
+    if (!(std::isfinite(c.period) && c.period > 0.0)) return what + ": the period must be > 0";
+    if (auto e = finite_error(what + ": values", values); !e.empty()) return e;
+    for (std::size_t k = 0; k < c.n; ++k)
+        if (!(angles[k] >= 0.0 && angles[k] < c.period && (k == 0 || angles[k] > angles[k - 1])))
+            return what + ": angles must rise, from 0 on and below the period";
+    to = lm::model::PeriodicCurve(c.period, std::move(angles), std::move(values));
+    return {};
+}
+std::string read(const lm_loss_map& m, const std::string& what, lm::LossMap& to) {
+    if (m.speeds == nullptr || m.loads == nullptr || m.values == nullptr || m.n_speeds < 2 || m.n_loads < 2)
+        return what + ": a loss map needs two speeds and two loads at least";
+    std::vector<double> speeds = list(m.speeds, m.n_speeds), loads = list(m.loads, m.n_loads),
+                        values = list(m.values, m.n_speeds * m.n_loads);
+    if (auto e = rising_error(what + ": speeds", speeds, -1e-300); !e.empty()) return e;
+    if (auto e = rising_error(what + ": loads", loads, -std::numeric_limits<double>::infinity()); !e.empty()) return e;
+    if (auto e = finite_error(what + ": values", values); !e.empty()) return e;
+    to = lm::LossMap(std::move(speeds), std::move(loads), std::move(values));
+    return {};
+}
+
+// A drive with these parameters, of which a motor or gear is taken.
+std::string read(const lm_parameter* parameters, std::size_t n, const std::string& what, lm::Drive& to) {
+    for (std::size_t k = 0; k < n; ++k) {
+        const lm::Parameter* p = lm::find_parameter(text(parameters[k].key));
+        if (p == nullptr) return what + ": there is no parameter '" + text(parameters[k].key) + "'";
+        if (!std::isfinite(parameters[k].value)) return what + ": " + text(parameters[k].key) + " must be finite";
+        p->in(to) = parameters[k].value;
+    }
+    return {};
+}
+
+}  // namespace
+
+extern "C" {
+
+int lm_interface_version(void) { return LM_INTERFACE_VERSION; }
+
+size_t lm_parameter_count(void) { return std::size(lm::parameters); }
+const char* lm_parameter_key(size_t k) { return k < lm_parameter_count() ? lm::parameters[k].key : nullptr; }
+const char* lm_parameter_unit(size_t k) { return k < lm_parameter_count() ? lm::parameters[k].unit : nullptr; }
+
+lm_train* lm_train_new(void) { return new (std::nothrow) lm_train; }
+void lm_train_free(lm_train* train) { delete train; }
+const char* lm_train_error(const lm_train* train) { return train->error.c_str(); }
+
+int lm_add_shaft(lm_train* train, const char* name, double inertia, double viscous_friction, double friction_torque,
+                 double breakaway_torque, const lm_curve* drag, int loaded) {
+    return train->attempt([&] {
+        std::string wrong = name_error(*train, name);
+        lm::model::Shaft s;
+        if (wrong.empty() && drag != nullptr) wrong = read(*drag, "shaft '" + text(name) + "': drag", s.drag);
+        if (!wrong.empty()) return wrong;
+        s.name = name;
+        s.inertia = inertia;
+        s.viscous_friction = viscous_friction;
+        s.friction = {friction_torque, breakaway_torque, {}, {}};
+        s.loaded = loaded != 0;
+        train->description.add_shaft(std::move(s));
+        return wrong;
+    });
+}
+
+int lm_add_motor(lm_train* train, const char* name, const char* shaft, const lm_parameter* parameters, size_t n,
+                 int torque_source, double torque_limit) {
+    return train->attempt([&] {
+        std::string wrong = name_error(*train, name);
+        lm::Drive drive;
+        if (wrong.empty()) wrong = read(parameters, n, "motor '" + text(name) + "'", drive);
+        if (!wrong.empty()) return wrong;
+        drive.motor.kind = torque_source != 0 ? lm::Motor::torque_source : lm::Motor::dc;
+        train->description.add_motor(name, text(shaft), drive.motor, torque_limit);
+        return wrong;
+    });
+}
+
+int lm_add_gear(lm_train* train, const char* name, const char* input, const char* output,
+                const lm_parameter* parameters, size_t n, const lm_curve* stiffness, const lm_loss_map* losses,
+                const double* efficiencies, double mesh_damping, const lm_periodic_curve* transmission_error) {
+    return train->attempt([&] {
+        const std::string what = "gear '" + text(name) + "'";
+        std::string wrong = name_error(*train, name);
+        lm::Drive drive;
+        lm::model::PeriodicCurve error;
+        if (wrong.empty()) wrong = read(parameters, n, what, drive);
+        if (wrong.empty() && stiffness != nullptr) {
+            drive.gearbox.compliance = lm::Gearbox::torsion_curve;
+            wrong = read(*stiffness, what + ": stiffness", drive.gearbox.curve);
+        }
+        if (wrong.empty() && losses != nullptr) {
+            drive.gearbox.losses = lm::Gearbox::loss_map;
+            wrong = read(*losses, what + ": losses", drive.gearbox.map);
+        }
+        if (wrong.empty() && transmission_error != nullptr)
+            wrong = read(*transmission_error, what + ": transmission error", error);
+        if (!wrong.empty()) return wrong;
+        std::optional<std::pair<double, double>> both;
+        if (efficiencies != nullptr) both.emplace(efficiencies[0], efficiencies[1]);
+        train->description.add_gear(name, text(input), text(output), drive.gearbox, both, mesh_damping,
+                                    transmission_error == nullptr ? nullptr : &error);
+        return wrong;
+    });
+}
+
+int lm_set_housing(lm_train* train, const char* gear, const char* shaft) {
+    return train->attempt([&] {
+        const auto named = [](const char* name) {
+            return [name](const auto& element) { return element.name == text(name); };
+        };
+        const lm::model::Train& t = train->description.train;
+        if (std::ranges::none_of(t.gears, named(gear))) return "there is no gear '" + text(gear) + "'";
+        if (std::ranges::none_of(t.shafts, named(shaft))) return "there is no shaft '" + text(shaft) + "'";
+        train->description.set_housing(text(gear), text(shaft));
+        return std::string{};
+    });
+}
+
+int lm_add_brake(lm_train* train, const char* name, const char* shaft, double torque, double breakaway_torque) {
+    return train->attempt([&] {
+        std::string wrong = name_error(*train, name);
+        if (wrong.empty()) train->description.add_brake(name, text(shaft), torque, breakaway_torque);
+        return wrong;
+    });
+}
+
+static int add_coupling(lm_train* train, const char* name, const char* input, const char* output, double torque,
+                        double breakaway_torque, Coupling::Kind kind) {
+    return train->attempt([&] {
+        std::string wrong = name_error(*train, name);
+        if (wrong.empty())
+            train->description.add_coupling(name, text(input), text(output), torque, breakaway_torque, kind);
+        return wrong;
+    });
+}
+int lm_add_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
+                  double breakaway_torque) {
+    return add_coupling(train, name, input, output, torque, breakaway_torque, Coupling::clutch);
+}
+int lm_add_safety_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
+                         double breakaway_torque) {
+    return add_coupling(train, name, input, output, torque, breakaway_torque, Coupling::safety_clutch);
+}
+int lm_add_freewheel(lm_train* train, const char* name, const char* input, const char* output) {
+    return add_coupling(train, name, input, output, 0.0, 0.0, Coupling::freewheel);
+}
+
+int lm_add_angle_torque(lm_train* train, const char* name, const char* shaft, const lm_periodic_curve* torque) {
+    return train->attempt([&] {
+        std::string wrong = name_error(*train, name);
+        lm::model::PeriodicCurve curve;
+        if (wrong.empty() && torque == nullptr) wrong = "angle torque '" + text(name) + "' has no curve";
+        if (wrong.empty()) wrong = read(*torque, "angle torque '" + text(name) + "'", curve);
+        if (wrong.empty()) train->description.add_angle_torque(name, text(shaft), curve);
+        return wrong;
+    });
+}
+
+}  // extern "C"

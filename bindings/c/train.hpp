@@ -1,0 +1,45 @@
+// A train of the C interface, and what its functions share.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "lostmotion.h"
+#include "lostmotion/model/train_description.hpp"
+
+// What change() returns as text, or what it throws, where there are exceptions.
+template <class Change>
+std::string attempted(Change&& change) {
+#ifdef __cpp_exceptions
+    try {
+        return change();
+    } catch (const std::exception& e) {
+        return e.what();
+    }
+#else
+    return change();
+#endif
+}
+
+struct lm_train {
+    lostmotion::model::TrainDescription description;
+    std::string error;
+
+    template <class Change>
+    int attempt(Change&& change) {
+        error = attempted(change);
+        return error.empty() ? LM_OK : LM_INVALID;
+    }
+};
+
+inline bool finite(const double* v, std::size_t n) {
+    return v != nullptr && std::all_of(v, v + n, [](double x) { return std::isfinite(x); });
+}
+inline std::string text(const char* s) { return s == nullptr ? std::string() : std::string(s); }
+inline std::vector<double> list(const double* from, std::size_t n) {
+    return from == nullptr ? std::vector<double>() : std::vector<double>(from, from + n);
+}

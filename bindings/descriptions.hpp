@@ -1,0 +1,86 @@
+// Scenarios as numbers that a program without Python reads.
+#pragma once
+
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "lostmotion/scenario/description.hpp"
+#include "train.hpp"
+
+namespace lostmotion::binding {
+
+inline std::vector<double> scenario_numbers(Scenario s) {
+    FieldWriter f;
+    describe(f, s);
+    return std::move(f.numbers);
+}
+
+inline Scenario scenario_with(const std::string& title, const std::vector<Signal>& inputs, double duration,
+                              double interval, const BoundControl& bound) {
+    Scenario s;
+    s.title = title;
+    s.inputs = inputs;
+    s.duration = duration;
+    s.sample_interval = interval;
+    s.control = control_of(bound);
+    return s;
+}
+
+inline std::vector<double> describe_drive(const std::string& title, const SharedDrive& drive,
+                                          const std::vector<Signal>& inputs, const std::vector<double>& start,
+                                          double capacity, double duration, double interval,
+                                          const BoundControl& bound) {
+    Scenario s = scenario_with(title, inputs, duration, interval, bound);
+    s.drive = drive.drive;
+    s.start = start;
+    s.hysteresis_capacities = {capacity};
+    return scenario_numbers(std::move(s));
+}
+
+// start: states by name; capacities: of the hysteresis of gears by name. What is left out is 0.
+inline std::vector<double> describe_train(const std::string& title, const TrainDescription& description,
+                                          const std::vector<Signal>& inputs, const Named& start,
+                                          const Named& capacities, double duration, double interval,
+                                          const BoundControl& bound) {
+    Scenario s = scenario_with(title, inputs, duration, interval, bound);
+    s.form = Scenario::of_train;
+    s.train = description.train;
+    for (const std::string& name : model::state_names(model::Assembly(s.train)))
+        s.start.push_back(value_of(start, name));
+    for (const model::Gear& g : s.train.gears) s.hysteresis_capacities.push_back(value_of(capacities, g.name));
+    return scenario_numbers(std::move(s));
+}
+
+// Of each parameter its key, unit and value, and of each number that follows from it the place, whether it follows from
+// the reciprocal value, offset and slope.
+using ParameterOfDescription =
+    std::tuple<std::string, std::string, double, std::vector<std::tuple<int, bool, double, double>>>;
+inline std::vector<double> write_description(const std::vector<double>& scenario,
+                                             const std::vector<ParameterOfDescription>& parameters) {
+    std::vector<ScenarioParameter> all;
+    for (const auto& [key, unit, value, effects] : parameters) {
+        all.push_back({key, unit, value, {}});
+        for (const auto& [place, reciprocal, offset, slope] : effects)
+            all.back().effects.push_back(
+                {place, reciprocal ? Effect::reciprocal : Effect::proportional, offset, slope});
+    }
+    return ScenarioDescription::write(scenario, std::move(all));
+}
+
+inline void bind_descriptions(nb::module_& m) {
+    m.def("describe_drive", &describe_drive, "title"_a, "drive"_a, "inputs"_a, "start"_a, "hysteresis_capacity"_a,
+          "duration"_a, "interval"_a, "control"_a,
+          nb::sig("def describe_drive(title: str, drive: Drive, inputs: collections.abc.Sequence[Signal], start: "
+                  "collections.abc.Sequence[float], hysteresis_capacity: float, duration: float, interval: float, "
+                  "control: tuple[float, collections.abc.Sequence[tuple[Axis, int, int, int, int]]]) -> list[float]"));
+    m.def("describe_train", &describe_train, "title"_a, "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a,
+          "duration"_a, "interval"_a, "control"_a,
+          nb::sig("def describe_train(title: str, train: Train, inputs: collections.abc.Sequence[Signal], start: "
+                  "collections.abc.Mapping[str, float], hysteresis_capacities: collections.abc.Mapping[str, float], "
+                  "duration: float, interval: float, control: tuple[float, "
+                  "collections.abc.Sequence[tuple[Axis, int, int, int, int]]]) -> list[float]"));
+    m.def("write_description", &write_description, "scenario"_a, "parameters"_a);
+}
+
+}  // namespace lostmotion::binding

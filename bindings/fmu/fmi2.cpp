@@ -1,0 +1,182 @@
+// Functions of FMI 2.0 for Co-Simulation. Types and statuses as in the standard, fmi-standard.org, version 2.0.4,
+// chapters 2.1 and 4.2.
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "instance.hpp"
+
+namespace lm = lostmotion::fmu;
+
+#if defined _WIN32
+#define FMU_API extern "C" __declspec(dllexport)
+#else
+#define FMU_API extern "C" __attribute__((visibility("default")))
+#endif
+
+namespace {
+
+using Boolean = int;
+using Reference = unsigned int;
+using Logger = void (*)(void* environment, const char* instance, int status, const char* category, const char* message,
+                        ...);
+struct Callbacks {
+    Logger log;
+    void* (*allocate)(std::size_t, std::size_t);
+    void (*release)(void*);
+    void (*step_finished)(void*, int);
+    void* environment;
+};
+
+// A sentence as a format without arguments: not all importers insert these.
+std::string as_format(const std::string& sentence) {
+    std::string format;
+    for (const char c : sentence) format += c == '%' ? "%%" : std::string(1, c);
+    return format;
+}
+
+struct Component {
+    std::string name;
+    Callbacks callbacks;
+    lm::Instance instance;
+
+    int ended(lm::Ended status) {
+        if (status != lm::ok && callbacks.log != nullptr)
+            callbacks.log(callbacks.environment, name.c_str(), status,
+                          status == lm::discard ? "logStatusDiscard" : "logStatusError",
+                          as_format(instance.sentence()).c_str());
+        return status;
+    }
+};
+Component& of(void* component) { return *static_cast<Component*>(component); }
+
+using State = std::vector<double>;
+
+}  // namespace
+
+FMU_API const char* fmi2GetTypesPlatform() { return "default"; }
+FMU_API const char* fmi2GetVersion() { return "2.0"; }
+FMU_API int fmi2SetDebugLogging(void*, Boolean, std::size_t, const char* const*) { return lm::ok; }
+
+FMU_API void* fmi2Instantiate(const char* name, int type, const char* guid, const char* resources,
+                              const Callbacks* callbacks, Boolean, Boolean) {
+    const auto refused = [&](const std::string& sentence) -> void* {
+        if (callbacks != nullptr && callbacks->log != nullptr)
+            callbacks->log(callbacks->environment, name, lm::error, "logStatusError", as_format(sentence).c_str());
+        return nullptr;
+    };
+    if (callbacks == nullptr || name == nullptr) return nullptr;
+    if (type != 1) return refused("this FMU is for Co-Simulation");
+    const std::string directory = lm::path_of_uri(resources == nullptr ? "" : resources);
+    auto* made = new Component{name, *callbacks, lm::Instance(directory)};
+    std::string problem = made->instance.problem();
+    if (problem.empty() && guid != nullptr && made->instance.identifier() != guid)
+        problem = "the identifier of modelDescription.xml is not that of the resources";
+    if (problem.empty()) return made;
+    delete made;
+    return refused(problem);
+}
+FMU_API void fmi2FreeInstance(void* c) { delete static_cast<Component*>(c); }
+
+FMU_API int fmi2SetupExperiment(void* c, Boolean, double, double start, Boolean, double) {
+    of(c).instance.set_start_time(start);
+    return lm::ok;
+}
+FMU_API int fmi2EnterInitializationMode(void*) { return lm::ok; }
+FMU_API int fmi2ExitInitializationMode(void* c) {
+    of(c).instance.exit_initialization();
+    return lm::ok;
+}
+FMU_API int fmi2Terminate(void*) { return lm::ok; }
+FMU_API int fmi2Reset(void* c) { return of(c).ended(of(c).instance.reset()); }
+
+FMU_API int fmi2GetReal(void* c, const Reference* r, std::size_t n, double* value) {
+    for (std::size_t k = 0; k < n; ++k)
+        if (const lm::Ended e = of(c).instance.get(r[k], value[k]); e != lm::ok) return of(c).ended(e);
+    return lm::ok;
+}
+FMU_API int fmi2SetReal(void* c, const Reference* r, std::size_t n, const double* value) {
+    for (std::size_t k = 0; k < n; ++k)
+        if (const lm::Ended e = of(c).instance.set(r[k], value[k]); e != lm::ok) return of(c).ended(e);
+    return lm::ok;
+}
+// There are numbers alone.
+static int none(void* c, std::size_t n) {
+    return n == 0 ? int{lm::ok} : of(c).ended(of(c).instance.failed("this FMU has variables of type Real alone"));
+}
+FMU_API int fmi2GetInteger(void* c, const Reference*, std::size_t n, int*) { return none(c, n); }
+FMU_API int fmi2GetBoolean(void* c, const Reference*, std::size_t n, Boolean*) { return none(c, n); }
+FMU_API int fmi2GetString(void* c, const Reference*, std::size_t n, const char**) { return none(c, n); }
+FMU_API int fmi2SetInteger(void* c, const Reference*, std::size_t n, const int*) { return none(c, n); }
+FMU_API int fmi2SetBoolean(void* c, const Reference*, std::size_t n, const Boolean*) { return none(c, n); }
+FMU_API int fmi2SetString(void* c, const Reference*, std::size_t n, const char* const*) { return none(c, n); }
+
+FMU_API int fmi2GetFMUstate(void* c, void** state) {
+    auto* to = static_cast<State*>(*state);
+    if (to == nullptr) to = new State;
+    *state = to;
+    return of(c).ended(of(c).instance.get_state(*to));
+}
+FMU_API int fmi2SetFMUstate(void* c, void* state) {
+    const auto& from = *static_cast<State*>(state);
+    return of(c).ended(of(c).instance.set_state(from.data(), from.size()));
+}
+FMU_API int fmi2FreeFMUstate(void*, void** state) {
+    delete static_cast<State*>(*state);
+    *state = nullptr;
+    return lm::ok;
+}
+FMU_API int fmi2SerializedFMUstateSize(void*, void* state, std::size_t* size) {
+    *size = sizeof(double) * static_cast<State*>(state)->size();
+    return lm::ok;
+}
+FMU_API int fmi2SerializeFMUstate(void* c, void* state, char* bytes, std::size_t size) {
+    const auto& from = *static_cast<State*>(state);
+    if (size != sizeof(double) * from.size()) return of(c).ended(of(c).instance.failed("the size is another one"));
+    std::memcpy(bytes, from.data(), size);
+    return lm::ok;
+}
+FMU_API int fmi2DeSerializeFMUstate(void* c, const char* bytes, std::size_t size, void** state) {
+    if (size == 0 || size != sizeof(double) * of(c).instance.state_size())
+        return of(c).ended(of(c).instance.failed("these bytes are no state of this FMU"));
+    auto* to = static_cast<State*>(*state);
+    if (to == nullptr) to = new State;
+    *state = to;
+    to->resize(size / sizeof(double));
+    std::memcpy(to->data(), bytes, size);
+    return lm::ok;
+}
+
+FMU_API int fmi2GetDirectionalDerivative(void* c, const Reference* unknown, std::size_t n_unknown,
+                                         const Reference* known, std::size_t n_known, const double* seed, double* out) {
+    return of(c).ended(of(c).instance.directional_derivative(unknown, n_unknown, known, seed, n_known, out));
+}
+FMU_API int fmi2SetRealInputDerivatives(void* c, const Reference* r, std::size_t n, const int* order,
+                                        const double* value) {
+    for (std::size_t k = 0; k < n; ++k)
+        if (const lm::Ended e = of(c).instance.set_input_rate(r[k], order[k], value[k]); e != lm::ok)
+            return of(c).ended(e);
+    return lm::ok;
+}
+FMU_API int fmi2GetRealOutputDerivatives(void* c, const Reference*, std::size_t n, const int*, double*) {
+    return n == 0 ? int{lm::ok} : of(c).ended(of(c).instance.failed("derivatives of outputs are not given"));
+}
+
+FMU_API int fmi2DoStep(void* c, double from, double interval, Boolean) {
+    return of(c).ended(of(c).instance.step(from, interval));
+}
+FMU_API int fmi2CancelStep(void* c) {
+    return of(c).ended(of(c).instance.failed("no step is under way: steps are done when they return"));
+}
+FMU_API int fmi2GetStatus(void*, int, int*) { return lm::discard; }
+FMU_API int fmi2GetRealStatus(void* c, int kind, double* value) {
+    if (kind != 2) return lm::discard;  // the last successful time
+    return of(c).ended(of(c).instance.get(lm::time_reference, *value));
+}
+FMU_API int fmi2GetIntegerStatus(void*, int, int*) { return lm::discard; }
+FMU_API int fmi2GetBooleanStatus(void*, int kind, Boolean* value) {
+    if (kind != 3) return lm::discard;  // terminated
+    *value = 0;
+    return lm::ok;
+}
+FMU_API int fmi2GetStringStatus(void*, int, const char**) { return lm::discard; }

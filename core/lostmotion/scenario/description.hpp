@@ -1,0 +1,181 @@
+// A scenario as a row of numbers that a program without Python can read and alter:
+//
+//   mark, version, count of the numbers of the scenario, these (scenario.hpp), then its parameters
+//
+// A parameter is a number of the scenario in the words of its file, such as "load.inertia", and says which numbers
+// follow from it: each is offset + slope v, or offset + slope/v. A number that follows from several is their product,
+// in terms of its present value, if all of them are without an offset, else the sum of their changes.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "scenario.hpp"
+
+namespace lostmotion {
+
+struct Effect {
+    int place = 0;  // among the numbers of the scenario
+    enum Law { proportional, reciprocal } law = proportional;
+    double offset = 0.0, slope = 0.0;
+
+    double operator()(double v) const { return offset + (law == proportional ? slope * v : slope / v); }
+};
+
+struct ScenarioParameter {
+    std::string key, unit;
+    double value = 0.0;  // SI
+    std::vector<Effect> effects;
+};
+
+class ScenarioDescription {
+ public:
+    static constexpr double mark = 19533.0, version = 1.0;
+    static constexpr std::size_t head = 3;
+
+    static std::vector<double> write(Scenario scenario, std::vector<ScenarioParameter> parameters = {}) {
+        FieldWriter body;
+        describe(body, scenario);
+        return write(body.numbers, std::move(parameters));
+    }
+    // The numbers of a scenario with its parameters.
+    static std::vector<double> write(const std::vector<double>& body, std::vector<ScenarioParameter> parameters) {
+        FieldWriter f;
+        f.numbers = {mark, version, static_cast<double>(body.size())};
+        f.numbers.insert(f.numbers.end(), body.begin(), body.end());
+        describe(f, parameters, body.size());
+        return std::move(f.numbers);
+    }
+
+    // error(): what is wrong with the numbers, or empty. Then nothing else may be asked for.
+    explicit ScenarioDescription(std::span<const double> numbers) { error_ = read(numbers); }
+
+    const std::string& error() const { return error_; }
+    const Scenario& scenario() const { return scenario_; }
+    const std::vector<ScenarioParameter>& parameters() const { return parameters_; }
+    // What these return is wrong with a value, or nothing; then the scenario has changed.
+    std::string set(std::size_t k, double value) {
+        if (k >= parameters_.size()) return "there is no parameter of this number";
+        ScenarioParameter& p = parameters_[k];
+        const double before = std::exchange(p.value, value);
+        std::string error = std::isfinite(value) ? apply() : "it must be finite";
+        if (error.empty()) return error;
+        p.value = before;
+        return "parameter " + p.key + ": " + error;
+    }
+
+    std::string set_times(double duration, double interval) {
+        if (!(std::isfinite(duration) && std::isfinite(interval) && duration > 0.0 && interval > 0.0 &&
+              duration / interval <= max_samples))
+            return "duration and sample interval must be > 0, and the samples at most 1e8";
+        times_ = {duration, interval};
+        use_given();
+        return {};
+    }
+    std::string set_input(std::size_t k, Signal signal) {
+        if (k >= scenario_.inputs.size()) return "there is no input of this number";
+        inputs_[k] = std::move(signal);
+        use_given();
+        return {};
+    }
+
+ private:
+    template <class F>
+    static void describe(F& f, std::vector<ScenarioParameter>& parameters, std::size_t places) {
+        f.each("parameters", parameters, [&](ScenarioParameter& p) {
+            f.text("key", p.key);
+            f.text("unit", p.unit);
+            f.number("value", p.value);
+            f.each("effects", p.effects, [&](Effect& e) {
+                f.integer("place", e.place, 0, static_cast<long>(places) - 1);
+                f.choice("law", e.law, 2);
+                f.number("offset", e.offset);
+                f.number("slope", e.slope);
+            });
+        });
+    }
+    template <class F>
+    static void describe(F& f, Scenario& s) {
+        lostmotion::describe(f, s);
+    }
+
+    std::string read(std::span<const double> numbers) {
+        if (numbers.size() < head || numbers[0] != mark) return "these numbers are no description of a scenario";
+        if (numbers[1] != version) return "the description is of another version; write it anew";
+        const double count = numbers[2];
+        if (!(count >= 1.0 && count <= static_cast<double>(numbers.size() - head)) || count != std::floor(count))
+            return "the description is cut off";
+        const auto n = static_cast<std::size_t>(count);
+        body_.assign(numbers.begin() + head, numbers.begin() + static_cast<std::ptrdiff_t>(head + n));
+        FieldReader f(numbers.subspan(head + n));
+        describe(f, parameters_, n);
+        if (!f.well()) return f.error();
+        if (f.left() != 0) return "the description goes on beyond its end";
+        if (std::string error = read_scenario(body_); !error.empty()) return error;
+        for (std::size_t k = 0; k < parameters_.size(); ++k) {
+            initial_.push_back(parameters_[k].value);
+            for (const Effect& e : parameters_[k].effects) effects_[e.place].emplace_back(k, e);
+        }
+        return {};
+    }
+    std::string read_scenario(std::span<const double> body) {
+        FieldReader f(body);
+        Scenario s;
+        describe(f, s);
+        if (!f.well()) return f.error();
+        if (f.left() != 0) return "the scenario goes on beyond its end";
+        std::string error = check(s);
+        if (!error.empty()) return error;
+        scenario_ = std::move(s);
+        use_given();
+        return {};
+    }
+    void use_given() {
+        if (times_) std::tie(scenario_.duration, scenario_.sample_interval) = *times_;
+        for (const auto& [k, signal] : inputs_) scenario_.inputs[k] = signal;
+    }
+
+    // The scenario with the parameters as they are.
+    std::string apply() {
+        std::vector<double> body = body_;
+        for (const auto& [place, effects] : effects_) {
+            double& entry = body[static_cast<std::size_t>(place)];
+            const bool product = effects.size() > 1 && std::all_of(effects.begin(), effects.end(), [](const auto& of) {
+                                     return of.second.offset == 0.0;
+                                 });
+            double sum = 0.0, factor = 1.0;
+            const Effect* only = nullptr;
+            int changed = 0;
+            for (const auto& [k, effect] : effects) {
+                const double now = parameters_[k].value, before = initial_[k];
+                if (now == before) continue;
+                ++changed;
+                only = &effect;
+                sum += effect(now) - effect(before);
+                factor *= effect(now) / effect(before);
+                if (changed == 1 && effects.size() == 1) entry = effect(now);
+            }
+            if (changed == 0 || (only != nullptr && effects.size() == 1)) continue;
+            entry = product ? entry * factor : entry + sum;
+        }
+        return read_scenario(body);
+    }
+
+    std::string error_;
+    Scenario scenario_;
+    std::vector<double> body_;  // as it was given
+    std::vector<ScenarioParameter> parameters_;
+    std::vector<double> initial_;  // values of the parameters that belong to it
+    std::map<int, std::vector<std::pair<std::size_t, Effect>>> effects_;
+    std::optional<std::pair<double, double>> times_;
+    std::map<std::size_t, Signal> inputs_;
+};
+
+}  // namespace lostmotion

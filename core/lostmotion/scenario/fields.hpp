@@ -1,0 +1,227 @@
+// Descriptions as rows of numbers: what writes one and what reads one, with every number, length and index checked.
+//
+// A structure is described once, by a function describe(fields, structure), which both call. A text is its length and
+// its bytes, one number each; a list is its length and its entries; what may be absent is 0, or 1 and what it is.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace lostmotion {
+
+// What a number may be; all but `limit` and `bound` are finite.
+enum class Range {
+    any,
+    positive,
+    not_negative,
+    up_to_one,  // > 0 and <= 1
+    limit,      // > 0, or infinite
+    limit_or_zero,
+    bound,  // any, or infinite
+};
+
+inline bool within(Range range, double v) {
+    const bool finite = std::isfinite(v);
+    switch (range) {
+        case Range::any: return finite;
+        case Range::positive: return finite && v > 0.0;
+        case Range::not_negative: return finite && v >= 0.0;
+        case Range::up_to_one: return v > 0.0 && v <= 1.0;
+        case Range::limit: return v > 0.0;
+        case Range::limit_or_zero: return v >= 0.0;
+        case Range::bound: return !std::isnan(v);
+    }
+    return false;
+}
+inline const char* range_text(Range range) {
+    switch (range) {
+        case Range::any: return "finite";
+        case Range::positive: return "finite and > 0";
+        case Range::not_negative: return "finite and >= 0";
+        case Range::up_to_one: return "> 0 and <= 1";
+        case Range::limit: return "> 0";
+        case Range::limit_or_zero: return ">= 0";
+        case Range::bound: return "a number";
+    }
+    return "";
+}
+
+// Where in a description something stands, such as "gears[0].ratio".
+class FieldPath {
+ public:
+    class Step {
+     public:
+        Step(FieldPath& path, std::string name) : path_(path) { path_.names_.push_back(std::move(name)); }
+        ~Step() { path_.names_.pop_back(); }
+        Step(const Step&) = delete;
+        Step& operator=(const Step&) = delete;
+
+     private:
+        FieldPath& path_;
+    };
+    std::string to(const std::string& name) const {
+        std::string all;
+        for (const std::string& n : names_) all += (all.empty() || n[0] == '[' ? "" : ".") + n;
+        return all + (all.empty() || name.empty() || name[0] == '[' ? "" : ".") + name;
+    }
+
+ private:
+    std::vector<std::string> names_;
+};
+
+class FieldWriter {
+ public:
+    static constexpr bool reads = false;
+
+    std::vector<double> numbers;
+
+    bool well() const { return true; }
+    void wrong(const std::string&, const std::string&) {}
+
+    void number(const char*, double v, Range = Range::any) { numbers.push_back(v); }
+    template <class Integer>
+    void integer(const char*, Integer v, long long, long long) {
+        numbers.push_back(static_cast<double>(v));
+    }
+    template <class Enum>
+    void choice(const char*, Enum v, int) {
+        numbers.push_back(static_cast<double>(static_cast<int>(v)));
+    }
+    void flag(const char*, bool v) { numbers.push_back(v ? 1.0 : 0.0); }
+    void text(const char*, const std::string& v) {
+        numbers.push_back(static_cast<double>(v.size()));
+        for (const char c : v) numbers.push_back(static_cast<double>(static_cast<unsigned char>(c)));
+    }
+    void list(const char*, const std::vector<double>& v, Range = Range::any) {
+        numbers.push_back(static_cast<double>(v.size()));
+        numbers.insert(numbers.end(), v.begin(), v.end());
+    }
+    template <class T, class Use>
+    void each(const char*, std::vector<T>& v, Use&& use) {
+        numbers.push_back(static_cast<double>(v.size()));
+        for (T& entry : v) use(entry);
+    }
+    template <class T, class Use>
+    void optional(const char* name, std::optional<T>& v, const T&, Use&& use) {
+        flag(name, v.has_value());
+        if (v) use(*v);
+    }
+    template <class Use>
+    void part(const char*, Use&& use) {
+        use();
+    }
+};
+
+class FieldReader {
+ public:
+    static constexpr bool reads = true;
+
+    explicit FieldReader(std::span<const double> numbers) : numbers_(numbers) {}
+
+    bool well() const { return error_.empty(); }
+    const std::string& error() const { return error_; }
+    std::size_t left() const { return numbers_.size() - next_; }
+    std::size_t place() const { return next_; }
+    // The first thing that is wrong, and with what.
+    void wrong(const std::string& name, const std::string& how) {
+        if (well()) error_ = path_.to(name) + ' ' + how;
+    }
+
+    void number(const char* name, double& v, Range range = Range::any) {
+        const double given = take(name);
+        if (!well()) return;
+        if (!within(range, given)) return wrong(name, "is " + printed(given) + "; it must be " + range_text(range));
+        v = given;
+    }
+    template <class Integer>
+    void integer(const char* name, Integer& v, long long low, long long high) {
+        const double given = take(name);
+        if (!well()) return;
+        if (!(given >= static_cast<double>(low) && given <= static_cast<double>(high)) || given != std::floor(given))
+            return wrong(name, "is " + printed(given) + "; it must be a whole number from " + std::to_string(low) +
+                                   " to " + std::to_string(high));
+        v = static_cast<Integer>(given);
+    }
+    template <class Enum>
+    void choice(const char* name, Enum& v, int count) {
+        int given = 0;
+        integer(name, given, 0, count - 1);
+        if (well()) v = static_cast<Enum>(given);
+    }
+    void flag(const char* name, bool& v) {
+        int given = 0;
+        integer(name, given, 0, 1);
+        if (well()) v = given != 0;
+    }
+    void text(const char* name, std::string& v) {
+        const std::size_t n = length(name);
+        v.clear();
+        for (std::size_t k = 0; k < n && well(); ++k) {
+            int c = 0;
+            integer(name, c, 1, 255);
+            v += static_cast<char>(c);
+        }
+    }
+    void list(const char* name, std::vector<double>& v, Range range = Range::any) {
+        const std::size_t n = length(name);
+        v.assign(n, 0.0);
+        for (std::size_t k = 0; k < n && well(); ++k) number(name, v[k], range);
+    }
+    template <class T, class Use>
+    void each(const char* name, std::vector<T>& v, Use&& use) {
+        const std::size_t n = length(name);
+        v.clear();
+        for (std::size_t k = 0; k < n && well(); ++k) {
+            const FieldPath::Step here(path_, name), entry(path_, '[' + std::to_string(k) + ']');
+            v.emplace_back();
+            use(v.back());
+        }
+    }
+    // initial: of what is to be read.
+    template <class T, class Use>
+    void optional(const char* name, std::optional<T>& v, const T& initial, Use&& use) {
+        bool given = false;
+        flag(name, given);
+        v.reset();
+        if (!well() || !given) return;
+        const FieldPath::Step here(path_, name);
+        v = initial;
+        use(*v);
+    }
+    template <class Use>
+    void part(const char* name, Use&& use) {
+        const FieldPath::Step here(path_, name);
+        use();
+    }
+
+ private:
+    static std::string printed(double v) {
+        char text[32];
+        std::snprintf(text, sizeof text, "%.10g", v);
+        return text;
+    }
+    double take(const char* name) {
+        if (well() && left() == 0) wrong(name, "is missing: the description ends before it");
+        return well() ? numbers_[next_++] : 0.0;
+    }
+    // Of a text or a list, each entry of which takes a number at least.
+    std::size_t length(const char* name) {
+        long n = 0;
+        integer(name, n, 0, static_cast<long>(left()));
+        return well() ? static_cast<std::size_t>(n) : 0;
+    }
+
+    std::span<const double> numbers_;
+    std::size_t next_ = 0;
+    FieldPath path_;
+    std::string error_;
+};
+
+}  // namespace lostmotion

@@ -1,0 +1,271 @@
+// The parts of drives and trains, field by field, in the order of a description.
+#pragma once
+
+#include "../drive/drive.hpp"
+#include "../kernel/inputs.hpp"
+#include "../model/train.hpp"
+#include "fields.hpp"
+
+namespace lostmotion {
+
+inline constexpr long max_pieces = 30000;  // of a law: they are counted in 16 bits
+
+inline bool rising(const std::vector<double>& v) {
+    for (std::size_t k = 1; k < v.size(); ++k)
+        if (!(v[k] > v[k - 1])) return false;
+    return true;
+}
+
+template <class F>
+void describe(F& f, TorsionCurve& curve) {
+    std::vector<double> breaks, slopes;
+    for (int k = 0; k < curve.outermost_piece(); ++k) breaks.push_back(curve.upper(k));
+    for (int k = 0; k <= curve.outermost_piece(); ++k) slopes.push_back(curve.slope(k));
+    f.list("breaks", breaks, Range::positive);
+    f.list("slopes", slopes, Range::not_negative);
+    if constexpr (F::reads) {
+        if (f.well() && slopes.size() != breaks.size() + 1) f.wrong("slopes", "must be one more than breaks");
+        if (f.well() && !rising(breaks)) f.wrong("breaks", "must rise");
+        if (f.well() && breaks.size() > max_pieces) f.wrong("breaks", "are too many");
+        if (f.well()) curve = TorsionCurve(std::move(breaks), std::move(slopes));
+    }
+}
+
+// As it was given, without what extends it.
+template <class F>
+void describe(F& f, LossMap& map) {
+    std::vector<double> speeds, loads, values;
+    if (!map.empty()) {
+        const std::size_t n = map.speeds().size(), m = map.loads().size();
+        speeds.assign(map.speeds().begin(), map.speeds().end() - 1);
+        loads.assign(map.loads().begin() + 1, map.loads().end() - 1);
+        for (std::size_t j = 1; j + 1 < m; ++j)
+            for (std::size_t i = 0; i + 1 < n; ++i) values.push_back(map.values()[j * n + i]);
+    }
+    f.list("speeds", speeds, Range::not_negative);
+    f.list("loads", loads);
+    f.list("values", values, Range::not_negative);
+    if constexpr (F::reads) {
+        if (!f.well()) return;
+        if (speeds.size() < 2 || loads.size() < 2) return f.wrong("speeds", "and loads must be two at least");
+        if (speeds[0] != 0.0 || !rising(speeds)) return f.wrong("speeds", "must rise from 0");
+        if (!rising(loads)) return f.wrong("loads", "must rise");
+        if (values.size() != speeds.size() * loads.size()) return f.wrong("values", "must be one for each node");
+        map = LossMap(std::move(speeds), std::move(loads), std::move(values));
+    }
+}
+
+namespace model {
+
+template <class F>
+void describe(F& f, PeriodicCurve& curve) {
+    double period = curve.period();
+    std::vector<double> angles, values;
+    for (int k = 0; k < curve.pieces(); ++k) {
+        angles.push_back(curve.lower(k));
+        values.push_back(curve.value(k));
+    }
+    SineOfAngle sine = curve.sine_of();
+    f.number("period", period, Range::positive);
+    f.list("angles", angles, Range::not_negative);
+    f.list("values", values);
+    f.number("amplitude", sine.amplitude);
+    f.integer("order", sine.order, 1, 1000000);
+    f.number("phase", sine.phase);
+    if constexpr (F::reads) {
+        if (!f.well()) return;
+        if (angles.empty() || angles.size() != values.size() || angles.size() > max_pieces)
+            return f.wrong("angles", "must be as many as values, from 1 to " + std::to_string(max_pieces));
+        if (!rising(angles) || !(angles.back() < period))
+            return f.wrong("angles", "must rise and lie below the period");
+        curve = PeriodicCurve(period, std::move(angles), std::move(values), sine);
+    }
+}
+
+}  // namespace model
+
+template <class F>
+void describe(F& f, Motor& m) {
+    f.choice("kind", m.kind, 2);
+    f.number("rotor_inertia", m.rotor_inertia, Range::not_negative);
+    f.number("friction_torque", m.friction_torque, Range::not_negative);
+    f.number("rated_torque", m.rated_torque, Range::positive);
+    f.number("rated_speed", m.rated_speed, Range::positive);
+    f.number("electrical_time_constant", m.electrical_time_constant, Range::positive);
+    f.number("armature_voltage_constant", m.armature_voltage_constant, Range::positive);
+    f.number("command_limit", m.voltage_limit, Range::limit);
+}
+
+template <class F>
+void describe(F& f, Gearbox& g) {
+    f.number("ratio", g.ratio, Range::positive);
+    f.number("inertia", g.inertia, Range::not_negative);
+    f.number("viscous_friction", g.viscous_friction, Range::not_negative);
+    f.choice("compliance", g.compliance, 2);
+    if (g.compliance == Gearbox::torsion_curve) f.part("stiffness", [&] { describe(f, g.curve); });
+    f.number("hysteresis_efficiency", g.hysteresis_efficiency, Range::up_to_one);
+    f.choice("losses", g.losses, 2);
+    f.number("efficiency", g.efficiency, Range::positive);
+    if (g.losses == Gearbox::loss_map) f.part("loss_map", [&] { describe(f, g.map); });
+    f.number("rated_input_speed", g.rated_input_speed, Range::positive);
+    f.number("rated_output_torque", g.rated_output_torque, Range::positive);
+    if constexpr (F::reads) {
+        if (f.well() && g.compliance == Gearbox::torsion_curve && !(g.curve.max_slope() > 0.0))
+            f.wrong("stiffness", "must be > 0 somewhere");
+    }
+}
+
+template <class F>
+void describe(F& f, Load& l) {
+    f.number("inertia", l.inertia, Range::positive);
+    f.number("viscous_friction", l.viscous_friction, Range::not_negative);
+    f.number("friction_torque", l.friction_torque, Range::not_negative);
+}
+
+template <class F>
+void describe(F& f, Drive& d) {
+    f.part("motor", [&] { describe(f, d.motor); });
+    f.part("gearbox", [&] { describe(f, d.gearbox); });
+    f.part("load", [&] { describe(f, d.load); });
+    if constexpr (F::reads) {
+        if (f.well() && !(d.motor.rotor_inertia + d.gearbox.inertia > 0.0))
+            f.wrong("motor.rotor_inertia", "and gearbox.inertia must not both be 0");
+    }
+}
+
+template <class F>
+void describe(F& f, Sine& s) {
+    f.number("amplitude", s.amplitude);
+    f.number("frequency", s.frequency, Range::positive);
+    f.number("phase", s.phase);
+}
+
+template <class F>
+void describe(F& f, Signal& s) {
+    f.each("breakpoints", s.breakpoints, [&](Breakpoint& b) {
+        f.number("time", b.time, Range::not_negative);
+        f.number("value", b.value);
+        f.number("slope", b.slope);
+    });
+    f.each("sines", s.sines, [&](Sine& sine) { describe(f, sine); });
+    if constexpr (F::reads) {
+        if (!f.well()) return;
+        if (s.breakpoints.empty() || s.breakpoints[0].time != 0.0) return f.wrong("breakpoints", "must begin at 0 s");
+        for (std::size_t k = 1; k < s.breakpoints.size(); ++k)
+            if (!(s.breakpoints[k].time > s.breakpoints[k - 1].time))
+                return f.wrong("breakpoints", "must rise in time");
+    }
+}
+
+namespace model {
+
+// What a check of the train finds, such as shafts that it does not have, is left to it.
+inline constexpr long max_number = 1000;  // of a shaft or motor
+
+template <class F>
+void describe(F& f, DryFriction& d) {
+    f.number("torque", d.torque, Range::not_negative);
+    f.number("breakaway_torque", d.breakaway_torque, Range::not_negative);
+    f.list("speeds", d.speeds, Range::not_negative);
+    f.list("torques", d.torques, Range::not_negative);
+    if constexpr (F::reads) {
+        if (f.well() && d.speeds.size() > max_pieces) f.wrong("speeds", "are too many");
+    }
+}
+
+template <class F>
+void describe(F& f, Shaft& s) {
+    f.text("name", s.name);
+    f.number("inertia", s.inertia, Range::not_negative);
+    f.number("viscous_friction", s.viscous_friction, Range::not_negative);
+    f.part("friction", [&] { describe(f, s.friction); });
+    f.part("drag", [&] { describe(f, s.drag); });
+    f.flag("loaded", s.loaded);
+}
+
+template <class F>
+void describe(F& f, ShaftMotor& m) {
+    f.text("name", m.name);
+    f.integer("shaft", m.shaft, 0, max_number);
+    describe(f, m.law);
+    f.number("torque_limit", m.torque_limit, Range::limit);
+}
+
+template <class F>
+void describe(F& f, Gear& g) {
+    f.text("name", g.name);
+    f.integer("input", g.input, 0, max_number);
+    f.integer("output", g.output, 0, max_number);
+    f.integer("housing", g.housing, -1, max_number);
+    describe(f, g.law);
+    f.optional("efficiencies", g.efficiencies, MeshEfficiency(1.0, 1.0), [&](MeshEfficiency& e) {
+        double driving = e.driving(), overrunning = e.overrunning();
+        f.number("driving", driving, Range::positive);
+        f.number("overrunning", overrunning);
+        e = MeshEfficiency(driving, overrunning);
+    });
+    f.number("mesh_damping", g.mesh_damping, Range::not_negative);
+    bool present = g.transmission_error.present();
+    f.flag("transmission_error", present);
+    if (present) f.part("transmission_error", [&] { describe(f, g.transmission_error); });
+}
+
+template <class F>
+void describe(F& f, Brake& b) {
+    f.text("name", b.name);
+    f.integer("shaft", b.shaft, 0, max_number);
+    f.number("torque", b.torque, Range::not_negative);
+    f.number("breakaway_torque", b.breakaway_torque, Range::not_negative);
+}
+
+template <class F>
+void describe(F& f, Coupling& c) {
+    f.text("name", c.name);
+    f.choice("kind", c.kind, 3);
+    f.integer("input", c.input, 0, max_number);
+    f.integer("output", c.output, 0, max_number);
+    f.number("torque", c.torque, Range::not_negative);
+    f.number("breakaway_torque", c.breakaway_torque, Range::not_negative);
+}
+
+template <class F>
+void describe(F& f, AngleTorque& t) {
+    f.text("name", t.name);
+    f.integer("shaft", t.shaft, 0, max_number);
+    f.part("torque", [&] { describe(f, t.torque); });
+}
+
+template <class F>
+void describe(F& f, LinearController& c) {
+    const auto signal = [&](LinearController::Signal& s) {
+        f.choice("kind", s.kind, 4);
+        f.integer("shaft", s.shaft, 0, max_number);
+    };
+    const auto row = [&](std::vector<double>& r) { f.list("row", r); };
+    f.text("name", c.name);
+    f.integer("motor", c.motor, 0, max_number);
+    f.each("signals", c.signals, signal);
+    f.part("compared", [&] { signal(c.compared); });
+    f.each("states", c.states, [&](std::string& name) { f.text("name", name); });
+    f.each("A", c.A, row);
+    f.each("B", c.B, row);
+    f.list("C", c.C);
+    f.list("D", c.D);
+    f.list("back_calculation", c.back_calculation);
+    f.number("limit", c.limit, Range::limit);
+}
+
+template <class F>
+void describe(F& f, Train& t) {
+    const auto element = [&](auto& e) { describe(f, e); };
+    f.each("shafts", t.shafts, element);
+    f.each("motors", t.motors, element);
+    f.each("gears", t.gears, element);
+    f.each("brakes", t.brakes, element);
+    f.each("couplings", t.couplings, element);
+    f.each("angle_torques", t.angle_torques, element);
+    f.each("controllers", t.controllers, element);
+}
+
+}  // namespace model
+}  // namespace lostmotion

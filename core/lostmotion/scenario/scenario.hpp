@@ -1,0 +1,129 @@
+// All that a run takes: a drive or a train, what acts on it, its controllers, its state at t = 0, and how long.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "../simulation/train_run.hpp"
+#include "control_fields.hpp"
+
+namespace lostmotion {
+
+struct Scenario {
+    std::string title;
+    enum Form { of_drive, of_train } form = of_drive;
+    Drive drive;
+    model::Train train;
+    std::vector<Signal> inputs;                 // of each input, in their order; those of controllers are not looked at
+    std::vector<double> start;                  // states, in their order
+    std::vector<double> hysteresis_capacities;  // of each gear [N m]
+    Control control;
+    double duration = 1.0, sample_interval = 1e-3;  // [s]
+
+    std::size_t samples() const { return static_cast<std::size_t>(duration / sample_interval * (1.0 + 1e-12)) + 1; }
+};
+
+inline constexpr double max_samples = 1e8;
+
+template <class F>
+void describe(F& f, Scenario& s) {
+    f.text("title", s.title);
+    f.choice("form", s.form, 2);
+    if (s.form == Scenario::of_drive)
+        f.part("drive", [&] { describe(f, s.drive); });
+    else
+        f.part("train", [&] { model::describe(f, s.train); });
+    f.each("inputs", s.inputs, [&](Signal& signal) { describe(f, signal); });
+    f.list("start", s.start);
+    f.list("hysteresis_capacities", s.hysteresis_capacities, Range::not_negative);
+    f.part("control", [&] { describe(f, s.control); });
+    f.number("duration", s.duration, Range::positive);
+    f.number("sample_interval", s.sample_interval, Range::positive);
+}
+
+// States and capacities in their order as a start by name.
+inline TrainStart train_start(const model::Assembly& a, std::span<const double> states,
+                              std::span<const double> capacities) {
+    TrainStart start;
+    const std::vector<std::string> names = model::state_names(a);
+    for (std::size_t k = 0; k < names.size(); ++k) start.states[names[k]] = states[k];
+    for (std::size_t g = 0; g < a.train().gears.size(); ++g)
+        start.hysteresis_capacities[a.train().gears[g].name] = capacities[g];
+    return start;
+}
+
+inline double value_at_start(const Signal& s) {
+    double value = s.breakpoints[0].value;
+    for (const Sine& sine : s.sines) value += sine.amplitude * sine_cosine(sine.phase).sin;
+    return value;
+}
+
+// The inputs that no sampled controller gives, by their numbers among all.
+struct FreeInput {
+    std::string name;
+    std::size_t number;
+};
+inline std::vector<FreeInput> free_inputs(const Scenario& s) {
+    std::vector<std::string> names{"command", "load_torque"};
+    std::vector<std::size_t> commands{0};
+    if (s.form == Scenario::of_train) {
+        const model::Assembly a(s.train);
+        names = model::input_names(a);
+        commands.clear();
+        for (const model::MotorPlace& m : a.places().motors) commands.push_back(static_cast<std::size_t>(m.command));
+    }
+    std::vector<bool> controlled(names.size());
+    for (const ControlledAxis& axis : s.control.axes) controlled[commands[static_cast<std::size_t>(axis.motor)]] = true;
+    std::vector<FreeInput> out;
+    for (std::size_t k = 0; k < names.size(); ++k)
+        if (!controlled[k]) out.push_back({names[k], k});
+    return out;
+}
+
+// What is wrong with a scenario whose numbers are all in range, or empty.
+inline std::string check(const Scenario& s) {
+    if (!(s.duration / s.sample_interval <= max_samples)) return "sample_interval is too short for the duration";
+    const auto counted = [](const char* what, std::size_t given, std::size_t wanted) {
+        return given == wanted ? std::string()
+                               : std::string(what) + ": there are " + std::to_string(given) + "; there must be " +
+                                     std::to_string(wanted);
+    };
+    std::size_t motors = 1, shafts = 2, states = n_states, inputs = n_inputs, gears = 1;
+    if (s.form == Scenario::of_train) {
+        const TrainRun run(s.train);
+        if (!run.error().empty()) return run.error();
+        motors = s.train.motors.size();
+        shafts = s.train.shafts.size();
+        gears = s.train.gears.size();
+        states = static_cast<std::size_t>(run.assembly().layout().states);
+        inputs = static_cast<std::size_t>(run.assembly().layout().inputs);
+    }
+    for (std::string error : {counted("inputs", s.inputs.size(), inputs), counted("start", s.start.size(), states),
+                              counted("hysteresis_capacities", s.hysteresis_capacities.size(), gears)})
+        if (!error.empty()) return error;
+    std::vector<bool> turned(motors);
+    for (const ControlledAxis& axis : s.control.axes) {
+        const auto exists = [](int k, std::size_t n) { return k >= 0 && static_cast<std::size_t>(k) < n; };
+        if (!exists(axis.motor, motors) || !exists(axis.position_shaft, shafts) || !exists(axis.speed_shaft, shafts) ||
+            !exists(axis.reference_shaft, shafts))
+            return "a controller names a motor or a shaft that there is not";
+        const auto m = static_cast<std::size_t>(axis.motor);
+        if (turned[m]) return "two controllers turn the same motor";
+        turned[m] = true;
+        for (const model::LinearController& c : s.train.controllers)
+            if (s.form == Scenario::of_train && c.motor == axis.motor) return "two controllers turn the same motor";
+        const Motor& law = s.form == Scenario::of_train ? s.train.motors[m].law : s.drive.motor;
+        if (axis.law.field_orientation && law.kind != Motor::torque_source)
+            return "a motor under field-oriented control must be a torque source";
+    }
+    if (s.form == Scenario::of_train) {
+        const TrainRun run(s.train);
+        if (std::string error = check_control(run.assembly(), s.control); !error.empty()) return error;
+        return check_start(run.assembly(), s.start);
+    }
+    if (s.drive.rigid() && s.start[twist] != 0.0) return "the gearbox is rigid, but the start has a twist";
+    return {};
+}
+
+}  // namespace lostmotion

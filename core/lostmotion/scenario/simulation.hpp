@@ -1,0 +1,259 @@
+// A scenario, a drive or a train step by step, whichever kernel it takes.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "../simulation/train_stepping.hpp"
+#include "variables.hpp"
+
+namespace lostmotion {
+
+// What a snapshot consists of, number by number: use(number) may read or write. slots: how many the controllers have.
+template <class Snapshot, class Use>
+void each_number_of_snapshot(Snapshot& s, int slots, Use&& use) {
+    use(s.time);
+    for (auto& x : s.x) use(x);
+    if constexpr (requires { s.memory.hysteresis_capacity; }) {
+        use(s.memory.hysteresis_capacity);
+        use(s.memory.locked_torque);
+    } else {
+        for (auto& m : s.memory) use(m);
+    }
+    for (auto& m : s.key.modes) use(m);
+    if constexpr (requires { s.key.branch; }) {
+        for (auto& b : s.key.branch) use(b);
+    } else {
+        use(s.key.amplifier);
+        use(s.key.piece);
+        use(s.key.cell);
+        use(s.key.cell_back);
+    }
+    for (auto& u : s.input) use(u);
+    use(s.started);
+    use(s.steady);
+    each_number(s.course, use);
+    use(s.control.next);
+    if constexpr (!std::is_const_v<Snapshot>) s.control.slots.resize(static_cast<std::size_t>(slots));
+    for (std::size_t k = 0; k < static_cast<std::size_t>(slots); ++k) {
+        if constexpr (std::is_const_v<Snapshot>)
+            use(k < s.control.slots.size() ? s.control.slots[k] : 0.0);
+        else
+            use(s.control.slots[k]);
+    }
+}
+
+class ScenarioSimulation {
+ public:
+    // The scenario has passed its check. It begins at its start.
+    ScenarioSimulation(const Scenario& scenario, double step) : control_(scenario.control), variables_(scenario) {
+        if (scenario.form == Scenario::of_drive)
+            drive_ = std::make_unique<Simulation>(scenario.drive, step, control_);
+        else
+            train_ = std::make_unique<TrainSimulation>(scenario.train, step, control_);
+        laws_ = control_.laws();
+        name_all(scenario);
+        reset(scenario.start, scenario.hysteresis_capacities);
+    }
+    // A train that has passed its check, from rest.
+    ScenarioSimulation(const model::Train& train, double step) : ScenarioSimulation(of_train(train), step) {}
+
+    struct Names {
+        std::vector<std::string> states, inputs, capacities;
+    };
+    const Names& names() const { return names_; }
+    const Variables& variables() const { return variables_; }
+    // How many inputs the solver has, those of controllers among them, and which of them is the k-th of the names.
+    std::size_t solver_inputs() const { return begin_.size(); }
+    std::size_t solver_input(std::size_t k) const { return free_[k]; }
+
+    // use(simulation) with that of its kernel.
+    template <class Use>
+    decltype(auto) with(Use&& use) {
+        if (drive_) return use(*drive_);
+        return train_->with(use);
+    }
+    template <class Use>
+    decltype(auto) with(Use&& use) const {
+        if (drive_) return use(std::as_const(*drive_));
+        return std::as_const(*train_).with(use);
+    }
+    TrainSimulation* train() { return train_.get(); }
+    Simulation* drive() { return drive_.get(); }
+
+    double time() const {
+        return with([](const auto& s) { return s.time(); });
+    }
+    // Why a status is what it is, in words; empty if all is well.
+    std::string text(Status status) const {
+        if (drive_) return status_text(status, drive_->time(), drive_->stopped_at());
+        return train_->with([&](const auto& s) {
+            return train_status_text(train_->assembly(), status, s.time(), s.stopped_at(), s.too_many_guards());
+        });
+    }
+
+    // To t = 0, with the contacts still to be found. Returns what is wrong with the start, or nothing.
+    std::string reset(std::span<const double> states, std::span<const double> capacities) {
+        if (drive_) {
+            Simulation::Snapshot start;
+            std::copy(states.begin(), states.end(), start.x.begin());
+            start.memory = {capacities[0], 0.0};
+            drive_->restore(start);
+            return "";
+        }
+        return train_->reset(train_start(states, capacities));
+    }
+    TrainStart train_start(std::span<const double> states, std::span<const double> capacities) const {
+        return lostmotion::train_start(train_->assembly(), states, capacities);
+    }
+
+    // Each input of names().inputs runs in a straight line from its first to its second value.
+    Status advance(double interval, std::span<const double> begin, std::span<const double> end) {
+        for (std::size_t k = 0; k < free_.size(); ++k) {
+            begin_[free_[k]] = begin[k];
+            end_[free_[k]] = end[k];
+        }
+        if (drive_) return drive_->advance(interval, begin_[0], end_[0], begin_[1], end_[1]);
+        return train_->advance(interval, begin_, end_);
+    }
+    // What acts at t = 0, for what is read before the first step.
+    void hold(std::span<const double> inputs) {
+        with([&](auto& s) {
+            if (s.snapshot().started) return;
+            auto snapshot = s.snapshot();
+            for (std::size_t k = 0; k < free_.size(); ++k) snapshot.input[free_[k]] = inputs[k];
+            s.restore(snapshot);
+        });
+    }
+    // All variables at the present instant, with the inputs at their last values.
+    Status read(double* out) {
+        const Status status = with([](auto& s) { return s.find_regime(); });
+        if (status != Status::done) return status;
+        if (drive_) {
+            const Reading reading = drive_->reading();
+            std::copy(reading.value.begin(), reading.value.end(), out);
+        } else {
+            const std::vector<double> values = train_->with([](auto& s) { return s.values(); });
+            std::copy(values.begin(), values.end(), out);
+        }
+        variables_.derive(out, 1, 0);
+        if (laws_.empty()) return status;
+        with([&](const auto& s) {
+            double* to = out + variables_.first_shown();
+            for (const Variables::Shown& shown : variables_.shown()) {
+                const double* slot = s.snapshot().control.slots.data();
+                for (int a = 0; a < shown.axis; ++a) slot += laws_[static_cast<std::size_t>(a)].slots();
+                const control::Axis& law = laws_[static_cast<std::size_t>(shown.axis)];
+                *to++ = shown.signal < control::n_axis_signals
+                            ? law.signal(shown.signal, slot)
+                            : law.winding_signal(shown.signal - control::n_axis_signals, s.time(), slot);
+            }
+        });
+        return status;
+    }
+
+    // Another scenario of the same elements, at the present state: the contacts are found anew.
+    void go_on_from(const ScenarioSimulation& before) {
+        with([&]<class S>(S& to) {
+            before.with([&]<class From>(const From& from) {
+                if constexpr (std::is_same_v<S, From>) {
+                    auto snapshot = from.snapshot();
+                    snapshot.started = false;
+                    to.restore(snapshot);
+                }
+            });
+        });
+    }
+
+    // The whole state as numbers, with one that tells whether they belong to this simulation and are whole.
+    std::size_t state_size() const {
+        std::size_t n = 1;
+        with([&](const auto& s) {
+            each_number_of_snapshot(s.snapshot(), s.control_slots(), [&](const auto&) { ++n; });
+        });
+        return n;
+    }
+    void get_state(double* to) const {
+        double* const first = to;
+        with([&](const auto& s) {
+            each_number_of_snapshot(s.snapshot(), s.control_slots(),
+                                    [&](const auto& number) { *to++ = static_cast<double>(number); });
+        });
+        *to = sum(first, to);
+    }
+    // False: the numbers are not those of a state of such a simulation.
+    bool set_state(const double* from) {
+        const std::size_t n = state_size();
+        if (from[n - 1] != sum(from, from + n - 1)) return false;
+        with([&](auto& s) {
+            auto snapshot = s.snapshot();
+            each_number_of_snapshot(snapshot, s.control_slots(), [&](auto& number) {
+                number = static_cast<std::remove_reference_t<decltype(number)>>(*from++);
+            });
+            if (!snapshot.started && snapshot.control.next == 0) snapshot.control.slots.clear();
+            s.restore(snapshot);
+        });
+        return true;
+    }
+
+ private:
+    static Scenario of_train(const model::Train& train) {
+        Scenario s;
+        s.form = Scenario::of_train;
+        s.train = train;
+        const model::Assembly a(train);
+        s.start.resize(static_cast<std::size_t>(a.layout().states));
+        s.hysteresis_capacities.resize(train.gears.size());
+        return s;
+    }
+    void name_all(const Scenario& scenario) {
+        if (drive_) {
+            for (const StateName& s : state_names) names_.states.emplace_back(s.name);
+            names_.capacities.emplace_back("gearbox");
+        } else {
+            names_.states = model::state_names(train_->assembly());
+            for (const model::Gear& g : scenario.train.gears) names_.capacities.push_back(g.name);
+        }
+        for (const FreeInput& i : free_inputs(scenario)) {
+            free_.push_back(i.number);
+            names_.inputs.push_back(i.name);
+        }
+        begin_.resize(scenario.form == Scenario::of_drive
+                          ? std::size_t{n_inputs}
+                          : static_cast<std::size_t>(train_->assembly().layout().inputs));
+        end_ = begin_;
+        identity_ = 0xcbf29ce484222325u;
+        for (const auto* list : {&names_.states, &names_.inputs})
+            for (const std::string& name : *list) mix(identity_, name.data(), name.size());
+    }
+
+    static void mix(std::uint64_t& hash, const void* bytes, std::size_t n) {
+        for (std::size_t k = 0; k < n; ++k)
+            hash = (hash ^ static_cast<const unsigned char*>(bytes)[k]) * 0x100000001b3u;
+    }
+    // Of the bits of numbers, as a number without a fraction.
+    double sum(const double* first, const double* end) const {
+        std::uint64_t hash = identity_;
+        mix(hash, first, sizeof(double) * static_cast<std::size_t>(end - first));
+        return static_cast<double>(hash >> 12);
+    }
+
+    std::unique_ptr<Simulation> drive_;
+    std::unique_ptr<TrainSimulation> train_;
+    Control control_;
+    std::vector<control::Axis> laws_;
+    Variables variables_;
+    Names names_;
+    std::vector<std::size_t> free_;  // inputs that no controller gives
+    std::vector<double> begin_, end_;
+    std::uint64_t identity_ = 0;
+};
+
+}  // namespace lostmotion

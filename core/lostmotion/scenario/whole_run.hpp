@@ -1,0 +1,166 @@
+// A scenario in one go: samples of all variables, switchings, energies and the end.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "../simulation/run.hpp"
+#include "simulation.hpp"
+
+namespace lostmotion {
+
+struct WholeRunOptions {
+    bool energy = true;                   // of the exact solver
+    std::size_t max_switchings = 100000;  // kept; all are counted
+};
+
+struct WholeRun {
+    Status status = Status::done;
+    std::string error;
+    double time = 0.0;  // [s] reached
+    std::size_t samples = 0;
+    std::vector<Variable> variables;
+    std::vector<double> values;  // one variable after the other
+    std::vector<std::string> energies, end_states;
+    std::vector<double> energy, end_state;  // [J], SI
+    std::vector<std::string> switching_columns;
+    std::vector<double> switchings;  // one switching after the other
+    std::size_t switching_count = 0;
+    double left_data_at = std::numeric_limits<double>::infinity();  // [s]
+};
+
+namespace whole_run {
+
+template <class Options>
+Options options_of(const Scenario& s, const WholeRunOptions& given, std::vector<double>& control) {
+    Options o;
+    o.duration = s.duration;
+    o.sample_interval = s.sample_interval;
+    o.samples = s.samples();
+    o.energy = given.energy;
+    o.max_switchings = given.max_switchings;
+    o.control = s.control;
+    if (s.control.present()) {
+        control.assign(s.control.axes.size() * static_cast<std::size_t>(s.control.signals()) * o.samples, 0.0);
+        o.control_out = control.data();
+    }
+    return o;
+}
+
+inline void add(std::vector<std::string>& names, std::vector<double>& values, const std::string& name, double value) {
+    names.push_back(name);
+    values.push_back(value);
+}
+
+// solve(drive, signals, start, options, samples): by one of the solvers.
+template <class Solve>
+void of_drive(const Scenario& s, const WholeRunOptions& given, std::vector<double>& control, WholeRun& out,
+              Solve&& solve) {
+    const RunOptions options = options_of<RunOptions>(s, given, control);
+    Start start;
+    std::copy(s.start.begin(), s.start.end(), start.x.begin());
+    start.memory.hysteresis_capacity = s.hysteresis_capacities[0];
+    const Signals signals{s.inputs[0], s.inputs[1]};
+    const RunReport r = solve(s.drive, signals, start, options, out.values.data());
+    out.status = r.status;
+    out.time = r.time;
+    out.error = status_text(r.status, r.time, r.contact);
+    if (options.energy)
+        for (const EnergyEntry& e : energy_entries) add(out.energies, out.energy, e.name, e.of(r.energy));
+    for (const StateName& n : state_names) add(out.end_states, out.end_state, n.name, r.x[n.value]);
+    add(out.end_states, out.end_state, "hysteresis_capacity", r.memory.hysteresis_capacity);
+    for (const SwitchingColumn& c : switching_columns()) out.switching_columns.push_back(c.name);
+    for (const Switching& w : r.switchings)
+        for (const SwitchingColumn& c : switching_columns()) out.switchings.push_back(c.value(w));
+    out.switching_count = r.switching_count;
+    out.left_data_at = r.left_data_at;
+}
+
+// solve(run, signals, states, memory, options, samples)
+template <class Solve>
+void of_train(const Scenario& s, const WholeRunOptions& given, std::vector<double>& control, WholeRun& out,
+              Solve&& solve) {
+    const TrainOptions options = options_of<TrainOptions>(s, given, control);
+    const TrainRun run(s.train);
+    const model::Assembly& a = run.assembly();
+    const auto [x, memory] = run.in_layout(train_start(a, s.start, s.hysteresis_capacities));
+    const TrainReport r = solve(run, s.inputs, x, memory, options, out.values.data());
+    out.status = r.status;
+    out.time = r.time;
+    out.error = error_text(r, a);
+    if (!r.message.empty()) return;
+    if (options.energy)
+        for (const auto& [name, energy] : named_ledger(r, a)) add(out.energies, out.energy, name, energy);
+    for (const auto& [name, value] : named_end(r, a)) add(out.end_states, out.end_state, name, value);
+    const int contacts = a.layout().contacts;
+    out.switching_columns = {"instant", "cause"};
+    for (const char* when : {"_before", "_after"})
+        for (int c = 0; c < contacts; ++c) out.switching_columns.push_back(model::contact_name(a, c) + when);
+    out.switchings.resize(r.switchings.size() * out.switching_columns.size());
+    double* to = out.switchings.data();
+    for (const TrainSwitching& w : r.switchings) to = write_switching(w, contacts, to);
+    out.switching_count = r.switching_count;
+    out.left_data_at = r.left_data_at;
+}
+
+// Signals of the controllers into the rows of the variables. A motor with a winding shows the torque of its currents,
+// in the place of the straight lines that the mechanics were driven by.
+inline void add_signals(const Scenario& s, const Variables& variables, const std::vector<double>& control,
+                        WholeRun& out) {
+    const std::size_t n = out.samples, signals = static_cast<std::size_t>(s.control.signals());
+    const auto recorded = [&](std::size_t axis, std::size_t signal) {
+        return control.data() + (axis * signals + signal) * n;
+    };
+    double* to = out.values.data() + variables.first_shown() * n;
+    for (const Variables::Shown& shown : variables.shown())
+        to = std::copy_n(recorded(static_cast<std::size_t>(shown.axis), static_cast<std::size_t>(shown.signal)), n, to);
+    for (std::size_t a = 0; a < s.control.axes.size(); ++a) {
+        const ControlledAxis& axis = s.control.axes[a];
+        if (!axis.law.field_orientation) continue;
+        const std::string motor =
+            s.form == Scenario::of_drive ? "motor" : s.train.motors[static_cast<std::size_t>(axis.motor)].name;
+        const int place = variables.place(motor + "_torque");
+        const std::size_t first = control::n_axis_signals;
+        const double *i_d = recorded(a, first + control::direct_current),
+                     *i_q = recorded(a, first + control::quadrature_current);
+        for (std::size_t k = 0; k < n; ++k)
+            out.values[static_cast<std::size_t>(place) * n + k] =
+                axis.law.field_orientation->winding.torque(i_d[k], i_q[k]);
+    }
+}
+
+template <class OfDrive, class OfTrain>
+WholeRun run(const Scenario& s, const WholeRunOptions& options, OfDrive&& solve_drive, OfTrain&& solve_train) {
+    const Variables variables(s);
+    WholeRun out;
+    out.samples = s.samples();
+    out.variables = variables.all();
+    out.values.assign(variables.size() * out.samples, 0.0);
+    std::vector<double> control;
+    if (s.form == Scenario::of_drive)
+        of_drive(s, options, control, out, solve_drive);
+    else
+        of_train(s, options, control, out, solve_train);
+    if (s.control.present()) add_signals(s, variables, control, out);
+    for (std::size_t k = 0; k < out.samples; ++k) variables.derive(out.values.data(), out.samples, k);
+    return out;
+}
+
+}  // namespace whole_run
+
+// By the exact solver. The scenario has passed its check.
+inline WholeRun run_whole(const Scenario& s, const WholeRunOptions& options = {}) {
+    return whole_run::run(
+        s, options,
+        [](const Drive& drive, const Signals& signals, const Start& start, const RunOptions& o, double* out) {
+            return run_exact(drive, signals, start, o, out);
+        },
+        [](const TrainRun& run, const std::vector<Signal>& signals, const std::vector<double>& x,
+           const std::vector<double>& memory, const TrainOptions& o,
+           double* out) { return run.run(signals, x, memory, o, out); });
+}
+
+}  // namespace lostmotion

@@ -1,0 +1,65 @@
+"""A scenario as numbers that the C interface reads, with its parameters by their keys in scenario files."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import _core
+from ..control.axis import OPEN_LOOP
+from ..errors import InputError
+from ..inputs.arguments import checked
+from ..simulation.run import core_inputs
+from ..simulation.scenario import Scenario
+from ..simulation.train_results import core_case
+from ..simulation.train_scenario import TrainScenario
+from .parameters import parameters_of
+
+
+@checked
+def description(scenario: Scenario | TrainScenario, *, parameters: bool = True) -> np.ndarray:
+    """A scenario as the numbers that `lm_scenario_read` of the C interface takes.
+
+    Parameters
+    ----------
+    scenario
+        With its signals, controllers and references, its state at t = 0, duration and sample interval.
+    parameters
+        Whether the numbers also say how they follow from the values of the scenario, so that these can be changed without
+        Python. To find that out the scenario is made anew some hundred times, which takes seconds.
+
+    Returns
+    -------
+    numpy.ndarray
+        Float64.
+
+    Raises
+    ------
+    InputError
+        A controller has a law of your own, which only Python can call.
+    """
+    found = parameters_of(scenario, numbers_of).parameters if parameters else ()
+    values = [(p.key, p.unit, p.value, [(e.place, e.reciprocal, e.offset, e.slope) for e in p.effects]) for p in found]
+    return np.array(_core.write_description(numbers_of(scenario).tolist(), values))
+
+
+def numbers_of(scenario: Scenario | TrainScenario) -> np.ndarray:
+    """The numbers of a scenario alone.
+
+    Raises
+    ------
+    InputError
+    """
+    if own := [name for name, controller in scenario.axes().items() if controller.law]:
+        raise InputError(
+            f"controller of {own[0]}: has a law of your own, which only Python can call; describe the scenario without it, and turn "
+            "the motor by its command"
+        )
+    table = scenario.simulation
+    times = table.duration, table.sample_interval
+    control = scenario.control() if scenario.axes() else OPEN_LOOP
+    if isinstance(scenario, TrainScenario):
+        core, inputs, start, capacities = core_case(scenario)
+        return np.array(_core.describe_train(scenario.title, core, inputs, start, capacities, *times, control))
+    _, command, load_torque, state, capacity = core_inputs(scenario)
+    inputs = [command, load_torque]
+    return np.array(_core.describe_drive(scenario.title, scenario.core(), inputs, state, capacity, *times, control))

@@ -1,0 +1,175 @@
+"""Scenarios as numbers: read by the C library, run, stepped and altered there as in Python."""
+
+import ctypes as c
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from lostmotion.portable.description import numbers_of
+from lostmotion.portable.parameters import Parameter, Parameters, parameters_of, predicted
+from test_c_interface import INPUTS, INVALID, OK, VARIABLES, doubles, library  # noqa: F401
+from test_c_interface import Simulation as Stepped
+
+SAMPLES = 0
+
+
+class Scenario:
+    """A scenario that the C library has read."""
+
+    def __init__(self, lib: c.CDLL, numbers: np.ndarray) -> None:
+        for name in ("lm_scenario_read", "lm_scenario_run", "lm_simulation_from", "lm_result_values"):
+            getattr(lib, name).restype = c.c_void_p
+        for name in ("lm_scenario_error", "lm_scenario_parameter_key", "lm_result_name", "lm_result_error"):
+            getattr(lib, name).restype = c.c_char_p
+        for name in ("lm_scenario_parameter_count", "lm_result_count", "lm_result_samples"):
+            getattr(lib, name).restype = c.c_size_t
+        lib.lm_scenario_get.restype = c.c_double
+        self.lib, error = lib, c.create_string_buffer(500)
+        handle = lib.lm_scenario_read(doubles(numbers), c.c_size_t(len(numbers)), error, c.c_size_t(500))
+        self.refused = error.value.decode()
+        self.handle = c.c_void_p(handle)
+
+    def error(self) -> str:
+        return self.lib.lm_scenario_error(self.handle).decode()
+
+    def keys(self) -> list[str]:
+        count = self.lib.lm_scenario_parameter_count(self.handle)
+        return [self.lib.lm_scenario_parameter_key(self.handle, c.c_size_t(k)).decode() for k in range(count)]
+
+    def set(self, key: str, value: float) -> int:
+        place = c.c_size_t(self.keys().index(key))
+        return int(self.lib.lm_scenario_set(self.handle, place, c.c_double(value)))
+
+    def run(self) -> dict[str, np.ndarray]:
+        result = c.c_void_p(self.lib.lm_scenario_run(self.handle, 0, c.c_size_t(0)))
+        assert result, self.error()
+        assert self.lib.lm_result_status(result) == OK, self.lib.lm_result_error(result)
+        count, samples = self.lib.lm_result_count(result, SAMPLES), self.lib.lm_result_samples(result)
+        address = self.lib.lm_result_values(result, SAMPLES)
+        table = np.ctypeslib.as_array(c.cast(address, c.POINTER(c.c_double)), (count, samples)).copy()
+        names = [self.lib.lm_result_name(result, SAMPLES, c.c_size_t(k)).decode() for k in range(count)]
+        self.lib.lm_result_free(result)
+        return dict(zip(names, table, strict=True))
+
+    def simulation(self, step: float) -> Stepped:
+        made = self.lib.lm_simulation_from(self.handle, c.c_double(step))
+        assert made, self.error()
+        return Stepped(self.lib, c.c_void_p(made))
+
+
+@pytest.mark.parametrize("name", ["paper-2dof-nl-small", "position-axis", "field-weakening", "joint-under-gravity"])
+def test_a_run_has_the_bits_of_python(library: c.CDLL, name: str) -> None:  # noqa: F811
+    there = Scenario(library, lm.description(lm.load(name), parameters=False)).run()
+    here = lm.simulate(lm.load(name))
+    assert set(there) == set(here)
+    for variable in there:
+        assert np.array_equal(there[variable], here[variable].to_numpy(), equal_nan=True), variable
+
+
+@pytest.fixture
+def axis(library: c.CDLL) -> Scenario:  # noqa: F811
+    return Scenario(library, lm.description(lm.load("position-axis"), parameters=False))
+
+
+def loads() -> Iterator[tuple[float, float]]:
+    return ((0.5 * math.sin(0.1 * k), 0.5 * math.sin(0.1 * (k + 1))) for k in range(200))
+
+
+def test_steps_under_a_controller_have_the_bits_of_python(axis: Scenario) -> None:
+    python, there = lm.Simulation(lm.load("position-axis"), step=1e-3), axis.simulation(1e-3)
+    assert there.names(INPUTS) == ["load_torque"]
+    names = there.names(VARIABLES)
+    for first, last in loads():
+        python.advance(1e-3, load_torque=(first, last))
+        assert axis.lib.lm_advance(there.handle, c.c_double(1e-3), doubles([first]), doubles([last])) == OK
+    told, wanted = dict(zip(names, there.read(), strict=True)), python.read()
+    assert {name: told[name] for name in wanted} == pytest.approx(wanted, rel=0.0, abs=0.0, nan_ok=True)
+    assert told["position_reference"] > 0.1
+
+
+def test_a_state_under_a_controller_is_continued_bit_for_bit_and_damage_is_seen(axis: Scenario) -> None:
+    one, other = axis.simulation(1e-3), axis.simulation(1e-3)
+    for _ in range(150):
+        assert one.advance(1e-3, [0.2]) == OK
+    kept = one.state()
+    assert other.lib.lm_set_state(other.handle, kept) == OK
+    for _ in range(150):
+        assert one.advance(1e-3, [0.2]) == other.advance(1e-3, [0.2]) == OK
+    assert bytes(one.state()) == bytes(other.state())
+    kept[3] += 1e-9
+    assert other.lib.lm_set_state(other.handle, kept) == INVALID
+    assert other.error() == "these numbers are not those of a state of this simulation"
+
+
+SMALL = ("load.inertia", "gearbox.ratio", "motor.friction_torque", "command.amplitude", "gearbox.hysteresis.efficiency")
+
+
+@pytest.fixture(scope="module")
+def found() -> Parameters:
+    return parameters_of(lm.load("paper-2dof-nl-small"), numbers_of)
+
+
+def test_a_parameter_that_is_set_gives_the_run_of_the_changed_scenario(library: c.CDLL) -> None:  # noqa: F811
+    scenario = lm.load("paper-2dof-nl-small").replace(**{"simulation.duration": 0.5})
+    there = Scenario(library, lm.description(scenario))
+    assert set(SMALL) <= set(there.keys())
+    for key, value in zip(SMALL, (2.7, 80.0, 0.013, 0.06, 0.9), strict=True):
+        assert there.set(key, value) == OK, there.error()
+    changed = scenario.replace(**dict(zip(SMALL, (2.7, 80.0, 0.013, 0.06, 0.9), strict=True)))
+    told, wanted = there.run(), lm.simulate(changed)
+    for name in ("load_speed", "motor_torque", "twist"):
+        assert np.allclose(told[name], wanted[name], rtol=1e-9, atol=1e-9 * float(np.abs(wanted[name]).max()))
+    assert there.set("load.inertia", -1.0) == INVALID
+    assert there.error() == "parameter load.inertia: drive.load.inertia is -1; it must be finite and > 0"
+
+
+def test_what_is_predicted_of_several_parameters_is_what_the_scenario_has(found: Parameters) -> None:
+    scenario = lm.load("paper-2dof-nl-small")
+    values = {p.key: p.value * 1.03 for p in found.parameters if p.value > 0.0 and p.key != "initial.twist"}
+    told = predicted(numbers_of(scenario), found.parameters, values)
+    wanted = numbers_of(scenario.replace(**values))
+    assert np.allclose(told, wanted, rtol=1e-10, atol=0.0)
+    assert np.count_nonzero(wanted != numbers_of(scenario)) >= len(values)
+
+
+def test_what_cannot_be_set_is_said(found: Parameters) -> None:
+    assert found.refused["gearbox.stiffness.backlash"] == "changes what the scenario consists of"
+    keys = {p.key for p in found.parameters}
+    assert not keys & found.refused.keys()
+    of_axis: Any = parameters_of(lm.load("position-axis"), numbers_of)
+    # The current controller has exp(-T/tau_a) in its gains.
+    assert of_axis.refused["motor.electrical_time_constant"] == "is neither linear in the numbers nor reciprocal"
+    gain = next(p for p in of_axis.parameters if p.key == "controller.position.gain")
+    assert isinstance(gain, Parameter)
+    assert gain.unit == "1/s"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda n: n[:0], "these numbers are no description of a scenario"),
+        (lambda n: n[:100], "the description is cut off"),
+        (lambda n: np.append(n, 0.0), "the description goes on beyond its end"),
+        (lambda n: np.concatenate([n[:1], [99.0], n[2:]]), "the description is of another version; write it anew"),
+        (lambda n: np.where(n == 2.0, math.nan, n), " is nan; it must be "),
+    ],
+)
+def test_numbers_that_are_no_description_are_refused(
+    library: c.CDLL,  # noqa: F811
+    change: Any,
+    said: str,
+) -> None:
+    scenario = Scenario(library, change(lm.description(lm.load("paper-2dof-nl-small"), parameters=False)))
+    assert not scenario.handle
+    assert said in scenario.refused
+
+
+def test_a_law_of_ones_own_cannot_be_described() -> None:
+    axis = lm.load("speed-axis")
+    own = {"law": True, "sample_time": 1e-3, "reference": {"kind": "torque"}, "encoder": {"ideal": True}}
+    with pytest.raises(lm.InputError, match="controller of motor: has a law of your own"):
+        lm.description(axis.replace(controller=own))

@@ -1,0 +1,303 @@
+"""FMUs under FMPy: valid, the same bits as step by step in Python, state and rollback, parameters and errors."""
+
+import math
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import lostmotion as lm
+from conftest import ALL_SCENARIOS, ROOT
+from lostmotion.portable import fmu as exporting
+from lostmotion.portable.parameters import Parameters
+
+fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
+LIBRARIES = ROOT / "build" / "c" / "fmu"
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="make c-library builds the FMU's library for Linux")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def library() -> None:
+    """`make test` builds it; a checkout that only runs pytest builds it here."""
+    if not (LIBRARIES / "x86_64-linux" / "lostmotion.so").exists():
+        subprocess.run(["make", "c-library"], cwd=ROOT, check=True)
+
+
+class Slave:
+    """An FMU of FMI 2.0 for Co-Simulation, initialised."""
+
+    def __init__(self, path: Path, directory: Path, changes: dict[str, float] | None = None) -> None:
+        from fmpy.fmi2 import FMU2Slave
+
+        self.said: list[str] = []
+        description = fmpy.read_model_description(str(path))
+        self.reference = {v.name: v.valueReference for v in description.modelVariables}
+        self.names = [v.name for v in description.modelVariables if v.causality == "output"]
+        fmpy.extract(str(path), unzipdir=str(directory))
+        self.fmu = FMU2Slave(
+            guid=description.guid, unzipDirectory=str(directory), modelIdentifier="lostmotion", instanceName="drive"
+        )
+        self.fmu.instantiate(callbacks=self.callbacks())
+        self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.enterInitializationMode()
+        self.set(changes or {})
+        self.fmu.exitInitializationMode()
+        self.time = 0.0
+
+    def callbacks(self) -> Any:
+        from fmpy import fmi2
+
+        def log(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+            self.said.append(message.decode())
+
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
+        callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+        callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+        self._callbacks = callbacks
+        return callbacks
+
+    def set(self, values: dict[str, float]) -> None:
+        if values:
+            self.fmu.setReal([self.reference[name] for name in values], list(values.values()))
+
+    def step(self, interval: float, **inputs: tuple[float, float]) -> None:
+        """Each input from its first value in a straight line to its second."""
+        from ctypes import c_double, c_int, c_size_t, c_uint
+
+        self.set({name: first for name, (first, _) in inputs.items()})
+        n = len(inputs)
+        self.fmu.fmi2SetRealInputDerivatives(
+            self.fmu.component,
+            (c_uint * n)(*(self.reference[name] for name in inputs)),
+            c_size_t(n),
+            (c_int * n)(*([1] * n)),
+            (c_double * n)(*((b - a) / interval for a, b in inputs.values())),
+        )
+        self.fmu.doStep(self.time, interval)
+        self.time += interval
+
+    def read(self) -> dict[str, float]:
+        return dict(zip(self.names, self.fmu.getReal([self.reference[n] for n in self.names]), strict=True))
+
+    def close(self) -> None:
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory: Any) -> Path:
+    path = tmp_path_factory.mktemp("fmu") / "paper.fmu"
+    lm.export_fmu(lm.load("paper-2dof-nl-small"), path, libraries=LIBRARIES)
+    return path
+
+
+@pytest.fixture
+def drive(paper: Path, tmp_path: Path) -> Iterator[Slave]:
+    slave = Slave(paper, tmp_path)
+    yield slave
+    slave.close()
+
+
+def without_parameters(monkeypatch: Any) -> None:
+    monkeypatch.setattr(exporting, "parameters_of", lambda *_: Parameters((), {}))
+
+
+def exported(path: Path, to: Path, monkeypatch: Any) -> Path:
+    """Without parameters: to find them takes seconds."""
+    without_parameters(monkeypatch)
+    out = to / f"{path.stem}.fmu"
+    lm.export_fmu(lm.load(path), out, libraries=LIBRARIES)
+    return out
+
+
+@pytest.mark.parametrize("path", ALL_SCENARIOS, ids=lambda p: p.stem)
+def test_the_description_of_every_scenario_is_valid(path: Path, tmp_path: Path, monkeypatch: Any) -> None:
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(exported(path, tmp_path, monkeypatch))) == []
+
+
+def test_an_fmu_with_its_parameters_is_valid_and_says_what_it_has(paper: Path) -> None:
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(paper)) == []
+    variables = {v.name: v for v in fmpy.read_model_description(str(paper)).modelVariables}
+    assert variables["load.inertia"].causality == "parameter"
+    assert variables["load.inertia"].variability == "tunable"
+    assert float(variables["load.inertia"].start) == 2.0
+    assert variables["load.inertia"].unit == "kg*m^2"
+    assert variables["initial.load_speed"].variability == "fixed"
+    assert "command.amplitude" not in variables
+    assert float(variables["motor_speed"].nominal) > 1.0
+    assert variables["command"].causality == "input"
+    with zipfile.ZipFile(paper) as archive:
+        assert "load.inertia" in archive.read("documentation/index.html").decode()
+
+
+STEPS = {
+    "1e-5 s": [1e-5] * 200,
+    "0.1 s": [0.1] * 8,
+    "irregular": [1e-3 * (1.0 + 0.9 * math.sin(3.0 * k)) for k in range(150)],
+}
+
+
+@pytest.mark.parametrize("steps", STEPS.values(), ids=STEPS)
+def test_steps_have_the_bits_of_python(steps: list[float], drive: Slave) -> None:
+    python = lm.Simulation(lm.load("paper-2dof-nl-small"), step=1e-3)
+    time = 0.0
+    for interval in steps:
+        ends = [(0.2 * math.sin(7.0 * t), 3.0 * math.sin(2.0 * t)) for t in (time, time + interval)]
+        (u0, m0), (u1, m1) = ends
+        # The end as the FMU has it, from the derivative.
+        u, m = ((a, a + (b - a) / interval * interval) for a, b in ((u0, u1), (m0, m1)))
+        drive.step(interval, command=(u0, u1), load_torque=(m0, m1))
+        python.advance(interval, command=u, load_torque=m)
+        time += interval
+        told, wanted = drive.read(), python.read()
+        assert {name: told[name] for name in told} == {name: wanted[name] for name in told}
+    assert wanted["motor_torque"] != 0.0
+
+
+@pytest.mark.parametrize("name", ["position-axis", "hunting-with-backlash", "two-motors-one-ring", "field-weakening"])
+def test_trains_and_controllers_have_the_bits_of_python(name: str, tmp_path: Path, monkeypatch: Any) -> None:
+    scenario = lm.load(name)
+    interval = scenario.simulation.sample_interval
+    python = lm.Simulation(scenario, step=interval)
+    slave = Slave(exported(ROOT / "scenarios" / f"{name}.toml", tmp_path, monkeypatch), tmp_path / "open")
+    inputs = dict.fromkeys(python.inputs, (0.05, 0.05))
+    for _ in range(150):
+        slave.step(interval, **inputs)
+        python.advance(interval, **inputs)
+    told, wanted = slave.read(), python.read()
+    shared = [n for n in told if n in wanted]
+    assert len(shared) > 8
+    assert {n: told[n] for n in shared} == {n: wanted[n] for n in shared}
+    slave.close()
+
+
+def test_after_a_rollback_and_from_bytes_the_motion_is_the_same(drive: Slave, paper: Path, tmp_path: Path) -> None:
+    for _ in range(80):
+        drive.step(1e-3, command=(0.1, 0.1))
+    state, time = drive.fmu.getFMUState(), drive.time
+    kept = drive.fmu.serializeFMUState(state)
+    for _ in range(80):
+        drive.step(1e-3, command=(0.1, 0.1))
+    first = drive.read()
+    drive.fmu.setFMUState(state)
+    drive.time = time
+    drive.step(0.02, command=(-0.3, 0.3))
+    drive.fmu.setFMUState(state)
+    drive.time = time
+    for _ in range(80):
+        drive.step(1e-3, command=(0.1, 0.1))
+    assert drive.read() == first
+    drive.fmu.freeFMUState(state)
+
+    other = Slave(paper, tmp_path / "other")
+    other.fmu.setFMUState(other.fmu.deSerializeFMUstate(kept))
+    other.time = time
+    for _ in range(80):
+        other.step(1e-3, command=(0.1, 0.1))
+    assert other.read() == first
+    other.close()
+
+
+def test_parameters_act_from_the_start_and_between_steps(paper: Path, tmp_path: Path) -> None:
+    changes = {"load.inertia": 3.0, "motor.friction_torque": 0.02}
+    slave = Slave(paper, tmp_path, changes)
+    python = lm.Simulation(lm.load("paper-2dof-nl-small").replace(**changes), step=1e-3)
+    for _ in range(60):
+        slave.step(1e-3, command=(0.2, 0.2))
+        python.advance(1e-3, command=0.2)
+    told, wanted = slave.read(), python.read()
+    assert {n: told[n] for n in told} == {n: wanted[n] for n in told}
+    before = slave.read()
+    slave.set({"load.inertia": 30.0})
+    after = slave.read()
+    for name in ("motor_speed", "load_speed", "twist", "load_angle"):
+        assert after[name] == before[name]
+    slave.step(1e-4, command=(0.2, 0.2))
+    rate = (slave.read()["load_speed"] - before["load_speed"]) / 1e-4
+    viscous = 7.424284477308235 * before["load_speed"]
+    assert rate == pytest.approx((before["output_torque"] - viscous) / 30.0, rel=0.05)
+    slave.close()
+
+
+def test_what_is_wrong_is_said_in_the_words_of_the_project(drive: Slave) -> None:
+    from fmpy.fmi1 import FMICallException
+
+    with pytest.raises(FMICallException):
+        drive.set({"load.inertia": -1.0})
+    assert drive.said == ["parameter load.inertia: drive.load.inertia is -1; it must be finite and > 0"]
+    with pytest.raises(FMICallException):
+        drive.fmu.doStep(0.5, 1e-3)
+    assert drive.said[-1] == "the communication point is 0.500000 s, but the FMU is at 0.000000 s"
+    drive.step(1e-3, command=(0.1, 0.1))
+
+
+def test_a_jam_ends_in_an_error_with_the_sentence_of_python(tmp_path: Path, monkeypatch: Any) -> None:
+    from fmpy.fmi1 import FMICallException
+
+    without_parameters(monkeypatch)
+    scenario = lm.TrainScenario(
+        shafts={"worm": {}, "drum": {"inertia": 2.0, "torque": 20.0}},
+        motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 1e-4}},
+        gears={
+            "gear": {
+                "input": "worm",
+                "output": "drum",
+                "ratio": 50,
+                "stiffness": {"kind": "rigid"},
+                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.44, "backdrive_efficiency": -0.2},
+            }
+        },
+        initial={"speeds": {"worm": -100.0, "drum": -2.0}},
+        simulation={"duration": 0.1, "sample_interval": 1e-3},
+    )
+    with pytest.raises(lm.SolverError) as jammed:
+        lm.simulate(scenario)
+    path = tmp_path / "jam.fmu"
+    lm.export_fmu(scenario, path, libraries=LIBRARIES)
+    slave = Slave(path, tmp_path / "open")
+    with pytest.raises(FMICallException):
+        slave.step(1e-3, drum_load_torque=(20.0, 20.0))
+    assert slave.said == [str(jammed.value)]
+    slave.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [(("drive.zip",), "must end in .fmu"), (("nowhere/drive.fmu",), "its directory does not exist")],
+)
+def test_a_path_that_cannot_be_written_is_refused(arguments: Any, said: str, tmp_path: Path, monkeypatch: Any) -> None:
+    without_parameters(monkeypatch)
+    with pytest.raises(lm.InputError, match=said):
+        lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / arguments[0], libraries=LIBRARIES)
+
+
+def test_without_a_library_there_is_no_fmu(tmp_path: Path, monkeypatch: Any) -> None:
+    without_parameters(monkeypatch)
+    with pytest.raises(lm.InputError, match="has no library of an FMU; build them by `make fmu`"):
+        lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / "drive.fmu", libraries=tmp_path)
+
+
+def test_without_its_controller_the_motor_is_turned_by_an_input(tmp_path: Path, monkeypatch: Any) -> None:
+    without_parameters(monkeypatch)
+    path = tmp_path / "plant.fmu"
+    lm.export_fmu(lm.load("position-axis"), path, controllers=False, libraries=LIBRARIES)
+    inputs = [v.name for v in fmpy.read_model_description(str(path)).modelVariables if v.causality == "input"]
+    assert inputs == ["command", "load_torque"]
+
+
+def test_directional_derivatives_are_those_of_the_inputs(drive: Slave) -> None:
+    drive.step(0.05, command=(0.3, 0.3))
+    unknown, known = ([drive.reference[name]] for name in ("load_torque", "command"))
+    assert known != unknown
+    outputs = [drive.reference[name] for name in ("motor_torque", "output_torque")]
+    # Both are states or follow from them: an input changes them later.
+    assert list(drive.fmu.getDirectionalDerivative(outputs, known, [1.0])) == [0.0, 0.0]
