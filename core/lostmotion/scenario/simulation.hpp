@@ -143,19 +143,8 @@ class ScenarioSimulation {
             const std::vector<double> values = train_->with([](auto& s) { return s.values(); });
             std::copy(values.begin(), values.end(), out);
         }
+        if (!laws_.empty()) with([&](const auto& in) { read_controllers(in.snapshot(), out); });
         variables_.derive(out, 1, 0);
-        if (laws_.empty()) return status;
-        with([&](const auto& s) {
-            double* to = out + variables_.first_shown();
-            for (const Variables::Shown& shown : variables_.shown()) {
-                const double* slot = s.snapshot().control.slots.data();
-                for (int a = 0; a < shown.axis; ++a) slot += laws_[static_cast<std::size_t>(a)].slots();
-                const control::Axis& law = laws_[static_cast<std::size_t>(shown.axis)];
-                *to++ = shown.signal < control::n_axis_signals
-                            ? law.signal(shown.signal, slot)
-                            : law.winding_signal(shown.signal - control::n_axis_signals, s.time(), slot);
-            }
-        });
         return status;
     }
 
@@ -229,6 +218,11 @@ class ScenarioSimulation {
                           ? std::size_t{n_inputs}
                           : static_cast<std::size_t>(train_->assembly().layout().inputs));
         end_ = begin_;
+        for (const ControlledAxis& axis : control_.axes) {
+            const auto m = static_cast<std::size_t>(axis.motor);
+            const std::string motor = scenario.form == Scenario::of_drive ? "motor" : scenario.train.motors[m].name;
+            torques_.push_back(static_cast<std::size_t>(variables_.place(motor + "_torque")));
+        }
         identity_ = 0xcbf29ce484222325u;
         for (const auto* list : {&names_.states, &names_.inputs})
             for (const std::string& name : *list) mix(identity_, name.data(), name.size());
@@ -238,6 +232,23 @@ class ScenarioSimulation {
         for (std::size_t k = 0; k < n; ++k)
             hash = (hash ^ static_cast<const unsigned char*>(bytes)[k]) * 0x100000001b3u;
     }
+    // What the controllers show. A motor with a winding has the torque of its currents, in the place of the straight
+    // line that drives the mechanics.
+    template <class Snapshot>
+    void read_controllers(const Snapshot& now, double* out) const {
+        std::vector<const double*> slots{now.control.slots.data()};
+        for (const control::Axis& law : laws_) slots.push_back(slots.back() + law.slots());
+        double* to = out + variables_.first_shown();
+        for (const Variables::Shown& shown : variables_.shown()) {
+            const auto a = static_cast<std::size_t>(shown.axis);
+            *to++ = shown.signal < control::n_axis_signals
+                        ? laws_[a].signal(shown.signal, slots[a])
+                        : laws_[a].winding_signal(shown.signal - control::n_axis_signals, now.time, slots[a]);
+        }
+        for (std::size_t a = 0; a < laws_.size(); ++a)
+            if (laws_[a].field_orientation) out[torques_[a]] = laws_[a].winding_torque(now.time, slots[a]);
+    }
+
     // Of the bits of numbers, as a number without a fraction.
     double sum(const double* first, const double* end) const {
         std::uint64_t hash = identity_;
@@ -249,6 +260,7 @@ class ScenarioSimulation {
     std::unique_ptr<TrainSimulation> train_;
     Control control_;
     std::vector<control::Axis> laws_;
+    std::vector<std::size_t> torques_;  // variables of the motors that the laws turn
     Variables variables_;
     Names names_;
     std::vector<std::size_t> free_;  // inputs that no controller gives
