@@ -13,7 +13,7 @@ unexport MAKEFLAGS
 demo: $(VENV)/built
 	$(BIN)/lostmotion reproduce -o out
 
-test: lint test-core c-library $(VENV)/built
+test: lint test-core c-library test-page $(VENV)/built
 	$(BIN)/pip install -q --group portable --group examples
 	$(BIN)/pytest
 
@@ -40,6 +40,30 @@ fmu: $(VENV)/tools
 	$(BIN)/pip install -q --group portable
 	$(BIN)/python bindings/c/build.py fmu src/lostmotion/fmu_libraries
 
+# The live page, src/lostmotion/live_page/page.html, and the core in it, which the wheel carries.
+LIVE := src/lostmotion/live_page
+NODE := command -v npm >/dev/null || (echo 'npm is missing: without node the live page is not built'; false)
+.PHONY: page
+page: $(LIVE)/page.html $(LIVE)/core.wasm.gz
+$(LIVE)/page.html: page/node_modules/installed $(wildcard page/*.ts page/*.html page/src/*)
+	cd page && npm run --silent build
+	cp build/page/index.html $@
+$(LIVE)/core.wasm.gz: $(SOURCES) $(wildcard bindings/c/*) | $(VENV)/portable
+	$(BIN)/python bindings/c/build.py wasm build/wasm/lostmotion.wasm
+	gzip -9 -n -c build/wasm/lostmotion.wasm >$@
+page/node_modules/installed: page/package.json page/package-lock.json
+	@$(NODE)
+	cd page && npm ci --silent
+	touch $@
+$(VENV)/portable: $(VENV)/tools
+	$(BIN)/pip install -q --group portable
+	touch $@
+
+# In Chromium; left out where there is no node.
+.PHONY: test-page
+test-page: $(VENV)/built
+	@$(NODE) || exit 0; $(MAKE) page && { command -v chromium >/dev/null || { apt-get update -q && apt-get install -qy chromium; }; } && cd page && npm run --silent lint && npm test --silent
+
 # 100,000 random drives of each kind; CASES and SEED choose others.
 CASES ?= 100000
 SEED ?= 1
@@ -59,7 +83,7 @@ bench: $(VENV)/built
 	$(BIN)/cmake --build build/bench
 	$(BIN)/python benchmarks/bench.py build/bench
 
-docs: $(VENV)/built
+docs: $(VENV)/built page
 	$(BIN)/pip install -q "lostmotion[docs]"
 	$(BIN)/python docs/generate.py
 	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build

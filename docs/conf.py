@@ -14,6 +14,7 @@ myst_heading_anchors = 3
 html_theme = "furo"
 html_title = "lostmotion"
 exclude_patterns = ["_build"]
+html_extra_path = ["_generated/extra"]
 autodoc_typehints = "description"
 autodoc_member_order = "bysource"
 autodoc_mock_imports: list[str] = []

@@ -9,6 +9,7 @@ from typing import Any
 
 import control_figures
 import limit_cycles_figures
+import live_pages
 import motors_figures
 import reference_figures
 import self_locking_figures
@@ -313,6 +314,7 @@ def generate(out: Path = OUT) -> None:
     motors_figures.write(out)
     control_figures.write(out)
     limit_cycles_figures.write(out)
+    live_pages.write(out / "extra" / "live")
     for name, text in pages.items():
         (out / f"{name}.md").write_text(text, encoding="utf-8")
 

@@ -29,6 +29,7 @@ LAYERS = [
     {"sizing", "servo", "pointing"},
     {"studies", "identification"},
     {"portable"},
+    {"live_page"},
     {"reports"},
     {"paper"},
     {"cli"},

@@ -71,6 +71,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "gearbox": (lm.gearbox, {"name": "paper-gearbox", "temperature": None, "added_backlash": 0.0, "loss_factor": 1.0}),
     "linearize": (lm.linearize, {"drive": SCENARIO, "state": lm.Initial(), "command": 0.0, "load_torque": 0.0, "command_rate": 0.0, "load_torque_rate": 0.0, "time": None, "inputs": None, "input_rates": None}),
     "linearize of a train": (lm.linearize, {"drive": TRAIN, "state": lm.TrainInitial(), "inputs": {}, "input_rates": {}}),
+    "live": (lm.live, {"scenario": SCENARIO, "height": 400}),
+    "LivePage": (lm.LivePage, {"scenario": SCENARIO, "height": 400}),
     "load": (lm.load, {"source": "paper-2dof-nl-small", "overrides": {}}),
     "load_study": (lm.load_study, {"path": "none.toml"}),
     "measure": (lm.measure, {"gearbox": None, "sheet": None, "notes": (), "progress": dangle}),
@@ -135,6 +137,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Scenario.from_json": (lm.Scenario.from_json, {"text": "{}"}),
 }  # fmt: skip
 SLOW = {
+    "live",  # needs the built page
+    "LivePage",
     "check_drive",
     "measure",
     "commission",

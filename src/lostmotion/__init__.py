@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from .identification.readers import read_log as read_log
     from .identification.task import Identification as Identification
     from .identification.task import load_identification as load_identification
+    from .live_page.notebook import LivePage as LivePage
+    from .live_page.notebook import live as live
     from .model.angle_torques import ErrorCurve as ErrorCurve
     from .model.angle_torques import ErrorHarmonic as ErrorHarmonic
     from .model.angle_torques import Gravity as Gravity
@@ -190,6 +192,7 @@ _HOMES = {
     "identification.logs": ("Channel", "Log"),
     "identification.readers": ("read_log",),
     "identification.task": ("Identification", "load_identification"),
+    "live_page.notebook": ("LivePage", "live"),
     "model.angle_torques": ("ErrorCurve", "ErrorHarmonic", "Gravity", "TorqueCurve", "TorqueHarmonic"),
     "model.couplings": ("Brake", "Clutch", "Freewheel"),
     "model.drive": ("Drive",),

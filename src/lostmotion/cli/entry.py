@@ -9,7 +9,22 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from . import catalogue, drive, fmu, identify, reproduce, response, rig, run, scenarios, select, servo, study, track
+from . import (
+    catalogue,
+    drive,
+    fmu,
+    identify,
+    live,
+    reproduce,
+    response,
+    rig,
+    run,
+    scenarios,
+    select,
+    servo,
+    study,
+    track,
+)
 from .terminal import fail
 
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # of the parser that typer brings along
@@ -81,6 +96,7 @@ for command in (
     reproduce.reproduce,
     run.run,
     fmu.fmu,
+    live.live,
     response.response,
     rig.rig,
     catalogue.catalogue,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .. import _core
@@ -12,7 +14,7 @@ from ..simulation.run import core_inputs
 from ..simulation.scenario import Scenario
 from ..simulation.train_results import core_case
 from ..simulation.train_scenario import TrainScenario
-from .parameters import parameters_of
+from .parameters import Parameter, parameters_of
 
 
 @checked
@@ -37,8 +39,24 @@ def description(scenario: Scenario | TrainScenario, *, parameters: bool = True) 
     InputError
         A controller has a law of your own, which only Python can call.
     """
-    found = parameters_of(scenario, numbers_of).parameters if parameters else ()
-    values = [(p.key, p.unit, p.value, [(e.place, e.reciprocal, e.offset, e.slope) for e in p.effects]) for p in found]
+    return described(scenario)[0] if parameters else _written(scenario, ())
+
+
+def described(scenario: Scenario | TrainScenario) -> tuple[np.ndarray, list[tuple[str, float]]]:
+    """The description with its parameters, and their keys and values.
+
+    Raises
+    ------
+    InputError
+    """
+    found = parameters_of(scenario, numbers_of).parameters
+    return _written(scenario, found), [(p.key, p.value) for p in found]
+
+
+def _written(scenario: Scenario | TrainScenario, parameters: Sequence[Parameter]) -> np.ndarray:
+    values = [
+        (p.key, p.unit, p.value, [(e.place, e.reciprocal, e.offset, e.slope) for e in p.effects]) for p in parameters
+    ]
     return np.array(_core.write_description(numbers_of(scenario).tolist(), values))
 
 

@@ -1,0 +1,29 @@
+/** What the core takes: the description of a scenario, and what is changed in it. All values in SI. */
+
+export interface CoreInput {
+  /** the numbers of lostmotion.description: doubles, lowest byte first, in base64 */
+  numbers: string;
+  /** of the same scenario with a gap where it has none, which is another torsion curve: taken while the key has a value above 0 */
+  with_gap: { key: string; numbers: string } | null;
+  /** commands and load torques, in the order of the core */
+  inputs: Signal[];
+  duration: number;
+  interval: number;
+  /** parameters that are changed, by their keys */
+  values: Record<string, number>;
+  /** numbers of the inputs that are changed */
+  changed_inputs: number[];
+}
+
+/** The sum of all that is given. */
+export interface Signal {
+  mean: number;
+  /** amplitude, frequency [Hz], phase [rad] */
+  sines: [number, number, number][];
+  /** height, time */
+  steps: [number, number][];
+  /** rise, duration, begin */
+  ramps: [number, number, number][];
+  /** other courses: each (time, value, slope) from a time on */
+  courses: [number, number, number][][];
+}

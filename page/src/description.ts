@@ -1,0 +1,89 @@
+/** What Python writes into the page: what the core takes, what is drawn, and what can be changed. All values in SI. */
+import type { CoreInput } from "./core_input";
+
+export interface Description {
+  name: string;
+  title: string;
+  version: string;
+  core: CoreInput;
+  /** from the first motor on */
+  shafts: ShaftView[];
+  gears: GearView[];
+  motors: MotorView[];
+  contacts: { label: string; variable: string }[];
+  /** no controller turns its motors */
+  open_loop: boolean;
+  /** of controllers, over time */
+  figures: { title: string; unit: string; series: { variable: string; minus?: string; label: string }[] }[];
+  sliders: Slider[];
+  /** the scenario file: tables, lists, numbers, texts */
+  scenario: Table;
+}
+
+/** Elements with the names of their variables; null: there is none. */
+export interface ShaftView {
+  name: string;
+  speed: string;
+  angle: string | null;
+  contact: string | null;
+  motor: boolean;
+}
+export interface GearView {
+  name: string;
+  input: string;
+  output: string;
+  ratio: number;
+  /** its housing stands, so that the ratio holds between the speeds */
+  fixed: boolean;
+  twist: string | null;
+  output_torque: string;
+  /** total, at the output; 0 where there is none */
+  backlash: number;
+  losses: LossMap | null;
+}
+/** values[load][speed] of the loss coefficient, over relative speed and load */
+export interface LossMap {
+  speeds: number[];
+  loads: number[];
+  values: number[][];
+  rated_speed: number;
+  rated_torque: number;
+}
+export interface MotorView {
+  name: string;
+  shaft: string;
+  torque: string;
+  command: string | null;
+}
+
+export interface Slider {
+  /** in the scenario file */
+  key: string;
+  group: string;
+  label: string;
+  /** as shown, and what one of it is in SI */
+  unit: string;
+  factor: number;
+  value: number;
+  min: number;
+  max: number;
+  /** equal ways on the slider are equal ratios */
+  logarithmic: boolean;
+  /** a parameter of the core by this key, the duration, or where the number stands in an input */
+  target: "parameter" | "duration" | { input: number; path: (string | number)[] };
+  /** where it stands in the description, for what is drawn */
+  view?: (string | number)[];
+  /** other keys that the scenario file needs with this one */
+  needs?: Record<string, number>;
+}
+
+export type Value = number | string | boolean | null | Value[] | Table;
+export interface Table {
+  [key: string]: Value;
+}
+
+/** The description in the page. */
+export function read(document: Document): Description {
+  const text = document.getElementById("description")?.textContent ?? "";
+  return JSON.parse(text) as Description;
+}

@@ -1,0 +1,163 @@
+/** The page: what is shown, and what follows what. */
+import "./style.css";
+import { Actions } from "./actions";
+import { type Changes, changed, fromFragment, toFragment } from "./changes";
+import { Controls } from "./controls";
+import { Core, CoreError, type Run } from "./core";
+import { type Description, read } from "./description";
+import { byId } from "./dom";
+import { Drawing } from "./drawing";
+import { EnergyCard } from "./energy_card";
+import { LoopCard } from "./loop_card";
+import { MapCard } from "./map_card";
+import { Player } from "./player";
+import { PlayerBar } from "./player_bar";
+import { ResponseCard } from "./response_card";
+import { Strip } from "./strip";
+import { TimeCharts } from "./time_charts";
+import { format } from "./units";
+import { coreBytes } from "./wasm";
+
+class Page {
+  private readonly changes: Changes;
+  private d: Description;
+  private run?: Run;
+  private pinned?: Run;
+  private waiting = false;
+  private readonly player: Player;
+  private readonly bar: PlayerBar;
+  private readonly drawing = new Drawing();
+  private readonly charts = new TimeCharts(byId("time-charts"), (time) => this.bar.hold(time));
+  private readonly strip = new Strip(byId("strip"));
+  private readonly loops = new LoopCard(byId("cards"));
+  private readonly maps = new MapCard(byId("cards"));
+  private readonly energy = new EnergyCard(byId("cards"));
+  private readonly response: ResponseCard;
+  private readonly controls: Controls;
+  private readonly actions: Actions;
+
+  constructor(
+    private readonly core: Core,
+    private readonly original: Description,
+    bytes: ArrayBuffer,
+  ) {
+    const { changes, unusable } = fromFragment(location.hash, original.sliders);
+    this.changes = changes;
+    this.d = changed(original, changes);
+    byId("title").textContent = original.title || original.name;
+    document.title = `${original.title || original.name} – lostmotion`;
+    byId("drawing").append(this.drawing.root);
+    this.player = new Player(this.d.core.duration, (time) => this.show(time));
+    this.bar = new PlayerBar(byId("player"), this.player);
+    this.response = new ResponseCard(byId("cards"), original, bytes);
+    this.controls = new Controls(byId("controls"), original.sliders, changes, () => this.later());
+    this.actions = new Actions(byId("actions"), {
+      pin: (on) => {
+        this.pinned = on ? this.run : undefined;
+        this.paint();
+      },
+      reset: () => {
+        this.changes.clear();
+        this.controls.show();
+        this.later();
+      },
+      redraw: () => this.paint(),
+      scenario: () => this.d.scenario,
+      run: () => this.run,
+      pictures: () => [...this.charts.pictures(), this.strip.canvas],
+      name: original.name,
+      title: original.title || original.name,
+    });
+    if (this.compute()) {
+      this.paint();
+      this.response.use(this.d);
+    }
+    if (unusable.length > 0) this.say(`The address holds what this drive does not know: ${unusable.join(", ")}`, true);
+    addEventListener("resize", () => this.later());
+    addEventListener("hashchange", () => this.follow());
+    if (this.run) this.bar.start();
+  }
+
+  /** Once in a frame, however often a slider reports. */
+  private later(): void {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
+      this.d = changed(this.original, this.changes);
+      if (this.compute()) {
+        this.paint();
+        this.response.use(this.d);
+      }
+      tell(this.changes, this.d);
+      const fragment = toFragment(this.changes);
+      // In a notebook the page has no address of its own.
+      if (location.protocol !== "about:" && location.hash.slice(1) !== fragment)
+        history.replaceState(null, "", fragment ? `#${fragment}` : location.pathname + location.search);
+    });
+  }
+
+  private follow(): void {
+    const { changes } = fromFragment(location.hash, this.original.sliders);
+    this.changes.clear();
+    for (const [key, value] of changes) this.changes.set(key, value);
+    this.controls.show();
+    this.later();
+  }
+
+  private compute(): boolean {
+    try {
+      const first = !this.run;
+      this.run = this.core.run(this.d.core);
+      if (first) this.charts.build(this.d, this.run);
+      const { milliseconds, switchings, time } = this.run;
+      this.say(
+        `${format(time.at(-1)!, 3)} s, ${switchings} switchings, solved exactly in ${milliseconds.toFixed(1)} ms`,
+        false,
+      );
+      return true;
+    } catch (error) {
+      if (!(error instanceof CoreError)) throw error;
+      this.say(error.message, true);
+      return false;
+    }
+  }
+
+  private paint(): void {
+    if (!this.run) return;
+    this.drawing.use(this.d, this.run);
+    this.charts.draw(this.run, this.pinned);
+    this.strip.draw(this.d, this.run);
+    this.loops.draw(this.d, this.run, this.pinned);
+    this.maps.draw(this.d, this.run, this.pinned);
+    this.energy.draw(this.run);
+    this.response.draw();
+    this.player.use(this.run.time.at(-1)!);
+    this.actions.show();
+  }
+
+  private show(time: number): void {
+    if (!this.run) return;
+    const k = Math.min(this.run.time.length - 1, Math.round(time / this.d.core.interval));
+    this.drawing.show(k, this.player.playing ? this.player.pace : 0);
+    this.charts.mark(time, k);
+    this.loops.mark(k);
+    this.maps.mark(k);
+    this.bar.show(time);
+  }
+
+  private say(text: string, failed: boolean): void {
+    const summary = byId("summary");
+    summary.textContent = text;
+    summary.classList.toggle("failed", failed);
+  }
+}
+
+/** Tells a notebook that shows the page what is changed, and the scenario with it. */
+function tell(changes: Changes, { scenario }: Description): void {
+  if (parent !== window) parent.postMessage({ lostmotion: { values: Object.fromEntries(changes), scenario } }, "*");
+}
+
+const bytes = await coreBytes(document);
+new Page(await Core.load(bytes), read(document), bytes);
+performance.mark("first-plot");

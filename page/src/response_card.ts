@@ -1,0 +1,107 @@
+/** Frequency response of the load's speed over the amplitude of the command, worked out beside the page. */
+import type { Description } from "./description";
+import { h } from "./dom";
+import { words } from "./kinematics";
+import { type Line, Plot } from "./plot";
+import type { Point } from "./response";
+import type { Answer, Task } from "./response.worker";
+import ResponseWorker from "./response.worker?worker&inline";
+import { look, swatch } from "./time_charts";
+import { format } from "./units";
+
+const AMPLITUDES = [1, 0.3, 0.1, 0.03];
+const FREQUENCIES = Array.from({ length: 29 }, (_, k) => 0.3 * 10 ** ((2.4 * k) / 28)); // 0.3 to 75 Hz
+const PATIENCE = 250; // ms without a change before work begins
+
+export class ResponseCard {
+  private readonly worker?: Worker;
+  private readonly state = h("span", { class: "entry", role: "status" });
+  private gain?: Plot;
+  private phase?: Plot;
+  private lines: Point[][] = [];
+  private number = 0;
+  private waiting = 0;
+
+  /** core: bytes for the worker. */
+  constructor(
+    root: HTMLElement,
+    d: Description,
+    private core: ArrayBuffer | undefined,
+  ) {
+    if (!d.open_loop || d.motors.length === 0) return;
+    const [gain, phase] = [h("div", { class: "plot" }), h("div", { class: "plot low" })];
+    const entries = AMPLITUDES.map((a, k) => h("span", { class: "entry" }, swatch(k), format(a)));
+    const title = `Frequency response: ${words(d.shafts.at(-1)!.name)} speed per command, by amplitude of the command`;
+    root.append(
+      h("figure", { class: "wide" }, h("figcaption", {}, h("b", {}, title), ...entries, this.state), gain, phase),
+    );
+    this.gain = new Plot(gain, "Gain over frequency for several amplitudes of the command");
+    this.phase = new Plot(phase, "Phase over frequency for several amplitudes of the command");
+    this.worker = new ResponseWorker();
+    this.worker.onmessage = ({ data }: MessageEvent<Answer>) => this.take(data);
+  }
+
+  /** After a change; the work begins once the changes pause. */
+  use(d: Description): void {
+    if (!this.worker) return;
+    clearTimeout(this.waiting);
+    this.state.textContent = "…";
+    this.waiting = window.setTimeout(() => {
+      this.number += 1;
+      this.lines = [];
+      const task: Task = {
+        number: this.number,
+        input: d.core,
+        variable: d.shafts.at(-1)!.speed,
+        amplitudes: AMPLITUDES,
+        frequencies: FREQUENCIES,
+      };
+      if (this.core) task.core = this.core;
+      this.core = undefined;
+      this.worker!.postMessage(task);
+    }, PATIENCE);
+  }
+
+  private take({ number, points, done }: Answer): void {
+    if (number !== this.number) return;
+    this.lines.push(points);
+    const unsettled = this.lines.flat().filter((p) => !p.settled).length;
+    this.state.textContent = done ? (unsettled > 0 ? `${unsettled} points had not settled` : "") : "…";
+    this.draw();
+  }
+
+  draw(): void {
+    if (this.lines.length === 0) return;
+    const x = {
+      label: "frequency",
+      unit: "Hz",
+      logarithmic: true,
+      range: [FREQUENCIES[0]!, FREQUENCIES.at(-1)!] as [number, number],
+    };
+    const line = (points: Point[], k: number, of: (p: Point) => number): Line => ({
+      label: format(AMPLITUDES[k]!),
+      x: Float64Array.from(points, (p) => p.frequency),
+      y: Float64Array.from(points, of),
+      ...look(k),
+    });
+    const largest = Math.max(...this.lines.flat().map((p) => p.gain));
+    const floor = 1e-4 * largest;
+    const range: [number, number] = [floor, 2 * largest];
+    this.gain!.draw({
+      x,
+      y: { label: "gain", unit: "rad/s", logarithmic: true, range },
+      lines: this.lines.map((points, k) => line(points, k, (p) => Math.max(p.gain, floor))),
+    });
+    this.phase!.draw({
+      x,
+      y: { label: "phase", unit: "°", range: [-360, 0] },
+      lines: this.lines.map((points, k) =>
+        line(
+          points.filter((p) => p.gain > floor),
+          k,
+          (p) => (p.phase * 180) / Math.PI,
+        ),
+      ),
+    });
+  }
+}

@@ -1,0 +1,8 @@
+/** The bytes of the core, which Python puts into the page: gzip, in base64. */
+
+export async function coreBytes(document: Document): Promise<ArrayBuffer> {
+  const text = atob(document.getElementById("core")!.textContent!.trim());
+  const bytes = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream).arrayBuffer();
+}

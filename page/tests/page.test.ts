@@ -1,0 +1,167 @@
+import { readFileSync, statSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { execFileSync } from "node:child_process";
+import { fileURLToPath } from "node:url";
+import axe from "axe-core";
+import type { Browser, BrowserContextOptions, Page } from "playwright-core";
+import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { expected, launch, pages, ready, table, watch } from "./browser";
+
+let browser: Browser;
+let directory: string;
+beforeAll(async () => {
+  directory = pages();
+  browser = await launch();
+});
+afterAll(() => browser?.close());
+
+/** A page that must stay silent, opened as by a double click. */
+async function open(
+  name: string,
+  options: BrowserContextOptions = {},
+  fragment = "",
+): Promise<{ page: Page; seen: string[] }> {
+  const page = await browser.newPage({ viewport: { width: 1280, height: 900 }, reducedMotion: "reduce", ...options });
+  const seen = watch(page);
+  await page.goto(`file://${join(directory, `${name}.html`)}${fragment}`);
+  await ready(page);
+  return { page, seen };
+}
+
+function compare(found: Record<string, number[]>, wanted: Record<string, (number | null)[]>): void {
+  const different = Object.entries(wanted).filter(
+    ([name, values]) => !values.every((v, k) => Object.is(found[name]?.[k], v ?? NaN)),
+  );
+  expect(different.map(([name]) => name)).toEqual([]);
+}
+
+describe.each(["drive", "worm", "axis"])("the page of the %s", (name) => {
+  test("has the same bits as Python, as it is and with changed values, and says and asks nothing", async () => {
+    const wanted = expected(directory, name);
+    const plain = await open(name);
+    compare(await table(plain.page), wanted.as_it_is);
+    const fragment = `#${Object.entries(wanted.changes)
+      .map(([key, value]) => `${key}=${value}`)
+      .join("&")}`;
+    const changed = await open(name, {}, fragment);
+    compare(await table(changed.page), wanted.changed);
+    expect([...plain.seen, ...changed.seen]).toEqual([]);
+    await plain.page.close();
+    await changed.page.close();
+  });
+});
+
+test.each([
+  ["drive", "light", 1280],
+  ["drive", "dark", 1280],
+  ["drive", "light", 390],
+  ["axis", "dark", 390],
+] as const)("the page of the %s has no barrier that axe finds (%s, %i pixels)", async (name, colorScheme, width) => {
+  const { page, seen } = await open(name, { colorScheme, viewport: { width, height: 900 } });
+  await page.evaluate(axe.source);
+  const { violations } = await page.evaluate(() => (globalThis as any).axe.run());
+  expect(
+    violations.map(
+      (v: any) =>
+        `${v.id}: ${v.nodes
+          .map((n: any) => n.html)
+          .slice(0, 3)
+          .join(" ")}`,
+    ),
+  ).toEqual([]);
+  expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBeLessThanOrEqual(width);
+  expect(seen).toEqual([]);
+  await page.close();
+});
+
+test("a slider moved by the keyboard changes the run, the address and the file that Python reads", async () => {
+  const { page, seen } = await open("drive");
+  const before = await table(page);
+  await page.getByRole("slider", { name: "friction torque" }).first().focus();
+  for (let k = 0; k < 5; ++k) await page.keyboard.press("PageUp");
+  await page.waitForFunction(() => location.hash.includes("motor.friction_torque="));
+  const after = await table(page);
+  expect(after.load_speed).not.toEqual(before.load_speed);
+  const [download] = await Promise.all([
+    page.waitForEvent("download"),
+    page.getByRole("button", { name: "TOML" }).click(),
+  ]);
+  const file = join(directory, "downloaded.toml");
+  writeFileSync(file, readFileSync(await download.path()));
+  const script =
+    "import sys, json, lostmotion as lm; print(json.dumps(lm.simulate(lm.load(sys.argv[1])).load_speed.values.tolist()))";
+  const python = fileURLToPath(new URL("../../.venv/bin/python", import.meta.url));
+  expect(after.load_speed).toEqual(JSON.parse(execFileSync(python, ["-c", script, file], { encoding: "utf-8" })));
+  expect(seen).toEqual([]);
+  await page.close();
+});
+
+test("a value out of the slider's range is marked and changes nothing", async () => {
+  const { page } = await open("drive");
+  const field = page.getByRole("textbox", { name: /^efficiency|^hysteresis efficiency/ }).first();
+  await field.fill("7");
+  await field.press("Enter");
+  expect(await field.getAttribute("aria-invalid")).toBe("true");
+  expect(new URL(page.url()).hash).toBe("");
+  await page.close();
+});
+
+test("what an address holds that the drive does not know is said", async () => {
+  const { page } = await open("drive", {}, "#load.mass=3");
+  expect(await page.textContent("#summary")).toContain("load.mass=3");
+  await page.close();
+});
+
+test("in a frame without an address, as in a notebook, it says what is changed", async () => {
+  const page = await browser.newPage({ reducedMotion: "reduce" });
+  const seen = watch(page);
+  await page.setContent('<iframe style="width: 1000px; height: 700px"></iframe>');
+  await page.evaluate(
+    (html) => {
+      const heard: unknown[] = ((window as any).heard = []);
+      addEventListener("message", (event) => heard.push(event.data));
+      document.querySelector("iframe")!.srcdoc = html;
+    },
+    readFileSync(join(directory, "drive.html"), "utf-8"),
+  );
+  const field = page.frameLocator("iframe").getByRole("textbox", { name: "ratio, number" });
+  await field.fill("75");
+  await field.press("Enter");
+  await page.waitForFunction(() => (window as any).heard.length > 0);
+  const { values, scenario } = await page.evaluate(() => (window as any).heard.at(-1).lostmotion);
+  expect([values, scenario.gearbox.ratio]).toEqual([{ "gearbox.ratio": 75 }, 75]);
+  expect(seen).toEqual([]);
+  await page.close();
+});
+
+/** Milliseconds from frame to frame while a slider moves in each of them. */
+async function frames(page: Page, count: number): Promise<number[]> {
+  return page.evaluate(async (n) => {
+    const slider = document.querySelector<HTMLInputElement>('input[type="range"][id="load.inertia"]')!;
+    const next = (): Promise<number> => new Promise((done) => requestAnimationFrame(done));
+    const times = [await next()];
+    for (let k = 0; k < n; ++k) {
+      slider.value = String(300 + ((k * 7) % 400));
+      slider.dispatchEvent(new Event("input"));
+      times.push(await next());
+    }
+    return times.slice(1).map((t, k) => t - times[k]!);
+  }, count);
+}
+
+test("figures: size, time to the first plot, and frames while a slider moves (printed, not judged)", async () => {
+  const kilobytes = statSync(join(directory, "drive.html")).size / 1e3;
+  const { page } = await open("drive", { reducedMotion: "no-preference" });
+  const first = await page.evaluate(() => performance.getEntriesByName("first-plot")[0]!.startTime);
+  const client = await page.context().newCDPSession(page);
+  const report = [`page ${kilobytes.toFixed(0)} kB, first plot ${first.toFixed(0)} ms`];
+  for (const slower of [1, 4]) {
+    await client.send("Emulation.setCPUThrottlingRate", { rate: slower });
+    const times = (await frames(page, 120)).slice(20).sort((a, b) => a - b);
+    const [median, high] = [times[50]!, times[95]!];
+    report.push(`processor / ${slower}: frame ${median.toFixed(1)} ms, 95 % within ${high.toFixed(1)} ms`);
+    expect(median).toBeGreaterThan(0);
+  }
+  console.log(report.join("; "));
+  await page.close();
+});

@@ -1,0 +1,46 @@
+"""`lostmotion live`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .arguments import Overrides, SourceArgument
+from .targets import try_file
+from .terminal import busy
+
+
+def live(
+    scenario: SourceArgument,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="HTML file; left out, NAME.html.")
+    ] = None,
+    overrides: Overrides = None,
+    show: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
+) -> None:
+    """Write a drive as one page for the browser: sliders, and a drawing that moves.
+
+    The page solves the drive itself, by the same core as here; it needs no server and no network, and can be sent to others.
+
+    \b
+    lostmotion live paper-2dof-nl-small
+    lostmotion live drive.toml --set load.inertia="3 kg*m^2" -o drive.html --no-open
+    """
+    from ..errors import InputError
+    from ..live_page.page import write_page
+    from ..simulation.sources import load
+
+    path = Path(f"{Path(scenario).stem}.html") if output is None else output
+    if path.suffix not in (".html", ".htm"):
+        raise InputError(f"{path}: the ending {path.suffix or '(none)'} is not known; it must be .html")
+    try_file(path)
+    loaded = load(scenario, overrides or ())
+    with busy("Writing"):
+        write_page(path, loaded)
+    print(f"Page written to {path}")
+    if show:
+        import webbrowser
+
+        webbrowser.open(path.resolve().as_uri())

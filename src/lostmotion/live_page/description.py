@@ -1,0 +1,165 @@
+"""A scenario as the page takes it: what its core runs, what it draws, and what can be changed."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..model.signals import Signal
+from ..model.torsion import TorsionCurve
+from ..portable.description import described
+from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainScenario
+from ..units.practical import ARCMIN
+from . import sliders
+from .drawn import axis_figures, drawn_drive, drawn_train
+
+USUAL_BACKLASH = 12.0 / ARCMIN  # to where the slider goes where there is none
+
+
+def describe(scenario: Scenario | TrainScenario, name: str) -> dict[str, Any]:
+    """The scenario as page/src/description.ts describes it.
+
+    Parameters
+    ----------
+    name
+        By which downloads are called.
+
+    Raises
+    ------
+    InputError
+        A controller has a law of your own, which only Python can call.
+    """
+    from importlib.metadata import version
+
+    numbers, values = described(scenario)
+    closed = _closed_gap(scenario)
+    core = {
+        "numbers": _packed(numbers),
+        "with_gap": None
+        if closed is None
+        else {"key": closed, "numbers": _packed(described(scenario.replace(**{closed: USUAL_BACKLASH}))[0])},
+        "inputs": [_signal(signal, scenario.simulation.duration) for _, signal in _inputs(scenario)],
+        "duration": scenario.simulation.duration,
+        "interval": scenario.simulation.sample_interval,
+        "values": {},
+        "changed_inputs": [],
+    }
+    drawn = drawn_drive(scenario) if isinstance(scenario, Scenario) else drawn_train(scenario)
+    return {
+        "name": name,
+        "title": scenario.title,
+        "version": version("lostmotion"),
+        "core": core,
+        **drawn,
+        "open_loop": not (scenario.axes() or (isinstance(scenario, TrainScenario) and scenario.controllers)),
+        "figures": [
+            figure
+            for motor, c in scenario.axes().items()
+            for figure in axis_figures(c, motor, isinstance(scenario, TrainScenario))
+        ],
+        "sliders": [s.to_page() for s in _sliders(scenario, values, closed)],
+        "scenario": scenario.model_dump(exclude_none=True, mode="json"),
+    }
+
+
+def _packed(numbers: np.ndarray) -> str:
+    return base64.b64encode(numbers.astype("<f8").tobytes()).decode()
+
+
+def _gears(scenario: Scenario | TrainScenario) -> dict[str, Any]:
+    """By the table in the scenario file."""
+    if isinstance(scenario, Scenario):
+        return {"gearbox": scenario.gearbox}
+    return {f"gears.{name}": gear for name, gear in scenario.gears.items()}
+
+
+def _closed_gap(scenario: Scenario | TrainScenario) -> str | None:
+    """The key of the backlash of the one gear whose torsion curve has none."""
+    curves = {key: g.stiffness for key, g in _gears(scenario).items() if isinstance(g.stiffness, TorsionCurve)}
+    closed = [f"{key}.stiffness.backlash" for key, c in curves.items() if c.backlash == 0.0 == c.preload]
+    return closed[0] if len(closed) == 1 else None
+
+
+def _inputs(scenario: Scenario | TrainScenario) -> list[tuple[str, Signal[Any]]]:
+    """What acts, in the order of the core, by its table in the scenario file; references of controllers, which the page does not
+    change, without."""
+    if isinstance(scenario, Scenario):
+        return [("command", scenario.command), ("load.torque", scenario.load.torque)]
+    signals = scenario.signals()
+    keys = {f"{name}_command": f"command.{name}" for name in scenario.commanded()}
+    keys |= {f"{name}_load_torque": f"shafts.{name}.torque" for name in scenario.shafts}
+    names = scenario.core().input_names()
+    return [(keys[name], signals[name]) if name in keys and name in signals else ("", Signal()) for name in names]
+
+
+def _signal(signal: Signal[Any], duration: float) -> dict[str, Any]:
+    """As page/src/core_input.ts describes it, with a sine and a step of height 0 for the sliders of one."""
+    others = (signal.chirp, signal.samples, getattr(signal, "wind", None))
+    return {
+        "mean": signal.mean,
+        "sines": signal.sine_list() or [(0.0, 1.0, 0.0)],
+        "steps": [(s.height, s.time) for s in signal.steps] or [sliders.no_step(duration)],
+        "ramps": [(r.rise, r.duration, r.begin) for r in signal.ramps],
+        "courses": [part.breakpoints() for part in others if part is not None],
+    }
+
+
+def _sliders(
+    scenario: Scenario | TrainScenario, values: list[tuple[str, float]], closed: str | None
+) -> list[sliders.Slider]:
+    usual: dict[str, float] = {}
+    views: dict[str, sliders.Place] = {}
+    for k, key in enumerate(_gears(scenario)):
+        views |= {f"{key}.ratio": ["gears", k, "ratio"], f"{key}.stiffness.backlash": ["gears", k, "backlash"]}
+    if closed is not None:
+        values = [*values, (closed, 0.0)]
+        usual[closed] = USUAL_BACKLASH
+    for key, _ in values:
+        if key.endswith("friction_torque"):
+            usual[key] = _usual_friction(scenario, key)
+    found = [*_signal_sliders(scenario), *sliders.of_parameters(values, usual, views)]
+    return [
+        *sliders.ordered(found),
+        sliders.duration(scenario.simulation.duration, scenario.simulation.sample_interval),
+    ]
+
+
+def _signal_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.Slider]:
+    if isinstance(scenario, TrainScenario):
+        turned = {f"command.{name}" for name in scenario.controllers}
+    else:
+        turned = set() if scenario.controller is None else {"command"}
+    duration = scenario.simulation.duration
+    for number, (key, signal) in enumerate(_inputs(scenario)):
+        if not key or key in turned:
+            continue
+        if key.startswith("command"):
+            _, _, name = key.partition(".")
+            group = f"Command of {name.replace('_', ' ')}" if name and len(_inputs(scenario)) > 2 else "Command"
+            yield from sliders.of_signal(signal, key, group, "1", number, 1.1, duration)
+        else:
+            shaft = "load" if isinstance(scenario, Scenario) else key.split(".")[1]
+            group = "Load torque" if shaft == "load" else f"Load torque on {shaft.replace('_', ' ')}"
+            yield from sliders.of_signal(signal, key, group, "N*m", number, _torque_at(scenario, shaft), duration)
+
+
+def _torque_at(scenario: Scenario | TrainScenario, shaft: str) -> float:
+    """What a shaft may have to carry [N·m]: the rated torque of the gear or the motor that drives it, else 1."""
+    if isinstance(scenario, Scenario):
+        return scenario.gearbox.rated_output_torque if shaft == "load" else scenario.motor.rated_torque or 1.0
+    for gear in scenario.gears.values():
+        if gear.output == shaft:
+            return gear.rated_output_torque or gear.ratio * _torque_at(scenario, gear.input)
+    return next((m.rated_torque for m in scenario.motors.values() if m.shaft == shaft and m.rated_torque), 1.0)
+
+
+def _usual_friction(scenario: Scenario | TrainScenario, key: str) -> float:
+    """To where the slider of a friction torque goes that is 0 [N·m]."""
+    table, *names = key.split(".")
+    if table == "motors" and isinstance(scenario, TrainScenario):
+        return 0.2 * _torque_at(scenario, scenario.motors[names[0]].shaft)
+    return 0.05 * _torque_at(scenario, names[0] if table == "shafts" else table)

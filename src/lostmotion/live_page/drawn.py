@@ -1,0 +1,126 @@
+"""What the page draws of a scenario: its elements with the names of their variables, as page/src/description.ts describes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..control.controller import Controller
+from ..model.losses import LossMap
+from ..model.torsion import Rigid, TorsionCurve
+from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainScenario
+
+
+def drawn_drive(scenario: Scenario) -> dict[str, Any]:
+    """Of a scenario in the short form."""
+    rigid = isinstance(scenario.gearbox.stiffness, Rigid)
+    contacts = [
+        ("motor", "input_contact"),
+        *([] if rigid else [("gearbox twist", "twist_contact")]),
+        ("load", "load_contact"),
+    ]
+    shafts = [
+        {"name": "motor", "speed": "motor_speed", "angle": None, "contact": "input_contact", "motor": True},
+        {"name": "load", "speed": "load_speed", "angle": "load_angle", "contact": "load_contact", "motor": False},
+    ]
+    variables = {"twist": None if rigid else "twist", "output_torque": "output_torque"}
+    motor = {"name": "motor", "shaft": "motor", "torque": "motor_torque", "command": "command"}
+    return {
+        "shafts": shafts,
+        "gears": [
+            {
+                "name": "gearbox",
+                "input": "motor",
+                "output": "load",
+                "fixed": True,
+                **variables,
+                **_laws(scenario.gearbox),
+            }
+        ],
+        "motors": [motor],
+        "contacts": [{"label": label, "variable": variable} for label, variable in contacts],
+    }
+
+
+def drawn_train(scenario: TrainScenario) -> dict[str, Any]:
+    """Of a scenario in the long form."""
+    names = [name for name, _, _ in scenario.core().channels()]
+
+    def known(name: str) -> str | None:
+        return name if name in names else None
+
+    with_motor = {m.shaft for m in scenario.motors.values()}
+    shafts = [
+        {
+            "name": n,
+            "speed": f"{n}_speed",
+            "angle": known(f"{n}_angle"),
+            "contact": known(f"{n}_contact"),
+            "motor": n in with_motor,
+        }
+        for n in scenario.shafts
+    ]
+    gears = [
+        {
+            "name": n,
+            "input": g.input,
+            "output": g.output,
+            "fixed": g.housing is None,
+            "twist": None if isinstance(g.stiffness, Rigid) else known(f"{n}_twist"),
+            "output_torque": f"{n}_output_torque",
+            **_laws(g),
+        }
+        for n, g in scenario.gears.items()
+    ]
+    motors = [
+        {"name": n, "shaft": m.shaft, "torque": f"{n}_torque", "command": known(f"{n}_command")}
+        for n, m in scenario.motors.items()
+    ]
+    contacts = [name for name in names if name.endswith("_contact")]
+    return {
+        "shafts": shafts,
+        "gears": gears,
+        "motors": motors,
+        "contacts": [{"label": c.removesuffix("_contact").replace("_", " "), "variable": c} for c in contacts],
+    }
+
+
+def axis_figures(controller: Controller, motor: str, named: bool) -> list[dict[str, Any]]:
+    """Charts over time of a controller.
+
+    Parameters
+    ----------
+    named
+        Its variables begin with the name of its motor.
+    """
+    prefix, of = (f"{motor}_", f" of {motor.replace('_', ' ')}") if named else ("", "")
+    kind = controller.reference.kind
+    if kind == "torque":
+        return []
+    quantity, unit = ("position", "rad") if kind == "position" else ("speed", "rad/s")
+    reference, measured = f"{prefix}{quantity}_reference", f"{prefix}measured_{quantity}"
+    followed = [{"variable": reference, "label": "reference"}, {"variable": measured, "label": "measured"}]
+    error = [{"variable": reference, "minus": measured, "label": "reference − measured"}]
+    return [
+        {"title": f"{quantity.capitalize()}{of}", "unit": unit, "series": followed},
+        {"title": f"Following error{of}", "unit": unit, "series": error},
+    ]
+
+
+def _laws(gear: Any) -> dict[str, Any]:
+    losses = None
+    if isinstance(gear.losses, LossMap):
+        rated = {"rated_speed": gear.rated_input_speed, "rated_torque": gear.rated_output_torque}
+        losses = dict(zip(("speeds", "loads", "values"), gear.losses.whole(), strict=True)) | rated
+    stiffness = gear.stiffness
+    return {
+        "ratio": gear.ratio,
+        "backlash": _open(stiffness) if isinstance(stiffness, TorsionCurve) else 0.0,
+        "losses": losses,
+    }
+
+
+def _open(curve: TorsionCurve) -> float:
+    """The twist over which a curve carries nothing [rad], both ways."""
+    breaks, slopes = curve.pieces()
+    return 2.0 * breaks[0] if slopes[0] == 0.0 else 0.0

@@ -1,0 +1,59 @@
+"""The page of a scenario: one HTML file with the core inside."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+from ..atomic_writer import write_bytes
+from ..errors import InputError
+from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainScenario
+from .description import describe
+
+# `make page` puts both beside this file, and the wheel carries them.
+TEMPLATE = Path(__file__).with_name("page.html")
+CORE = Path(__file__).with_name("core.wasm.gz")
+
+
+def page(scenario: Scenario | TrainScenario, name: str = "drive") -> str:
+    """The page as HTML; nothing in it refers to anything outside.
+
+    Parameters
+    ----------
+    name
+        By which downloads are called.
+
+    Raises
+    ------
+    InputError
+        A controller has a law of your own, which only Python can call; in a checkout, the page has not been built.
+    """
+    for part in (TEMPLATE, CORE):
+        if not part.is_file():
+            raise InputError(f"{part}: is missing, since the live page is not built; run `make page`, which needs node")
+    places = {"CORE": base64.b64encode(CORE.read_bytes()).decode(), "DESCRIPTION": _as_script(describe(scenario, name))}
+    text = TEMPLATE.read_text(encoding="utf-8")
+    for place, content in places.items():
+        before, found, after = text.partition(f'">\n      {place}\n')
+        if not found:
+            raise InputError(f"{TEMPLATE}: has no place for {place}; run `make page` again")
+        text = f'{before}">{content}{after.lstrip()}'
+    return text
+
+
+def write_page(path: Path, scenario: Scenario | TrainScenario) -> None:
+    """Writes the page of a scenario, whole or not at all.
+
+    Raises
+    ------
+    InputError
+    """
+    write_bytes(path, page(scenario, path.stem).encode())
+
+
+def _as_script(data: Any) -> str:
+    """JSON that may stand in a script element: what could end it is written as an escape."""
+    return json.dumps(data, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")

@@ -1,0 +1,215 @@
+"""What can be changed on the page: which values of a scenario, in which unit, and how far."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..model.signals import Signal
+from ..units.practical import ARCMIN
+
+Place = list[str | int]
+
+
+@dataclass(frozen=True)
+class Range:
+    """How far a slider goes [SI]."""
+
+    min: float
+    max: float
+    logarithmic: bool = False
+
+
+@dataclass(frozen=True)
+class Slider:
+    """One value of a scenario; all values in SI."""
+
+    key: str  # in the scenario file
+    group: str
+    label: str
+    si_unit: str
+    value: float
+    range: Range
+    target: str | dict[str, Any]  # "parameter", "duration", or where it stands in an input
+    view: Place | None = None  # where it stands in what is drawn
+    needs: Mapping[str, float] | None = None  # other keys that the file needs with it
+
+    def to_page(self) -> dict[str, Any]:
+        """As page/src/description.ts describes it."""
+        unit, factor = unit_of(self.si_unit, max(abs(self.value), 0.3 * self.range.max))
+        shown = {key: value for key, value in vars(self).items() if value is not None}
+        del shown["si_unit"], shown["range"]
+        return shown | vars(self.range) | {"unit": unit, "factor": factor}
+
+
+# SI unit -> units that are shown, from the largest one on, each with what one of it is in SI and from which value on it reads well.
+UNITS: dict[str, list[tuple[str, float, float]]] = {
+    "kg*m^2": [("kg·m²", 1.0, 0.05), ("kg·cm²", 1e-4, 0.0)],
+    "N*m": [("N·m", 1.0, 0.5), ("mN·m", 1e-3, 0.0)],
+    "N*m*s/rad": [("N·m·s/rad", 1.0, 0.05), ("mN·m·s/rad", 1e-3, 1e-3), ("µN·m·s/rad", 1e-6, 0.0)],
+    "N*m/rad": [("kN·m/rad", 1e3, 500.0), ("N·m/rad", 1.0, 0.05), ("mN·m/rad", 1e-3, 0.0)],
+    "rad": [("arcmin", 1.0 / ARCMIN, 0.0)],
+    "s": [("s", 1.0, 0.3), ("ms", 1e-3, 0.0)],
+    "Hz": [("Hz", 1.0, 0.0)],
+    "1/s": [("1/s", 1.0, 0.0)],
+    "1/s^2": [("1/s²", 1.0, 0.0)],
+    "1": [("", 1.0, 0.0)],
+}
+
+
+def unit_of(si_unit: str, value: float) -> tuple[str, float]:
+    """(unit, what one of it is in SI) in which such a value reads well."""
+    return next((unit, factor) for unit, factor, low in UNITS[si_unit] if value >= low)
+
+
+def around(value: float, ways: float = 10.0) -> Range:
+    """From a share to a multiple of a value."""
+    return Range(value / ways, value * ways, logarithmic=True)
+
+
+def from_zero(value: float, usual: float = 0.0) -> Range:
+    """To a few times a value, or where it is 0 to a usual one."""
+    return Range(0.0, 4.0 * value if value > 0.0 else usual)
+
+
+SHARE = Range(0.3, 1.0)
+
+# End of a key -> label, SI unit, and its range: ways around the value, from 0 on, or a share.
+LABELS: dict[str, tuple[str, str, float | str]] = {
+    "rotor_inertia": ("rotor inertia", "kg*m^2", 10.0),
+    "electrical_time_constant": ("electrical time constant", "s", 10.0),
+    "ratio": ("ratio", "1", 3.0),
+    "stiffness.backlash": ("backlash (total)", "rad", "from 0"),
+    "stiffness.stiffness": ("torsional stiffness", "N*m/rad", 10.0),
+    "hysteresis.efficiency": ("hysteresis efficiency", "1", "share"),
+    "losses.efficiency": ("efficiency", "1", "share"),
+    "mesh_damping": ("mesh damping", "N*m*s/rad", "from 0"),
+    "inertia": ("inertia", "kg*m^2", 10.0),
+    "viscous_friction": ("viscous friction", "N*m*s/rad", "from 0"),
+    "feedforward.friction_torque": ("friction feedforward", "N*m", "from 0"),
+    "friction_torque": ("friction torque", "N*m", "from 0"),
+    "breakaway_torque": ("break-away torque", "N*m", 4.0),
+    "position.gain": ("position gain", "1/s", 10.0),
+    "position.integral_gain": ("position integral gain", "1/s^2", "from 0"),
+    "position.feedforward": ("speed feedforward", "1", "from 0"),
+    "speed.gain": ("speed gain", "N*m*s/rad", 10.0),
+    "speed.integral_gain": ("speed integral gain", "N*m/rad", "from 0"),
+    "speed.torque_limit": ("torque limit", "N*m", 10.0),
+    "current.time_constant": ("current loop time constant", "s", 10.0),
+}
+TABLES = ("motor", "motors", "gearbox", "gears", "load", "shafts", "brakes", "clutches", "controller", "controllers")
+
+
+def of_parameters(
+    values: Iterable[tuple[str, float]], usual: Mapping[str, float], views: Mapping[str, Place]
+) -> Iterator[Slider]:
+    """Sliders of the values that the core can change.
+
+    Parameters
+    ----------
+    values
+        Keys of the scenario file, and the values.
+    usual
+        Of keys that are 0: to where the slider goes.
+    views
+        Of keys that are drawn: where they stand.
+    """
+    for key, value in values:
+        table, *names = key.split(".")
+        label = _label(key)
+        none = key.endswith((".ratio", "losses.efficiency")) and value == 1.0  # a coupling, a gear without losses
+        if table not in TABLES or label is None or none:
+            continue
+        text, unit, way = label
+        if way == "share":
+            reach = Range(min(SHARE.min, value), SHARE.max)
+        elif isinstance(way, float) and value > 0.0:
+            reach = around(value, way)
+        else:
+            reach = from_zero(value, usual.get(key, 0.0))
+        if reach.max > reach.min:
+            yield Slider(key, _group(table, names), text, unit, value, reach, "parameter", views.get(key))
+
+
+def _label(key: str) -> tuple[str, str, float | str] | None:
+    parts = key.split(".")
+    ends = (".".join(parts[-n:]) for n in (2, 1))
+    return next((LABELS[end] for end in ends if end in LABELS), None)
+
+
+def _group(table: str, names: list[str]) -> str:
+    """Heading: the table, or the name of the element."""
+    if table in ("motor", "gearbox", "load", "controller"):
+        return table.capitalize()
+    element = names[0].replace("_", " ").capitalize()
+    return f"Controller of {element}" if table == "controllers" else element
+
+
+def of_signal(
+    signal: Signal[Any], key: str, group: str, unit: str, number: int, most: float, duration: float
+) -> Iterator[Slider]:
+    """Sliders of a command or a load torque: its mean, its first sine, its steps; where there is none, one can be added.
+
+    Parameters
+    ----------
+    key
+        Its table in the scenario file.
+    number
+        Among the inputs of the core.
+    most
+        To where its values go, at least.
+    duration
+        Of the run [s].
+    """
+
+    def slider(
+        end: str, label: str, si_unit: str, value: float, reach: Range, path: Place, needs: Any = None
+    ) -> Slider:
+        there = None if needs is None else {f"{key}.{other}": given for other, given in needs.items()}
+        return Slider(f"{key}.{end}", group, label, si_unit, value, reach, {"input": number, "path": path}, needs=there)
+
+    mean = float(signal.mean)
+    most = max(most, 1.5 * abs(mean))
+    yield slider("mean", "mean", unit, mean, Range(-most, most), ["mean"])
+    amplitude, frequency = float(signal.amplitude or 0.0), signal.frequency
+    if amplitude > 0.0 and frequency is not None:
+        reach = Range(min(most, amplitude) / 50.0, max(most, 1.5 * amplitude), logarithmic=True)
+        yield slider("amplitude", "amplitude", unit, amplitude, reach, ["sines", 0, 0])
+        yield slider("frequency", "frequency", "Hz", frequency, around(frequency), ["sines", 0, 1])
+    elif frequency is None and not signal.sines:
+        yield slider("amplitude", "amplitude", unit, 0.0, Range(0.0, most), ["sines", 0, 0], {"frequency": 1.0})
+        yield slider("frequency", "frequency", "Hz", 1.0, around(1.0), ["sines", 0, 1], {"amplitude": 0.0})
+    steps = [(float(step.height), step.time) for step in signal.steps[:4]] or [no_step(duration)]
+    for k, (height, time) in enumerate(steps):
+        words = f"step {k + 1}" if len(steps) > 1 else "step"
+        high = max(most, 1.5 * abs(height))
+        other = None if signal.steps else {f"steps.{k}.time": time}
+        yield slider(f"steps.{k}.height", words, unit, height, Range(-high, high), ["steps", k, 0], other)
+        other = None if signal.steps else {f"steps.{k}.height": height}
+        yield slider(
+            f"steps.{k}.time", f"{words} at", "s", time, Range(0.0, max(duration, time)), ["steps", k, 1], other
+        )
+
+
+def no_step(duration: float) -> tuple[float, float]:
+    """(height, time) of a step that can be added to a signal without one."""
+    return 0.0, 0.1 * duration
+
+
+def duration(value: float, sample_interval: float) -> Slider:
+    """Of the run."""
+    reach = Range(max(value / 5.0, sample_interval), 5.0 * value, logarithmic=True)
+    return Slider("simulation.duration", "Run", "duration", "s", value, reach, "duration")
+
+
+def ordered(found: Iterable[Slider]) -> list[Slider]:
+    """What acts first, then the controllers, then the drive, then the run; in each group as they were found."""
+    ranks = ("Command", "Reference", "Controller")
+
+    def rank(slider: Slider) -> int:
+        first = next((k for k, word in enumerate(ranks) if re.match(word, slider.group)), len(ranks))
+        return len(ranks) + 1 if slider.group == "Run" else first
+
+    return sorted(found, key=rank)

@@ -1,0 +1,153 @@
+"""The live page: what Python writes into it. What it does in a browser is tested in page/tests."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import lostmotion as lm
+from conftest import ROOT
+from lostmotion.cli import app
+from lostmotion.live_page import page as live_page
+from lostmotion.live_page.description import describe
+from lostmotion.live_page.sliders import LABELS, UNITS, of_signal
+from lostmotion.model.signals import CommandSignal
+
+SOURCE = (ROOT / "page" / "index.html").read_text()
+SHORT = {"simulation.duration": "0.1 s"}
+
+
+@pytest.fixture
+def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stands in for `make page`: its source, and bytes as the core."""
+    (tmp_path / "page.html").write_text(SOURCE)
+    (tmp_path / "core.wasm.gz").write_bytes(b"\x1f\x8bcore")
+    monkeypatch.setattr(live_page, "TEMPLATE", tmp_path / "page.html")
+    monkeypatch.setattr(live_page, "CORE", tmp_path / "core.wasm.gz")
+
+
+def content(page: str, name: str) -> str:
+    """Of a script element."""
+    return re.search(rf'<script [^>]*id="{name}">(.*?)</script>', page, re.S).group(1)  # type: ignore[union-attr]
+
+
+@pytest.mark.usefixtures("built")
+def test_the_page_holds_the_core_and_the_scenario() -> None:
+    scenario = lm.load("paper-2dof-nl-small", SHORT)
+    page = live_page.page(scenario, "drive")
+    assert base64.b64decode(content(page, "core")) == b"\x1f\x8bcore"
+    described = json.loads(content(page, "description"))
+    assert described["title"] == scenario.title
+    assert lm.Scenario(**described["scenario"]) == scenario
+
+
+@pytest.mark.usefixtures("built")
+def test_no_title_ends_the_script_that_holds_it() -> None:
+    title = '</script><script>alert("1")</script><!--'
+    page = live_page.page(lm.load("paper-2dof-nl-small", SHORT).replace(title=title))
+    assert json.loads(content(page, "description"))["title"] == title
+    assert page.count("<script") == SOURCE.count("<script")
+
+
+def test_without_a_built_page_the_remedy_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live_page, "TEMPLATE", tmp_path / "page.html")
+    with pytest.raises(lm.InputError, match=r"page\.html: is missing.*run `make page`, which needs node"):
+        lm.live(lm.load("paper-2dof-nl-small", SHORT), height=500)
+
+
+def sliders(scenario: lm.Scenario | lm.TrainScenario) -> dict[str, dict]:  # type: ignore[type-arg]
+    return {s["key"]: s for s in describe(scenario, "n")["sliders"]}
+
+
+@pytest.mark.parametrize("name", ["paper-2dof-nl-small", "two-motors-one-ring", "position-axis"])
+def test_every_slider_stands_at_a_value_of_the_scenario_that_can_be_used(name: str) -> None:
+    scenario = lm.load(name)
+    found = sliders(scenario)
+    assert len(found) >= 8
+    for key, slider in found.items():
+        assert slider["min"] <= slider["value"] <= slider["max"], key
+        assert slider["min"] < slider["max"], key
+        assert slider["unit"] in {unit for units in UNITS.values() for unit, _, _ in units}
+        if "needs" not in slider:
+            assert scenario.replace(**{key: slider["value"]}) == scenario, key
+    present = [key for key, slider in found.items() if "needs" not in slider]
+    for key in present[::5]:  # each of them is slow to check
+        for end in ("min", "max"):
+            scenario.replace(**{key: found[key][end]})
+
+
+def test_a_gap_can_be_opened_where_there_is_none() -> None:
+    scenario = lm.load("paper-2dof-nl-small", SHORT)
+    slider = sliders(scenario)["gearbox.stiffness.backlash"]
+    assert (slider["value"], slider["min"], slider["unit"]) == (0.0, 0.0, "arcmin")
+    core = describe(scenario, "n")["core"]
+    assert core["with_gap"]["key"] == "gearbox.stiffness.backlash"
+    assert len(base64.b64decode(core["with_gap"]["numbers"])) > len(base64.b64decode(core["numbers"]))
+
+
+def test_a_command_without_a_sine_or_a_step_can_get_one_with_the_keys_that_belong_to_it() -> None:
+    found = {s.key: s for s in of_signal(CommandSignal(mean=0.5), "command", "Command", "1", 0, 1.1, 2.0)}
+    assert found["command.amplitude"].needs == {"command.frequency": 1.0}
+    assert found["command.steps.0.height"].needs == {"command.steps.0.time": 0.2}
+
+
+def test_labels_belong_to_keys_of_scenario_files() -> None:
+    known = (ROOT / "docs").joinpath("generate.py").parent
+    sys.path.insert(0, str(known))
+    try:
+        import generate
+
+        words = set(re.findall(r"`([\w.]+)`", generate.scenario_reference() + generate.train_reference()))
+    finally:
+        sys.path.remove(str(known))
+    for label in LABELS:
+        assert label.rpartition(".")[2] in {word.rpartition(".")[2] for word in words}, label
+
+
+@pytest.mark.usefixtures("built")
+def test_the_command_writes_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    run = CliRunner().invoke
+    done = run(app, ["live", "paper-2dof-nl-small", "--set", "simulation.duration=0.1"])
+    assert done.output.endswith("Page written to paper-2dof-nl-small.html\n")
+    assert opened == [(tmp_path / "paper-2dof-nl-small.html").as_uri()]
+    assert (
+        json.loads(content((tmp_path / "paper-2dof-nl-small.html").read_text(), "description"))["name"]
+        == "paper-2dof-nl-small"
+    )
+    run(app, ["live", "paper-2dof-nl-small", "-o", "a.html", "--no-open"])
+    assert len(opened) == 1
+    refused = run(app, ["live", "paper-2dof-nl-small", "-o", "a.pdf"])
+    assert str(refused.exception) == "a.pdf: the ending .pdf is not known; it must be .html"
+
+
+@pytest.mark.usefixtures("built")
+def test_a_notebook_shows_the_page_and_reads_its_sliders() -> None:
+    scenario = lm.load("paper-2dof-nl-small", SHORT)
+    view = lm.live(scenario, height=500)
+    assert view.values == {}
+    assert view.scenario == scenario
+    changed = scenario.replace(**{"load.inertia": 3.0})
+    view._widget.values = {"load.inertia": 3.0}  # as the page says it
+    view._widget.tables = json.loads(changed.to_json())
+    assert view.scenario == changed
+    assert "application/vnd.jupyter.widget-view+json" in view._repr_mimebundle_()[0]
+    with pytest.raises(lm.InputError, match="height: 100 pixels must lie between 200 and 10000"):
+        lm.live(scenario, height=100)
+
+
+@pytest.mark.usefixtures("built")
+def test_without_anywidget_a_notebook_shows_the_page_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "anywidget", None)
+    view = lm.live(lm.load("paper-2dof-nl-small", SHORT))
+    assert view._repr_mimebundle_()["text/html"].startswith('<iframe srcdoc="&lt;!doctype html&gt;')
+    with pytest.raises(lm.MissingLibraryError, match="lostmotion\\[notebook\\]"):
+        _ = view.values
