@@ -16,7 +16,7 @@ pytest.importorskip("ziglang", reason=MISSING)
 wasmtime: Any = pytest.importorskip("wasmtime", reason=MISSING)
 
 ROOT = Path(__file__).parent.parent
-MODULE = ROOT / "build" / "portable" / "lostmotion.wasm"
+MODULE = ROOT / "build" / "wasm" / "lostmotion.wasm"
 SAMPLES, ENERGIES, END_STATE, SWITCHINGS = range(4)
 
 
@@ -32,8 +32,8 @@ def builder() -> Any:
 
 
 def compiled() -> Path:
-    """The module, less optimised than `make wasm` builds it: that takes half the time, and gives the same bits."""
-    path: Path = builder().wasm(MODULE, "-O1")
+    """The module of `make wasm`, which the live page carries, too."""
+    path: Path = builder().wasm(MODULE)
     return path
 
 

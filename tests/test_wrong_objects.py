@@ -65,6 +65,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "catalogue": (lm.catalogue, {}),
     "characteristics": (lm.characteristics, {"response": RESPONSE, "drive": SCENARIO, "output": "load_speed"}),
     "check_drive": (lm.check_drive, {"scenario": SCENARIO}),
+    "description": (lm.description, {"scenario": SCENARIO, "parameters": False}),
+    "export_fmu": (lm.export_fmu, {"scenario": SCENARIO, "path": "drive.fmu", "controllers": True, "libraries": None}),
     "energy_of": (lm.energy_of, {"dataset": RESULT}),
     "explain": (lm.explain, {"what": SCENARIO, "time": 0.01}),
     "frequency_response": (lm.frequency_response, {"drive": SCENARIO, "frequencies": [10.0], "amplitudes": [1.0], "source": "command", "mean_command": 0.0, "mean_load_torque": 0.0, "harmonics": 1, "refine": None, "threads": 1, "max_periods": 5, "law": None, "progress": dangle}),
@@ -87,7 +89,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "save": (lm.save, {"dataset": RESULT, "path": "out.csv"}),
     "scenario_of": (lm.scenario_of, {"dataset": RESULT}),
     "shipped_scenarios": (lm.shipped_scenarios, {}),
-    "simulate": (lm.simulate, {"scenario_or_drive": SCENARIO, "command": 0.0, "load_torque": 0.0, "duration": 0.01, "sample_interval": 0.001, "initial": None, "solver": "exact", "relative_tolerance": None, "energy": True, "law": None}),
+    "simulate": (lm.simulate, {"scenario_or_drive": SCENARIO, "command": 0.0, "load_torque": 0.0, "duration": 0.01, "sample_interval": 0.001, "initial": None, "solver": "exact", "relative_tolerance": None, "energy": True, "law": None, "sensitivities": None}),
     "study": (lm.study, {"what": STUDY, "directory": "study", "threads": 1, "executor": None, "progress": None}),
     "switchings_of": (lm.switchings_of, {"result": RESULT}),
     "as_filter": (lm.as_filter, {"system": scipy.signal.dlti([1.0], [1.0, -0.5], dt=1e-3)}),
@@ -138,6 +140,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
 }  # fmt: skip
 SLOW = {
     "live",  # needs the built page
+    "description",
+    "export_fmu",  # needs the built libraries
     "LivePage",
     "check_drive",
     "measure",
