@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..inputs.operators import ARITHMETIC, COMPARISONS
 from ..simulation.variables import VARIABLES
 from .functions import BANDWIDTH, FUNCTIONS, METHODS, REDUCTIONS, Function, Parameter
 from .measures import Measure, measure, plain, power, product, text_of, total
@@ -28,22 +29,7 @@ MAX_LENGTH = 2000  # characters
 MAX_DEPTH = 100  # parts inside of parts
 KNOWN_UNITS = ("1", *dict.fromkeys(v.unit for v in VARIABLES), "J", "Hz", "N*m/rad")
 
-ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-}
 LOGIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {ast.BitAnd: operator.and_, ast.BitOr: operator.or_}
-COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
-    ast.Eq: operator.eq,
-    ast.NotEq: operator.ne,
-}
 # What is not in the grammar but may be tried, and what to write instead.
 INSTEAD = {
     ast.BoolOp: "and, or; write & and |, with each comparison in brackets",
