@@ -414,8 +414,7 @@ class SwitchedDrive {
             const int k = std::countr_zero(near);
             const bool by_value_alone = event != nullptr && event->by_value_alone(entry.regime.guards[k]);
             // The form out of the table, which is at hand.
-            const int sign = flow.sign(guards.form(k), value[k], size[k], by_value_alone);
-            if (sign >= 0) continue;
+            if (sign_after(flow, guards.form(k), value[k], size[k], by_value_alone).sign >= 0) continue;
             if ((entry.contacts >> k & 1) == 0) return {&entry.regime.guards[k], overcome};
             overcome = true;
         }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "../kernel/elimination.hpp"
 #include "../parts/gearbox.hpp"
 #include "../parts/load.hpp"
 #include "../parts/motor.hpp"
@@ -199,39 +200,16 @@ inline bool Drive::solve_reactions(const RegimeKey& key, const Regime& r, Equati
                                                   e.load_acceleration};
     std::array<Open, n_contacts> rows;
     std::array<int, n_contacts> unknowns{};
-    int n = 0;
+    std::size_t n = 0;
     for (int c = 0; c < n_contacts; ++c) {
         if (key.modes[c] != 0 || (all_stuck && c == twist_contact)) continue;
         rows[n] = speed_rate[c];
         unknowns[n++] = static_cast<int>(n_terms) + c;
     }
-    // Gauss-Jordan elimination with row pivoting; the right-hand sides are the known terms.
-    for (int k = 0; k < n; ++k) {
-        int pivot = k;
-        for (int row = k + 1; row < n; ++row)
-            if (std::fabs(rows[row].c[unknowns[k]]) > std::fabs(rows[pivot].c[unknowns[k]])) pivot = row;
-        std::swap(rows[k], rows[pivot]);
-        const double p = rows[k].c[unknowns[k]];
-        if (p == 0.0) return false;
-        rows[k] = rows[k] / p;
-        rows[k].c[unknowns[k]] = 1.0;
-        for (int row = 0; row < n; ++row) {
-            if (row == k) continue;
-            const double factor = rows[row].c[unknowns[k]];
-            rows[row] -= factor * rows[k];
-            rows[row].c[unknowns[k]] = 0.0;
-        }
-    }
-    const auto substitute = [&](Open& f) {
-        for (int k = 0; k < n; ++k) {
-            const double factor = f.c[unknowns[k]];
-            if (factor == 0.0) continue;
-            f -= factor * rows[k];
-            f.c[unknowns[k]] = 0.0;
-        }
-    };
+    const auto subtract = [](Open& f, double factor, const Open& row) { f -= factor * row; };
+    if (!eliminate(rows, unknowns, n, subtract)) return false;
     for (Open* f : {&e.T_2, &e.T_1, &e.F_input, &e.H, &e.F_load, &e.input_acceleration, &e.load_acceleration})
-        substitute(*f);
+        substitute(*f, rows, unknowns, n, subtract);
     // Turning the rotor forward must need more torque, not less: else the friction jams. While it rests at its limit
     // this goes for the torque T_2 that it would wind up by giving way.
     const LinearForm result = closed(r.at_rest[input_contact] ? e.T_2 : e.input_acceleration);

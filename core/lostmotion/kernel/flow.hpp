@@ -30,20 +30,6 @@ class Flow {
 
     Flow(const LinearRates& rates, const Instant& now) : rates_(rates), now_(now) {}
 
-    // Sign that a form has just after now, from its value and the sum of the magnitudes of its terms: that of the first
-    // of the value and its derivatives that is not zero. 0 if it stays at zero or, if asked by value alone, is zero
-    // now.
-    int sign(const LinearForm& form, double value, double magnitude, bool by_value_alone) {
-        for (int k = 1; k < n_derivatives; ++k) {
-            const double next = rate(form, k);
-            if (std::fabs(value) > noise(magnitude, next)) return value > 0.0 ? +1 : -1;
-            if (by_value_alone) return 0;
-            value = next;
-            magnitude = rate_magnitude(form, k);
-        }
-        return 0;
-    }
-
     // What counts as zero: rounding of the terms, and since the instant itself is known to its rounding only, a value
     // may be off by that times its rate.
     double noise(double magnitude, double rate) const {
@@ -85,5 +71,25 @@ class Flow {
     int order_ = 0, n_magnitudes_ = 0;
     std::array<State, n_derivatives + 1> x_, magnitude_;  // as far as they are known
 };
+
+struct Sign {
+    int sign = 0;
+    int order = 0;          // of the first derivative that is not zero
+    double relative = 0.0;  // to the sum of the magnitudes of its terms
+};
+// The sign that a form has just after now, from its value and the sum of the magnitudes of its terms: that of the first
+// of its derivatives that is not zero. 0 if it stays at zero or, if asked by value alone, is zero now.
+template <class F, class Form>
+Sign sign_after(F& flow, const Form& form, double value, double size, bool by_value_alone = false) {
+    for (int k = 0; k + 1 < n_derivatives; ++k) {
+        const double rate = flow.rate(form, k + 1);
+        if (std::fabs(value) > flow.noise(size, rate))
+            return {value > 0.0 ? +1 : -1, k, size > 0.0 ? value / size : 0.0};
+        if (by_value_alone) return {};
+        value = rate;
+        size = flow.rate_magnitude(form, k + 1);
+    }
+    return {};
+}
 
 }  // namespace lostmotion

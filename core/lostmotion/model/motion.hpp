@@ -100,24 +100,4 @@ class RowFlow {
     std::array<std::array<double, max_states>, n_derivatives + 1> x_, size_;  // as far as they are known
 };
 
-struct Sign {
-    int sign = 0;
-    int order = 0;          // of the first derivative that is not zero
-    double relative = 0.0;  // to the sum of the magnitudes of its terms
-};
-// The sign that a form has just after now, from its value and the sum of the magnitudes of its terms: that of the first
-// of its derivatives that is not zero.
-template <class F, class Form>
-Sign sign_after(F& flow, const Form& form, double value, double size, bool by_value_alone = false) {
-    for (int k = 0; k + 1 < n_derivatives; ++k) {
-        const double rate = flow.rate(form, k + 1);
-        if (std::fabs(value) > flow.noise(size, rate))
-            return {value > 0.0 ? +1 : -1, k, size > 0.0 ? value / size : 0.0};
-        if (by_value_alone) return {};
-        value = rate;
-        size = flow.rate_magnitude(form, k + 1);
-    }
-    return {};
-}
-
 }  // namespace lostmotion::model

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "../kernel/elimination.hpp"
 #include "contact_place.hpp"
 #include "regime.hpp"
 
@@ -109,30 +110,9 @@ inline bool solve_reactions(const std::vector<ContactPlace>& contacts, const Lay
     auto& [rows, unknowns] = stuck;
     const std::size_t n = rows.size();
     const bool two_shafts = acceleration.size() == 2;
-    // Gauss-Jordan elimination with row pivoting; the right-hand sides are the known terms.
-    for (std::size_t k = 0; k < n; ++k) {
-        std::size_t pivot = k;
-        for (std::size_t row = k + 1; row < n; ++row)
-            if (std::fabs(rows[row].c[unknowns[k]]) > std::fabs(rows[pivot].c[unknowns[k]])) pivot = row;
-        std::swap(rows[k], rows[pivot]);
-        const double p = rows[k].c[unknowns[k]];
-        if (p == 0.0) return false;
-        rows[k] = rows[k] / p;
-        rows[k].c[unknowns[k]] = 1.0;
-        for (std::size_t row = 0; row < n; ++row) {
-            const double factor = rows[row].c[unknowns[k]];
-            if (row == k || factor == 0.0) continue;
-            subtract(rows[row], factor, rows[k], two_shafts);
-            rows[row].c[unknowns[k]] = 0.0;
-        }
-    }
-    for (Row* f : forms)
-        for (std::size_t k = 0; k < n; ++k) {
-            const double factor = f->c[unknowns[k]];
-            if (factor == 0.0) continue;
-            subtract(*f, factor, rows[k], two_shafts);
-            f->c[unknowns[k]] = 0.0;
-        }
+    const auto take = [&](Row& f, double factor, const Row& row) { subtract(f, factor, row, two_shafts); };
+    if (!eliminate(rows, unknowns, n, take)) return false;
+    for (Row* f : forms) substitute(*f, rows, unknowns, n, take);
     return free;
 }
 
