@@ -16,6 +16,7 @@ from ..simulation.train_scenario import TrainScenario
 from ..units.practical import practical
 from .margins import Bandwidth, Margins, bandwidth_of, frequencies, margins
 from .motion import (
+    STEPPED,
     Following,
     LimitCycle,
     Settling,
@@ -136,7 +137,8 @@ def commission(
 
     Margins, bandwidths and stiffness are those of the exact linear sampled loop in each regime of the plant (piece of the
     torsion curve, twist or load stuck): plant by the matrix exponential over a base tick, sample times and delays as they
-    are, a loop with several sample times as the time-invariant system over that of its outermost loop. A loop is cut where its
+    are, a loop with several sample times as the time-invariant system over that of its outermost loop. Field-oriented control is
+    linear about the steady motion of the regime: its speed, and the torque that keeps it. A loop is cut where its
     measured value enters its controller, the loops within it closed, those around it open. Limits, quantisation and dead zones
     do not count there; they do in the runs: steps, following, settling and rest are exact simulations of the scenario.
 
@@ -167,7 +169,8 @@ def commission(
     for name in axis.loops:
         for regime in points:
             loops.append(_loop_sheet(axis, regime, name))
-        steps.append(step_response(axis, name))
+        if name in STEPPED:
+            steps.append(step_response(axis, name))
         progress()
     followed = following(axis)
     wide = default_window(axis) if window is None else window

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..control.loops import CurrentLoop, Feedforward
+from ..control.loops import CurrentLoop, Feedforward, FieldOriented
 from ..control.references import PositionReference
 from ..inputs.part import Part
 from ..model.torsion import TorsionCurve
@@ -22,6 +22,7 @@ from .regimes import Axis, speed_of
 if TYPE_CHECKING:
     import xarray
 
+STEPPED = ("current", "speed", "position")  # loops that a reference can step; that of i_d has none of its own
 HALVINGS = 12  # of a step, until no limit acts on it
 STEP_SHARE = 0.02  # of the longest move, the first size of a position step
 AT_REST = 1e-9  # of a turn: what a shaft that stands may move by rounding
@@ -166,7 +167,13 @@ def _is_limited(axis: Axis, loop: str, data: xarray.Dataset) -> bool:
         found.append((f"{axis.motor}_command", motor.command_limit))
     if motor.torque_limit is not None:
         found.append((f"{axis.motor}_torque", motor.torque_limit))
-    return any(float(np.abs(data[name].values).max()) >= within * limit for name, limit in found)
+    most = {name: float(np.abs(data[name].values).max()) for name, _ in found}
+    if isinstance(c.current, FieldOriented) and motor.winding is not None and motor.winding.max_current is not None:
+        for what, limit in (("voltage", motor.phase_voltage), ("current", math.sqrt(2.0) * motor.winding.max_current)):
+            pair = (data[f"{axis.motor}_{which}_{what}"].values for which in ("direct", "quadrature"))
+            found.append((what, limit))
+            most[what] = float(np.hypot(*pair).max())
+    return any(most[name] >= within * limit for name, limit in found)
 
 
 # --- following and settling ---

@@ -12,7 +12,6 @@ import numpy as np
 from .. import _core
 from ..control.axis import turns
 from ..control.controller import Controller
-from ..control.loops import CurrentLoop, FieldOriented, SampledCurrent
 from ..errors import InputError, need
 from ..inputs.validation import shown
 from ..model.gear import Gear
@@ -21,6 +20,7 @@ from ..response.linear import LinearModel, train_model
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form
 from ..simulation.train_state import start_capacities, start_values
+from .winding import OrientedWinding
 
 if TYPE_CHECKING:
     from ..model.train import DriveTrain
@@ -64,7 +64,13 @@ class Axis:
     def loops(self) -> tuple[str, ...]:
         """Names of the loops that are closed, the innermost first."""
         c = self.controller
-        present = {"current": c.current.kind == "pi", "speed": c.speed is not None, "position": c.position is not None}
+        oriented = c.current.kind == "field_oriented"
+        present = {
+            "direct current": oriented,
+            "current": oriented or c.current.kind == "pi",
+            "speed": c.speed is not None,
+            "position": c.position is not None,
+        }
         return tuple(name for name, there in present.items() if there)
 
     def main_gear(self) -> str | None:
@@ -104,21 +110,12 @@ def axis_of(scenario: Scenario | TrainScenario, motor: str | None = None) -> Axi
         raise InputError(
             f"the controller of {name} has law = true, a function whose loops are not known; give it loops"
         )
-    axis = _loaded(_across(Axis(scenario if isinstance(scenario, TrainScenario) else in_long_form(scenario), name)))
+    axis = _loaded(Axis(scenario if isinstance(scenario, TrainScenario) else in_long_form(scenario), name))
     if not axis.loops:
-        raise InputError(f'the controller of {name} closes no loop; give it a speed loop, or current.kind = "pi"')
+        raise InputError(
+            f'the controller of {name} closes no loop; give it a speed loop, or current.kind = "pi" or "field_oriented"'
+        )
     return axis
-
-
-def _across(axis: Axis) -> Axis:
-    """The axis with the current loop that field-oriented control is while i_d is zero: of kind "pi", with the inductance L_q."""
-    loop = axis.controller.current
-    if not isinstance(loop, FieldOriented):
-        return axis
-    pi = CurrentLoop(kind="pi", **{key: getattr(loop, key) for key in SampledCurrent.model_fields})
-    controller = axis.controller.model_copy(update={"current": pi})
-    controllers = {**axis.scenario.controllers, axis.motor: controller}
-    return Axis(axis.scenario.model_copy(update={"controllers": controllers}), axis.motor)
 
 
 def _loaded(axis: Axis) -> Axis:
@@ -139,6 +136,8 @@ class Regime:
     model: LinearModel
     over_tick: np.ndarray
     """Phi and Gamma of x[k+1] = Phi x[k] + Gamma u[k], u the command of the motor held over a base tick: (n, n + 1)"""
+    winding: OrientedWinding | None = None
+    """of a motor under field-oriented control, whose command is the torque of its currents"""
 
     @classmethod
     def of(cls, axis: Axis, name: str, meaning: str, model: LinearModel) -> Regime:
@@ -149,7 +148,11 @@ class Regime:
         n = len(model.states)
         block = np.zeros((n + 1, n + 1))
         block[:n, :n], block[:n, n] = model.A, model.B[:, model.inputs.index(f"{axis.motor}_command")]
-        return cls(name, meaning, model, expm(block * axis.controller.sample_time)[:n])
+        over_tick = expm(block * axis.controller.sample_time)[:n]
+        winding, c = None, axis.controller
+        if c.current.kind == "field_oriented":
+            winding = OrientedWinding.of(axis.scenario.motors[axis.motor], axis.motor, c, model)
+        return cls(name, meaning, model, over_tick, winding)
 
 
 def regimes(axis: Axis) -> list[Regime]:

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -22,51 +22,13 @@ from ..control.filters import companion
 from ..control.loops import CurrentLoop, Difference, ExactSpeed, Observer
 from ..errors import InputError
 from ..response.linear import LinearModel
+from . import field_orientation
 from .regimes import Axis, Regime
+from .rows import INPUTS, Row, Tick
 
-LOOPS = ("current", "speed", "position")  # the innermost first
-INPUTS = ("reference", "rate", "second", "measured", "command")
-"""of a loop: its reference with two derivatives, what takes the place of its measured value where it is cut, and a disturbance of
-the command"""
+LOOPS = ("direct current", "current", "speed", "position")  # the innermost first
 
-Row = np.ndarray
-"""a signal as a linear form over the state at a tick, and the inputs"""
 Entering = Callable[[int, np.ndarray], np.ndarray]
-
-
-@dataclass
-class _Tick:
-    """The signals of one tick, computed in the order of the controller."""
-
-    names: list[str]
-    rows: dict[str, Row] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        unit = np.eye(len(self.names) + len(INPUTS))
-        self.rows = dict(zip((*self.names, *INPUTS), unit, strict=True))
-
-    def __getitem__(self, name: str) -> Row:
-        return self.rows[name]
-
-    def __setitem__(self, name: str, row: Row) -> None:
-        self.rows[name] = row
-
-    @property
-    def zero(self) -> Row:
-        return np.zeros(len(self.names) + len(INPUTS))
-
-    def delayed(self, name: str, row: Row, ticks: int) -> Row:
-        """A signal some ticks ago."""
-        for k in range(ticks):
-            row, self[f"{name}{k}"] = self[f"{name}{k}"], row
-        return row
-
-    def filtered(self, name: str, row: Row, system: tuple[np.ndarray, np.ndarray, np.ndarray, float]) -> Row:
-        A, B, C, D = system
-        z = [self[f"{name}{k}"] for k in range(len(B))]
-        for k, (a, b) in enumerate(zip(A, B, strict=True)):
-            self[f"{name}{k}"] = b * row + sum((x * y for x, y in zip(a, z, strict=True)), self.zero)
-        return np.asarray(D * row + sum((c * y for c, y in zip(C, z, strict=True)), self.zero))
 
 
 @dataclass(frozen=True)
@@ -106,6 +68,7 @@ class SampledLoop:
         return self.axis.loops[: self.axis.loops.index(self.loop) + 1]
 
     def every(self, loop: str) -> int:
+        loop = {"direct current": "current"}.get(loop, loop)
         return next(n for name, _, n in self.axis.controller.schedules() if name == loop)
 
     @property
@@ -119,26 +82,38 @@ class SampledLoop:
     def ticks(self) -> list[tuple[np.ndarray, np.ndarray, dict[str, Row]]]:
         """Of each tick of one sample time: state to state, inputs to state, and the signals."""
         names = self._states()
-        n, total = len(self.model.states), len(names)
-        phi, gamma = self.regime.over_tick[:, :-1], self.regime.over_tick[:, -1]
+        n, total = len(self.plant_states), len(names)
         out = []
         for k in range(self.every(self.loop)):
-            tick = _Tick(names)
-            self._control(tick, k)
-            plant = phi @ np.array([tick[name] for name in names[:n]]) + np.outer(gamma, tick["acting"])
+            tick = Tick(names)
+            acting = self._control(tick, k)
+            plant = self._over_tick(k) @ np.vstack([[tick[name] for name in names[:n]], acting])
             rows = np.vstack([plant, [tick[name] for name in names[n:]]])
             out.append((rows[:, :total], rows[:, total:], tick.rows))
         return out
 
+    @property
+    def plant_states(self) -> tuple[str, ...]:
+        """Those of the plant, and the currents of a winding."""
+        return (*self.model.states, *(() if self.regime.winding is None else field_orientation.CURRENTS))
+
+    def _over_tick(self, k: int) -> np.ndarray:
+        """From the states of the plant and what acts on it to its states a tick later."""
+        winding = self.regime.winding
+        return self.regime.over_tick if winding is None else winding.over_ticks[k % winding.every][0]
+
     def _states(self) -> list[str]:
         c = self.axis.controller
-        names = list(self.model.states)
+        names = list(self.plant_states)
 
         def row(name: str, count: int) -> list[str]:
             return [f"{name}{k}" for k in range(count)]
 
-        names += row("command_delay_", c.delay)
-        names += ["torque_reference", "measured_speed", "speed_reference", "computed_command"]
+        names += ["torque_reference", "measured_speed", "speed_reference"]
+        if self.regime.winding is not None:
+            names += field_orientation.states(self.regime.winding)
+        else:
+            names += ["computed_command", "current_integral", *row("command_delay_", c.delay)]
         for key in ("encoder", "position_encoder"):
             encoder = getattr(c, key)
             names += row(f"{key}_delay_", 0 if encoder is None else encoder.delay)
@@ -152,7 +127,7 @@ class SampledLoop:
                     names += row(f"{key}_{k}_", len(system[1]))
         if c.position is not None:
             names += ["position_integral", "blended"]
-        return [*names, "current_integral"]
+        return names
 
     def _kind_of_estimate(self) -> Difference | Observer | ExactSpeed:
         """Without a speed loop, the current loop has the plain difference for its back-e.m.f."""
@@ -163,7 +138,7 @@ class SampledLoop:
         c = self.axis.controller
         return [companion(*f.discrete(c.loop_time("speed"))) for f in getattr(c.speed, key)]
 
-    def _output(self, tick: _Tick, name: str) -> Row:
+    def _output(self, tick: Tick, name: str) -> Row:
         """A variable of the plant that the command does not act on at once."""
         m = self.model
         if name not in m.outputs:
@@ -175,7 +150,8 @@ class SampledLoop:
 
     # --- one tick, in the order of Axis::step ---
 
-    def _control(self, tick: _Tick, k: int) -> None:
+    def _control(self, tick: Tick, k: int) -> np.ndarray:
+        """Computes the signals of a tick; returns what acts on the plant from it on."""
         c, axis = self.axis.controller, self.axis
         for shaft in (axis.motor_shaft, axis.shaft):
             tick[f"{shaft}_angle"] = self._output(tick, f"{shaft}_angle")
@@ -189,6 +165,8 @@ class SampledLoop:
             self._position_loop(tick)
         if due.get("speed"):
             self._speed_loop(tick)
+        if self.regime.winding is not None:
+            return self._winding(tick, k, speed_shaft)
         if self.loop == "current":
             tick["torque_reference"] = tick["reference"]
         if isinstance(c.current, CurrentLoop):
@@ -196,9 +174,19 @@ class SampledLoop:
                 tick["computed_command"] = self._current_loop(tick, c.current)
         else:
             tick["computed_command"] = tick["torque_reference"] / axis.scenario.motors[axis.motor].rated_torque
-        tick["acting"] = tick.delayed("command_delay_", tick["computed_command"] + tick["command"], c.delay)
+        return tick.delayed("command_delay_", tick["computed_command"], c.delay)[None, :]
 
-    def _sensor(self, tick: _Tick, key: str, signal: str, target: str) -> str:
+    def _winding(self, tick: Tick, k: int, speed_shaft: str) -> np.ndarray:
+        winding = self.regime.winding
+        assert winding is not None
+        rotor = tick[f"{self.axis.motor_shaft}_angle"]
+        read = tick["speed_angle"] if speed_shaft == self.axis.motor_shaft else rotor
+        if k % winding.every == 0:
+            measured = partial(self._measured, tick)
+            field_orientation.control(tick, winding, (rotor, read), self.loop, measured)
+        return field_orientation.acting(tick, winding, rotor, k % winding.every)
+
+    def _sensor(self, tick: Tick, key: str, signal: str, target: str) -> str:
         """Reads an encoder, to the angle of `target`; returns its shaft."""
         encoder: Encoder | None = getattr(self.axis.controller, key)
         shaft = (encoder and encoder.shaft) or self.axis.motor_shaft
@@ -207,7 +195,7 @@ class SampledLoop:
         tick[signal] = (scale or 1.0) * tick.delayed(f"{key}_delay_", self._output(tick, f"{shaft}_angle"), delay)
         return shaft
 
-    def _estimate(self, tick: _Tick, shaft: str) -> Row:
+    def _estimate(self, tick: Tick, shaft: str) -> Row:
         T, e, angle = self.axis.controller.loop_time("speed"), self._kind_of_estimate(), tick["speed_angle"]
         if isinstance(e, Difference):
             smoothing = -math.expm1(-T / e.time_constant) if e.time_constant > 0.0 else 1.0
@@ -225,12 +213,12 @@ class SampledLoop:
         scale = turns(self.axis.train, self.axis.motor_shaft, shaft)
         return (scale or 1.0) * self._output(tick, f"{shaft}_speed")
 
-    def _measured(self, tick: _Tick, loop: str, row: Row) -> Row:
+    def _measured(self, tick: Tick, loop: str, row: Row) -> Row:
         """What a controller takes for its measured value: where the loop is cut, the input in its place."""
         tick[f"{loop}_measured"] = row
         return tick["measured"] if self.cut and loop == self.loop else row
 
-    def _position_loop(self, tick: _Tick) -> None:
+    def _position_loop(self, tick: Tick) -> None:
         c, ratio = self.axis.controller, self.axis.ratio
         assert c.position is not None
         angle = tick["speed_angle"] / ratio
@@ -245,7 +233,7 @@ class SampledLoop:
         tick["position_integral"] = tick["position_integral"] + c.loop_time("position") * c.position.integral_gain * e
         tick["speed_reference"] = ratio * wanted
 
-    def _speed_loop(self, tick: _Tick) -> None:
+    def _speed_loop(self, tick: Tick) -> None:
         c, ratio = self.axis.controller, self.axis.ratio
         loop, T = c.speed, c.loop_time("speed")
         assert loop is not None
@@ -270,7 +258,7 @@ class SampledLoop:
             torque = tick.filtered(f"torque_filters_{k}_", torque, system)
         tick["torque_reference"] = torque
 
-    def _current_loop(self, tick: _Tick, loop: CurrentLoop) -> Row:
+    def _current_loop(self, tick: Tick, loop: CurrentLoop) -> Row:
         m = self.axis.scenario.motors[self.axis.motor].as_dc()
         k_N, tau = m.armature_voltage_constant, m.electrical_time_constant
         assert k_N is not None and tau is not None and m.rated_speed is not None  # noqa: PT018
@@ -344,14 +332,22 @@ class SampledLoop:
 
     def compliance(self, frequency: Any, shaft: str, load: str) -> np.ndarray:
         """Angle of a shaft [rad] at the samples, for one N·m of a load torque that is a sine of continuous time [Hz]."""
-        m, n = self.model, len(self.model.states)
-        w, eye = _angular(frequency), np.eye(n)
-        b = m.B[:, m.inputs.index(f"{load}_load_torque")]
-        z = np.exp(1j * w * self.tick)
-        over_tick = (z[:, None, None] * eye - self.regime.over_tick[:, :-1]) @ b
+        m, n, winding = self.model, len(self.model.states), self.regime.winding
+        w, b = _angular(frequency), m.B[:, m.inputs.index(f"{load}_load_torque")]
         force = np.zeros((len(w), len(self.transition)), complex)
+        nothing = np.zeros((len(w), len(INPUTS)))
+
+        def of_winding(k: int, _: np.ndarray) -> np.ndarray:
+            assert winding is not None
+            force[:, : n + 2] = winding.forced(b, w, k % winding.every)
+            return force
+
+        if winding is not None:
+            return self._samples(f"{shaft}_angle", w, of_winding, nothing)
+        z, eye = np.exp(1j * w * self.tick), np.eye(n)
+        over_tick = (z[:, None, None] * eye - self.regime.over_tick[:, :-1]) @ b
         force[:, :n] = np.linalg.solve(1j * w[:, None, None] * eye - m.A, over_tick[:, :, None])[:, :, 0]
-        return self._samples(f"{shaft}_angle", w, lambda _, __: force, np.zeros((len(w), len(INPUTS))))
+        return self._samples(f"{shaft}_angle", w, lambda _, __: force, nothing)
 
 
 def _angular(frequency: Any) -> np.ndarray:
