@@ -7,8 +7,9 @@
 
 namespace lostmotion {
 
-// Solves rows[k] = 0 for the unknowns, columns `unknowns[k]` of the forms; then row k is 1 times its unknown, none of the
-// others, and the known terms. `subtract(f, factor, row)` is f -= factor * row. False if there is no unique solution.
+// Solves rows[k] = 0 for the unknowns, columns `unknowns[k]` of the forms; then row k is 1 times its unknown, none of
+// the others, and the known terms. `subtract(f, factor, row)` is f -= factor * row. False if there is no unique
+// solution.
 template <class Rows, class Unknowns, class Subtract>
 bool eliminate(Rows& rows, const Unknowns& unknowns, std::size_t n, const Subtract& subtract) {
     for (std::size_t k = 0; k < n; ++k) {
