@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT, SCENARIOS
 from lostmotion.cli import app
+from lostmotion.paper import paper_scenario
 from lostmotion.simulation.scenario import from_tables
 from lostmotion.sizing.drive_check import check_drive
 from lostmotion.sizing.duty_cycle import DutyCycle, duty_cycle
@@ -351,3 +352,23 @@ def test_a_load_that_is_only_slowed_down_by_friction_is_no_sinking_one():
     )
     for rule in MEANS:
         assert "with command 0" not in by_rule(coasting)[rule].remark
+
+
+def test_the_drive_check_finds_what_is_wrong():
+    scenario = lm.load(ROOT / "scenarios" / "catalogue-robot-joint.toml")
+    heavy = scenario.replace(**{"load.inertia": 60.0, "command.frequency": 3.0})
+    wrong = {f.what for f in check_drive(heavy) if f.verdict == "warning"}
+    assert {"inertia of the load / of the motor side", "resonance on the softest segment"} <= wrong
+    weak = scenario.replace(**{"command.amplitude": 0.004})
+    (zone,) = [f for f in check_drive(weak) if f.what == "dead zone"]
+    assert zone.verdict == "warning"
+    assert "does not move" in zone.remark
+    # That it does not move is a fact of the run, not of the check alone.
+    assert float(abs(lm.simulate(weak)["motor_speed"]).max()) == 0.0
+    plain = [f for f in check_drive(paper_scenario("2-DOF-NL", "large")) if f.verdict == "unknown"]
+    assert {"output torque, largest"} <= {f.what for f in plain}
+
+
+def test_a_load_that_drives_is_no_dead_zone():
+    findings = {f.what: f for f in check_drive(lm.load(ROOT / "scenarios" / "backlash-reversing-load.toml"))}
+    assert findings["dead zone"].verdict == "ok"  # the command is 0 throughout
