@@ -7,9 +7,11 @@
 
 namespace lostmotion::model {
 
-// Dimensions of the kernel for trains. Guards are 64 at most: the solver keeps them as bits of a word.
-using Narrow = Dims<4, 1, 6, 6, 8, 32>;
-using Middle = Dims<8, 2, 8, 10, 12, 64>;
+// Dimensions of the kernel for trains, which takes the narrowest that holds one. Guards are 64 at most: the solver
+// keeps them as bits of a word. Every input that there is room for costs time at every event check, so there is room
+// for few.
+using Narrow = Dims<4, 1, 4, 6, 8, 32>;
+using Middle = Dims<8, 2, 6, 10, 12, 64>;
 using Wide = Dims<16, 4, 16, 20, 24, 64>;
 
 template <class D>
