@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import control_figures
+import identification_figures
 import limit_cycles_figures
 import live_pages
 import motors_figures
@@ -314,6 +315,7 @@ def generate(out: Path = OUT) -> None:
     motors_figures.write(out)
     control_figures.write(out)
     limit_cycles_figures.write(out)
+    identification_figures.write(out)
     live_pages.write(out / "extra" / "live")
     for name, text in pages.items():
         (out / f"{name}.md").write_text(text, encoding="utf-8")

@@ -48,12 +48,12 @@ class Engine:
         """so far"""
 
     def residual(self, log: Prepared, values: Mapping[str, float], rung: int) -> np.ndarray:
-        """Measured less computed, one row for each measured channel, SI; NaN where the rig has no motion."""
+        """Measured less computed, times the weights of the samples, one row for each measured channel, SI; NaN where the rig has no motion."""
         try:
             seen = self.rig.run(log, values, rung)
         except (InputError, _core.SolverError):
             return np.full((len(log.measured), len(log.time)), np.nan)
-        return np.array([log.measured[name] - seen[name] for name in log.measured])
+        return np.array([(log.measured[name] - seen[name]) * log.weight for name in log.measured])
 
     def residuals(self, logs: Sequence[Prepared], point: Point, rung: int) -> list[np.ndarray]:
         """Of each log, see `residual`."""

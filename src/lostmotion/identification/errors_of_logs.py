@@ -27,10 +27,10 @@ class LogError:
 
 
 def log_errors(logs: Sequence[Prepared], residuals: Sequence[np.ndarray]) -> list[LogError]:
-    """Of each log and each measured channel."""
+    """Of each log and each measured channel, of residuals with their weights; the errors are without."""
     found = []
     for log, rows in zip(logs, residuals, strict=True):
-        for (name, measured), r in zip(log.measured.items(), rows, strict=True):
+        for (name, measured), r in zip(log.measured.items(), rows / log.weight, strict=True):
             rmse = float(np.sqrt(np.mean(r**2)))
             spread = float(np.std(measured))
             fit = 1.0 - rmse / spread if spread > 0.0 else float("nan")

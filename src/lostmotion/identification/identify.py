@@ -86,7 +86,7 @@ class IdentificationResult:
                 continue
             i = self.intervals[name]
             unit = f" {p.unit}" if p.unit else ""
-            lines.append(f"  {name} = {self.values[name]:.5g} ({i.low:.5g} to {i.high:.5g}){unit}")
+            lines.append(f"  {name} = {p.shown(self.values[name])} ({p.shown(i.low)} to {p.shown(i.high)}){unit}")
         for channel in self.task.measured:
             for held_out, what in ((False, "fitted"), (True, "held out")):
                 mae, rmse = self.error(channel, held_out=held_out)

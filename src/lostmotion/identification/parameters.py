@@ -9,11 +9,11 @@ from pydantic import BeforeValidator, model_validator
 
 from ..inputs.part import Part
 from ..inputs.quantities import Number
-from ..units.conversion import si_value
+from ..units.conversion import si_factor, si_value
 
 
 def in_unit(value: Any, unit: str, key: str) -> float | None:
-    """A number, or text with a unit of the kind of `unit`, in SI.
+    """A number in SI, or text with a unit of the kind of `unit`, in SI.
 
     Raises
     ------
@@ -24,7 +24,7 @@ def in_unit(value: Any, unit: str, key: str) -> float | None:
     if not isinstance(value, str):
         raise ValueError(f"has {key} = {value!r}; give a number in SI, or text with a unit")
     try:
-        return si_value(value, unit)
+        return si_value(value, unit) * si_factor(unit)
     except ValueError as problem:
         raise ValueError(f"has {key} = {value!r}, which {problem}") from None
 
@@ -42,7 +42,7 @@ class FreeParameter(Part):
     max: Number = math.inf
     """largest value"""
     unit: str = ""
-    """in which values are written, and shown in results"""
+    """in which results show it, and of the kind of which its texts are; numbers in the file are in SI all the same"""
     scale: Number | None = None
     """a change that matters; left out, a tenth of the start value, or of the range where that is 0"""
     tolerance: Number | None = None
@@ -86,7 +86,15 @@ class FreeParameter(Part):
                 raise ValueError(f"has {key} = {value:g}; it must be positive")
         if self.logarithmic and not (self.start > 0.0 and self.min > 0.0):
             raise ValueError("is logarithmic, so start and min must be positive")
+        try:
+            si_factor(self.unit)
+        except ValueError as problem:
+            raise ValueError(f"has unit = {self.unit!r}, which {problem}") from None
         return self
+
+    def shown(self, value: float) -> str:
+        """A value [SI] in its unit, to five figures."""
+        return f"{value / si_factor(self.unit):.5g}"
 
     @property
     def step(self) -> float:

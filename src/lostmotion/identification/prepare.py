@@ -16,7 +16,7 @@ from .formulas import Formula
 from .logs import Channel, Log
 from .readers import find_logs, read_log
 from .screening import screened
-from .task import Identification
+from .task import FormulaText, Identification
 
 KINDS = ("rad", "rad/s", "N*m", "A", "V", "N", "m", "m/s", "s", "K", "rad/s^2", "m/s^2", "W", "Pa")
 
@@ -43,6 +43,8 @@ class Prepared:
     """what formulas may name: its header, and ``first_CHANNEL`` and ``mean_CHANNEL``"""
     segments: tuple[Segment, ...]
     held_out: bool
+    weight: np.ndarray
+    """of each sample, by which its errors are multiplied"""
     cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -149,6 +151,7 @@ def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepar
         facts,
         _segments(task, log, facts),
         held_out,
+        _weights(task, log, facts),
     )
 
 
@@ -164,24 +167,31 @@ def _segments(task: Identification, log: Log, facts: Mapping[str, Any]) -> tuple
     n = len(log.time)
     phase = np.full(n, -1)
     for k, entry in enumerate(task.phases):
-        formula = Formula(entry.when)
-        names = [name for name in formula.names if name in log.channels]
-        columns = {name: log.values(name) for name in names}
-        if not names:
-            phase[:] = k if _fact(entry.when, facts, log, f"phases[{k}].when") else phase
-            continue
-        rows = np.array([columns[name] for name in names]).T
-        distinct, which = np.unique(rows, axis=0, return_inverse=True)
-        if len(distinct) > 1000:
-            raise InputError(
-                f"{log.name}: key phases[{k}].when: {entry.when!r} names a channel with {len(distinct)} values; name one that switches"
-            )
-        holds = np.array(
-            [
-                bool(_fact(entry.when, {**facts, **dict(zip(names, row, strict=True))}, log, "phases"))
-                for row in distinct
-            ]
-        )
-        phase[holds[which.ravel()]] = k
+        phase[_by_sample(entry.when, log, facts, f"phases[{k}].when") != 0.0] = k
     edges = [0, *(np.flatnonzero(np.diff(phase)) + 1).tolist(), n]
     return tuple(Segment(a, b, int(phase[a])) for a, b in itertools.pairwise(edges))
+
+
+def _weights(task: Identification, log: Log, facts: Mapping[str, Any]) -> np.ndarray:
+    found = _by_sample(task.logs.weight, log, facts, "logs.weight")
+    if not np.all(found > 0.0):
+        k = int(np.argmin(found))
+        raise InputError(
+            f"{log.name}: key logs.weight: {task.logs.weight!r} is {found[k]:g} at {log.time[k]:.4g} s; it must be positive"
+        )
+    return found
+
+
+def _by_sample(text: FormulaText, log: Log, facts: Mapping[str, Any], key: str) -> np.ndarray:
+    """A formula of the header and of channels that switch, for each sample."""
+    names = [name for name in Formula(text).names if name in log.channels]
+    if not names:
+        return np.full(len(log.time), float(_fact(text, facts, log, key)))
+    rows = np.array([log.values(name) for name in names]).T
+    distinct, which = np.unique(rows, axis=0, return_inverse=True)
+    if len(distinct) > 1000:
+        raise InputError(
+            f"{log.name}: key {key}: {text!r} names a channel with {len(distinct)} values; name one that switches"
+        )
+    values = [float(_fact(text, {**facts, **dict(zip(names, row, strict=True))}, log, key)) for row in distinct]
+    return np.array(values)[which.ravel()]

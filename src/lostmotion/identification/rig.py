@@ -20,6 +20,7 @@ from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_for
 from ..simulation.train_state import start_capacities
 from .formulas import Formula
 from .prepare import Prepared, Segment
+from .shaft_angles import angle_terms
 from .task import Identification, InputChannel, MeasuredChannel, Rung
 
 FINE = 2e-3  # [s] between samples of a run, so that a jump of the torque between two of them is seen
@@ -89,6 +90,7 @@ class Rig:
     def _units(self) -> dict[str, str]:
         units = {str(name): str(unit) for name, unit, _ in self.scenario.core().channels()}
         kinds = {"position": "rad", "speed": "rad/s", "torque": "N*m"}
+        units |= {f"{name}_angle": "rad" for name in self.scenario.shafts if angle_terms(self.scenario, name, units)}
         return units | {f"{name}_reference": kinds[c.reference.kind] for name, c in self.scenario.axes().items()}
 
     def changes(self, values: Mapping[str, Any], rung: int, phase: int) -> dict[str, Any]:
@@ -160,7 +162,7 @@ class Rig:
                 self._control(log, built, known, begin, end),
             )
             data = dict(zip(built.names, result["values"], strict=True))
-            parts.append({name: data.get(name, np.zeros(samples)) for name in wanted})
+            parts.append({name: _variable(name, built, data, samples) for name in wanted})
             times.append(np.linspace(begin, end, samples))
             state = {name: value for name, value in result["end_state"].items() if name in built.names}
         time = np.concatenate(times)
@@ -264,6 +266,16 @@ def number(text: str | float, known: Mapping[str, Any], key: str) -> float:
         return float(Formula(text).value(known))
     except ValueError as problem:
         raise InputError(f"key {key}: {problem}") from None
+
+
+def _variable(name: str, built: Built, data: Mapping[str, np.ndarray], samples: int) -> np.ndarray:
+    """A variable of a run, or the angle of a shaft through the gears behind it."""
+    if name in data:
+        return data[name]
+    found = np.zeros(samples)
+    for variable, factor in angle_terms(built.scenario, name.removesuffix("_angle"), data).items():
+        found = found + factor * data[variable]
+    return found
 
 
 def _ends(log: Prepared, segment: Segment) -> tuple[float, float]:

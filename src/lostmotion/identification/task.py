@@ -41,6 +41,9 @@ class LogFiles(Part):
     """left out at the beginning of each log"""
     last: Annotated[Time, Positive] | None = None
     """after which a log is not used; left out, to its end"""
+    weight: FormulaText = 1.0
+    """of samples, by the header or by channels that switch, such as ``1 + 9*(ramp < 100)``: their errors count as if they were larger
+    by that factor"""
 
 
 class InputChannel(Part):
@@ -172,6 +175,7 @@ class Identification(Part):
             if hasattr(entry, key)
         ]
         found += [(f"phases[{k}].when", [phase.when]) for k, phase in enumerate(self.phases)]
+        found.append(("logs.weight", [self.logs.weight]))
         return found + ([("logs.held_out", [self.logs.held_out])] if self.logs.held_out is not None else [])
 
     def rungs(self) -> tuple[Rung, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..identification.identify import IdentificationResult, residual_table
 from ..identification.ladder import free_on
+from ..units.conversion import si_factor
 from . import plots
 from .pages import embed, panels_csv, render_page, save_figure, table_csv, write_text
 from .panels import Curve, Panel
@@ -79,16 +80,16 @@ def write_identification(directory: Path, name: str, result: IdentificationResul
 
 
 def parameter_rows(result: IdentificationResult) -> list[list[str]]:
-    """Values with intervals, as text in SI."""
+    """Values with intervals, as text in their units."""
     rows = []
     for name, p in result.task.parameters.items():
         value, interval = result.values[name], result.intervals.get(name)
         ends = (
             ["", "", p.unit, "given"]
             if interval is None
-            else [f"{interval.low:.5g}", f"{interval.high:.5g}", p.unit, interval.method]
+            else [p.shown(interval.low), p.shown(interval.high), p.unit, interval.method]
         )
-        rows.append([name, f"{value:.5g}", *ends])
+        rows.append([name, p.shown(value), *ends])
     return rows
 
 
@@ -228,6 +229,7 @@ def _shade(k: int) -> str:
 def _profile(result: IdentificationResult, name: str) -> Panel:
     values, rise = np.array(result.profiles[name]).T
     unit = result.task.parameters[name].unit or "-"
+    values = values / si_factor(unit)
     return Panel(
         name,
         f"{name} [{unit}]",

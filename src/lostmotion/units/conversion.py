@@ -93,6 +93,24 @@ def si_value(text: str, unit: str) -> float:
     return float(number) if _NUMBER.fullmatch(number) and math.isfinite(float(number)) else to_si(text, unit)
 
 
+@lru_cache(maxsize=1000)
+def si_factor(unit: str) -> float:
+    """One of a unit in SI, angles in rad: ``"deg"`` is 0.01745, ``"rpm"`` 0.1047; 1 without a unit.
+
+    Raises
+    ------
+    ValueError
+        The unit is not known.
+    """
+    if unit.strip() in ("", "-", "1"):
+        return 1.0
+    try:
+        units = read_unit(unit)
+    except UnknownUnitError as error:
+        raise ValueError(_unknown("1", unit, error.symbol, "")) from None
+    return float(registry().Quantity(1.0, _registry_text(units)).to_base_units().magnitude)
+
+
 def _wanted(unit: str) -> str:
     return f'a value in {unit}, such as "1 {unit}"' if unit else 'a plain number, such as "0.5" or "50 %"'
 
