@@ -10,7 +10,7 @@ from scipy.linalg import expm
 import lostmotion as lm
 from lostmotion.data_sheets.components import motor_table
 from lostmotion.sizing.drive_check import check_drive
-from lostmotion.sizing.thermal import COPPER, TwoBodies
+from lostmotion.sizing.thermal import COPPER, TwoBodies, mean_square
 
 THERMAL = {
     "thermal_resistance_winding_case": "0.8 K/W",
@@ -90,7 +90,7 @@ def test_steps_of_all_lengths_are_exact(pause: float) -> None:
     b = np.array([LOSS * 0.16 * (1.0 + COPPER * 15.0) / C_W, 0.0])
     augmented = np.zeros((3, 3))
     augmented[:2, :2], augmented[:2, 2] = A, b
-    for (F, g), h in zip(zip(*bodies.steps(time, torque), strict=True), np.diff(time), strict=True):
+    for (F, g), h in zip(zip(*bodies.steps(time, mean_square(torque)), strict=True), np.diff(time), strict=True):
         expected = expm(augmented * h)
         assert pytest.approx(expected[:2, :2], rel=1e-10, abs=1e-14) == F  # 1 + A times something: rounding of 1
         assert g == pytest.approx(expected[:2, 2], rel=1e-9, abs=1e-15)

@@ -12,15 +12,18 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.control.tuning import TwoInertias, suited
+from lostmotion.simulation.run import run
 from lostmotion.simulation.scenario import LoadTable
 from lostmotion.sizing.duty_cycle import DutyCycle
 from lostmotion.sizing.required_motion import check_motor, input_demand, required_motion
 from lostmotion.studies.axis import repeated
 from lostmotion.studies.axis_columns import COLUMNS, last_cycle
+from lostmotion.studies.axis_electrical import Electrical
 from lostmotion.studies.study import Study
 from lostmotion.studies.task_file import task_of
 
 J, FRICTION, RATIO, CYCLE = 0.1, 0.5, 50.0, 1.0
+FINE = 40  # samples in a sample time of the controller
 SPEED, ACCELERATION, DISTANCE = 4.0, 40.0, 1.2
 INERTIA_1, EFFICIENCY = 2e-6, 0.8
 
@@ -210,20 +213,69 @@ def test_a_row_is_the_run_of_its_scenario(task: Study, result: Any):
         data = lm.simulate(scenario, energy=False)
         each = (data.sizes["time"] - 1) // count
         last = data.isel(time=slice((count - 1) * each, count * each + 1))
-        torque, current = (
-            last["motor_torque"].values,
-            last["motor_torque"].values / scenario.motor.limits.torque_constant,
-        )
-        assert float(row["motor_torque_rms"]) == pytest.approx(math.sqrt(np.mean(torque[:-1] ** 2)), rel=1e-12)
-        assert float(row["current_peak"]) == abs(current).max()
+        constant = scenario.motor.limits.torque_constant
+        assert float(row["current_peak"]) == abs(last["motor_torque"].values).max() / constant
         assert float(row["voltage_peak"]) == abs(last["command"].values).max() * scenario.motor.rated_voltage
         error = last["load_angle"].values - scenario.controller.reference.at(last["time"].values)[0]
         assert float(row["tracking_error_peak"]) == abs(error).max()
         ends = [int(np.searchsorted(last["time"].values - last["time"].values[0], t - 1e-9)) for t in (0.5, CYCLE)]
         assert float(row["reversal_error"]) == pytest.approx(abs(error[ends[0]] - error[ends[1]]), abs=2e-5)
-        power = (last["command"].values * scenario.motor.rated_voltage * current)[:-1]
-        interval = scenario.simulation.sample_interval
-        assert float(row["energy"] - row["energy_returned"]) == pytest.approx(interval * power.sum(), rel=1e-9)
+        fine = lm.simulate(scenario, energy=False, sample_interval=scenario.simulation.sample_interval / FINE)
+        torque, command = (fine[name].values[-each * FINE - 1 :] for name in ("motor_torque", "command"))
+        held = np.repeat(command[:-1:FINE], FINE)  # the command of a tick
+        square = (torque[:-1] ** 2 + torque[:-1] * torque[1:] + torque[1:] ** 2) / 3.0
+        power = held * scenario.motor.rated_voltage * 0.5 * (torque[:-1] + torque[1:]) / constant
+        energy = power.reshape(-1, FINE).mean(axis=1) * scenario.simulation.sample_interval
+        # Straight lines between the fine samples: (T/(40 tau))^2/12 = 1e-6 of the ripple, for rms and energy alike.
+        assert float(row["motor_torque_rms"]) == pytest.approx(math.sqrt(square.mean()), rel=1e-5)
+        assert float(row["current_rms"]) == pytest.approx(math.sqrt(square.mean()) / constant, rel=1e-5)
+        assert float(row["energy"]) == pytest.approx(energy[energy > 0.0].sum(), rel=1e-5)
+        assert float(row["energy_returned"]) == pytest.approx(-energy[energy < 0.0].sum(), rel=1e-4)
+
+
+@pytest.mark.parametrize("current", [{"kind": "ideal"}, {"kind": "first_order", "time_constant": "0.3 ms"}])
+def test_without_a_sampled_current_loop_torque_and_energy_are_those_of_fine_samples(current: dict[str, str]):
+    scenario = lm.load("position-axis", {"simulation.duration": 0.3, "simulation.sample_interval": 125e-6})
+    scenario = scenario.replace(**{"controller.current": current, "motor": MOTOR})
+    samples = slice(800, 2401)
+    found = Electrical.of(scenario, run(scenario, energy=False), samples)
+    fine = lm.simulate(scenario, energy=False, sample_interval=125e-6 / FINE)
+    torque, speed = (fine[name].values[800 * FINE :] for name in ("motor_torque", "motor_speed"))
+    if current["kind"] == "ideal":  # held over a tick
+        torque = np.append(np.repeat(torque[FINE // 2 :: FINE], FINE), torque[-1])
+    ends = torque[:-1], (torque[:-1] if current["kind"] == "ideal" else torque[1:])
+    square = (ends[0] ** 2 + ends[0] * ends[1] + ends[1] ** 2) / 3.0
+    assert found.torque_square == pytest.approx(square.reshape(-1, FINE).mean(axis=1), rel=1e-4, abs=1e-9)
+    mean = 0.5 * (ends[0] + ends[1])
+    back_emf = (MOTOR.armature_voltage_constant - 1.0) * 0.5 * (speed[:-1] + speed[1:]) / MOTOR.rated_speed
+    volts = MOTOR.rated_voltage / MOTOR.armature_voltage_constant
+    power = volts * (square / MOTOR.rated_torque + mean * back_emf) / MOTOR.limits.torque_constant
+    # What the inductance stores, and the heat of the ripple within a tick.
+    assert found.energy.sum() == pytest.approx(power.mean() * 0.2, rel=2e-3)
+
+
+def test_under_field_oriented_control_they_are_those_of_the_winding():
+    """Energy less heat less what the windings store is the work of the torque."""
+    train = lm.load("field-weakening")
+    base = lm.load("position-axis")
+    motor = train.motors["m"].model_dump(exclude_none=True)
+    scenario = lm.Scenario(
+        **{**base.model_dump(exclude_none=True), "motor": {k: v for k, v in motor.items() if k != "shaft"}}
+    )
+    scenario = scenario.replace(**{"controller.current": {"kind": "field_oriented"}, "controller.speed.torque_limit": 2.0,
+                                   "simulation.duration": 0.3, "simulation.sample_interval": 125e-6})  # fmt: skip
+    result = run(scenario, energy=False)
+    found = Electrical.of(scenario, result, slice(0, 2401))
+    phase, torque, speed = scenario.motor.winding.phase_values(), result["motor_torque"], result["motor_speed"]
+    assert found.torque_square.mean() == pytest.approx(np.mean(torque[:-1] ** 2), rel=0.02)
+    assert found.heating_square == pytest.approx(found.torque_square, rel=1e-2, abs=1e-4 * found.torque_square.max())
+    heat = 1.5 * phase.resistance * found.current_rms**2 * 0.3
+    stored = 0.75 * (
+        phase.inductance_d * result["direct_current"][-1] ** 2
+        + phase.inductance_q * result["quadrature_current"][-1] ** 2
+    )
+    work = np.sum(0.5 * (torque[1:] * speed[1:] + torque[:-1] * speed[:-1])) * 125e-6
+    assert found.energy.sum() == pytest.approx(heat + stored + work, rel=1e-3)
 
 
 def test_the_run_takes_about_what_the_rules_require(task: Study, result: Any):

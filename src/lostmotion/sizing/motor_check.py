@@ -14,7 +14,7 @@ from ..model.motor import Motor
 from ..units.practical import RPM
 from .duty_cycle import DutyCycle
 from .finding import Finding, Verdict, within
-from .thermal import TwoBodies, steady_rise
+from .thermal import TwoBodies, mean_square, steady_rise
 
 
 def largest_speed(m: Motor, speed: float, where: str = "motor") -> Finding:
@@ -71,7 +71,8 @@ def _rise(m: Motor, cycle: DutyCycle, torque: float, ambient: float) -> float | 
     steady, bodies = rms_rise(m, torque, ambient), TwoBodies.of(m, ambient)
     if steady is None or bodies is None or cycle.held_longer:
         return steady
-    course = bodies.repeated(*cycle.repeated_torque())
+    time, torques = cycle.repeated_torque()
+    course = bodies.repeated(time, mean_square(torques))
     return math.inf if course is None else float(course[0].max()) - ambient
 
 

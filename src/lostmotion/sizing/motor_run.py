@@ -18,7 +18,7 @@ from ..model.task import Task
 from ..simulation.results import RawResult, scenario_of
 from ..simulation.train_scenario import TrainScenario
 from .motor_check import command_of_run
-from .thermal import COPPER, need_two_bodies, rms
+from .thermal import COPPER, mean_square, need_two_bodies, rms
 
 if TYPE_CHECKING:
     import xarray
@@ -170,10 +170,10 @@ def temperatures(
             raise InputError(
                 "temperatures: a motion that has been repeated for ever has no beginning; leave winding and case out"
             )
-        course = bodies.repeated(time, heating)
+        course = bodies.repeated(time, mean_square(heating))
     else:
         start = (ambient if winding is None else winding, ambient if case is None else case)
-        course = bodies.course(time, heating, start)
+        course = bodies.course(time, mean_square(heating), start)
     if course is None:
         raise InputError(
             "temperatures: repeated, the winding has no end to its heat: its loss grows faster than it is carried off"

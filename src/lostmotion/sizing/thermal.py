@@ -58,10 +58,11 @@ class TwoBodies:
         times = limits.thermal_time_constant_winding, limits.thermal_time_constant_motor
         return cls(*limits.thermal_parts, *times, *copper, ambient, alpha)
 
-    def steps(self, time: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of each interval the map x -> F x + g of the temperatures x = (T_w, T_c) - T_a: F (n, 2, 2) and g (n, 2)."""
+    def steps(self, time: np.ndarray, square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of each interval between instants [s] the map x -> F x + g of the temperatures x = (T_w, T_c) - T_a: F (n, 2, 2) and
+        g (n, 2), by the mean of M² over it [(N·m)²]."""
         h = np.diff(time)
-        heat = self.loss * mean_square(torque)
+        heat = self.loss * square
         C_w, C_c = self.winding_time / self.winding_case, self.case_time / self.case_ambient
         a11 = (self.alpha * heat - 1.0 / self.winding_case) / C_w
         a12, a21 = 1.0 / (self.winding_case * C_w), 1.0 / (self.winding_case * C_c)
@@ -77,16 +78,16 @@ class TwoBodies:
         constant = heat * (1.0 + self.alpha * (self.ambient - self.reference)) / C_w
         return unit + A @ whole, whole[:, :, 0] * constant[:, None]
 
-    def course(self, time: np.ndarray, torque: np.ndarray, start: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Temperatures of winding and case [°C] at the samples, from those at the first."""
-        return self._follow(*_from_start(*self.steps(time, torque)), np.subtract(start, self.ambient))
+    def course(self, time: np.ndarray, square: np.ndarray, start: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+        """Temperatures of winding and case [°C] at the instants, from those at the first."""
+        return self._follow(*_from_start(*self.steps(time, square)), np.subtract(start, self.ambient))
 
-    def repeated(self, time: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    def repeated(self, time: np.ndarray, square: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """The same, of a cycle that has been repeated for ever.
 
         x = F x + g over the whole cycle, solved for x. None if the heat that grows with the temperature has no end.
         """
-        F, g = _from_start(*self.steps(time, torque))
+        F, g = _from_start(*self.steps(time, square))
         if max(abs(np.linalg.eigvals(F[-1]))) >= 1.0:
             return None
         return self._follow(F, g, np.linalg.solve(np.eye(2) - F[-1], g[-1]))

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from ..control.controller import Controller
 from ..control.loops import Feedforward
 from ..control.references import Move, PositionReference
+from ..control.sample_times import whole_multiple
 from ..control.tuning import TwoInertias, suited
 from ..inputs.quantities import Angle, Number, Positive, Time, Whole
 from ..model.gearbox import Gearbox
@@ -73,6 +74,8 @@ class AxisTask(Task):
             It cannot, or has not.
         """
         reference = reference_of(scenario)
+        assert scenario.controller is not None
+        whole_multiple(self.cycle, scenario.controller.sample_time, "task.cycle")
         repeated(reference, self.cycle, FEWEST)
         repeated_torque(scenario.load.torque, self.cycle, FEWEST)
         for key in ("max_reversal_error", "settling_window"):
@@ -177,14 +180,13 @@ def axis_scenario(base: Scenario, motor: Motor, gearbox: Gearbox, cycle: float, 
     """
     reference = reference_of(base)
     controller = tuned(base, motor, gearbox)
-    every = cycle / math.ceil(cycle / base.simulation.sample_interval * (1.0 - WHOLE))
     return base.model_copy(
         update={
             "motor": motor,
             "gearbox": gearbox,
             "controller": controller.model_copy(update={"reference": repeated(reference, cycle, count)}),
             "load": base.load.model_copy(update={"torque": repeated_torque(base.load.torque, cycle, count)}),
-            "simulation": SimulationTable(duration=count * cycle, sample_interval=every),
+            "simulation": SimulationTable(duration=count * cycle, sample_interval=controller.sample_time),
             "initial": Initial(load_angle=float(reference.at(0.0)[0])),
         }
     )

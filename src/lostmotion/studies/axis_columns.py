@@ -10,10 +10,10 @@ from ..model.motor import Motor
 from ..simulation.results import RawResult
 from ..simulation.scenario import Scenario
 from ..sizing.duty_cycle import DutyCycle
-from ..sizing.motor_check import command_of_run, rms_rise
-from ..sizing.motor_run import current_voltage_power, oriented_amplitudes
+from ..sizing.motor_check import rms_rise
 from ..sizing.thermal import TwoBodies
 from .axis import AxisTask, reference_of
+from .axis_electrical import Electrical
 
 COLUMNS = {
     "current_peak": ("A", "largest current of the motor; of a synchronous one amplitude of a phase"),
@@ -33,8 +33,8 @@ COLUMNS = {
     "tracking_error_rms": ("rad", "rms distance of the load from its reference"),
     "reversal_error": ("rad", "load at rest after forward moves less that after backward ones, magnitude"),
     "settling_time": ("s", "longest time after a move until the load stays in the window"),
-    "energy": ("J", "electrical energy taken per cycle"),
-    "energy_returned": ("J", "electrical energy given back per cycle"),
+    "energy": ("J", "electrical energy taken per cycle, by its mean in each sample time"),
+    "energy_returned": ("J", "electrical energy given back per cycle, the same way"),
     "position_gain": ("1/s", "gain of the position loop"),
     "speed_gain": ("N*m*s/rad", "gain of the speed loop"),
     "integral_gain": ("N*m/rad", "integral gain of the speed loop"),
@@ -42,6 +42,8 @@ COLUMNS = {
     "change": ("1", "relative difference of the last two cycles"),
 }
 """each with its unit and meaning"""
+
+TOGETHER = 8  # sample times whose heat is taken as even
 
 
 def rms(values: np.ndarray) -> float:
@@ -72,14 +74,24 @@ def duty_cycle_of(result: RawResult, cycle: slice, period: float) -> DutyCycle:
     return DutyCycle(result.time[cycle], np.abs(speed), output, torque, None, period)
 
 
-def temperatures_of(motor: Motor, duty: DutyCycle, ambient: float) -> tuple[float, float]:
+def temperatures_of(motor: Motor, time: np.ndarray, square: np.ndarray, ambient: float) -> tuple[float, float]:
     """Highest temperatures of winding and case [°C] in the cycle repeated for ever, as far as the data of the motor tell: without its
-    time constants the winding alone, by the rms torque; NaN where nothing is known."""
+    time constants the winding alone, by the rms torque; NaN where nothing is known.
+
+    Parameters
+    ----------
+    time
+        [s], evenly.
+    square
+        Mean of the torque that heats as this cycle does, squared, over each interval [(N·m)²].
+    """
     bodies = TwoBodies.of(motor, ambient)
     if bodies is not None:
-        course = bodies.repeated(duty.time, duty.motor_torque)
+        first = np.arange(0, len(square), TOGETHER)
+        mean = np.add.reduceat(square, first) / np.diff(np.append(first, len(square)))
+        course = bodies.repeated(np.append(time[first], time[-1]), mean)
         return (math.inf, math.inf) if course is None else (float(course[0].max()), float(course[1].max()))
-    rise = rms_rise(motor, rms(duty.motor_torque), ambient)
+    rise = rms_rise(motor, math.sqrt(float(square.mean())), ambient)
     return math.nan if rise is None else ambient + rise, math.nan
 
 
@@ -88,10 +100,8 @@ def row_of(scenario: Scenario, task: AxisTask, result: RawResult, count: int) ->
     here = last_cycle(result, count)
     time = result.time[here]
     duty = duty_cycle_of(result, here, task.cycle)
-    current, voltage, power = _electrical(scenario, result, here)
-    winding, case = temperatures_of(scenario.motor, duty, task.ambient_temperature)
-    power = power[:-1]
-    step = time[1] - time[0]
+    e = Electrical.of(scenario, result, here)
+    winding, case = temperatures_of(scenario.motor, time, e.heating_square, task.ambient_temperature)
     g, torque = scenario.gearbox, result["motor_torque"][here]
     controller = scenario.controller
     assert controller is not None
@@ -99,12 +109,12 @@ def row_of(scenario: Scenario, task: AxisTask, result: RawResult, count: int) ->
     assert controller.speed is not None
     error = result["load_angle"] - reference_of(scenario).at(result.time)[0]
     return {
-        "current_peak": float(np.abs(current).max()),
-        "current_rms": rms(current),
-        "voltage_peak": float(np.abs(voltage).max()),
-        "voltage_rms": rms(voltage),
+        "current_peak": float(np.abs(e.current).max()),
+        "current_rms": e.current_rms,
+        "voltage_peak": float(np.abs(e.voltage).max()),
+        "voltage_rms": rms(e.voltage),
         "motor_torque_peak": float(np.abs(torque).max()),
-        "motor_torque_rms": rms(torque),
+        "motor_torque_rms": math.sqrt(float(e.torque_square.mean())),
         "winding_temperature": winding,
         "case_temperature": case,
         "output_torque_peak": float(np.abs(duty.output_torque).max()),
@@ -115,28 +125,14 @@ def row_of(scenario: Scenario, task: AxisTask, result: RawResult, count: int) ->
         "tracking_error_peak": float(np.abs(error[here]).max()),
         "tracking_error_rms": rms(error[here]),
         **_at_rest(scenario, task, time, error[here], count),
-        "energy": float(step * np.maximum(power, 0.0).sum()),
-        "energy_returned": float(-step * np.minimum(power, 0.0).sum()),
+        "energy": float(np.maximum(e.energy, 0.0).sum()),
+        "energy_returned": float(-np.minimum(e.energy, 0.0).sum()),
         "position_gain": controller.position.gain,
         "speed_gain": controller.speed.gain,
         "integral_gain": controller.speed.k_i,
         "cycles": float(count),
         "change": change(result, count),
     }
-
-
-def _electrical(scenario: Scenario, result: RawResult, here: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Current [A], voltage [V] and power [W] of the motor."""
-    m = scenario.motor
-    command, torque, speed = (result[name][here] for name in ("command", "motor_torque", "motor_speed"))
-    oriented = oriented_amplitudes(result, "motor")
-    if oriented is None:
-        command = command_of_run(m, scenario.controller, command, torque, speed)
-        return current_voltage_power(m, command, torque, speed)
-    i_d, i_q, u_d, u_q = (
-        result[f"{axis}_{what}"][here] for what in ("current", "voltage") for axis in ("direct", "quadrature")
-    )
-    return oriented[0][here], oriented[1][here], 1.5 * (u_d * i_d + u_q * i_q)
 
 
 def _at_rest(scenario: Scenario, task: AxisTask, time: np.ndarray, error: np.ndarray, count: int) -> dict[str, float]:

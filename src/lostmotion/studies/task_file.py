@@ -20,7 +20,6 @@ from .study import Study
 
 TABLES = ("title", "task", "load", "controller", "motor", "gearbox", "vary", "select")
 OBJECTIVES = {"energy": "least", "tracking_error_peak": "least"}
-SAMPLES = 4  # sample times of the controller between two samples of the run
 GAINS = {"position": {"gain": 1.0}, "speed": {"gain": 1.0}}  # which the rule replaces
 CONTROLLER = {"sample_time": 125e-6, "encoder": {"lines": 2048}, "current": {"kind": "pi"}}
 POSITION = {"sample_time": 1e-3, "feedforward": 1.0}
@@ -70,7 +69,7 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         "motor": _table(tables, "motor"),
         "gearbox": _table(tables, "gearbox"),
         "task": {key: value for key, value in tables["task"].items() if key in Task.model_fields},
-        "simulation": {"duration": task.cycle, "sample_interval": SAMPLES * time},
+        "simulation": {"duration": task.cycle, "sample_interval": time},
     }
     vary = _vary(tables, directory)
     for entry in vary:
