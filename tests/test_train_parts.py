@@ -101,3 +101,10 @@ def test_speeds_are_shown_in_terms_of_the_last_shaft_of_their_own_part() -> None
     shown = {a.get_ylabel(): [line.get_label() for line in a.get_lines()] for a in figure.axes}
     for axis in ("traverse", "elevation"):
         assert shown[f"speed at {axis} [rad/s]"] == [f"{axis}_motor / 100", axis]
+
+
+def test_bits_do_not_depend_on_whether_parts_run_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = lm.load("direction-finder", {"simulation.duration": 0.2})
+    beside = lm.simulate(scenario)
+    monkeypatch.setattr(train_results, "SIDE_BY_SIDE", 0)
+    assert lm.simulate(scenario).identical(beside)

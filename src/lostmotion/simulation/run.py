@@ -19,6 +19,7 @@ from ..model.signals import CommandSignal, TorqueSignal
 from .results import RawResult, raw_result
 from .scenario import Initial, LoadTable, Scenario, SimulationTable
 from .sensitivities import run_sensitivities
+from .train_parts import SIDE_BY_SIDE
 from .train_results import run_train
 from .train_scenario import TrainScenario
 from .train_variables import axis_variables, train_variables
@@ -35,7 +36,6 @@ TOLERANCE = 1e-8  # of the adaptive solver, if none is given
 TOLERANCES = (1e-15, 1e-3)  # beyond rounding, and beyond what finds the switching instants
 
 MAX_SWITCHINGS = 100_000  # kept with a result; beyond it they are only counted
-SIDE_BY_SIDE = 1_000_000  # ticks: the longest run that has its coarser one beside it, which Ctrl-C does not end
 BYTES_PER_SAMPLE = 170  # of a result while it is made, measured
 
 

@@ -14,6 +14,7 @@ from .train_scenario import TrainInitial, TrainScenario
 
 INSTANT, LEADING = 0, 2  # of a switching: the column of its instant, and how many come before those of contacts
 NO_CONTACT = 2.0
+SIDE_BY_SIDE = 1_000_000  # ticks: the longest run that another one may have beside it, which Ctrl-C does not end
 SUMS = ("residual", "stored_change", "turned_over")  # of the ledger, over all elements
 
 
@@ -163,10 +164,11 @@ def _joined_switchings(
             start[places] = own[0, LEADING : LEADING + width]
         first += len(own)
     table = table[np.argsort(table[:, INSTANT], kind="stable")]
-    now = start
-    for row in table:
-        before, after = row[LEADING : LEADING + n], row[LEADING + n :]
-        others = np.isnan(before)
-        before[others] = after[others] = now[others]
-        now = after
+    before, after = table[:, LEADING : LEADING + n], table[:, LEADING + n :]  # views
+    known = np.where(np.isnan(after), -1, np.arange(count)[:, None])
+    last = np.maximum.accumulate(known, axis=0)
+    now = np.where(last < 0, start, np.take_along_axis(after, np.maximum(last, 0), axis=0))
+    others = np.isnan(before)
+    before[others] = np.vstack([start, now[:-1]])[others]
+    after[others] = now[others]
     return table

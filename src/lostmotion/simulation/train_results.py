@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..model.train import DriveTrain
 from .results import RawResult, installed_version
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import CONTACTS_OF_TRAIN, packed
-from .train_parts import control_of_part, joined_results, parts_of
+from .train_parts import SIDE_BY_SIDE, control_of_part, joined_results, parts_of
 from .train_scenario import TrainScenario
 from .train_state import start_capacities
 from .train_variables import angle_through, angles_through_gears, named_signals
@@ -25,7 +26,8 @@ from .windings import set_torques
 def run_train(
     scenario: TrainScenario, options: tuple[Any, ...], how: str, control: Bound, *, ledger: bool
 ) -> RawResult:
-    """A run of a drive train. Parts of it that nothing joins are solved one after the other.
+    """A run of a drive train. Parts of it that nothing joins are solved apart; under controllers side by side, unless one of these is a
+    function in Python.
 
     Parameters
     ----------
@@ -49,11 +51,18 @@ def _core_result(
     """The solver's train, and what the solver gave for it."""
     parts = parts_of(scenario)
     if len(parts) > 1:
-        results = []
-        for part in parts:
+
+        def solved(part: TrainScenario) -> dict[str, Any]:
             core, result = _core_result(part, options, control_of_part(control, scenario, part))
             names = {"channels": [name for name, _, _ in core.channels()], "contacts": core.contact_names()}
-            results.append(result | names)
+            return result | names
+
+        if not control[1] or any(c.law for c in scenario.axes().values()) or options[0] > SIDE_BY_SIDE * control[0]:
+            results = list(map(solved, parts))
+        else:
+            with ThreadPoolExecutor(len(parts) - 1) as beside:
+                others = [beside.submit(solved, part) for part in parts[1:]]
+                results = [solved(parts[0]), *(other.result() for other in others)]
         return scenario.core(), joined_results(scenario, parts, results, options[-1])
     case = core_case(scenario)
     return case[0], core_run(case, options, control)
