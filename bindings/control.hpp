@@ -297,6 +297,14 @@ inline void bind_control(nb::module_& m) {
         .value("position", Axis::position_mode);
     axis.def(nb::init<>())
         .def_rw("mode", &BoundAxis::mode)
+        .def(
+            "slots",
+            [](const BoundAxis& a) {
+                control::Axis placed = a;
+                placed.place();
+                return std::pair(placed.slots(), placed.running_slots());
+            },
+            "How many numbers it remembers, and which of them go on with time.")
         .def_rw("camera", &BoundAxis::camera)
         .def_rw("tracker", &BoundAxis::tracker)
         .def_rw("reference_delay", &BoundAxis::reference_delay)

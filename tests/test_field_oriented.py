@@ -325,6 +325,46 @@ def test_steps_of_any_length_are_the_run_and_a_state_goes_on_bit_for_bit() -> No
     assert ends[0] == ends[1]
 
 
+@pytest.mark.parametrize("number", range(6))
+def test_step_by_step_the_bound_is_that_of_the_run_and_holds(number: int) -> None:
+    a = random_axis(np.random.default_rng([7, number]), number)
+    a.load_torque = ((0.0, 0.3),)
+    one = scenario(a, TICKS)
+    run = lm.simulate(one)
+    states, _ = a.run(TICKS)
+    stepped = lm.Simulation(one, error_bound=True)
+    kept, names = None, ("direct_current", "quadrature_current", "motor_torque", "motor_speed")
+    far = dict.fromkeys(names, 0.0)
+    for k in range(TICKS):
+        stepped.advance(a.tick, load_torque=0.3)
+        i_d, i_q, speed = states[k + 1, 4], states[k + 1, 5], states[k + 1, 1]
+        for name, true in zip(names, (i_d, i_q, a.torque(i_d, i_q), speed), strict=True):
+            far[name] = max(far[name], abs(stepped[name] - true))
+        kept = stepped.state if k == TICKS // 2 else kept
+    bound = stepped.error_bound
+    scale = (a.i_max, a.i_max, a.torque(0.0, a.i_max), float(np.abs(states[:, 1]).max()))
+    for name, size in zip(names, scale, strict=True):
+        assert far[name] <= bound[name] + 1e-10 * size
+        # The instants of the steps differ by rounding from those of the run.
+        assert bound[name] == pytest.approx(json.loads(run.attrs["error_bound"])[name], rel=1e-3, abs=1e-10 * size)
+    stepped.state = kept
+    for _ in range(TICKS // 2 + 1, TICKS):
+        stepped.advance(a.tick, load_torque=0.3)
+    assert stepped.error_bound == bound
+    stepped.reset()
+    assert set(stepped.error_bound.values()) == {0.0}
+    with pytest.raises(lm.InputError, match="error_bound=True"):
+        lm.Simulation(one).error_bound  # noqa: B018
+
+
+def test_a_bound_step_by_step_needs_field_oriented_control_and_a_law_that_repeats() -> None:
+    with pytest.raises(lm.InputError, match="field_oriented"):
+        lm.Simulation(lm.load("position-axis"), error_bound=True)
+    one = scenario(changed(ROUND, J_M=1e-3), 10, law=True)
+    with pytest.raises(lm.InputError, match="repeatable=True"):
+        lm.Simulation(one, law=lambda *_: (1.0, 2.0), error_bound=True)
+
+
 def test_an_input_that_changes_within_a_tick_is_felt_there() -> None:
     """Step by step with the load's step at its instant, and the run that knows of it beforehand."""
     a = random_axis(np.random.default_rng([7, 5]), 5)
@@ -407,11 +447,6 @@ def test_what_cannot_be_controlled_so_is_refused(changes: dict[str, Any], words:
     assert "\n" not in str(refused.value)
     for word in words:
         assert word in str(refused.value)
-
-
-def test_a_response_refuses_it() -> None:
-    with pytest.raises(lm.InputError, match=r'response: .* "field_oriented"'):
-        lm.frequency_response(lm.load("field-weakening"), [5.0], 0.1)
 
 
 def test_a_law_must_give_both_voltages() -> None:

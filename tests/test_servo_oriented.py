@@ -114,6 +114,32 @@ def test_stiffness_at_speed_is_that_of_a_run_under_a_sine_of_load_torque(monkeyp
     assert abs(found - complex(a, b) / size) < 1e-6 * abs(found)
 
 
+def test_a_frequency_response_is_that_of_the_linear_loop_where_it_is_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the periodic motion at 0.05 rad/s; and the loop about zero torque of the same motor at half of that speed is another one."""
+    scenario, f = axis(300.0), [20.0, 100.0]
+    whole, regime = at_speed(scenario, monkeypatch)
+    found = lm.frequency_response(scenario, f, 0.05)
+    expected = SampledLoop(whole, regime, "speed", False).response(f, feedforward=False)
+    assert not any(found["reason"].values.ravel())
+    assert found["response"].sel(output="m_measured_speed").values.ravel() == pytest.approx(expected, rel=1e-6)
+    assert not {"m_copper_heat", "m_electrical_energy"} & set(found["output"].values)
+
+
+def test_a_large_sine_is_answered_as_a_long_run_answers_it() -> None:
+    """8 rad/s at 50 Hz, where torque and current bend: the fundamental and the second harmonic of a run after its transient."""
+    scenario, f, size = axis(300.0), 50.0, 8.0
+    found = lm.frequency_response(scenario, [f], size)
+    wave = {"kind": "speed", "mean": 300.0, "amplitude": size, "frequency": f}
+    run = lm.simulate(scenario.replace(**{"controllers.m.reference": wave}), duration=1.6, sample_interval=T / 4)
+    n = round(1.4 / (T / 4))  # a response samples at a quarter and three quarters of each tick
+    t = run["time"].to_numpy()[n + 1 : -1 : 2]
+    for name in ("m_quadrature_current", "m_direct_current", "m_torque", "load_speed"):
+        y = run[name].to_numpy()[n + 1 :: 2]
+        expected = [2.0 * np.mean(y * np.exp(-2j * np.pi * k * f * t)) for k in (1, 2)]
+        harmonics = found["harmonics"].sel(output=name).values.ravel()
+        assert np.abs(harmonics[1:3] - expected).max() < 1e-6 * abs(expected[0])
+
+
 def test_the_sheet_of_a_spindle_has_both_currents() -> None:
     report = lm.commission(lm.load("field-weakening"))
     assert list(dict.fromkeys(row.loop for row in report.loops)) == ["direct current", "current", "speed"]

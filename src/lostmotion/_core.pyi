@@ -713,6 +713,9 @@ class Axis:
     @mode.setter
     def mode(self, arg: Axis.Mode, /) -> None: ...
 
+    def slots(self) -> tuple[int, list[int]]:
+        """How many numbers it remembers, and which of them go on with time."""
+
     @property
     def camera(self) -> Camera: ...
 

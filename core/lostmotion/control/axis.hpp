@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <limits>
 #include <optional>
@@ -163,6 +164,12 @@ class Axis {
         slots_ = slots.count();
     }
     int slots() const { return slots_; }
+    // Those of a winding that go on with time: instants and energies. A motion that repeats does not bring them back.
+    std::vector<int> running_slots() const {
+        if (!field_orientation) return {};
+        static_assert(offsetof(WindingCourse, begin) == 0 && offsetof(WindingCourse, end) == sizeof(double));
+        return {course_, course_ + 1, energy_, energy_ + 1};
+    }
 
     // Before the first tick: the drive as it is, the integrators empty.
     void start(const Sampled& y, double tick_length, double* slot) const {

@@ -10,13 +10,14 @@ converges as Newton's method does where it is smooth), and taken only if the mot
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from .. import _core
+from ..control.axis import Bound
 from ..control.controller import Controller
 from ..control.references import PositionReference
 from ..simulation.scenario import Scenario
@@ -42,7 +43,7 @@ class AxisSignal:
     slot: int
     """where it is, among what all controllers remember"""
     every: int
-    """ticks from one value to the next"""
+    """ticks from one value to the next; 0: it varies between the ticks"""
     phase: int
     """tick of the first"""
 
@@ -78,6 +79,7 @@ class ClosedLoop:
         self.source = source if source in self.constants else None
         self.wave = self._wave(amplitude)
         self.begin = 0  # tick at which the window begins
+        self._running = list(running_slots(self.simulation._control))
         self.windows = self.jumps = 0
         self._to(0)
 
@@ -114,11 +116,16 @@ class ClosedLoop:
         self.windows += 1
 
     def record(self) -> tuple[np.ndarray, np.ndarray]:
-        """Over one window, with the variables of the plant and what the controllers remember at each sample, (variable, sample)."""
+        """Over one window, with the variables of the plant and what the controllers remember and show at each sample, (variable,
+        sample)."""
         rows, slots = [], []
+        windings = list(self.simulation.winding_torques())
         for sample in range(1, self.window.samples + 1):
-            rows.append(self.core.read())
-            slots.append(self.core.get_state()[-1][1:])
+            row = self.core.read()
+            for channel, torque in windings:  # in the place of the straight line that drives the mechanics
+                row[channel] = torque(row)
+            rows.append(row)
+            slots.append([*self.core.get_state()[-1][1:], *self.core.control_signals()])
             self._to(sample)
         self._next()
         return np.array(rows).T, np.array(slots).T
@@ -128,7 +135,8 @@ class ClosedLoop:
     def state(self) -> tuple[np.ndarray, tuple[int, ...]]:
         """The numbers that vary continuously, and the modes of the contacts with the pieces of the laws."""
         _, x, memory, key, _, _, _, control = self.core.get_state()
-        return np.array([*x, *memory, *control[1:]]), tuple(key)
+        repeating = np.delete(control[1:], self._running)
+        return np.array([*x, *memory, *repeating]), tuple(key)
 
     def set_state(self, numbers: np.ndarray) -> None:
         """In the present modes."""
@@ -136,7 +144,18 @@ class ClosedLoop:
         v, n, m = numbers.tolist(), len(x), len(x) + len(memory)
         known = len(x) + len(inputs)  # of the course: rates, and the inputs that they belong to
         forgotten = course[:known] + [0.0] * (len(course) - known)
-        self.core.set_state(time, v[:n], v[n:m], key, inputs, started, forgotten, [control[0], *v[m:]])
+        slots = np.array(control[1:])
+        slots[np.delete(np.arange(len(slots)), self._running)] = v[m:]
+        self.core.set_state(time, v[:n], v[n:m], key, inputs, started, forgotten, [control[0], *slots.tolist()])
+
+
+def running_slots(control: Bound) -> Iterator[int]:
+    """Where, among what all controllers remember, instants and energies of windings are, which no periodic motion brings back."""
+    first = 0
+    for axis, *_ in control[1]:
+        count, running = axis.slots()
+        yield from (first + slot for slot in running)
+        first += count
 
 
 def mean_of(reference: AnyReference) -> float:
@@ -276,6 +295,8 @@ class Search:
     def _sampled(self, signal: AxisSignal, slots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Angles of the sine at the instants of a controller's variable, and its values."""
         w = self.loop.window
+        if signal.every == 0:
+            return w.angle((np.arange(slots.shape[1]) * w.stride + 0.5) / w.points), slots[signal.slot]
         ticks = np.floor(np.arange(slots.shape[1]) * w.stride / w.points).astype(int)
         since = np.mod(ticks - signal.phase, signal.every)
         if w.stride == 1:

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..control.axis import Bound
 from ..control.law import Law
 from ..model.train import DriveTrain
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario, in_long_form
+from ..simulation.train_scenario import TrainScenario
 from ..simulation.train_variables import signals_of
 from .closed_loop import AxisSignal, ClosedLoop, Motion, Search, mean_of
 from .plant import Plant
@@ -45,9 +44,14 @@ def frame_of(scenario: Scenario | TrainScenario) -> tuple[float, int]:
 
 
 def axis_signals(scenario: Scenario | TrainScenario) -> Iterator[AxisSignal]:
-    """The variables of the controllers, in the order of `axis_variables`."""
+    """The variables of the controllers; of windings those that repeat, behind all that the controllers remember."""
+
+    def titled(name: str, motor: str) -> str:
+        return name if isinstance(scenario, Scenario) else f"{motor}_{name}"
+
     base, axes = scenario.control({name: Law(_nothing) for name, c in scenario.axes().items() if c.law})
-    first = 0
+    first, own, winding = 0, len(_core.axis_signals()), _core.winding_signals()
+    count = sum(axis.slots()[0] for axis, *_ in axes)
     for k, (motor, c) in enumerate(scenario.axes().items()):
         mode = c.reference.kind
         every = {loop: n * round(c.sample_time / base) for loop, _, n in c.schedules()}
@@ -55,26 +59,21 @@ def axis_signals(scenario: Scenario | TrainScenario) -> Iterator[AxisSignal]:
             if name not in signals_of(c):
                 continue
             outer = mode == "position" and name in ("position_reference", "measured_position", "speed_reference")
-            title = name if isinstance(scenario, Scenario) else f"{motor}_{name}"
+            title = titled(name, motor)
             if c.law or mode == "torque":  # computed at each tick
                 yield AxisSignal(title, first + slot, 1, 0)
             elif outer:
                 yield AxisSignal(title, first + slot, every["position"], round(c.phase / base))
             else:
                 yield AxisSignal(title, first + slot, every["speed"], 0)
-        first += slots_of(scenario, (base, axes[k : k + 1]))
+        for n, (name, unit, _) in enumerate(winding):
+            if name in signals_of(c) and unit != "J":
+                yield AxisSignal(titled(name, motor), count + k * (own + len(winding)) + own + n, 0, 0)
+        first += axes[k][0].slots()[0]
 
 
 def _nothing(*_: Any) -> float:
     return 0.0
-
-
-def slots_of(scenario: Scenario | TrainScenario, control: Bound) -> int:
-    """How many numbers some controllers remember."""
-    train = scenario if isinstance(scenario, TrainScenario) else in_long_form(scenario)
-    core = _core.TrainSimulation(train.core(), control[0], control)
-    core.read()
-    return len(core.get_state()[-1]) - 1
 
 
 def respond_closed(

@@ -134,16 +134,12 @@ def plant_or_loop(what: Drive | Scenario | TrainScenario) -> Plant:
     if not isinstance(what, Scenario | TrainScenario) or not what.axes():
         return plant
     axes = what.axes()
-    for name, c in axes.items():
-        if c.current.kind == "field_oriented":
-            raise InputError(
-                f'response: the controller of {name} has current.kind = "field_oriented", whose winding has states that a response does not '
-                'follow; take "pi", which it is while i_d is zero'
-            )
     prefix = "{}_" if isinstance(what, TrainScenario) else ""
     references = {f"{prefix.format(motor)}reference": c.reference for motor, c in axes.items()}
     commands = [f"{prefix.format(motor)}command" for motor in axes]
-    shown_by = axis_variables(axes if prefix else {"": what.axes()["motor"]})
+    shown_by = [
+        v for v in axis_variables(axes if prefix else {"": what.axes()["motor"]}) if v.unit != "J"
+    ]  # which add up
     first, controller = next(iter(axes.items()))
     measured = {"position": "measured_position", "speed": "measured_speed", "torque": "torque"}[
         controller.reference.kind

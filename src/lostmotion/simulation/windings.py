@@ -57,20 +57,23 @@ def error_bound(
     The error of the second is a sixteenth of the difference where nothing switches, a quarter where the torque jumps; the
     difference itself is the bound, with what the passes leave.
     """
-    bounds = {}
+    names = bounded(scenario)
+    apart = {name: float(np.max(np.abs(fine[name] - coarse[name]))) for name in names}
+    return bounds_of(names, {name: float(np.max(np.abs(fine[name]))) for name in names}, apart)
+
+
+def bounded(scenario: Scenario | TrainScenario) -> dict[str, str]:
+    """The variables that have a bound, each with the one whose largest value its rounding goes with as well."""
+    names: dict[str, str] = {}
     for prefix, shaft, _ in oriented(scenario):
-        names = [
-            f"{prefix}direct_current",
-            f"{prefix}quadrature_current",
-            f"{prefix or 'motor_'}torque",
-            f"{shaft}_speed",
-        ]
-        for name in names:
-            floor = AGREEMENT * max(
-                float(np.max(np.abs(fine[n]))) for n in (name, names[1 if name in names[:2] else 2])
-            )
-            bounds[name] = float(np.max(np.abs(fine[name] - coarse[name]))) + floor
-    return bounds
+        across, torque = f"{prefix}quadrature_current", f"{prefix or 'motor_'}torque"
+        names |= {f"{prefix}direct_current": across, across: across, torque: torque, f"{shaft}_speed": torque}
+    return names
+
+
+def bounds_of(names: Mapping[str, str], largest: Mapping[str, float], apart: Mapping[str, float]) -> dict[str, float]:
+    """Bounds by variable, from the largest values of one run and the largest differences of both."""
+    return {name: apart[name] + AGREEMENT * max(largest[name], largest[other]) for name, other in names.items()}
 
 
 def errors_of(result: Any) -> dict[str, float]:
