@@ -266,6 +266,7 @@ inline void bind_train(nb::module_& m) {
         .def("add_controller", &TrainDescription::add_controller, "motor"_a, "signals"_a, "compared"_a, "states"_a,
              "A"_a, "B"_a, "C"_a, "D"_a, "back_calculation"_a, "limit"_a)
         .def("check", &TrainDescription::check)
+        .def("kernel", [](const TrainDescription& t) { return TrainRun(t.train).kernel(); })
         .def("check_start", &TrainDescription::check_start, "speeds"_a)
         .def("channels", &TrainDescription::channels, nb::sig("def channels(self) -> list[tuple[str, str, str]]"),
              "Name, unit, meaning.")

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+import lostmotion as lm
+
 MISSING = "the compiler is missing: .venv/bin/pip install --group portable"
 pytest.importorskip("ziglang", reason=MISSING)
 wasmtime: Any = pytest.importorskip("wasmtime", reason=MISSING)
 
 ROOT = Path(__file__).parent.parent
-MODULE = ROOT / "build" / "wasm" / "lostmotion.wasm"
 SAMPLES, ENERGIES, END_STATE, SWITCHINGS = range(4)
 
 
@@ -31,18 +32,23 @@ def builder() -> Any:
     return module
 
 
-def compiled() -> Path:
-    """The module of `make wasm`, which the live page carries, too."""
-    path: Path = builder().wasm(MODULE)
+def compiled(kernel: str) -> Path:
+    """The core of live pages for drives in the short form, or for trains of a kernel."""
+    path: Path = builder().page_core(kernel)
     return path
 
 
-class PortableCore:
-    """The functions of lostmotion.h in an instance of the module."""
+def kernel_of(scenario: lm.Scenario | lm.TrainScenario) -> str:
+    """That a scenario takes."""
+    return "drive" if isinstance(scenario, lm.Scenario) else scenario.core().kernel()
 
-    def __init__(self) -> None:
+
+class PortableCore:
+    """Functions of lostmotion.h in an instance of the module of a kernel."""
+
+    def __init__(self, kernel: str) -> None:
         engine = wasmtime.Engine()
-        module = wasmtime.Module.from_file(engine, str(compiled()))
+        module = wasmtime.Module.from_file(engine, str(compiled(kernel)))
         assert [i.name for i in module.imports] == []
         self._store = wasmtime.Store(engine)
         self._exports = wasmtime.Instance(self._store, module, []).exports(self._store)
@@ -88,7 +94,7 @@ class PortableCore:
             values = self.numbers(self("lm_result_values", result, part), count * length).reshape(count, length)
             for k in range(count):
                 out[f"{part} {self.text(self('lm_result_name', result, part, k))}"] = values[k]
-        rows, columns = self("lm_result_switchings", result), self("lm_result_count", result, SWITCHINGS)
+        rows, columns = self("lm_result_switching_count", result), self("lm_result_count", result, SWITCHINGS)
         table = self.numbers(self("lm_result_values", result, SWITCHINGS), rows * columns)
         out["switchings"] = table.reshape(rows, columns)
         self("lm_result_free", result)

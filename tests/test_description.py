@@ -10,7 +10,7 @@ import pytest
 
 import lostmotion as lm
 from lostmotion.portable.description import numbers_of
-from lostmotion.portable.parameters import Parameter, Parameters, parameters_of, predicted
+from lostmotion.portable.parameters import Effect, Parameter, Parameters, parameters_of, predicted
 from test_c_interface import INPUTS, INVALID, OK, VARIABLES, doubles, library  # noqa: F401
 from test_c_interface import Simulation as Stepped
 
@@ -173,3 +173,8 @@ def test_a_law_of_ones_own_cannot_be_described() -> None:
     own = {"law": True, "sample_time": 1e-3, "reference": {"kind": "torque"}, "encoder": {"ideal": True}}
     with pytest.raises(lm.InputError, match="controller of motor: has a law of your own"):
         lm.description(axis.replace(controller=own))
+
+
+def test_what_is_zero_in_a_sum_can_be_changed() -> None:
+    frictions = [Parameter(key, "N*m*s/rad", 0.0, (Effect(0, False, 0.0, 1.0),)) for key in ("shaft", "gear")]
+    assert predicted(np.zeros(1), frictions, {"shaft": 0.25, "gear": 0.5}) == [0.75]

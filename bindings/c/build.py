@@ -1,6 +1,7 @@
-"""Builds the C interface by the Zig compiler: as WebAssembly, or as the libraries of an FMU for all platforms.
+"""Builds the C interface by the Zig compiler: as WebAssembly, as the cores of live pages, or as the libraries of an FMU for all platforms.
 
     python bindings/c/build.py wasm build/wasm/lostmotion.wasm
+    python bindings/c/build.py page src/lostmotion/live_page
     python bindings/c/build.py fmu src/lostmotion/fmu_libraries
 
 Made anew where a source has changed. The compiler is on PyPI: pip install ziglang.
@@ -10,7 +11,9 @@ from __future__ import annotations
 
 import argparse
 import fcntl
+import gzip
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -20,13 +23,18 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 # The longest to compile first.
-SOURCES = tuple(HERE / f"{name}.cpp" for name in ("run", "simulation", "scenario", "train", "freestanding"))
+SOURCES = tuple(
+    HERE / f"{name}.cpp" for name in ("run", "simulation", "explanation", "scenario", "train", "freestanding")
+)
 FLAGS = (
     *("-std=gnu++20", "-g0", "-fvisibility=hidden", "-fno-exceptions", "-fno-rtti", "-fno-sanitize=all"),
     *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
 )
 # Of an FMU: no runs in one go.
-FMU_SOURCES = (HERE.parent / "fmu" / "fmi2.cpp", *(s for s in SOURCES if s.stem != "run"))
+FMU_SOURCES = (HERE.parent / "fmu" / "fmi2.cpp", *(s for s in SOURCES if s.stem not in ("run", "explanation")))
+# Of a live page: nothing else, and the kernel of its drive alone.
+PAGE_SOURCES = tuple(s for s in SOURCES if s.stem in ("run", "explanation", "scenario", "freestanding"))
+KERNELS = ("drive", "narrow", "middle", "wide")
 # The oldest C library that the libraries for Linux need, and the names of the libraries.
 PLATFORMS = {
     "x86_64-linux": ("x86_64-linux-gnu.2.17", "lostmotion.so"),
@@ -73,21 +81,50 @@ def objects(sources: Sequence[Path], target: Sequence[str], optimisation: str, d
     return made
 
 
-def wasm(to: Path, optimisation: str = "-O3") -> Path:
-    """The C interface as a WebAssembly module that imports nothing; `_initialize` is to be called first.
+def linked(to: Path, made: Sequence[Path], *exports: str) -> None:
+    """A WebAssembly module that imports nothing; `_initialize` is to be called first."""
+    unfinished = to.with_suffix(".unfinished.wasm")
+    options = ("-mexec-model=reactor", "-s", *(f"-Wl,{e}" for e in exports), f"-Wl,-z,stack-size={STACK}")
+    zig("cc", *WASM, *options, *made, "-o", unfinished)
+    unfinished.replace(to)
 
-    Its functions are those of lostmotion.h, and malloc and free.
-    """
+
+def wasm(to: Path, optimisation: str = "-O3") -> Path:
+    """The C interface as a WebAssembly module: the functions of lostmotion.h, and malloc and free."""
     to.parent.mkdir(parents=True, exist_ok=True)
     with (to.parent / f".{to.name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
         made = objects(SOURCES, WASM, optimisation, to.parent / f"{to.stem}-objects")
         if not to.exists() or to.stat().st_mtime < max(o.stat().st_mtime for o in made):
-            unfinished = to.with_suffix(".unfinished.wasm")
-            options = ("-mexec-model=reactor", "-s", "-Wl,--export=malloc", "-Wl,--export=free", "-Wl,--export-dynamic")
-            zig("cc", *WASM, *options, f"-Wl,-z,stack-size={STACK}", *made, "-o", unfinished)
-            unfinished.replace(to)
+            linked(to, made, "--export=malloc", "--export=free", "--export-dynamic")
     return to
+
+
+def called_by_page() -> list[str]:
+    """The functions that page/src calls."""
+    sources = "".join(path.read_text() for path in (ROOT / "page" / "src").glob("*.ts"))
+    return sorted(set(re.findall(r'"(lm_\w+|malloc|free)"', sources)))
+
+
+def page_core(kernel: str, optimisation: str = "-O3") -> Path:
+    """The core of a live page with one kernel alone: a WebAssembly module with the functions that a page calls."""
+    directory = ROOT / "build" / "page-core" / kernel
+    directory.mkdir(parents=True, exist_ok=True)
+    to = directory / "core.wasm"
+    with (directory / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
+        made = objects(PAGE_SOURCES, (*WASM, f"-DLOSTMOTION_KERNEL={kernel}"), optimisation, directory)
+        calls = ROOT / "page" / "src" / "core.ts"
+        if not to.exists() or to.stat().st_mtime < max(p.stat().st_mtime for p in (*made, calls)):
+            linked(to, made, *(f"--export={name}" for name in called_by_page()))
+    return to
+
+
+def page(to: Path, optimisation: str = "-O3", kernels: Sequence[str] = KERNELS) -> None:
+    """The cores of live pages as these carry them, KERNEL.wasm.gz."""
+    for kernel in kernels:
+        packed = gzip.compress(page_core(kernel, optimisation).read_bytes(), 9, mtime=0)
+        (to / f"{kernel}.wasm.gz").write_bytes(packed)
 
 
 def fmu(to: Path, optimisation: str = "-O2", platforms: Sequence[str] = tuple(PLATFORMS)) -> None:
@@ -107,13 +144,15 @@ def fmu(to: Path, optimisation: str = "-O2", platforms: Sequence[str] = tuple(PL
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("what", choices=("wasm", "fmu"))
+    parser.add_argument("what", choices=("wasm", "page", "fmu"))
     parser.add_argument("to", type=Path)
     parser.add_argument("-O", dest="optimisation", default="3")
     parser.add_argument("platforms", nargs="*", help=f"of an FMU: some of {', '.join(PLATFORMS)}; default all")
     given = parser.parse_args()
     if given.what == "wasm":
         print(wasm(given.to, f"-O{given.optimisation}"))
+    elif given.what == "page":
+        page(given.to, f"-O{given.optimisation}")
     else:
         fmu(given.to, f"-O{given.optimisation}", given.platforms or tuple(PLATFORMS))
 

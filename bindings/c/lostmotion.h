@@ -20,8 +20,6 @@ extern "C" {
 
 #if defined _WIN32
 #define LM_API __declspec(dllexport)
-#elif defined __wasm__
-#define LM_API __attribute__((visibility("default"), used))
 #else
 #define LM_API __attribute__((visibility("default")))
 #endif
@@ -74,6 +72,12 @@ typedef struct {
  * then references of continuous controllers. The parameters of the signal that it replaces then change nothing. */
 LM_API int lm_scenario_set_signal(lm_scenario* scenario, size_t input, const lm_signal* signal);
 
+/* What a sampled controller is to follow, counted as those of the scenario: from a time on value + rate s +
+ * second s^2/2 + third s^3/6, the first from t = 0 on, n x (time, value, rate, second, third); and sines. The
+ * parameters of the reference that it replaces then change nothing. */
+LM_API int lm_scenario_set_reference(lm_scenario* scenario, size_t controller, const double* pieces, size_t n,
+                                     const double* sines, size_t n_sines);
+
 /* The value of an input at t = 0. */
 LM_API double lm_scenario_input_at_start(const lm_scenario* scenario, size_t input);
 
@@ -102,6 +106,21 @@ LM_API size_t lm_result_count(const lm_result* result, lm_part part);
 LM_API const char* lm_result_name(const lm_result* result, lm_part part, size_t k);
 LM_API const char* lm_result_unit(const lm_result* result, size_t variable);
 LM_API const double* lm_result_values(const lm_result* result, lm_part part);
+
+/* Why it stands still: what holds each dry contact at an instant [s] of the run, and what would free it. NULL if the
+ * motion does not reach that instant; lm_scenario_error says why. */
+typedef struct lm_explanation lm_explanation;
+LM_API lm_explanation* lm_scenario_explain(lm_scenario* scenario, double time);
+LM_API void lm_explanation_free(lm_explanation* explanation);
+
+typedef enum {
+    LM_CONTACTS, /* mode (-1 slips backward, 0 stuck, +1 slips forward), speed [rad/s], torque that it holds or takes
+                    [N m], and those up to which it holds forward and backward [N m] */
+    LM_MOTORS    /* constant commands from which on its shaft turns (of a drive: its load) forward and backward */
+} lm_explained;
+LM_API size_t lm_explanation_count(const lm_explanation* explanation, lm_explained what);
+LM_API const char* lm_explanation_name(const lm_explanation* explanation, lm_explained what, size_t k);
+LM_API const double* lm_explanation_values(const lm_explanation* explanation, lm_explained what, size_t k);
 
 /* --- a train --- */
 

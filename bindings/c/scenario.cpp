@@ -57,6 +57,23 @@ int lm_scenario_set_signal(lm_scenario* scenario, size_t input, const lm_signal*
     return scenario->changed(scenario->description.set_input(input, std::move(read)));
 }
 
+int lm_scenario_set_reference(lm_scenario* scenario, size_t controller, const double* pieces, size_t n,
+                              const double* sines, size_t n_sines) {
+    if (!(n > 0 && finite(pieces, 5 * n)) || (n_sines > 0 && !finite(sines, 3 * n_sines)))
+        return scenario->changed("the reference has no piece, or a number is not finite");
+    lm::control::Reference reference;
+    reference.pieces.resize(n);
+    for (std::size_t k = 0; k < n; ++k) {
+        const double* p = pieces + 5 * k;
+        reference.pieces[k] = {p[0], {p[1], p[2], p[3], p[4]}};
+        if (k == 0 ? p[0] != 0.0 : !(p[0] > p[-5]))
+            return scenario->changed("the reference must begin at 0 s, and its pieces rise in time");
+    }
+    for (std::size_t k = 0; k < n_sines; ++k)
+        reference.sines.push_back({sines[3 * k], sines[3 * k + 1], sines[3 * k + 2]});
+    return scenario->changed(scenario->description.set_reference(controller, std::move(reference)));
+}
+
 double lm_scenario_input_at_start(const lm_scenario* scenario, size_t input) {
     const lm::Scenario& s = scenario->description.scenario();
     if (input >= s.inputs.size()) return std::nan("");

@@ -6,14 +6,17 @@
 namespace lostmotion {
 
 // TEMPLATE: `extern template` to declare, `template` to compile.
-#define LOSTMOTION_TRAIN_KERNEL(TEMPLATE, D)                                                                      \
-    TEMPLATE TrainReport run_train_in<D>(const typename TrainReader<D>::Model&, const std::vector<Signal>&,       \
-                                         std::span<const double>, std::span<const double>, const TrainOptions&,   \
-                                         double*, TrainWatcher<D>*);                                              \
-    TEMPLATE TrainReport reach_train_in<D>(const typename TrainReader<D>::Model&, const std::vector<Signal>&,     \
-                                           std::span<const double>, std::span<const double>, const TrainOptions&, \
-                                           TrainPoint&);                                                          \
-    TEMPLATE class SimulationOf<model::TrainSystem<D>>;                                                           \
+#define LOSTMOTION_TRAIN_KERNEL(TEMPLATE, D)                                                                           \
+    TEMPLATE TrainReport run_train_exactly_in<D>(const typename TrainReader<D>::Model&, const std::vector<Signal>&,    \
+                                                 std::span<const double>, std::span<const double>,                     \
+                                                 const TrainOptions&, double*, TrainWatcher<D>*);                      \
+    TEMPLATE TrainReport run_train_adaptively_in<D>(const typename TrainReader<D>::Model&, const std::vector<Signal>&, \
+                                                    std::span<const double>, std::span<const double>,                  \
+                                                    const TrainOptions&, double*);                                     \
+    TEMPLATE TrainReport reach_train_in<D>(const typename TrainReader<D>::Model&, const std::vector<Signal>&,          \
+                                           std::span<const double>, std::span<const double>, const TrainOptions&,      \
+                                           TrainPoint&);                                                               \
+    TEMPLATE class SimulationOf<model::TrainSystem<D>>;                                                                \
     TEMPLATE class TrainSimulationIn<D>;
 
 LOSTMOTION_TRAIN_KERNEL(extern template, model::Narrow)

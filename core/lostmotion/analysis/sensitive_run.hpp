@@ -59,7 +59,7 @@ inline TrainReport run_with_derivatives(const TrainRun& run, const std::vector<S
     return run.in_kernel([&, &x = x, &memory = memory]<class D>(const typename TrainReader<D>::Model& model) {
         RegimeTangents regimes(trains, tangents, channels);
         TrainSensitivity<D> watcher(trains, tangents, regimes, variations, start, options.control, output);
-        return run_train_in<D>(model, inputs, x, memory, options, out, &watcher);
+        return run_train_exactly_in<D>(model, inputs, x, memory, options, out, &watcher);
     });
 }
 

@@ -36,6 +36,14 @@ struct DependsOn<D> {
     void see_memory(int, double) {}
 };
 
+// The kernels that a build holds: all, or one alone, as the cores of live pages do.
+enum class Kernel { all, drive, narrow, middle, wide };
+#ifndef LOSTMOTION_KERNEL
+#define LOSTMOTION_KERNEL all
+#endif
+constexpr bool holds(Kernel k) { return Kernel::LOSTMOTION_KERNEL == Kernel::all || Kernel::LOSTMOTION_KERNEL == k; }
+inline constexpr bool holds_trains = Kernel::LOSTMOTION_KERNEL != Kernel::drive;
+
 template <int coupled_, int angles_, int inputs_, int memory_, int contacts_, int guards_>
 struct Dims {
     static constexpr int coupled = coupled_;    // states that act on one another

@@ -1,6 +1,8 @@
 // A train as the solvers see it: a switched linear system of compile-time dimensions.
 #pragma once
 
+#include <type_traits>
+
 #include "modes.hpp"
 #include "pack.hpp"
 #include "scales.hpp"
@@ -13,6 +15,7 @@ namespace lostmotion::model {
 using Narrow = Dims<4, 1, 4, 6, 8, 32>;
 using Middle = Dims<8, 2, 6, 10, 12, 64>;
 using Wide = Dims<16, 4, 16, 20, 24, 64>;
+using Widest = std::conditional_t<holds(Kernel::wide), Wide, std::conditional_t<holds(Kernel::middle), Middle, Narrow>>;
 
 template <class D>
 struct TrainRegime : PackedRegime<D> {

@@ -4,7 +4,7 @@
 //
 // A parameter is a number of the scenario in the words of its file, such as "load.inertia", and says which numbers
 // follow from it: each is offset + slope v, or offset + slope/v. A number that follows from several is their product,
-// in terms of its present value, if all of them are without an offset, else the sum of their changes.
+// in terms of its present value, if that is not 0 and all of them are without an offset, else the sum of their changes.
 #pragma once
 
 #include <algorithm>
@@ -85,6 +85,13 @@ class ScenarioDescription {
         use_given();
         return {};
     }
+    // Of a sampled controller, counted as the axes of the scenario.
+    std::string set_reference(std::size_t axis, control::Reference reference) {
+        if (axis >= scenario_.control.axes.size()) return "there is no controller of this number";
+        references_[axis] = std::move(reference);
+        use_given();
+        return {};
+    }
 
  private:
     template <class F>
@@ -140,6 +147,7 @@ class ScenarioDescription {
     void use_given() {
         if (times_) std::tie(scenario_.duration, scenario_.sample_interval) = *times_;
         for (const auto& [k, signal] : inputs_) scenario_.inputs[k] = signal;
+        for (const auto& [k, reference] : references_) scenario_.control.axes[k].law.reference = reference;
     }
 
     // The scenario with the parameters as they are.
@@ -147,9 +155,9 @@ class ScenarioDescription {
         std::vector<double> body = body_;
         for (const auto& [place, effects] : effects_) {
             double& entry = body[static_cast<std::size_t>(place)];
-            const bool product = effects.size() > 1 && std::all_of(effects.begin(), effects.end(), [](const auto& of) {
-                                     return of.second.offset == 0.0;
-                                 });
+            const bool product =
+                effects.size() > 1 && entry != 0.0 &&
+                std::all_of(effects.begin(), effects.end(), [](const auto& of) { return of.second.offset == 0.0; });
             double sum = 0.0, factor = 1.0;
             const Effect* only = nullptr;
             int changed = 0;
@@ -176,6 +184,7 @@ class ScenarioDescription {
     std::map<int, std::vector<std::pair<std::size_t, Effect>>> effects_;
     std::optional<std::pair<double, double>> times_;
     std::map<std::size_t, Signal> inputs_;
+    std::map<std::size_t, control::Reference> references_;
 };
 
 }  // namespace lostmotion

@@ -26,6 +26,13 @@ struct Scenario {
 
 inline constexpr double max_samples = 1e8;
 
+// What is wrong where a build holds no kernel for a scenario, or empty.
+inline std::string check_build(Scenario::Form form) {
+    if (form == Scenario::of_drive ? holds(Kernel::drive) : holds_trains) return {};
+    return form == Scenario::of_drive ? "this core was built for trains; the scenario is of a drive in the short form"
+                                      : "this core was built for drives in the short form; the scenario is of a train";
+}
+
 template <class F>
 void describe(F& f, Scenario& s) {
     f.text("title", s.title);
@@ -83,6 +90,7 @@ inline std::vector<FreeInput> free_inputs(const Scenario& s) {
 
 // What is wrong with a scenario whose numbers are all in range, or empty.
 inline std::string check(const Scenario& s) {
+    if (std::string error = check_build(s.form); !error.empty()) return error;
     if (!(s.duration / s.sample_interval <= max_samples)) return "sample_interval is too short for the duration";
     const auto counted = [](const char* what, std::size_t given, std::size_t wanted) {
         return given == wanted ? std::string()

@@ -140,10 +140,10 @@ WholeRun run(const Scenario& s, const WholeRunOptions& options, OfDrive&& solve_
     out.variables = variables.all();
     out.values.assign(variables.size() * out.samples, 0.0);
     std::vector<double> control;
-    if (s.form == Scenario::of_drive)
-        of_drive(s, options, control, out, solve_drive);
-    else
-        of_train(s, options, control, out, solve_train);
+    if constexpr (holds(Kernel::drive))
+        if (s.form == Scenario::of_drive) of_drive(s, options, control, out, solve_drive);
+    if constexpr (holds_trains)
+        if (s.form == Scenario::of_train) of_train(s, options, control, out, solve_train);
     if (s.control.present()) add_signals(s, variables, control, out);
     for (std::size_t k = 0; k < out.samples; ++k) variables.derive(out.values.data(), out.samples, k);
     return out;
@@ -160,7 +160,7 @@ inline WholeRun run_whole(const Scenario& s, const WholeRunOptions& options = {}
         },
         [](const TrainRun& run, const std::vector<Signal>& signals, const std::vector<double>& x,
            const std::vector<double>& memory, const TrainOptions& o,
-           double* out) { return run.run(signals, x, memory, o, out); });
+           double* out) { return run.run_exactly(signals, x, memory, o, out); });
 }
 
 }  // namespace lostmotion

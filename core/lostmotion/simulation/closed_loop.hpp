@@ -311,7 +311,7 @@ Status run_recorded(Solver& solver, const StartOf<typename Solver::D>& start, co
     solver.interrupted_context = options.interrupted_context;
     if (!options.control.present()) {
         const Status begun = solver.begin(0.0, start.x, start.memory);
-        return begun == Status::done ? solver.advance(options.duration, observer) : begun;
+        return begun == Status::done && options.duration > 0.0 ? solver.advance(options.duration, observer) : begun;
     }
     const std::vector<control::Axis> laws = options.control.laws();
     auto loop = make_loop(laws);
@@ -327,6 +327,15 @@ Status run_recorded(Solver& solver, const StartOf<typename Solver::D>& start, co
     if constexpr (requires { observer.finish(loop); }) observer.finish(loop);
     if (ended == Status::done) hold_until(std::numeric_limits<double>::infinity());
     return ended;
+}
+
+// What acts at the end of such a run: after a jump of the inputs there, and before a tick.
+template <class Solver, class Signals>
+auto inputs_at_end(Solver& solver, const Signals& signals, const Control& control) {
+    if (control.present()) return solver.input_before(solver.time(), solver.state());
+    InputState<typename Solver::D> input(signals, solver.basis());
+    input.anchor(solver.time());
+    return input.values();
 }
 
 }  // namespace lostmotion

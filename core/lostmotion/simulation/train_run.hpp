@@ -305,53 +305,82 @@ inline Named named_end(const TrainReport& report, const model::Assembly& a) {
     return end;
 }
 
-// start: the states by the layout of the assembly, or nothing for rest. watcher: of the exact solver, if any.
+// What a run begins with, by the layout of a kernel: signals, state, and the controllers in the train.
 template <class D>
-TrainReport run_train_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
-                         std::span<const double> start, std::span<const double> memory, const TrainOptions& options,
-                         double* out, TrainWatcher<D>* watcher = nullptr) {
-    using System = model::TrainSystem<D>;
-    const model::Assembly& a = model.assembly;
-    const model::Layout& n = a.layout();
-    TrainReport report;
-    report.message = check_start(a, start);
-    if (report.message.empty()) report.message = check_control(a, options.control);
-    if (!report.message.empty()) return report;
-    const System system(a);
-    const SignalsOf<D> signals = with_ramps(model::packed_signals<D>(inputs), options.control, [&](int motor) {
-        return a.places().motors[static_cast<std::size_t>(motor)].command;
-    });
-    const auto [x, m] = model::packed_start<D>(n, start, memory);
-    TrainRecorder<D> recorder(model, options, out, report, watcher);
-    const auto in_train = [&](const auto& laws) { return closed_loop_of<D>(a, options.control, laws); };
-    const auto finish = [&](auto& solver) {
-        report.ended(system, solver);
-        report.stored_begin = model::stored_energy(a, x);
-        report.stored_end = model::stored_energy(a, solver.state());
-    };
-    if (options.tolerance > 0.0) {
-        AdaptiveSolver<System> solver(system, signals, options.tolerance, system.rated_scale());
-        struct {
-            TrainRecorder<D>& recorder;
-            AdaptiveSolver<System>& solver;
-            void step(const typename System::Regime& r, const typename D::Memory& m, const DenseStepOf<D>& dense,
-                      bool last) {
-                recorder.sample(solver, r, m, dense, last);
-            }
-            void switching(const SwitchingOf<System>& s) { recorder.switching(s); }
-            bool wants_switching() const { return recorder.wants_switching(); }
-        } observer{recorder, solver};
-        report.status = run_recorded(solver, {x, m}, options, observer, in_train);
-        report.steps = solver.steps();
-        finish(solver);
-        return report;
+struct PackedRun {
+    PackedRun(const model::Assembly& a, const std::vector<Signal>& inputs, std::span<const double> x,
+              std::span<const double> m, const TrainOptions& options)
+        : assembly(a),
+          options(options),
+          signals(with_ramps(model::packed_signals<D>(inputs), options.control,
+                             [&](int motor) { return a.places().motors[static_cast<std::size_t>(motor)].command; })),
+          start(model::packed_start<D>(a.layout(), x, m)) {}
+
+    auto in_train() const {
+        return [this](const auto& laws) { return closed_loop_of<D>(assembly, options.control, laws); };
     }
-    ExactSolver<System> solver(system, signals, options.sample_interval, system.balanced_scale());
+
+    const model::Assembly& assembly;
+    const TrainOptions& options;
+    model::TrainSystem<D> system{assembly};
+    SignalsOf<D> signals;
+    StartOf<D> start;
+};
+
+// Why a run cannot begin, or empty.
+inline std::string check_run(const model::Assembly& a, std::span<const double> start, const Control& control) {
+    std::string wrong = check_start(a, start);
+    return wrong.empty() ? check_control(a, control) : wrong;
+}
+
+// By the exact solver. start: the states by the layout of the assembly, or nothing for rest.
+template <class D>
+TrainReport run_train_exactly_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
+                                 std::span<const double> start, std::span<const double> memory,
+                                 const TrainOptions& options, double* out, TrainWatcher<D>* watcher = nullptr) {
+    TrainReport report;
+    report.message = check_run(model.assembly, start, options.control);
+    if (!report.message.empty()) return report;
+    const PackedRun<D> c(model.assembly, inputs, start, memory, options);
+    TrainRecorder<D> recorder(model, options, out, report, watcher);
+    ExactSolver<model::TrainSystem<D>> solver(c.system, c.signals, options.sample_interval, c.system.balanced_scale());
     if (watcher != nullptr) watcher->begin(solver);
-    report.status = run_recorded(solver, {x, m}, options, recorder, in_train);
+    report.status = run_recorded(solver, c.start, options, recorder, c.in_train());
     recorder.end();
     report.steps = solver.event_checks();
-    finish(solver);
+    report.ended(c.system, solver);
+    report.stored_begin = model::stored_energy(model.assembly, c.start.x);
+    report.stored_end = model::stored_energy(model.assembly, solver.state());
+    return report;
+}
+
+// By the adaptive solver, to options.tolerance.
+template <class D>
+TrainReport run_train_adaptively_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
+                                    std::span<const double> start, std::span<const double> memory,
+                                    const TrainOptions& options, double* out) {
+    using System = model::TrainSystem<D>;
+    TrainReport report;
+    report.message = check_run(model.assembly, start, options.control);
+    if (!report.message.empty()) return report;
+    const PackedRun<D> c(model.assembly, inputs, start, memory, options);
+    TrainRecorder<D> recorder(model, options, out, report, nullptr);
+    AdaptiveSolver<System> solver(c.system, c.signals, options.tolerance, c.system.rated_scale());
+    struct {
+        TrainRecorder<D>& recorder;
+        AdaptiveSolver<System>& solver;
+        void step(const typename System::Regime& r, const typename D::Memory& m, const DenseStepOf<D>& dense,
+                  bool last) {
+            recorder.sample(solver, r, m, dense, last);
+        }
+        void switching(const SwitchingOf<System>& s) { recorder.switching(s); }
+        bool wants_switching() const { return recorder.wants_switching(); }
+    } observer{recorder, solver};
+    report.status = run_recorded(solver, c.start, options, observer, c.in_train());
+    report.steps = solver.steps();
+    report.ended(c.system, solver);
+    report.stored_begin = model::stored_energy(model.assembly, c.start.x);
+    report.stored_end = model::stored_energy(model.assembly, solver.state());
     return report;
 }
 
@@ -361,23 +390,16 @@ TrainReport reach_train_in(const typename TrainReader<D>::Model& model, const st
                            std::span<const double> start, std::span<const double> memory, const TrainOptions& options,
                            TrainPoint& point) {
     TrainReport report;
-    report.message = check_start(model.assembly, start);
+    report.message = check_run(model.assembly, start, options.control);
     if (!report.message.empty()) return report;
-    const model::TrainSystem<D> system(model.assembly);
-    const SignalsOf<D> signals = model::packed_signals<D>(inputs);
-    const auto [x, m] = model::packed_start<D>(model.assembly.layout(), start, memory);
-    ExactSolver<model::TrainSystem<D>> solver(system, signals, options.sample_interval, system.balanced_scale());
-    solver.interrupted = options.interrupted;
-    solver.interrupted_context = options.interrupted_context;
+    const PackedRun<D> c(model.assembly, inputs, start, memory, options);
+    ExactSolver<model::TrainSystem<D>> solver(c.system, c.signals, options.sample_interval, c.system.balanced_scale());
     NoObserver nothing;
-    report.status = solver.begin(0.0, x, m);
-    if (report.status == Status::done && options.duration > 0.0)
-        report.status = solver.advance(options.duration, nothing);
-    report.ended(system, solver);
+    report.status = run_recorded(solver, c.start, options, nothing, c.in_train());
+    report.ended(c.system, solver);
     if (report.status != Status::done) return report;
-    InputState<D> input(signals, solver.basis());
-    input.anchor(solver.time());
-    point = point_of<D>(model, solver.regime(), solver.time(), solver.state(), solver.memory(), input.values());
+    point = point_of<D>(model, solver.regime(), solver.time(), solver.state(), solver.memory(),
+                        inputs_at_end(solver, c.signals, options.control));
     return report;
 }
 
@@ -407,17 +429,26 @@ class TrainRun {
         assembly_ = std::make_unique<model::Assembly>(train);
         channels_ = train_channels(*assembly_);
         const model::Layout n = model::Places(train, true).layout;
-        if (!model::fits<model::Wide>(train, n))
+        using model::Widest;
+        if (!model::fits<Widest>(train, n))
             error_ = "the train has " + std::to_string(n.coupled) + " coupled states, " + std::to_string(n.inputs) +
                      " inputs and " + std::to_string(n.contacts) + " dry contacts; at most " +
-                     std::to_string(model::Wide::coupled) + ", " + std::to_string(model::Wide::inputs) + " and " +
-                     std::to_string(model::Wide::contacts) + " are possible";
+                     std::to_string(Widest::coupled) + ", " + std::to_string(Widest::inputs) + " and " +
+                     std::to_string(Widest::contacts) + " are possible";
     }
     const std::string& error() const { return error_; }
     const model::Assembly& assembly() const { return *assembly_; }
     const std::vector<TrainChannel>& channels() const { return channels_; }
 
-    // What `use` gives in the narrowest kernel that holds the train.
+    // The narrowest kernel that holds the train.
+    const char* kernel() const {
+        const model::Train& train = assembly_->train();
+        const model::Layout& n = assembly_->layout();
+        return model::fits<model::Narrow>(train, n)   ? "narrow"
+               : model::fits<model::Middle>(train, n) ? "middle"
+                                                      : "wide";
+    }
+    // What `use` gives in it.
     template <class Use>
     auto in_kernel(const Use& use) const {
         return in_kernel(*assembly_, use);
@@ -430,9 +461,11 @@ class TrainRun {
             const typename TrainReader<D>::Model model{assembly, channels_};
             return use.template operator()<D>(model);
         };
-        if (model::fits<model::Narrow>(train, n)) return in(model::Narrow{});
-        if (model::fits<model::Middle>(train, n)) return in(model::Middle{});
-        return in(model::Wide{});
+        if constexpr (holds(Kernel::narrow))
+            if (model::fits<model::Narrow>(train, n)) return in(model::Narrow{});
+        if constexpr (holds(Kernel::middle))
+            if (model::fits<model::Middle>(train, n)) return in(model::Middle{});
+        return in(model::Widest{});
     }
 
     // States and memory by the layout of the assembly.
@@ -448,11 +481,19 @@ class TrainRun {
     }
     TrainReport run(const std::vector<Signal>& inputs, std::span<const double> start, std::span<const double> memory,
                     const TrainOptions& options, double* out) const {
-        const auto in = [&]<class D>(const typename TrainReader<D>::Model& model) {
-            return run_train_in<D>(model, inputs, start, memory, options, out);
-        };
+        if (!(options.tolerance > 0.0)) return run_exactly(inputs, start, memory, options, out);
         // The adaptive solver takes smooth laws as they are.
-        return options.tolerance > 0.0 ? in_kernel(model::Assembly(assembly_->train(), true), in) : in_kernel(in);
+        return in_kernel(model::Assembly(assembly_->train(), true),
+                         [&]<class D>(const typename TrainReader<D>::Model& model) {
+                             return run_train_adaptively_in<D>(model, inputs, start, memory, options, out);
+                         });
+    }
+    // By the exact solver, whatever the tolerance.
+    TrainReport run_exactly(const std::vector<Signal>& inputs, std::span<const double> start,
+                            std::span<const double> memory, const TrainOptions& options, double* out) const {
+        return in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
+            return run_train_exactly_in<D>(model, inputs, start, memory, options, out);
+        });
     }
 
     TrainReport reach(const std::vector<Signal>& inputs, const TrainStart& start, const TrainOptions& options,

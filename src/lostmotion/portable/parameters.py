@@ -185,8 +185,8 @@ def _together(
 def predicted(base: np.ndarray, parameters: Iterable[Parameter], values: Mapping[str, float]) -> np.ndarray:
     """The numbers of a scenario with other values of parameters, as the C interface makes them.
 
-    A number that follows from several is their product, in terms of its present value, if all of them are without an offset,
-    else the sum of their changes.
+    A number that follows from several is their product, in terms of its present value, if that is not 0 and all of them are
+    without an offset, else the sum of their changes.
     """
     effects = defaultdict(list)
     for p in parameters:
@@ -195,7 +195,7 @@ def predicted(base: np.ndarray, parameters: Iterable[Parameter], values: Mapping
     out = base.copy()
     for place, all_of in effects.items():
         moved = [(e.at(before), e.at(now)) for e, before, now in all_of if now != before]
-        if len(all_of) > 1 and all(e.offset == 0.0 for e, _, _ in all_of):
+        if len(all_of) > 1 and base[place] != 0.0 and all(e.offset == 0.0 for e, _, _ in all_of):
             for before, now in moved:
                 out[place] *= now / before
         elif len(all_of) > 1:
