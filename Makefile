@@ -40,17 +40,18 @@ fmu: $(VENV)/tools
 	$(BIN)/pip install -q --group portable
 	$(BIN)/python bindings/c/build.py fmu src/lostmotion/fmu_libraries
 
-# The live page, src/lostmotion/live_page/page.html, and the core in it, which the wheel carries.
+# The live page, src/lostmotion/live_page/page.html, and its cores, one for each kernel, which the wheel carries.
 LIVE := src/lostmotion/live_page
 NODE := command -v npm >/dev/null || (echo 'npm is missing: without node the live page is not built'; false)
 .PHONY: page
-page: $(LIVE)/page.html $(LIVE)/core.wasm.gz
+page: $(LIVE)/page.html $(LIVE)/wide.wasm.gz
 $(LIVE)/page.html: page/node_modules/installed $(wildcard page/*.ts page/*.html page/src/*)
 	cd page && npm run --silent build
 	cp build/page/index.html $@
-$(LIVE)/core.wasm.gz: $(SOURCES) $(wildcard bindings/c/*) | $(VENV)/portable
-	$(BIN)/python bindings/c/build.py wasm build/wasm/lostmotion.wasm
-	gzip -9 -n -c build/wasm/lostmotion.wasm >$@
+# The last of them to be written.
+$(LIVE)/wide.wasm.gz: $(SOURCES) $(wildcard bindings/c/*) page/src/core.ts | $(VENV)/portable
+	$(BIN)/python bindings/c/build.py page $(LIVE)
+	touch $@
 page/node_modules/installed: page/package.json page/package-lock.json
 	@$(NODE)
 	cd page && npm ci --silent
@@ -78,6 +79,7 @@ bench: $(VENV)/built
 	$(BIN)/pip install -q --group bench
 	command -v valgrind >/dev/null || { apt-get update -q && apt-get install -qy valgrind; } || echo 'without valgrind'
 	echo '#include <cvode/cvode.h>' | c++ -E -x c++ - >/dev/null 2>&1 || { apt-get update -q && apt-get install -qy libsundials-dev; } || echo 'without SUNDIALS'
+	command -v npm >/dev/null && $(MAKE) page c-library || echo 'without the live page'
 	$(BIN)/python benchmarks/baseline.py build/baseline
 	$(BIN)/cmake -S . -B build/bench -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_BENCHMARKS=ON -DLOSTMOTION_WERROR=ON -DLOSTMOTION_BASELINE=$(abspath build/baseline) >build/bench.log
 	$(BIN)/cmake --build build/bench

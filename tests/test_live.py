@@ -16,6 +16,7 @@ from conftest import ROOT
 from lostmotion.cli import app
 from lostmotion.live_page import page as live_page
 from lostmotion.live_page.description import describe
+from lostmotion.live_page.references import reference_sliders, reference_view
 from lostmotion.live_page.sliders import LABELS, UNITS, of_signal
 from lostmotion.model.signals import CommandSignal
 
@@ -27,9 +28,10 @@ SHORT = {"simulation.duration": "0.1 s"}
 def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stands in for `make page`: its source, and bytes as the core."""
     (tmp_path / "page.html").write_text(SOURCE)
-    (tmp_path / "core.wasm.gz").write_bytes(b"\x1f\x8bcore")
+    for kernel in ("drive", "narrow", "middle", "wide"):
+        (tmp_path / f"{kernel}.wasm.gz").write_bytes(b"\x1f\x8b" + kernel.encode())
     monkeypatch.setattr(live_page, "TEMPLATE", tmp_path / "page.html")
-    monkeypatch.setattr(live_page, "CORE", tmp_path / "core.wasm.gz")
+    monkeypatch.setattr(live_page, "CORES", tmp_path)
 
 
 def content(page: str, name: str) -> str:
@@ -41,10 +43,53 @@ def content(page: str, name: str) -> str:
 def test_the_page_holds_the_core_and_the_scenario() -> None:
     scenario = lm.load("paper-2dof-nl-small", SHORT)
     page = live_page.page(scenario, "drive")
-    assert base64.b64decode(content(page, "core")) == b"\x1f\x8bcore"
+    assert base64.b64decode(content(page, "core")) == b"\x1f\x8bdrive"
     described = json.loads(content(page, "description"))
     assert described["title"] == scenario.title
     assert lm.Scenario(**described["scenario"]) == scenario
+
+
+def test_a_page_holds_the_narrowest_kernel_of_its_train() -> None:
+    names = ("paper-2dof-nl-small", "position-axis", "worm-lowering", "direction-finder")
+    assert [live_page.core_of(lm.load(name)).name for name in names] == [
+        "drive.wasm.gz",
+        "drive.wasm.gz",
+        "middle.wasm.gz",
+        "wide.wasm.gz",
+    ]
+
+
+def test_margins_are_those_of_the_servo_sheet() -> None:
+    scenario = lm.load("speed-axis")
+    shown = {(v["loop"], v["regime"]): v for v in describe(scenario, "n")["loops"]}
+    sheet = lm.commission(scenario)
+    assert {(row.loop, row.regime) for row in sheet.loops} == shown.keys()
+    for row in sheet.loops:
+        view = shown[row.loop, row.regime]
+        assert view["stable"] is row.margins.stable
+        assert view["phase_margin"] == pytest.approx(row.margins.phase_margin, rel=1e-9, nan_ok=False)
+        assert view["bandwidth"] == pytest.approx(row.bandwidth.three_decibels, rel=1e-9)
+
+
+def test_moves_of_a_reference_can_be_changed() -> None:
+    scenario = lm.load("hunting-with-backlash")
+    found = {key: s for key, s in sliders(scenario).items() if key.startswith("controller.reference.")}
+    assert list(found) == [
+        "controller.reference.moves.0.to",
+        "controller.reference.moves.1.to",
+        "controller.reference.speed",
+        "controller.reference.acceleration",
+        "controller.reference.jerk",
+        "controller.reference.dwell",
+    ]
+    assert found["controller.reference.moves.0.to"]["unit"] == "°"
+    assert found["controller.reference.speed"]["target"] == {"reference": 0, "path": ["moves", "speed"]}
+
+
+def test_what_follows_a_target_cannot_be_changed() -> None:
+    for name, controller in lm.load("direction-finder").axes().items():
+        assert reference_view(controller.reference, 1.0) is None
+        assert list(reference_sliders(controller, f"controllers.{name}.reference", "Reference", 0, 1.0)) == []
 
 
 @pytest.mark.usefixtures("built")
@@ -92,7 +137,7 @@ def test_a_gap_can_be_opened_where_there_is_none() -> None:
 
 
 def test_a_command_without_a_sine_or_a_step_can_get_one_with_the_keys_that_belong_to_it() -> None:
-    found = {s.key: s for s in of_signal(CommandSignal(mean=0.5), "command", "Command", "1", 0, 1.1, 2.0)}
+    found = {s.key: s for s in of_signal(CommandSignal(mean=0.5), "command", "Command", "1", {"input": 0}, 1.1, 2.0)}
     assert found["command.amplitude"].needs == {"command.frequency": 1.0}
     assert found["command.steps.0.height"].needs == {"command.steps.0.time": 0.2}
 

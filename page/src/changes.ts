@@ -26,9 +26,12 @@ export function changed(original: Description, changes: Changes): Description {
 function change(d: Description, { target, view, key }: Slider, value: number): void {
   if (target === "parameter") d.core.values[key] = value;
   else if (target === "duration") d.core.duration = value;
-  else {
+  else if ("input" in target) {
     put(d.core.inputs[target.input]!, target.path, value);
     if (!d.core.changed_inputs.includes(target.input)) d.core.changed_inputs.push(target.input);
+  } else {
+    put(d.core.references[target.reference]!, target.path, value);
+    if (!d.core.changed_references.includes(target.reference)) d.core.changed_references.push(target.reference);
   }
   if (view) put(d, view, value);
 }

@@ -1,5 +1,6 @@
 /** The core, compiled to WebAssembly, behind its C interface (bindings/c/lostmotion.h). */
-import type { CoreInput, Signal } from "./core_input";
+import type { CoreInput, Reference, Signal } from "./core_input";
+import { course } from "./moves";
 import { breakpoints, sines } from "./signals";
 
 /** Samples of all variables of one run, its energies and its switchings. */
@@ -14,11 +15,36 @@ export interface Run {
   milliseconds: number;
 }
 
+/** Torques [N·m] at a dry contact, as `lm.explain` has them. */
+export interface ContactState {
+  name: string;
+  /** -1 slips backward, 0 stuck, 1 slips forward */
+  mode: number;
+  /** [rad/s] */
+  speed: number;
+  /** held, or while slipping taken */
+  torque: number;
+  /** it holds torques up to this, and down to minus that */
+  forward: number;
+  backward: number;
+}
+/** Constant commands from which on a motor turns its shaft; of a drive in the short form, its load. */
+export interface MotorState {
+  name: string;
+  forward: number;
+  backward: number;
+}
+export interface Explanation {
+  contacts: ContactState[];
+  motors: MotorState[];
+}
+
 /** The sentence that Python would give. */
 export class CoreError extends Error {}
 
 type Call = (...values: number[]) => number;
 const [SAMPLES, ENERGIES] = [0, 1]; // lm_part
+const [CONTACTS, MOTORS] = [0, 1]; // lm_explained
 const MESSAGE = 1000; // bytes for an error
 
 export class Core {
@@ -40,15 +66,51 @@ export class Core {
   /** Runs the scenario; nothing of it stays in the core. */
   run(input: CoreInput): Run {
     const begun = performance.now();
-    let [scenario, result] = [0, 0];
+    return this.with(input, (scenario) => {
+      const result = this.call("lm_scenario_run", scenario, 1, 0);
+      if (result === 0) throw this.error("lm_scenario_error", scenario);
+      try {
+        if (this.call("lm_result_status", result) !== 0) throw this.error("lm_result_error", result);
+        return this.taken_out(result, input.interval, begun);
+      } finally {
+        this.call("lm_result_free", result);
+      }
+    });
+  }
+
+  /** What holds each contact at an instant of the run. */
+  explain(input: CoreInput, time: number): Explanation {
+    // The interval of lm.explain, so that the bits are the same.
+    return this.with({ ...input, interval: 1e-3 }, (scenario) => {
+      const found = this.call("lm_scenario_explain", scenario, time);
+      if (found === 0) throw this.error("lm_scenario_error", scenario);
+      const rows = <Row>(what: number, row: (name: string, values: Float64Array) => Row): Row[] =>
+        Array.from({ length: this.call("lm_explanation_count", found, what) }, (_, k) =>
+          row(
+            this.text(this.call("lm_explanation_name", found, what, k)),
+            this.numbers(this.call("lm_explanation_values", found, what, k), 5),
+          ),
+        );
+      const contacts = rows(CONTACTS, (name, [mode, speed, torque, forward, backward]) => ({
+        name,
+        mode: mode!,
+        speed: speed!,
+        torque: torque!,
+        forward: forward!,
+        backward: backward!,
+      }));
+      const motors = rows(MOTORS, (name, [forward, backward]) => ({ name, forward: forward!, backward: backward! }));
+      this.call("lm_explanation_free", found);
+      return { contacts, motors };
+    });
+  }
+
+  private with<Found>(input: CoreInput, use: (scenario: number) => Found): Found {
+    let scenario = 0;
     try {
       scenario = this.read(input);
-      result = this.call("lm_scenario_run", scenario, 1, 0);
-      if (result === 0) throw this.error("lm_scenario_error", scenario);
-      if (this.call("lm_result_status", result) !== 0) throw this.error("lm_result_error", result);
-      return this.taken_out(result, input.interval, begun);
+      return use(scenario);
     } finally {
-      this.call("lm_result_free", result);
       this.call("lm_scenario_free", scenario);
       for (const address of this.taken) this.call("free", address);
       this.taken = [];
@@ -62,6 +124,16 @@ export class Core {
     const message = this.reserve(MESSAGE);
     const scenario = this.call("lm_scenario_read", this.doubles(numbers), numbers.length, message, MESSAGE);
     if (scenario === 0) throw new CoreError(this.text(message));
+    try {
+      this.change(scenario, input);
+      return scenario;
+    } catch (error) {
+      this.call("lm_scenario_free", scenario);
+      throw error;
+    }
+  }
+
+  private change(scenario: number, input: CoreInput): void {
     const must = (status: number): void => {
       if (status !== 0) throw this.error("lm_scenario_error", scenario);
     };
@@ -72,24 +144,17 @@ export class Core {
     }
     for (const k of input.changed_inputs)
       must(this.call("lm_scenario_set_signal", scenario, k, this.signal(input.inputs[k]!)));
+    for (const k of input.changed_references)
+      must(this.call("lm_scenario_set_reference", scenario, k, ...this.reference(input.references[k]!)));
     must(this.call("lm_scenario_set_times", scenario, input.duration, input.interval));
-    return scenario;
   }
 
   private taken_out(result: number, interval: number, begun: number): Run {
     const samples = this.call("lm_result_samples", result);
     const names = this.names(result, SAMPLES);
-    const all = new Float64Array(
-      this.memory.buffer,
-      this.call("lm_result_values", result, SAMPLES),
-      names.length * samples,
-    ).slice();
+    const all = this.numbers(this.call("lm_result_values", result, SAMPLES), names.length * samples).slice();
     const energies = this.names(result, ENERGIES);
-    const joules = new Float64Array(
-      this.memory.buffer,
-      this.call("lm_result_values", result, ENERGIES),
-      energies.length,
-    );
+    const joules = this.numbers(this.call("lm_result_values", result, ENERGIES), energies.length);
     return {
       time: Float64Array.from({ length: samples }, (_, k) => k * interval),
       values: new Map(names.map((name, k) => [name, all.subarray(k * samples, (k + 1) * samples)])),
@@ -107,11 +172,19 @@ export class Core {
 
   /** lm_signal, for 32 bit addresses */
   private signal(of: Signal): number {
-    const [lines, waves] = [breakpoints(of), sines(of)];
-    const words = [this.doubles(lines.flat()), lines.length, this.doubles(waves.flat()), waves.length];
     const address = this.reserve(16);
+    const words = [...this.table(breakpoints(of)), ...this.table(sines(of))];
     new Uint32Array(this.memory.buffer, address, 4).set(words);
     return address;
+  }
+  private reference(of: Reference): number[] {
+    const moves = of.moves === null ? [] : [course(of.moves)];
+    const pieces = breakpoints({ ...of, courses: [...of.courses, ...moves] }, 3);
+    return [...this.table(pieces), ...this.table(sines(of))];
+  }
+  /** Address and number of rows. */
+  private table(rows: number[][]): [number, number] {
+    return [this.doubles(rows.flat()), rows.length];
   }
 
   // --- memory, freed at the end of a run; views are made anew, since it grows ---
@@ -124,8 +197,11 @@ export class Core {
   }
   private doubles(values: ArrayLike<number>): number {
     const address = this.reserve(8 * values.length);
-    new Float64Array(this.memory.buffer, address, values.length).set(values);
+    this.numbers(address, values.length).set(values);
     return address;
+  }
+  private numbers(address: number, count: number): Float64Array {
+    return new Float64Array(this.memory.buffer, address, count);
   }
   private text(address: number): string {
     const bytes = new Uint8Array(this.memory.buffer, address);

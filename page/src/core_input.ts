@@ -7,12 +7,15 @@ export interface CoreInput {
   with_gap: { key: string; numbers: string } | null;
   /** commands and load torques, in the order of the core */
   inputs: Signal[];
+  /** of sampled controllers, in the order of the core; null: the page cannot change it */
+  references: (Reference | null)[];
   duration: number;
   interval: number;
   /** parameters that are changed, by their keys */
   values: Record<string, number>;
-  /** numbers of the inputs that are changed */
+  /** numbers of the inputs, and of the references, that are changed */
   changed_inputs: number[];
+  changed_references: number[];
 }
 
 /** The sum of all that is given. */
@@ -24,6 +27,28 @@ export interface Signal {
   steps: [number, number][];
   /** rise, duration, begin */
   ramps: [number, number, number][];
-  /** other courses: each (time, value, slope) from a time on */
-  courses: [number, number, number][][];
+  /** other courses: each (time, value, derivatives) from a time on */
+  courses: number[][][];
+}
+
+export interface Reference extends Signal {
+  moves: Moves | null;
+}
+
+/** From rest to rest; what a move does not have (null) is that of all. */
+export interface Moves {
+  start: number;
+  begin: number;
+  speed: number | null;
+  acceleration: number | null;
+  /** null for all: without limit */
+  jerk: number | null;
+  dwell: number;
+  moves: {
+    to: number;
+    speed: number | null;
+    acceleration: number | null;
+    jerk: number | null;
+    dwell: number | null;
+  }[];
 }

@@ -13,6 +13,8 @@ export interface Description {
   contacts: { label: string; variable: string }[];
   /** no controller turns its motors */
   open_loop: boolean;
+  /** margins of the loops of the controllers, with the values of the file */
+  loops: LoopView[];
   /** of controllers, over time */
   figures: { title: string; unit: string; series: { variable: string; minus?: string; label: string }[] }[];
   sliders: Slider[];
@@ -49,6 +51,20 @@ export interface LossMap {
   rated_speed: number;
   rated_torque: number;
 }
+/** One loop of a controller in one regime of the drive; null where a curve does not cross. */
+export interface LoopView {
+  loop: string;
+  regime: string;
+  meaning: string;
+  stable: boolean;
+  gain_margin: number | null;
+  /** [rad] */
+  phase_margin: number | null;
+  /** [Hz] */
+  crossover: number | null;
+  sensitivity_peak: number | null;
+  bandwidth: number | null;
+}
 export interface MotorView {
   name: string;
   shaft: string;
@@ -69,8 +85,12 @@ export interface Slider {
   max: number;
   /** equal ways on the slider are equal ratios */
   logarithmic: boolean;
-  /** a parameter of the core by this key, the duration, or where the number stands in an input */
-  target: "parameter" | "duration" | { input: number; path: (string | number)[] };
+  /** a parameter of the core by this key, the duration, or where the number stands in an input or in a reference */
+  target:
+    | "parameter"
+    | "duration"
+    | { input: number; path: (string | number)[] }
+    | { reference: number; path: (string | number)[] };
   /** where it stands in the description, for what is drawn */
   view?: (string | number)[];
   /** other keys that the scenario file needs with this one */

@@ -33,8 +33,8 @@ export function flows(energies: Map<string, number>): { into: Flow[]; out: Flow[
   return { into: into.sort(falling), out: out.sort(falling), residual };
 }
 
-const [WIDTH, TOP, SPAN, GAP, ROW] = [560, 10, 150, 6, 19];
-const [LEFT, MIDDLE, RIGHT] = [140, 215, 300]; // ends of the ribbons
+const [WIDTH, TOP, SPAN, GAP, ROW] = [610, 10, 150, 6, 19];
+const [LEFT, MIDDLE, RIGHT] = [150, 215, 290]; // ends of the ribbons
 
 export class EnergyCard {
   private readonly place = h("div", { class: "energy" });

@@ -43,6 +43,7 @@ export class Plot {
   private readonly cursor = document.createElement("div");
   private chart?: Chart;
   private readonly seen: Seen;
+  private marked?: [number, number?];
   private width = 0;
   private height = 0;
   private toX: Scale = (x) => x;
@@ -50,22 +51,23 @@ export class Plot {
   private xRange: [number, number] = [0, 1];
   private yRange: [number, number] = [0, 1];
 
+  /** atOnce: drawn with the first frame, before the browser says whether it is in the window. */
   constructor(
     readonly root: HTMLElement,
     label: string,
+    atOnce = false,
   ) {
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", label);
     this.cursor.className = "cursor";
     this.root.append(this.canvas, this.cursor);
-    this.seen = new Seen(this.root, () => this.paint());
+    this.seen = new Seen(this.root, () => this.paint(), atOnce);
     new ResizeObserver(() => this.fit()).observe(this.root);
   }
 
   draw(chart: Chart): void {
     this.chart = chart;
-    if (this.width === 0) this.fit();
-    else this.seen.changed();
+    if (this.width > 0) this.seen.changed();
   }
 
   /** The canvas, painted also where nobody sees it. */
@@ -87,6 +89,8 @@ export class Plot {
 
   /** A line at x, or with y a point there; it does not redraw the chart. */
   mark(x: number, y?: number): void {
+    this.marked = [x, y];
+    if (this.width === 0) return;
     const [left, top] = this.place(x, y ?? 0);
     const inside = left >= MARGIN.left - 1 && left <= this.width - MARGIN.right + 1;
     this.cursor.hidden = !inside;
@@ -102,7 +106,7 @@ export class Plot {
     this.canvas.width = Math.round(this.width * density);
     this.canvas.height = Math.round(this.height * density);
     this.canvas.getContext("2d")!.setTransform(density, 0, 0, density, 0, 0);
-    if (this.chart && this.width > 0) this.paint();
+    if (this.chart && this.width > 0) this.seen.changed();
   }
 
   private paint(): void {
@@ -131,6 +135,7 @@ export class Plot {
       this.trace(c, line);
     }
     c.restore();
+    if (this.marked) this.mark(...this.marked);
   }
 
   private shade(c: CanvasRenderingContext2D, value: (x: number, y: number) => number, ink: string): void {

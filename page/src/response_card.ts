@@ -1,11 +1,11 @@
 /** Frequency response of the load's speed over the amplitude of the command, worked out beside the page. */
+import type { Beside } from "./beside";
+import type { Answer } from "./beside.worker";
 import type { Description } from "./description";
 import { h } from "./dom";
 import { words } from "./kinematics";
 import { type Line, Plot } from "./plot";
 import type { Point } from "./response";
-import type { Answer, Task } from "./response.worker";
-import ResponseWorker from "./response.worker?worker&inline";
 import { look, swatch } from "./time_charts";
 import { format } from "./units";
 
@@ -14,58 +14,58 @@ const FREQUENCIES = Array.from({ length: 29 }, (_, k) => 0.3 * 10 ** ((2.4 * k) 
 const PATIENCE = 250; // ms without a change before work begins
 
 export class ResponseCard {
-  private readonly worker?: Worker;
   private readonly state = h("span", { class: "entry", role: "status" });
+  private readonly entries = AMPLITUDES.map((a) => h("span", {}, format(a)));
   private gain?: Plot;
   private phase?: Plot;
   private lines: Point[][] = [];
-  private number = 0;
   private waiting = 0;
 
-  /** core: bytes for the worker. */
   constructor(
     root: HTMLElement,
     d: Description,
-    private core: ArrayBuffer | undefined,
+    private readonly beside: Beside,
   ) {
     if (!d.open_loop || d.motors.length === 0) return;
     const [gain, phase] = [h("div", { class: "plot" }), h("div", { class: "plot low" })];
-    const entries = AMPLITUDES.map((a, k) => h("span", { class: "entry" }, swatch(k), format(a)));
+    const entries = AMPLITUDES.map((_, k) => h("span", { class: "entry" }, swatch(k), this.entries[k]!));
     const title = `Frequency response: ${words(d.shafts.at(-1)!.name)} speed per command, by amplitude of the command`;
     root.append(
       h("figure", { class: "wide" }, h("figcaption", {}, h("b", {}, title), ...entries, this.state), gain, phase),
     );
     this.gain = new Plot(gain, "Gain over frequency for several amplitudes of the command");
     this.phase = new Plot(phase, "Phase over frequency for several amplitudes of the command");
-    this.worker = new ResponseWorker();
-    this.worker.onmessage = ({ data }: MessageEvent<Answer>) => this.take(data);
   }
 
   /** After a change; the work begins once the changes pause. */
   use(d: Description): void {
-    if (!this.worker) return;
+    if (!this.gain) return;
     clearTimeout(this.waiting);
     this.state.textContent = "…";
     this.waiting = window.setTimeout(() => {
-      this.number += 1;
       this.lines = [];
-      const task: Task = {
-        number: this.number,
-        input: d.core,
-        variable: d.shafts.at(-1)!.speed,
-        amplitudes: AMPLITUDES,
-        frequencies: FREQUENCIES,
-      };
-      if (this.core) task.core = this.core;
-      this.core = undefined;
-      this.worker!.postMessage(task);
+      this.beside.ask(
+        {
+          kind: "response",
+          input: d.core,
+          variable: d.shafts.at(-1)!.speed,
+          amplitudes: AMPLITUDES,
+          frequencies: FREQUENCIES,
+        },
+        (answer) => this.take(answer),
+      );
     }, PATIENCE);
   }
 
-  private take({ number, points, done }: Answer): void {
-    if (number !== this.number) return;
+  private take(answer: Answer): void {
+    if (answer.kind !== "response") return;
+    const { points, done } = answer;
     this.lines.push(points);
     const unsettled = this.lines.flat().filter((p) => !p.settled).length;
+    this.lines.forEach((line, k) => {
+      const still = line.every((p) => p.gain === 0);
+      this.entries[k]!.textContent = `${format(AMPLITUDES[k]!)}${still ? " (does not move)" : ""}`;
+    });
     this.state.textContent = done ? (unsettled > 0 ? `${unsettled} points had not settled` : "") : "…";
     this.draw();
   }
@@ -86,22 +86,17 @@ export class ResponseCard {
     });
     const largest = Math.max(...this.lines.flat().map((p) => p.gain));
     const floor = 1e-4 * largest;
+    const moving = (points: Point[]): Point[] => points.filter((p) => p.gain > floor);
     const range: [number, number] = [floor, 2 * largest];
     this.gain!.draw({
       x,
       y: { label: "gain", unit: "rad/s", logarithmic: true, range },
-      lines: this.lines.map((points, k) => line(points, k, (p) => Math.max(p.gain, floor))),
+      lines: this.lines.map((points, k) => line(moving(points), k, (p) => p.gain)),
     });
     this.phase!.draw({
       x,
       y: { label: "phase", unit: "°", range: [-360, 0] },
-      lines: this.lines.map((points, k) =>
-        line(
-          points.filter((p) => p.gain > floor),
-          k,
-          (p) => (p.phase * 180) / Math.PI,
-        ),
-      ),
+      lines: this.lines.map((points, k) => line(moving(points), k, (p) => (p.phase * 180) / Math.PI)),
     });
   }
 }

@@ -1,12 +1,13 @@
 /** Draws only what is in the window; the rest when it comes into it. */
 
 export class Seen {
-  private inside = true;
   private late = false;
 
+  /** inside: whether it counts as in the window until the browser says. */
   constructor(
     of: Element,
     private readonly draw: () => void,
+    private inside = false,
   ) {
     new IntersectionObserver((entries) => {
       this.inside = entries.at(-1)!.isIntersecting;

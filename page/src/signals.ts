@@ -1,7 +1,8 @@
-/** Signals as the core takes them: straight lines from a time on, and sines. */
+/** Signals and references as the core takes them: pieces from a time on, and sines. */
 import type { Signal } from "./core_input";
 
-export type Breakpoint = [time: number, value: number, slope: number];
+/** A time, a value, and its derivatives as far as they are not 0. */
+export type Breakpoint = number[];
 
 /** The pieces of a signal, without steps of no height; from its last breakpoint on each is constant. */
 function pieces(signal: Signal): Breakpoint[][] {
@@ -15,26 +16,41 @@ function pieces(signal: Signal): Breakpoint[][] {
   ];
 }
 
-function at(piece: Breakpoint[], time: number): [number, number] {
-  let found: Breakpoint | undefined;
-  for (const point of piece) if (point[0] <= time) found = point;
-  return found ? [found[1] + found[2] * (time - found[0]), found[2]] : [0, 0];
+/** Value and derivatives of a polynomial some time after these were given. */
+function taylor(derivatives: number[], time: number): number[] {
+  return derivatives.map((_, order) => {
+    let total = derivatives.at(-1)!;
+    for (let k = derivatives.length - 2; k >= order; --k) total = derivatives[k]! + (total * time) / (k - order + 1);
+    return total;
+  });
 }
 
-/** All but the sines, from t = 0 on: in the same order of additions as in Python, so that the bits are the same. */
-export function breakpoints(signal: Signal): Breakpoint[] {
-  const waiting = pieces(signal).sort((a, b) => a[0]![0] - b[0]![0]);
-  const times = [...new Set([0, ...waiting.flat().map((point) => point[0])])].sort((a, b) => a - b);
+function at(piece: Breakpoint[], time: number, derivatives: number): number[] {
+  const [begin, ...given] = piece.findLast((point) => point[0]! <= time) ?? [0];
+  return taylor(
+    Array.from({ length: derivatives + 1 }, (_, k) => given[k] ?? 0),
+    time - begin!,
+  );
+}
+
+/**
+ * All but the sines, from t = 0 on, with so many derivatives: in the same order of additions as in Python, so that the
+ * bits are the same.
+ */
+export function breakpoints(signal: Signal, derivatives = 1): Breakpoint[] {
+  const waiting = pieces(signal).sort((a, b) => a[0]![0]! - b[0]![0]!);
+  const times = [...new Set([0, ...waiting.flat().map((point) => point[0]!)])].sort((a, b) => a - b);
   let active: Breakpoint[][] = [];
   let final = 0; // sum of the pieces that are past their last breakpoint and constant from there on
   const found: Breakpoint[] = [];
   for (const time of times) {
-    while (waiting[0] && waiting[0][0]![0] <= time) active.push(waiting.shift()!);
-    const here = active.map((piece) => at(piece, time));
-    const value = signal.mean + here.reduce((sum, [v]) => sum + v, final);
-    found.push([time, value, here.reduce((sum, [, slope]) => sum + slope, 0)]);
-    const past = active.map((piece) => time >= piece.at(-1)![0]);
-    final += here.reduce((sum, [v], k) => (past[k] ? sum + v : sum), 0);
+    while (waiting[0] && waiting[0][0]![0]! <= time) active.push(waiting.shift()!);
+    const here = active.map((piece) => at(piece, time, derivatives));
+    const value = signal.mean + here.reduce((sum, [v]) => sum + v!, final);
+    const slopes = Array.from({ length: derivatives }, (_, n) => here.reduce((sum, d) => sum + d[n + 1]!, 0));
+    found.push([time, value, ...slopes]);
+    const past = active.map((piece) => time >= piece.at(-1)![0]!);
+    final += here.reduce((sum, [v], k) => (past[k] ? sum + v! : sum), 0);
     active = active.filter((_, k) => !past[k]);
   }
   return found;

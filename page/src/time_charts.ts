@@ -89,7 +89,7 @@ export class TimeCharts {
       );
       const place = h("div", { class: "plot" });
       this.root.append(h("figure", {}, h("figcaption", {}, h("b", {}, figure.title), ...entries), place));
-      const plot = new Plot(place, `${figure.title} over time`);
+      const plot = new Plot(place, `${figure.title} over time`, true);
       const follow = (event: PointerEvent): void => {
         if (event.buttons === 1) this.seek(plot.valueAt(event.clientX - place.getBoundingClientRect().left));
       };

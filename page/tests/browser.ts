@@ -1,12 +1,10 @@
 /** Chromium, and pages that may neither ask for anything nor complain. */
-import { execFileSync } from "node:child_process";
-import { existsSync, mkdtempSync, readFileSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { existsSync, readFileSync } from "node:fs";
 import { join } from "node:path";
-import { fileURLToPath } from "node:url";
+import { gunzipSync } from "node:zlib";
 import { type Browser, chromium, type Page } from "playwright-core";
+import type { Description } from "../src/description";
 
-const root = fileURLToPath(new URL("../..", import.meta.url));
 const FLAGS = [
   "--no-sandbox",
   "--disable-gpu",
@@ -23,17 +21,22 @@ export function launch(): Promise<Browser> {
   return chromium.launch({ executablePath, args: FLAGS });
 }
 
-/** A directory with the pages of pages.py and the samples of Python. */
-export function pages(): string {
-  const directory = mkdtempSync(join(tmpdir(), "lostmotion-page-"));
-  execFileSync(join(root, ".venv/bin/python"), [join(root, "page/tests/pages.py"), directory], { stdio: "inherit" });
-  return directory;
+/** A script of a page, by its id. */
+function script(file: string, id: string): string {
+  return new RegExp(`<script [^>]*id="${id}">(.*?)</script>`, "s").exec(readFileSync(file, "utf-8"))![1]!;
+}
+export function coreOf(file: string): Buffer<ArrayBuffer> {
+  return Buffer.from(gunzipSync(Buffer.from(script(file, "core"), "base64")));
+}
+export function descriptionOf(file: string): Description {
+  return JSON.parse(script(file, "description")) as Description;
 }
 
 export interface Expected {
   changes: Record<string, number>;
   as_it_is: Record<string, (number | null)[]>;
   changed: Record<string, (number | null)[]>;
+  explained: { time: number; contacts: (string | number)[][]; motors: (string | number)[][] }[];
 }
 export function expected(directory: string, name: string): Expected {
   return JSON.parse(readFileSync(join(directory, `${name}.json`), "utf-8")) as Expected;

@@ -40,7 +40,18 @@ const described = (...sliders: Slider[]): Description => ({
       losses: null,
     },
   ],
-  core: { numbers: "", with_gap: null, inputs: [signal], duration: 1, interval: 0.1, values: {}, changed_inputs: [] },
+  loops: [],
+  core: {
+    numbers: "",
+    with_gap: null,
+    inputs: [signal],
+    references: [{ ...signal, moves: null }],
+    duration: 1,
+    interval: 0.1,
+    values: {},
+    changed_inputs: [],
+    changed_references: [],
+  },
   scenario: { gearbox: { ratio: 2 }, command: { mean: 0 }, shafts: [{ inertia: 1 }] },
 });
 
@@ -60,6 +71,15 @@ test("a signal is changed as a whole, and the file gets the keys that belong tog
   expect(d.core.inputs[0]!.sines).toEqual([[0.5, 1, 0]]);
   expect(d.core.changed_inputs).toEqual([0]);
   expect(d.scenario.command).toEqual({ mean: 0, amplitude: 0.5, frequency: 1 });
+});
+
+test("a reference is changed as a whole", () => {
+  const target = { reference: 0, path: ["mean"] };
+  const d = changed(
+    described(slider("controller.reference.mean", { target })),
+    new Map([["controller.reference.mean", 3]]),
+  );
+  expect([d.core.references[0]!.mean, d.core.changed_references]).toEqual([3, [0]]);
 });
 
 test("the address keeps every value to the last bit", () => {

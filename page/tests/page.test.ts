@@ -4,13 +4,12 @@ import { execFileSync } from "node:child_process";
 import { fileURLToPath } from "node:url";
 import axe from "axe-core";
 import type { Browser, BrowserContextOptions, Page } from "playwright-core";
-import { afterAll, beforeAll, describe, expect, test } from "vitest";
-import { expected, launch, pages, ready, table, watch } from "./browser";
+import { afterAll, beforeAll, describe, expect, inject, test } from "vitest";
+import { descriptionOf, expected, launch, ready, table, watch } from "./browser";
 
 let browser: Browser;
-let directory: string;
+const directory = inject("directory");
 beforeAll(async () => {
-  directory = pages();
   browser = await launch();
 });
 afterAll(() => browser?.close());
@@ -93,6 +92,111 @@ test("a slider moved by the keyboard changes the run, the address and the file t
   const python = fileURLToPath(new URL("../../.venv/bin/python", import.meta.url));
   expect(after.load_speed).toEqual(JSON.parse(execFileSync(python, ["-c", script, file], { encoding: "utf-8" })));
   expect(seen).toEqual([]);
+  await page.close();
+});
+
+test("why it stands still is told for the instant shown, and follows a slider", async () => {
+  const { page, seen } = await open("drive");
+  const time = page.getByRole("slider", { name: "Time", exact: true });
+  const answer = page.locator(".stand .answer");
+  await time.fill("25");
+  await page.waitForFunction(() => /^Stuck at 0.05 s: /.test(document.querySelector(".stand .answer")!.textContent!));
+  expect(await answer.textContent()).toBe("Stuck at 0.05 s: input shaft, twist of the gear.");
+  expect(await page.locator(".stand li").first().textContent()).toMatch(
+    /^input shaft: stuck, holds .* mN·m more frees it forward, .* backward$/,
+  );
+  const field = page.getByRole("textbox", { name: "friction torque, mN·m" }).first();
+  await field.fill("0");
+  await field.press("Enter");
+  await page.waitForFunction(() => !/input shaft/.test(document.querySelector(".stand .answer")!.textContent!));
+  expect(seen).toEqual([]);
+  await page.close();
+});
+
+test("a long run is worked out beside the page, which moves on meanwhile", async () => {
+  const { page, seen } = await open("axis", {}, "#simulation.duration=13");
+  const before = await page.textContent("#summary");
+  const longest = await page.evaluate(async () => {
+    const slider = document.querySelector<HTMLInputElement>('[id="controller.position.gain"]')!;
+    let [last, longest] = [performance.now(), 0];
+    slider.value = "620";
+    slider.dispatchEvent(new Event("input"));
+    const text = document.getElementById("summary")!.textContent;
+    while (document.getElementById("summary")!.textContent === text) {
+      await new Promise(requestAnimationFrame);
+      const now = performance.now();
+      if (document.getElementById("summary")!.textContent === text) longest = Math.max(longest, now - last);
+      last = now;
+    }
+    return longest;
+  });
+  const milliseconds = Number(/([\d.]+) ms/.exec(before!)![1]);
+  console.log(`a run of ${milliseconds} ms; longest frame meanwhile ${longest.toFixed(0)} ms`);
+  expect(longest).toBeLessThan(milliseconds);
+  expect(seen).toEqual([]);
+  await page.close();
+});
+
+test("the margins of the loops are those of the file, and the page says when sliders differ from it", async () => {
+  const { page, seen } = await open("axis");
+  const rows = page.locator("table tbody tr");
+  const { loops } = descriptionOf(join(directory, "axis.html"));
+  expect(await rows.count()).toBe(loops.length);
+  const note = page.locator("figure:has(table) .entry");
+  expect(await note.textContent()).toMatch(/^exact/);
+  await page.locator('[id="controller.position.gain"]').fill("700");
+  await page.waitForFunction(() =>
+    /lostmotion servo$/.test(document.querySelector("figure:has(table) .entry")!.textContent!),
+  );
+  expect(seen).toEqual([]);
+  await page.close();
+});
+
+test("a pinned run stays in the charts, which are downloaded as a picture", async () => {
+  const { page, seen } = await open("drive");
+  const picture = async (): Promise<Buffer> => {
+    const [download] = await Promise.all([
+      page.waitForEvent("download"),
+      page.getByRole("button", { name: "PNG" }).click(),
+    ]);
+    return readFileSync(await download.path());
+  };
+  const alone = await picture();
+  expect(alone.subarray(1, 4).toString()).toBe("PNG");
+  await page.getByRole("button", { name: "Pin" }).click();
+  await page.locator('[id="load.inertia"]').fill("800");
+  await page.waitForFunction(() => location.hash.includes("load.inertia="));
+  const both = await picture();
+  await page.getByRole("button", { name: "Pin" }).click();
+  const changed = await picture();
+  expect(both.equals(alone)).toBe(false);
+  expect(both.equals(changed)).toBe(false);
+  expect(seen).toEqual([]);
+  await page.close();
+});
+
+test("it plays by itself, but not where little motion is wanted", async () => {
+  const still = await open("drive");
+  expect(await still.page.getByRole("button", { name: "Play" }).count()).toBe(1);
+  const { page } = await open("drive", { reducedMotion: "no-preference" });
+  await page.waitForFunction(() => Number(document.querySelector<HTMLInputElement>("#player input")!.value) > 0);
+  await page.getByRole("button", { name: "Pause" }).press("Enter");
+  expect(await page.getByRole("button", { name: "Play" }).count()).toBe(1);
+  await still.page.close();
+  await page.close();
+});
+
+test("lines of one chart differ without colour, too", async () => {
+  const { page } = await open("worm");
+  const looks = await page.evaluate(() =>
+    [...document.querySelectorAll("#time-charts figure")].map((figure) =>
+      [...figure.querySelectorAll(".swatch line")].map(
+        (line) => `${line.getAttribute("stroke-width")} ${line.getAttribute("stroke-dasharray")}`,
+      ),
+    ),
+  );
+  expect(looks.some((lines) => lines.length > 2)).toBe(true);
+  for (const lines of looks) expect(new Set(lines).size).toBe(lines.length);
   await page.close();
 });
 

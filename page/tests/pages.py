@@ -7,6 +7,7 @@ import json
 import math
 import sys
 from pathlib import Path
+from typing import Any
 
 import lostmotion as lm
 from lostmotion.live_page.page import write_page
@@ -18,8 +19,13 @@ PAGES = {
         {"load.inertia": 3.25, "command.amplitude": 0.05, "gearbox.stiffness.backlash": 1e-3},
     ),
     "worm": ("worm-lowering", {"shafts.drum.inertia": 2.5, "gears.worm_gear.stiffness.stiffness": 8e3}),
-    "axis": ("hunting-with-backlash", {"controller.position.gain": 8.0}),
+    "axis": (
+        "hunting-with-backlash",
+        {"controller.position.gain": 8.0, "controller.reference.moves.0.to": 0.6, "controller.reference.speed": 0.9},
+    ),
 }
+# Instants at which Python says what stands still [s].
+INSTANTS = {"drive": (0.0, 0.05, 0.6667, 0.9), "worm": (0.05, 0.31, 1.4), "axis": (0.0101, 0.8003, 2.5003)}
 
 
 def samples(scenario: lm.Scenario | lm.TrainScenario) -> dict[str, list[float | None]]:
@@ -29,13 +35,37 @@ def samples(scenario: lm.Scenario | lm.TrainScenario) -> dict[str, list[float | 
     return {name: [None if math.isnan(v) else v for v in column] for name, column in columns.items()}
 
 
+def explanations(scenario: lm.Scenario | lm.TrainScenario, name: str) -> list[dict[str, Any]]:
+    """What `lm.explain` says at INSTANTS; of a closed loop by a simulation that has come there."""
+    found = []
+    for time in INSTANTS[name]:
+        if scenario.axes():
+            simulation = lm.Simulation(scenario)
+            simulation.advance(time)
+            told = lm.explain(simulation)
+        else:
+            told = lm.explain(scenario, time)
+        contacts = [(c.name, c.mode, c.speed, c.torque, c.capacity_forward, c.capacity_backward) for c in told.contacts]
+        if isinstance(told, lm.Explanation):
+            motors = [("motor", told.command_forward, told.command_backward)]
+        else:
+            motors = [(m.name, m.command_forward, m.command_backward) for m in told.motors]
+        found.append({"time": time, "contacts": contacts, "motors": motors})
+    return found
+
+
 def main(directory: Path) -> None:
     """For each page NAME.html and NAME.json."""
     directory.mkdir(parents=True, exist_ok=True)
     for page, (name, changes) in PAGES.items():
         scenario = lm.load(name)
         write_page(directory / f"{page}.html", scenario)
-        expected = {"changes": changes, "as_it_is": samples(scenario), "changed": samples(scenario.replace(**changes))}
+        expected = {
+            "changes": changes,
+            "as_it_is": samples(scenario),
+            "changed": samples(scenario.replace(**changes)),
+            "explained": explanations(scenario, page),
+        }
         (directory / f"{page}.json").write_text(json.dumps(expected))
 
 

@@ -16,6 +16,8 @@ from ..simulation.train_scenario import TrainScenario
 from ..units.practical import ARCMIN
 from . import sliders
 from .drawn import axis_figures, drawn_drive, drawn_train
+from .loops import loop_views
+from .references import reference_sliders, reference_view
 
 USUAL_BACKLASH = 12.0 / ARCMIN  # to where the slider goes where there is none
 
@@ -43,10 +45,12 @@ def describe(scenario: Scenario | TrainScenario, name: str) -> dict[str, Any]:
         if closed is None
         else {"key": closed, "numbers": _packed(described(scenario.replace(**{closed: USUAL_BACKLASH}))[0])},
         "inputs": [_signal(signal, scenario.simulation.duration) for _, signal in _inputs(scenario)],
+        "references": [reference_view(c.reference, scenario.simulation.duration) for c in scenario.axes().values()],
         "duration": scenario.simulation.duration,
         "interval": scenario.simulation.sample_interval,
         "values": {},
         "changed_inputs": [],
+        "changed_references": [],
     }
     drawn = drawn_drive(scenario) if isinstance(scenario, Scenario) else drawn_train(scenario)
     return {
@@ -56,6 +60,7 @@ def describe(scenario: Scenario | TrainScenario, name: str) -> dict[str, Any]:
         "core": core,
         **drawn,
         "open_loop": not (scenario.axes() or (isinstance(scenario, TrainScenario) and scenario.controllers)),
+        "loops": [view for motor in scenario.axes() for view in loop_views(scenario, motor)],
         "figures": [
             figure
             for motor, c in scenario.axes().items()
@@ -121,7 +126,7 @@ def _sliders(
     for key, _ in values:
         if key.endswith("friction_torque"):
             usual[key] = _usual_friction(scenario, key)
-    found = [*_signal_sliders(scenario), *sliders.of_parameters(values, usual, views)]
+    found = [*_signal_sliders(scenario), *_reference_sliders(scenario), *sliders.of_parameters(values, usual, views)]
     return [
         *sliders.ordered(found),
         sliders.duration(scenario.simulation.duration, scenario.simulation.sample_interval),
@@ -140,11 +145,20 @@ def _signal_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.Slid
         if key.startswith("command"):
             _, _, name = key.partition(".")
             group = f"Command of {name.replace('_', ' ')}" if name and len(_inputs(scenario)) > 2 else "Command"
-            yield from sliders.of_signal(signal, key, group, "1", number, 1.1, duration)
+            yield from sliders.of_signal(signal, key, group, "1", {"input": number}, 1.1, duration)
         else:
             shaft = "load" if isinstance(scenario, Scenario) else key.split(".")[1]
             group = "Load torque" if shaft == "load" else f"Load torque on {shaft.replace('_', ' ')}"
-            yield from sliders.of_signal(signal, key, group, "N*m", number, _torque_at(scenario, shaft), duration)
+            most = _torque_at(scenario, shaft)
+            yield from sliders.of_signal(signal, key, group, "N*m", {"input": number}, most, duration)
+
+
+def _reference_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.Slider]:
+    several = len(scenario.axes()) > 1
+    for number, (motor, controller) in enumerate(scenario.axes().items()):
+        table = "controller" if isinstance(scenario, Scenario) else f"controllers.{motor}"
+        group = f"Reference of {motor.replace('_', ' ')}" if several else "Reference"
+        yield from reference_sliders(controller, f"{table}.reference", group, number, scenario.simulation.duration)
 
 
 def _torque_at(scenario: Scenario | TrainScenario, shaft: str) -> float:

@@ -13,9 +13,15 @@ from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from .description import describe
 
-# `make page` puts both beside this file, and the wheel carries them.
+# `make page` puts all beside this file, and the wheel carries them.
 TEMPLATE = Path(__file__).with_name("page.html")
-CORE = Path(__file__).with_name("core.wasm.gz")
+CORES = Path(__file__).parent
+
+
+def core_of(scenario: Scenario | TrainScenario) -> Path:
+    """The core with the kernel that a scenario takes, so that a page holds no other."""
+    kernel = "drive" if isinstance(scenario, Scenario) else scenario.core().kernel()
+    return CORES / f"{kernel}.wasm.gz"
 
 
 def page(scenario: Scenario | TrainScenario, name: str = "drive") -> str:
@@ -31,10 +37,11 @@ def page(scenario: Scenario | TrainScenario, name: str = "drive") -> str:
     InputError
         A controller has a law of your own, which only Python can call; in a checkout, the page has not been built.
     """
-    for part in (TEMPLATE, CORE):
+    core = core_of(scenario)
+    for part in (TEMPLATE, core):
         if not part.is_file():
             raise InputError(f"{part}: is missing, since the live page is not built; run `make page`, which needs node")
-    places = {"CORE": base64.b64encode(CORE.read_bytes()).decode(), "DESCRIPTION": _as_script(describe(scenario, name))}
+    places = {"CORE": base64.b64encode(core.read_bytes()).decode(), "DESCRIPTION": _as_script(describe(scenario, name))}
     text = TEMPLATE.read_text(encoding="utf-8")
     for place, content in places.items():
         before, found, after = text.partition(f'">\n      {place}\n')

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..model.signals import Signal
+from ..model.signals import TimeFunction
 from ..units.practical import ARCMIN
 
 Place = list[str | int]
@@ -51,6 +52,10 @@ UNITS: dict[str, list[tuple[str, float, float]]] = {
     "N*m*s/rad": [("N·m·s/rad", 1.0, 0.05), ("mN·m·s/rad", 1e-3, 1e-3), ("µN·m·s/rad", 1e-6, 0.0)],
     "N*m/rad": [("kN·m/rad", 1e3, 500.0), ("N·m/rad", 1.0, 0.05), ("mN·m/rad", 1e-3, 0.0)],
     "rad": [("arcmin", 1.0 / ARCMIN, 0.0)],
+    "angle": [("°", math.pi / 180.0, 0.0)],
+    "rad/s": [("rad/s", 1.0, 0.0)],
+    "rad/s^2": [("rad/s²", 1.0, 0.0)],
+    "rad/s^3": [("rad/s³", 1.0, 0.0)],
     "s": [("s", 1.0, 0.3), ("ms", 1e-3, 0.0)],
     "Hz": [("Hz", 1.0, 0.0)],
     "1/s": [("1/s", 1.0, 0.0)],
@@ -148,16 +153,16 @@ def _group(table: str, names: list[str]) -> str:
 
 
 def of_signal(
-    signal: Signal[Any], key: str, group: str, unit: str, number: int, most: float, duration: float
+    signal: TimeFunction[Any], key: str, group: str, unit: str, where: Mapping[str, int], most: float, duration: float
 ) -> Iterator[Slider]:
-    """Sliders of a command or a load torque: its mean, its first sine, its steps; where there is none, one can be added.
+    """Sliders of a command, a load torque or a reference: its mean, its first sine, its steps; where there is none, one can be added.
 
     Parameters
     ----------
     key
         Its table in the scenario file.
-    number
-        Among the inputs of the core.
+    where
+        Its number among the inputs, or the references, of the core.
     most
         To where its values go, at least.
     duration
@@ -168,7 +173,7 @@ def of_signal(
         end: str, label: str, si_unit: str, value: float, reach: Range, path: Place, needs: Any = None
     ) -> Slider:
         there = None if needs is None else {f"{key}.{other}": given for other, given in needs.items()}
-        return Slider(f"{key}.{end}", group, label, si_unit, value, reach, {"input": number, "path": path}, needs=there)
+        return Slider(f"{key}.{end}", group, label, si_unit, value, reach, {**where, "path": path}, needs=there)
 
     mean = float(signal.mean)
     most = max(most, 1.5 * abs(mean))

@@ -1,0 +1,80 @@
+"""References of sampled controllers, as the page takes and changes them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from ..control.controller import Controller
+from ..control.references import PositionReference, Reference
+from . import sliders
+from .sliders import Place, Range, Slider
+
+UNITS = {"position": "rad", "speed": "rad/s", "torque": "N*m"}
+LIMITS = (("speed", "rad/s"), ("acceleration", "rad/s^2"), ("jerk", "rad/s^3"))
+
+
+def reference_view(reference: Reference[Any], duration: float) -> dict[str, Any] | None:
+    """As page/src/core_input.ts describes it, with a sine and a step of height 0 for the sliders of one.
+
+    None for what follows a target, which the page cannot change.
+    """
+    moves = None
+    if isinstance(reference, PositionReference):
+        if reference.target is not None:
+            return None
+        if reference.moves:
+            own = ("start", "begin", "speed", "acceleration", "jerk", "dwell")
+            moves = {key: getattr(reference, key) for key in own}
+            moves["moves"] = [m.model_dump() for m in reference.moves]
+    return {
+        "mean": reference.mean,
+        "sines": reference.sine_list() or [(0.0, 1.0, 0.0)],
+        "steps": [(s.height, s.time) for s in reference.steps] or [sliders.no_step(duration)],
+        "ramps": [(r.rise, r.duration, r.begin) for r in reference.ramps],
+        "courses": [] if reference.samples is None else [reference.samples.breakpoints()],
+        "moves": moves,
+    }
+
+
+def reference_sliders(controller: Controller, key: str, group: str, number: int, duration: float) -> Iterator[Slider]:
+    """Of its moves; without any, of its mean, its first sine and its steps.
+
+    Parameters
+    ----------
+    key
+        Table of the reference in the scenario file.
+    number
+        Among the controllers.
+    """
+    reference = controller.reference
+    unit = UNITS[reference.kind]
+    if isinstance(reference, PositionReference) and reference.moves:
+        yield from _of_moves(reference, key, group, number)
+        return
+    if isinstance(reference, PositionReference) and reference.target is not None:
+        return
+    sizes = [abs(float(v)) for v in (reference.mean, reference.amplitude or 0.0)]
+    sizes += [abs(float(part)) for s in reference.steps for part in (s.height,)]
+    sizes += [abs(float(r.rise)) for r in reference.ramps]
+    most = 1.5 * max(sizes) or {"position": math.pi, "speed": 10.0, "torque": 1.0}[reference.kind]
+    yield from sliders.of_signal(reference, key, group, unit, {"reference": number}, most, duration)
+
+
+def _of_moves(reference: PositionReference, key: str, group: str, number: int) -> Iterator[Slider]:
+    def slider(end: str, label: str, unit: str, value: float, reach: Range, path: Place) -> Slider:
+        return Slider(f"{key}.{end}", group, label, unit, value, reach, {"reference": number, "path": ["moves", *path]})
+
+    places = [reference.start, *(move.to for move in reference.moves)]
+    span = 1.5 * max(abs(p) for p in places) or math.pi
+    for k, move in enumerate(reference.moves[:6]):
+        label = f"move {k + 1} to" if len(reference.moves) > 1 else "move to"
+        yield slider(f"moves.{k}.to", label, "angle", move.to, Range(-span, span), ["moves", k, "to"])
+    for name, unit in LIMITS:
+        value = getattr(reference, name)
+        if value is not None and any(getattr(move, name) is None for move in reference.moves):
+            yield slider(name, f"{name} limit", unit, value, sliders.around(value), [name])
+    usual = max(reference.dwell, 0.25)
+    if any(move.dwell is None for move in reference.moves):
+        yield slider("dwell", "dwell", "s", reference.dwell, Range(0.0, 4.0 * usual), ["dwell"])
