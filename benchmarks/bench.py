@@ -13,6 +13,7 @@ import baseline
 import closed_loops
 import costs
 import gradients
+import live
 import one_run
 import studies
 import trains
@@ -89,6 +90,7 @@ def main() -> None:
     costs.section(report, scenario, build, programs)
     studies.section(report, scenario)
     start_up_section(report)
+    live.section(report)
     print(report.text())
     (ROOT / "benchmarks" / "RESULTS.md").write_text(report.text())
 
