@@ -68,7 +68,7 @@ export class MapCard {
 }
 
 /** Relative speed, and relative load, positive where the motor drives. */
-function working(d: Description, gear: Located, run: Run): { x: Float64Array; y: Float64Array } {
+export function working(d: Description, gear: Located, run: Run): { x: Float64Array; y: Float64Array } {
   const speed = run.values.get(d.shafts.find((s) => s.name === gear.input)!.speed)!;
   const torque = run.values.get(gear.output_torque)!;
   const { rated_speed, rated_torque } = gear.losses;
@@ -78,12 +78,15 @@ function working(d: Description, gear: Located, run: Run): { x: Float64Array; y:
   };
 }
 
-/** By straight lines between the nodes; beyond them the last value. */
+/** Linear on triangles between the nodes, as core/lostmotion/parts/loss_map.hpp has them; beyond the nodes the last value. */
 export function coefficient({ speeds, loads, values }: LossMap, v: number, mu: number): number {
   const [i, s] = place(speeds, v);
-  const [j, t] = place(loads, mu);
-  const at = (row: number): number => values[row]![i]! * (1 - s) + values[row]![i + 1]! * s;
-  return at(j) * (1 - t) + at(j + 1) * t;
+  const [j, r] = place(loads, mu);
+  const rising = loads[j]! + loads[j + 1]! >= 0;
+  const upper = rising ? r > s : r > 1 - s;
+  const [right, top] = [rising === upper ? 0 : 1, upper ? 1 : 0];
+  const at = (up: number, along: number): number => values[j + up]![i + along]!;
+  return at(top, right) + (at(top, 1) - at(top, 0)) * (s - right) + (at(1, right) - at(0, right)) * (r - top);
 }
 
 function place(nodes: number[], x: number): [number, number] {

@@ -32,13 +32,13 @@ export function format(value: number, digits = 4): string {
   return written.replace("-", "−");
 }
 
-/** Round values within [low, high], about `count` of them. */
+/** Round values within [low, high], about `count` of them, at most a third more. */
 export function ticks(low: number, high: number, count: number): number[] {
   const span = high - low;
   if (!(span > 0) || !Number.isFinite(span)) return [low];
   const raw = span / Math.max(1, count);
   const power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 5, 10].map((f) => f * power).find((s) => s >= raw * (1 - 1e-9))!;
+  const step = [1, 2, 5, 10].map((f) => f * power).find((s) => s >= 0.75 * raw)!;
   const first = Math.ceil(low / step - 1e-9);
   const last = Math.floor(high / step + 1e-9);
   return Array.from({ length: last - first + 1 }, (_, k) => Number(((first + k) * step).toPrecision(12)));

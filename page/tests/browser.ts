@@ -37,6 +37,7 @@ export interface Expected {
   as_it_is: Record<string, (number | null)[]>;
   changed: Record<string, (number | null)[]>;
   explained: { time: number; contacts: (string | number)[][]; motors: (string | number)[][] }[];
+  responses: { amplitude: number; frequency: number; re: number; im: number }[];
 }
 export function expected(directory: string, name: string): Expected {
   return JSON.parse(readFileSync(join(directory, `${name}.json`), "utf-8")) as Expected;

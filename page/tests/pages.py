@@ -54,6 +54,16 @@ def explanations(scenario: lm.Scenario | lm.TrainScenario, name: str) -> list[di
     return found
 
 
+def responses(scenario: lm.Scenario) -> list[dict[str, float]]:
+    """Of the load's speed, by periodic motions."""
+    found = lm.frequency_response(scenario, [0.5, 5.0, 30.0], [1.0, 0.1])["response"].sel(output="load_speed")
+    cells = [cell for row in found for cell in row]
+    return [
+        {"amplitude": float(c.amplitude), "frequency": float(c.frequency), "re": complex(c).real, "im": complex(c).imag}
+        for c in cells
+    ]
+
+
 def main(directory: Path) -> None:
     """For each page NAME.html and NAME.json."""
     directory.mkdir(parents=True, exist_ok=True)
@@ -65,6 +75,7 @@ def main(directory: Path) -> None:
             "as_it_is": samples(scenario),
             "changed": samples(scenario.replace(**changes)),
             "explained": explanations(scenario, page),
+            "responses": responses(scenario) if page == "drive" else [],
         }
         (directory / f"{page}.json").write_text(json.dumps(expected))
 

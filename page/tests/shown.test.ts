@@ -1,7 +1,10 @@
-import { expect, test } from "vitest";
+import { join } from "node:path";
+import { expect, inject, test } from "vitest";
+import { Core } from "../src/core";
 import { flows } from "../src/energy_card";
 import { extent, padded } from "../src/extent";
-import { coefficient } from "../src/map_card";
+import { coefficient, working } from "../src/map_card";
+import { coreOf, descriptionOf } from "./browser";
 import { format, logarithmicTicks, shown, ticks } from "../src/units";
 
 test("units take the prefix that reads well", () => {
@@ -20,6 +23,7 @@ test("ticks are round and within the range", () => {
   expect(ticks(-0.3, 1.1, 5)).toEqual([0, 0.5, 1]);
   expect(ticks(0, 2, 4)).toEqual([0, 0.5, 1, 1.5, 2]);
   expect(ticks(3, 3, 4)).toEqual([3]);
+  expect(ticks(-0.43, 0.43, 4)).toEqual([-0.4, -0.2, 0, 0.2, 0.4]);
   expect(logarithmicTicks(0.5, 20)).toEqual([0.5, 1, 2, 5, 10, 20]);
 });
 
@@ -50,4 +54,16 @@ test("the loss map is what stands at its nodes, and the last value beyond them",
   };
   expect([coefficient(map, 1, -1), coefficient(map, 3, 1), coefficient(map, 9, 9)]).toEqual([2, 7, 7]);
   expect(coefficient(map, 2, 0)).toBeCloseTo((2 + 3 + 6 + 7) / 4, 12);
+});
+
+test("the working point stands in the map where the core takes its losses", async () => {
+  const file = join(inject("directory"), "drive.html");
+  const d = descriptionOf(file);
+  const run = (await Core.load(coreOf(file))).run(d.core);
+  const gear = d.gears[0]!;
+  const { x, y } = working(d, { ...gear, losses: gear.losses! }, run);
+  const taken = run.values.get("loss_coefficient")!;
+  const slips = [...run.values.get("input_contact")!.keys()].filter((k) => run.values.get("input_contact")![k] !== 0);
+  expect(slips.length).toBeGreaterThan(500);
+  for (const k of slips) expect(coefficient(gear.losses!, x[k]!, y[k]!)).toBeCloseTo(taken[k]!, 12);
 });
