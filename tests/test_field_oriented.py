@@ -3,9 +3,12 @@
 import itertools
 import json
 import math
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
@@ -475,6 +478,31 @@ def test_the_bound_is_in_the_summary_and_the_heat_is_that_of_both_currents() -> 
     assert lm.motor_current(result)["current"].to_numpy() == pytest.approx(both)
     voltage = np.hypot(result["direct_voltage"], result["quadrature_voltage"]).to_numpy()
     assert lm.motor_current(result)["voltage"].to_numpy() == pytest.approx(voltage)
+
+
+def test_the_bound_of_each_run_is_a_column_of_a_study(tmp_path: Path) -> None:
+    one = scenario(changed(ROUND, J_M=1e-3, reference=3.0), 30)
+    study = lm.Study(
+        scenario=one,
+        vary=[{"key": "controller.reference.mean", "values": [1.0, 3.0]}],
+        keep={"torque": "final(motor_torque_error_bound)", "speed": "peak(motor_speed_error_bound)"},
+    )
+    table = pq.ParquetDataset(lm.study(study, tmp_path / "rows")).read()
+    for row, mean in enumerate((1.0, 3.0)):
+        bound = json.loads(lm.simulate(one.replace(**{"controller.reference.mean": mean})).attrs["error_bound"])
+        assert table["torque"].to_pylist()[row] == bound["motor_torque"]
+        assert table["speed"].to_pylist()[row] == bound["motor_speed"]
+
+
+def test_currents_that_are_sampled_too_seldom_are_told() -> None:
+    """With 3 pole pairs a third of a turn is an electrical revolution; ten samples in one are the rule of thumb."""
+    slow = lm.load("field-weakening", {"controllers.m.sample_time": 250e-6, "simulation.duration": 0.3})
+    assert "warning" not in lm.simulate(slow.replace(**{"controllers.m.sample_time": 125e-6})).attrs
+    run = lm.simulate(slow)
+    fastest = float(np.abs(run["motor_speed"]).max())
+    turn = 2.0 * math.pi / (3 * fastest)
+    told = rf"m: at {fastest:.4g} rad/s .* {turn / 250e-6:.3g} times .* at most {turn / 10:.3g} s"
+    assert re.search(told, run.attrs["warning"])
 
 
 # --- another simulator ---

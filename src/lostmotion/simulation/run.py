@@ -25,7 +25,7 @@ from .train_scenario import TrainScenario
 from .train_variables import axis_variables, train_variables
 from .variables import STATES
 from .windings import ATTRIBUTE as ERROR_BOUND
-from .windings import coarser, error_bound, oriented
+from .windings import coarser, error_bound, oriented, too_slow
 
 if TYPE_CHECKING:
     import xarray
@@ -157,8 +157,10 @@ def run(
     )
     laws = as_laws(law, scenario.axes())
     control = scenario.control(laws)
-    if not any(oriented(scenario)) or not all(one.repeatable for one in laws.values()):
+    if not any(oriented(scenario)):
         return whole_run(scenario, options, how, control)
+    if not all(one.repeatable for one in laws.values()):
+        return _warned(scenario, whole_run(scenario, options, how, control))
     again = (scenario, (*options[:3], False, *options[4:]), how, coarser(scenario.control(laws)))
     if laws or table.duration > SIDE_BY_SIDE * control[0]:
         result = whole_run(scenario, options, how, control)
@@ -169,6 +171,13 @@ def run(
             result = whole_run(scenario, options, how, control)
             coarse = waiting.result()
     result.attrs[ERROR_BOUND] = json.dumps(error_bound(scenario, result.values, coarse.values))
+    return _warned(scenario, result)
+
+
+def _warned(scenario: Scenario | TrainScenario, result: RawResult) -> RawResult:
+    """With what is to be said of the sampling of its currents."""
+    if text := too_slow(scenario, result.values):
+        result.attrs["warning"] = " ".join(filter(None, [result.attrs.get("warning"), text]))
     return result
 
 

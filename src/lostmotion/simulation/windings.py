@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -14,6 +15,8 @@ from .scenario import Scenario
 from .train_scenario import TrainScenario
 
 ATTRIBUTE = "error_bound"
+UNITS = {"current": "A", "torque": "N*m", "speed": "rad/s"}
+FEWEST = 10  # samples of the currents in an electrical revolution, by the rule of thumb of makers of drives
 AGREEMENT = 1e-10  # relative, to which the passes and rounding hold currents and speeds
 
 
@@ -74,6 +77,37 @@ def bounded(scenario: Scenario | TrainScenario) -> dict[str, str]:
 def bounds_of(names: Mapping[str, str], largest: Mapping[str, float], apart: Mapping[str, float]) -> dict[str, float]:
     """Bounds by variable, from the largest values of one run and the largest differences of both."""
     return {name: apart[name] + AGREEMENT * max(largest[name], largest[other]) for name, other in names.items()}
+
+
+def bound_names(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str, str]]:
+    """What the bounds are called as values of a run, with the variable that each is of and its unit."""
+    for name in bounded(scenario):
+        unit = next(unit for end, unit in UNITS.items() if name.endswith(end))
+        yield f"{name}_{ATTRIBUTE}", name, unit
+
+
+def bound_values(
+    scenario: Scenario | TrainScenario, attributes: Mapping[str, Any], samples: int
+) -> dict[str, np.ndarray]:
+    """The same of a run with these attributes, the same at each of its samples."""
+    bounds = json.loads(attributes.get(ATTRIBUTE, "{}"))
+    return {title: np.full(samples, bounds[name]) for title, name, _ in bound_names(scenario)}
+
+
+def too_slow(scenario: Scenario | TrainScenario, values: Mapping[str, Any]) -> str:
+    """Which currents are sampled too seldom for how fast their rotor has turned in a run; empty where all is well."""
+    found = []
+    for prefix, shaft, phase in oriented(scenario):
+        motor = prefix.removesuffix("_") or "motor"
+        controller = scenario.axes()[motor]
+        speed, time = float(np.max(np.abs(values[f"{shaft}_speed"]))), controller.loop_time("current")
+        turn = 2.0 * math.pi / (phase.pole_pairs * speed) if speed > 0.0 else math.inf
+        if time * FEWEST > turn:
+            found.append(
+                f"{motor}: at {speed:.4g} rad/s the currents are sampled {turn / time:.3g} times in an electrical revolution, and below "
+                f"{FEWEST} field-oriented control gets poor or unstable; take a sample time of at most {turn / FEWEST:.3g} s."
+            )
+    return " ".join(found)
 
 
 def errors_of(result: Any) -> dict[str, float]:

@@ -15,6 +15,7 @@ from ..simulation.scenario import Scenario
 from ..simulation.train_parts import parts_of
 from ..simulation.train_results import add_derived_of_train, core_case
 from ..simulation.train_scenario import TrainScenario
+from ..simulation.windings import bound_values
 from .check import COLUMNS, check_columns
 from .functions import REDUCTIONS
 from .runs import Runs, spread
@@ -48,7 +49,7 @@ def run_each(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         except (RuntimeError, ValueError) as error:
             runs.errors[k] = str(error)
             return
-        values = result.values | pointing_errors(scenario, result)
+        values = result.values | pointing_errors(scenario, result) | bound_values(scenario, result.attrs, samples)
         for c in sampled:
             runs.samples[c][k] = values[c]
         if energy:

@@ -11,6 +11,7 @@ from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.train_variables import axis_variables, train_variables
 from ..simulation.variables import CHANNEL_NAMES, VARIABLES
+from ..simulation.windings import bound_names
 
 OF_THE_RUN = ("energy", "time", "ideal_speed", "bandwidth")
 """further names: the ledger; the instants; the load speed of a rigid drive without inertia, friction and load under the same
@@ -38,12 +39,14 @@ OF_DRIVES = Vocabulary(
 
 
 def _controlled(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str]]:
-    """What controllers add: their signals, and by how much each axis misses its reference."""
+    """What controllers add: their signals, by how much each axis misses its reference, and how far windings may be wrong."""
     drive = isinstance(scenario, Scenario)
     for variable in axis_variables({"" if drive else motor: c for motor, c in scenario.axes().items()}):
         yield variable.name, variable.unit
     for _, name in pointing_names(scenario):
         yield name, "rad"
+    for name, _, unit in bound_names(scenario):
+        yield name, unit
 
 
 def vocabulary_of(scenario: Scenario | TrainScenario) -> Vocabulary:
