@@ -91,6 +91,47 @@ def fly_by(out: Path) -> None:
     _save(out, "tracking-fly-by", panels, 2, (10.0, 3.6))
 
 
+def by_camera(out: Path) -> None:
+    """The camera's fly-by over time, and what its latency costs with and without prediction."""
+    shipped = lm.load("tracking-camera")
+    known = lm.load("tracking-loss-map")
+    late = {"controller.tracker.prediction": False}
+    ways = {
+        "target known": (known, GREY),
+        "camera, predicted": (shipped, DARK),
+        "camera, not predicted": (shipped.replace(**late), LIGHT),
+    }
+    errors = []
+    for label, (scenario, style) in ways.items():
+        t, error = _error(scenario)
+        errors.append(Curve(label, t[t > SETTLED], 1e3 * error[t > SETTLED], style))
+    latencies = np.array([0.0, 0.02, 0.04, 0.06, 0.08, 0.1])
+    over = []
+    for label, changes, style in (("predicted", {}, DARK), ("not predicted", late, LIGHT)):
+        rms = [_rms(shipped.replace(**changes, **{"controller.camera.latency": x})) for x in latencies.tolist()]
+        over.append(Curve(label, 1e3 * latencies, 1e3 * np.array(rms), style))
+    panels = [
+        Panel("elevation of a fly-by: target less load", "time [s]", "error [mrad]", tuple(errors)),
+        Panel("its rms after 2 s", "latency of the camera [ms]", "error [mrad]", tuple(over)),
+    ]
+    _save(out, "tracking-camera", panels, 2, (10.0, 3.6))
+
+
+SETTLED = 2.0  # s, after which the tracker has found the target
+
+
+def _error(scenario: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Instants [s], and the reference less the load [rad]."""
+    run = lm.simulate(scenario, energy=False)
+    t = run["time"].to_numpy()
+    return t, scenario.controller.reference.at(t)[0] - run["load_angle"].to_numpy()
+
+
+def _rms(scenario: Any) -> float:
+    t, error = _error(scenario)
+    return float(np.sqrt(np.mean(error[t > SETTLED] ** 2)))
+
+
 def _save(out: Path, name: str, panels: list[Panel], columns: int, size: tuple[float, float]) -> None:
     plots.draw(panels, columns, size).savefig(out / f"{name}.png", metadata={"Software": None})
 
@@ -99,6 +140,7 @@ def write(out: Path) -> None:
     """All figures of the page into a directory."""
     over_amplitude(out)
     fly_by(out)
+    by_camera(out)
 
 
 if __name__ == "__main__":
