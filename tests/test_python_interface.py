@@ -138,6 +138,20 @@ def test_a_figure_shows_itself_in_a_notebook_and_leaves_the_user_s_settings_alon
     assert dict(mpl.rcParams) == before
 
 
+def test_the_summary_counts_what_contacts_do() -> None:
+    """Against the switchings themselves: a contact sticks as often as it slips, or once more or less."""
+    result = lm.simulate(lm.load("paper-2dof-nl-small"))
+    switchings = lm.switchings_of(result)
+    before, after = (switchings[f"input_contact_{when}"].values for when in ("before", "after"))
+    sticks, slips = int(np.sum((before != 0) & (after == 0))), int(np.sum((before == 0) & (after != 0)))
+    assert sticks > 0
+    assert abs(sticks - slips) <= 1
+    assert f"  contacts [times]: input sticks {sticks}, slips {slips}" in result.lm.summary()
+    train = lm.simulate(lm.load("direction-finder", {"simulation.duration": 0.3})).lm.summary()
+    (line,) = [line for line in train.splitlines() if "contacts [times]" in line]
+    assert "traverse gear twist sticks " in line
+
+
 def test_a_result_knows_its_scenario_summary_and_energy() -> None:
     result = lm.simulate(SMALL)
     assert result.lm.scenario == SMALL

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..simulation.results import RawResult, energy_of, is_train_result
+from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
+from ..simulation.switchings import names_in, unpacked
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.windings import errors_of
 
@@ -52,10 +54,30 @@ def summary(result: xarray.Dataset | RawResult) -> str:
         )
         if e["turned_over"] > 0.0:
             lines.append(f"  energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}")
-    lines += error_lines(result)
+    lines += [*contact_lines(result), *error_lines(result)]
     lines += [f"  warning: {result.attrs['warning']}"] if "warning" in result.attrs else []
     lines += [f"  note: {result.attrs['note']}"] if "note" in result.attrs else []
     return "\n".join(lines)
+
+
+def contact_lines(result: xarray.Dataset | RawResult) -> list[str]:
+    """How often each contact has come to stick, slipped again and turned around, of the switchings that the result keeps."""
+    if not result.attrs.get(SWITCHINGS):
+        return []
+    names = names_in(result.attrs)
+    modes = unpacked(result.attrs)
+    found = []
+    for name in (n.removesuffix("_before") for n in names if n.endswith("_contact_before")):
+        before, after = (modes[:, names.index(f"{name}_{when}")] for when in ("before", "after"))
+        counts = {
+            "sticks": (before != 0) & (after == 0),
+            "slips": (before == 0) & (after != 0),
+            "turns around": (before != 0) & (after == -before),
+        }
+        parts = [f"{what} {n}" for what, rows in counts.items() if (n := int(rows.sum()))]
+        if parts:
+            found.append(f"{name.removesuffix('_contact').replace('_', ' ')} {', '.join(parts)}")
+    return [f"  contacts [times]: {'; '.join(found)}"] if found else []
 
 
 def error_lines(result: xarray.Dataset | RawResult) -> list[str]:
@@ -100,6 +122,6 @@ def train_summary(result: xarray.Dataset | RawResult) -> str:
         lines.append(f"  energy [J]: {parts or 'none'}")
         if e["turned_over"] > 0.0:
             lines.append(f"  energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}")
-    lines += error_lines(result)
+    lines += [*contact_lines(result), *error_lines(result)]
     lines += [f"  {kind}: {result.attrs[kind]}" for kind in ("warning", "note") if kind in result.attrs]
     return "\n".join(lines)

@@ -39,6 +39,12 @@ def packed(table: Any) -> str:
     return base64.b64encode(np.ascontiguousarray(table, dtype="<f8").tobytes()).decode()
 
 
+def unpacked(attributes: Mapping[str, Any]) -> np.ndarray:
+    """The table again: a row for each switching, a column for each of `names_in`."""
+    table = np.frombuffer(base64.b64decode(attributes[ATTRIBUTE]), dtype="<f8")
+    return table.reshape(-1, len(names_in(attributes)))
+
+
 def packed_again(columns: Mapping[str, Any], attributes: Mapping[str, Any]) -> str:
     """The same from the columns of `switchings_of`."""
     return packed(np.stack([np.asarray(columns[name], dtype="<f8") for name in names_in(attributes)], axis=1))
@@ -73,7 +79,7 @@ def switchings_of(result: xarray.Dataset) -> xarray.Dataset:
         )
     names = names_in(result.attrs)
     causes = TRAIN_CAUSES if CONTACTS_OF_TRAIN in result.attrs else CAUSES
-    rows = np.frombuffer(base64.b64decode(result.attrs[ATTRIBUTE]), dtype="<f8").reshape(-1, len(names))
+    rows = unpacked(result.attrs)
     variables = {}
     for name, values in zip(names, rows.T, strict=True):
         own = values.copy() if name == "instant" or name in TORQUES else values.astype(np.int8)
