@@ -168,7 +168,7 @@ def commission(
     loops, steps = [], []
     for name in axis.loops:
         for regime in points:
-            loops.append(_loop_sheet(axis, regime, name))
+            loops.append(loop_sheet(axis, regime, name))
         if name in STEPPED:
             steps.append(step_response(axis, name))
         progress()
@@ -197,7 +197,8 @@ def work(scenario: Scenario | TrainScenario, motor: str | None = None) -> int:
     return len(axis_of(scenario, motor).loops) + 2
 
 
-def _loop_sheet(axis: Axis, regime: Regime, loop: str) -> LoopSheet:
+def loop_sheet(axis: Axis, regime: Regime, loop: str) -> LoopSheet:
+    """Of one loop in one regime."""
     cut, closed = (SampledLoop(axis, regime, loop, is_cut) for is_cut in (True, False))
     f = frequencies(cut, closed)
 
