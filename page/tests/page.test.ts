@@ -115,24 +115,16 @@ test("why it stands still is told for the instant shown, and follows a slider", 
 
 test("a long run is worked out beside the page, which moves on meanwhile", async () => {
   const { page, seen } = await open("axis", {}, "#simulation.duration=13");
-  const before = await page.textContent("#summary");
-  const longest = await page.evaluate(async () => {
+  const frames = await page.evaluate(async () => {
     const slider = document.querySelector<HTMLInputElement>('[id="controller.position.gain"]')!;
-    let [last, longest] = [performance.now(), 0];
+    const text = document.getElementById("summary")!.textContent;
     slider.value = "620";
     slider.dispatchEvent(new Event("input"));
-    const text = document.getElementById("summary")!.textContent;
-    while (document.getElementById("summary")!.textContent === text) {
-      await new Promise(requestAnimationFrame);
-      const now = performance.now();
-      if (document.getElementById("summary")!.textContent === text) longest = Math.max(longest, now - last);
-      last = now;
-    }
-    return longest;
+    let frames = 0; // a run in the page itself would end within the first
+    for (; document.getElementById("summary")!.textContent === text; ++frames) await new Promise(requestAnimationFrame);
+    return frames;
   });
-  const milliseconds = Number(/([\d.]+) ms/.exec(before!)![1]);
-  console.log(`a run of ${milliseconds} ms; longest frame meanwhile ${longest.toFixed(0)} ms`);
-  expect(longest).toBeLessThan(milliseconds);
+  expect(frames).toBeGreaterThan(2);
   expect(seen).toEqual([]);
   await page.close();
 });
