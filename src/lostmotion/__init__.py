@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from .data_sheets.sheet import Source as Source
     from .errors import InputError as InputError
     from .errors import MissingLibraryError as MissingLibraryError
+    from .identification.campaign import write_campaign as write_campaign
     from .identification.design import Candidate as Candidate
     from .identification.design import design_experiment as design_experiment
     from .identification.identify import IdentificationResult as IdentificationResult
@@ -187,6 +188,7 @@ _HOMES = {
     "data_sheets.records": ("catalogue",),
     "data_sheets.sheet": ("Source",),
     "errors": ("InputError", "MissingLibraryError"),
+    "identification.campaign": ("write_campaign",),
     "identification.design": ("Candidate", "design_experiment"),
     "identification.identify": ("IdentificationResult", "identify"),
     "identification.logs": ("Channel", "Log"),

@@ -31,6 +31,14 @@ def rig(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help='Change or add a value, e.g. --set temperature="40 degC".'),
     ] = None,
+    logs: Annotated[
+        Path | None,
+        typer.Option(
+            "--logs",
+            metavar="DIR",
+            help="Write logs of the rig's experiments and the file that identifies the gearbox from them, instead of the page.",
+        ),
+    ] = None,
 ) -> None:
     """Measure a gearbox on the virtual test rig and compare with its data sheet.
 
@@ -39,18 +47,27 @@ def rig(
     \b
     lostmotion rig schaeffler-rt1-h-20-100
     lostmotion rig my-gearbox.toml -o sheet --set loss_factor=1.3
+    lostmotion rig my-gearbox.toml --logs campaign
     """
     from ..data_sheets.gearbox_sheet import GearboxSheet
     from ..data_sheets.records import find
     from ..errors import need
     from ..simulation.scenario_files import gearbox_from_record
 
-    try_directory(output)
-    need("jinja2", "The page of the rig", "report")
+    try_directory(output if logs is None else logs)
+    if logs is None:
+        need("jinja2", "The page of the rig", "report")
 
     sheet = find(gearbox, "gearbox")
     assert isinstance(sheet, GearboxSheet)
     part, notes = gearbox_from_record(gearbox, overrides or ())
+    if logs is not None:
+        from ..identification.campaign import write_campaign
+
+        with busy("Running the rig"):
+            file = write_campaign(logs, part, title=f"{sheet.title or sheet.name}: logs of the virtual rig")
+        print(f"The logs are in {logs / 'logs'}; lostmotion identify {file} finds the gearbox in them")
+        return
     from ..test_rig.measurement import WORK, measure
 
     with progress(WORK, "Measuring") as step:

@@ -130,7 +130,7 @@ def _starts(point: Point, tried: dict[str, tuple[float, ...]]) -> Iterator[Point
 def _one(rig: Rig, engine: Engine, train: list[Prepared], rung: int, start: Point, name: str, notify: Notify) -> Fit:
     """Some logs first, then all."""
     options = rig.task.fit
-    few = several(train, options.first_logs)
+    few = [log for log in train if log.first] or several(train, options.first_logs)
 
     def tell(iteration: int, cost: float) -> None:
         notify(name, iteration, cost)
@@ -138,7 +138,8 @@ def _one(rig: Rig, engine: Engine, train: list[Prepared], rung: int, start: Poin
     fit = search(problem_of(rig, engine, few, rung), start, iterations=options.iterations, notify=tell)
     if len(few) == len(train):
         return fit
-    return search(problem_of(rig, engine, train, rung), fit.point, iterations=min(3, options.iterations), notify=tell)
+    rest = options.iterations if options.first is not None else min(3, options.iterations)
+    return search(problem_of(rig, engine, train, rung), fit.point, iterations=rest, notify=tell)
 
 
 def _means(task: Identification, errors: list[LogError], fit: Fit) -> tuple[float, float]:

@@ -45,6 +45,8 @@ class Prepared:
     held_out: bool
     weight: np.ndarray
     """of each sample, by which its errors are multiplied"""
+    first: bool
+    """whether the search is to begin with it"""
     cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -142,6 +144,7 @@ def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepar
         factor = channel_factor(unit, log.channels[channel].unit, units.get(variable, ""), f"{log.name}: {where}")
         return np.asarray(log.values(channel) * factor, dtype=float)
 
+    first = task.fit.first is not None and bool(_fact(task.fit.first, facts, log, "fit.first"))
     held_out = task.logs.held_out is not None and bool(_fact(task.logs.held_out, facts, log, "logs.held_out"))
     return Prepared(
         log,
@@ -152,6 +155,7 @@ def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepar
         _segments(task, log, facts),
         held_out,
         _weights(task, log, facts),
+        first,
     )
 
 

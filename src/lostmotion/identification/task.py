@@ -115,6 +115,8 @@ class FitOptions(Part):
     iterations: Annotated[Whole, Field(ge=1, le=500)] = 30
     first_logs: Annotated[Whole, Field(ge=1)] = 12
     """of which the search begins, before it takes all"""
+    first: FormulaText | None = None
+    """condition on the header of the logs with which the search begins, in place of `first_logs`: those without impacts"""
     sample_interval: Annotated[Time, Positive] | None = None
     """of the runs; left out, that of the log, at most 2 ms"""
 
@@ -176,6 +178,8 @@ class Identification(Part):
         ]
         found += [(f"phases[{k}].when", [phase.when]) for k, phase in enumerate(self.phases)]
         found.append(("logs.weight", [self.logs.weight]))
+        if self.fit.first is not None:
+            found.append(("fit.first", [self.fit.first]))
         return found + ([("logs.held_out", [self.logs.held_out])] if self.logs.held_out is not None else [])
 
     def rungs(self) -> tuple[Rung, ...]:
