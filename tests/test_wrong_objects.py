@@ -108,7 +108,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "load_task": (lm.load_task, {"path": "task.toml"}),
     "temperatures": (lm.temperatures, {"result": HEAT, "motor": None, "ambient": 25.0, "winding": 25.0, "case": 25.0, "repeated": False, "constant_resistance": False}),
     "to_control": (lm.to_control, {"response": RESPONSE, "amplitude": 1.0, "output": "load_speed"}),
-    "Simulation": (lm.Simulation, {"drive": SCENARIO, "step": 1e-3, "initial": None, "loaded": None, "law": None}),
+    "Simulation": (lm.Simulation, {"drive": SCENARIO, "step": 1e-3, "initial": None, "loaded": None, "law": None, "error_bound": False}),
     "Simulation of a train": (lm.Simulation, {"drive": TRAIN, "step": 1e-3, "initial": None, "loaded": ["worm"]}),
     "TestRig": (lm.TestRig, {"gearbox": SCENARIO.gearbox}),
     "ResultAccessor": (lm.ResultAccessor, {"dataset": RESULT}),
