@@ -13,6 +13,7 @@ import baseline
 import closed_loops
 import costs
 import gradients
+import identification
 import live
 import one_run
 import studies
@@ -23,7 +24,7 @@ import lostmotion as lm
 from lostmotion import _instruction_set
 
 ROOT = Path(__file__).parent.parent
-PEERS = ("numpy", "scipy", "numba", "pathsim", "mujoco", "rumoca", "xarray", "pyarrow")
+PEERS = ("numpy", "scipy", "numba", "pathsim", "mujoco", "rumoca", "cma", "xarray", "pyarrow")
 
 
 def start_up(*command: str) -> float:
@@ -87,6 +88,7 @@ def main() -> None:
     trains.section(report, programs)
     closed_loops.section(report, programs)
     gradients.section(report)
+    identification.section(report)
     costs.section(report, scenario, build, programs)
     studies.section(report, scenario)
     start_up_section(report)

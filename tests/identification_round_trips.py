@@ -1,6 +1,6 @@
 """Random servos, their logs with noise and quantisation, and how often the 95 % intervals hold the truth.
 
-    .venv/bin/python tests/identification_round_trips.py 60
+    .venv/bin/python tests/identification_round_trips.py 100
 
 prints for each parameter how many of the intervals hold its value. The result stands in docs/verification.md.
 """

@@ -12,6 +12,7 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion.identification.prepare import prepared, read_all
 from lostmotion.identification.rig import Rig
+from lostmotion.identification.runs import run_log
 from lostmotion.identification.task import Identification, load_identification
 
 EXAMPLE = ROOT / "examples" / "cycloidal"
@@ -92,7 +93,7 @@ def test_the_angle_of_the_rotor_is_that_behind_its_gears() -> None:
     task, rig = task_of()
     (log,) = [prepared(task, log, rig.units) for log in read_all(task, EXAMPLE)]
     values = {name: p.start for name, p in {**task.parameters, **task.nuisance}.items()}
-    run = rig.run(log, values, 0, ("rotor_angle", "cycloid_twist", "pins_twist", "output_angle"))
+    run = run_log(rig, log, values, 0, ("rotor_angle", "cycloid_twist", "pins_twist", "output_angle"))
     assert run["rotor_angle"] == pytest.approx(13.0 * (run["cycloid_twist"] + run["pins_twist"] + run["output_angle"]))
     assert np.ptp(run["cycloid_twist"]) > 1e-4 < np.ptp(run["pins_twist"])
 

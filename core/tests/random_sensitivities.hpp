@@ -9,7 +9,7 @@
 
 namespace lostmotion::model {
 
-struct SensitiveCase {
+struct RandomCase {
     Train train;
     std::vector<Signal> inputs;
     TrainStart start;
@@ -19,58 +19,56 @@ struct SensitiveCase {
 // A number that a run depends on.
 struct Knob {
     std::string name;
-    std::function<double&(SensitiveCase&)> at;
-    std::function<void(SensitiveCase&, double)> set_value;  // where it is no number of its own
+    std::function<double&(RandomCase&)> at;
+    std::function<void(RandomCase&, double)> set_value;  // where it is no number of its own
 
-    double get(const SensitiveCase& c) const {
-        SensitiveCase copy = c;
+    double get(const RandomCase& c) const {
+        RandomCase copy = c;
         return at(copy);
     }
-    void set(SensitiveCase& c, double v) const { set_value ? set_value(c, v) : static_cast<void>(at(c) = v); }
+    void set(RandomCase& c, double v) const { set_value ? set_value(c, v) : static_cast<void>(at(c) = v); }
 };
 
 // Everything of a case that is a number other than 0 and can be changed by itself.
-inline std::vector<Knob> knobs(const SensitiveCase& c) {
+inline std::vector<Knob> knobs(const RandomCase& c) {
     std::vector<Knob> out;
-    const auto add = [&](std::string name, std::function<double&(SensitiveCase&)> at) {
+    const auto add = [&](std::string name, std::function<double&(RandomCase&)> at) {
         Knob k{std::move(name), std::move(at), {}};
         if (const double v = k.get(c); v != 0.0 && std::isfinite(v)) out.push_back(std::move(k));
     };
     const auto number = [](std::size_t k) { return std::to_string(k); };
     for (std::size_t s = 0; s < c.train.shafts.size(); ++s) {
-        add("inertia" + number(s), [s](SensitiveCase& x) -> double& { return x.train.shafts[s].inertia; });
-        add("viscous" + number(s), [s](SensitiveCase& x) -> double& { return x.train.shafts[s].viscous_friction; });
-        add("friction" + number(s), [s](SensitiveCase& x) -> double& { return x.train.shafts[s].friction.torque; });
+        add("inertia" + number(s), [s](RandomCase& x) -> double& { return x.train.shafts[s].inertia; });
+        add("viscous" + number(s), [s](RandomCase& x) -> double& { return x.train.shafts[s].viscous_friction; });
+        add("friction" + number(s), [s](RandomCase& x) -> double& { return x.train.shafts[s].friction.torque; });
         add("breakaway" + number(s),
-            [s](SensitiveCase& x) -> double& { return x.train.shafts[s].friction.breakaway_torque; });
+            [s](RandomCase& x) -> double& { return x.train.shafts[s].friction.breakaway_torque; });
         for (std::size_t k = 0; k < c.train.shafts[s].friction.torques.size(); ++k)
             add("friction" + number(s) + "_torque" + number(k),
-                [s, k](SensitiveCase& x) -> double& { return x.train.shafts[s].friction.torques[k]; });
+                [s, k](RandomCase& x) -> double& { return x.train.shafts[s].friction.torques[k]; });
         for (std::size_t k = 1; k < c.train.shafts[s].friction.speeds.size(); ++k)
             add("friction" + number(s) + "_speed" + number(k),
-                [s, k](SensitiveCase& x) -> double& { return x.train.shafts[s].friction.speeds[k]; });
+                [s, k](RandomCase& x) -> double& { return x.train.shafts[s].friction.speeds[k]; });
     }
     for (std::size_t m = 0; m < c.train.motors.size(); ++m) {
-        add("rated_torque" + number(m),
-            [m](SensitiveCase& x) -> double& { return x.train.motors[m].law.rated_torque; });
-        add("rated_speed" + number(m), [m](SensitiveCase& x) -> double& { return x.train.motors[m].law.rated_speed; });
+        add("rated_torque" + number(m), [m](RandomCase& x) -> double& { return x.train.motors[m].law.rated_torque; });
+        add("rated_speed" + number(m), [m](RandomCase& x) -> double& { return x.train.motors[m].law.rated_speed; });
         add("time_constant" + number(m),
-            [m](SensitiveCase& x) -> double& { return x.train.motors[m].law.electrical_time_constant; });
+            [m](RandomCase& x) -> double& { return x.train.motors[m].law.electrical_time_constant; });
         add("motor_friction" + number(m),
-            [m](SensitiveCase& x) -> double& { return x.train.motors[m].law.friction_torque; });
-        add("torque_limit" + number(m), [m](SensitiveCase& x) -> double& { return x.train.motors[m].torque_limit; });
-        add("voltage_limit" + number(m),
-            [m](SensitiveCase& x) -> double& { return x.train.motors[m].law.voltage_limit; });
+            [m](RandomCase& x) -> double& { return x.train.motors[m].law.friction_torque; });
+        add("torque_limit" + number(m), [m](RandomCase& x) -> double& { return x.train.motors[m].torque_limit; });
+        add("voltage_limit" + number(m), [m](RandomCase& x) -> double& { return x.train.motors[m].law.voltage_limit; });
     }
     for (std::size_t g = 0; g < c.train.gears.size(); ++g) {
         if (c.train.gears.size() + c.train.couplings.size() < c.train.shafts.size())
-            add("ratio" + number(g), [g](SensitiveCase& x) -> double& { return x.train.gears[g].law.ratio; });
-        add("mesh_damping" + number(g), [g](SensitiveCase& x) -> double& { return x.train.gears[g].mesh_damping; });
+            add("ratio" + number(g), [g](RandomCase& x) -> double& { return x.train.gears[g].law.ratio; });
+        add("mesh_damping" + number(g), [g](RandomCase& x) -> double& { return x.train.gears[g].mesh_damping; });
         if (c.train.gears[g].law.hysteresis_efficiency < 1.0)
             add("hysteresis" + number(g),
-                [g](SensitiveCase& x) -> double& { return x.train.gears[g].law.hysteresis_efficiency; });
+                [g](RandomCase& x) -> double& { return x.train.gears[g].law.hysteresis_efficiency; });
         if (c.train.gears[g].law.efficiency < 1.0)
-            add("efficiency" + number(g), [g](SensitiveCase& x) -> double& { return x.train.gears[g].law.efficiency; });
+            add("efficiency" + number(g), [g](RandomCase& x) -> double& { return x.train.gears[g].law.efficiency; });
         if (!c.train.gears[g].rigid()) {
             const TorsionCurve curve = c.train.gears[g].law.curve;
             const int last = curve.outermost_piece();
@@ -85,23 +83,22 @@ inline std::vector<Knob> knobs(const SensitiveCase& c) {
             };
             for (std::size_t n = 0; n < slopes.size(); ++n)
                 if (slopes[n] != 0.0)
-                    out.push_back(
-                        {"stiffness" + number(g) + "_" + number(n),
-                         [=](SensitiveCase&) -> double& { return *value = slopes[n]; },
-                         [=](SensitiveCase& x, double v) { x.train.gears[g].law.curve = with(false, n, v); }});
+                    out.push_back({"stiffness" + number(g) + "_" + number(n),
+                                   [=](RandomCase&) -> double& { return *value = slopes[n]; },
+                                   [=](RandomCase& x, double v) { x.train.gears[g].law.curve = with(false, n, v); }});
             for (std::size_t n = 0; n < edges.size(); ++n)
                 out.push_back({"play" + number(g) + "_" + number(n),
-                               [=](SensitiveCase&) -> double& { return *value = edges[n]; },
-                               [=](SensitiveCase& x, double v) { x.train.gears[g].law.curve = with(true, n, v); }});
+                               [=](RandomCase&) -> double& { return *value = edges[n]; },
+                               [=](RandomCase& x, double v) { x.train.gears[g].law.curve = with(true, n, v); }});
         }
     }
     for (std::size_t k = 0; k < c.train.couplings.size(); ++k)
-        add("coupling" + number(k), [k](SensitiveCase& x) -> double& { return x.train.couplings[k].torque; });
+        add("coupling" + number(k), [k](RandomCase& x) -> double& { return x.train.couplings[k].torque; });
     for (std::size_t k = 0; k < c.train.brakes.size(); ++k)
-        add("brake" + number(k), [k](SensitiveCase& x) -> double& { return x.train.brakes[k].torque; });
+        add("brake" + number(k), [k](RandomCase& x) -> double& { return x.train.brakes[k].torque; });
     for (std::size_t a = 0; a < c.control.axes.size(); ++a) {
         const auto of_axis = [&](const char* name, auto member) {
-            add(name + number(a), [a, member](SensitiveCase& x) -> double& { return member(x.control.axes[a].law); });
+            add(name + number(a), [a, member](RandomCase& x) -> double& { return member(x.control.axes[a].law); });
         };
         using control::Axis;
         of_axis("speed_gain", [](Axis& x) -> double& { return x.speed_loop.gain; });
@@ -123,39 +120,37 @@ inline std::vector<Knob> knobs(const SensitiveCase& c) {
     for (std::size_t i = 0; i < c.inputs.size(); ++i) {
         for (std::size_t k = 0; k < c.inputs[i].breakpoints.size(); ++k) {
             add("value" + number(i) + "_" + number(k),
-                [i, k](SensitiveCase& x) -> double& { return x.inputs[i].breakpoints[k].value; });
+                [i, k](RandomCase& x) -> double& { return x.inputs[i].breakpoints[k].value; });
             add("slope" + number(i) + "_" + number(k),
-                [i, k](SensitiveCase& x) -> double& { return x.inputs[i].breakpoints[k].slope; });
+                [i, k](RandomCase& x) -> double& { return x.inputs[i].breakpoints[k].slope; });
             add("time" + number(i) + "_" + number(k),
-                [i, k](SensitiveCase& x) -> double& { return x.inputs[i].breakpoints[k].time; });
+                [i, k](RandomCase& x) -> double& { return x.inputs[i].breakpoints[k].time; });
         }
         for (std::size_t k = 0; k < c.inputs[i].sines.size(); ++k) {
-            add("amplitude" + number(i),
-                [i, k](SensitiveCase& x) -> double& { return x.inputs[i].sines[k].amplitude; });
-            add("frequency" + number(i),
-                [i, k](SensitiveCase& x) -> double& { return x.inputs[i].sines[k].frequency; });
-            add("phase" + number(i), [i, k](SensitiveCase& x) -> double& { return x.inputs[i].sines[k].phase; });
+            add("amplitude" + number(i), [i, k](RandomCase& x) -> double& { return x.inputs[i].sines[k].amplitude; });
+            add("frequency" + number(i), [i, k](RandomCase& x) -> double& { return x.inputs[i].sines[k].frequency; });
+            add("phase" + number(i), [i, k](RandomCase& x) -> double& { return x.inputs[i].sines[k].phase; });
         }
     }
     return out;
 }
 
-inline SensitiveCase with(const SensitiveCase& c, const Knob& knob, double value) {
-    SensitiveCase out = c;
+inline RandomCase with(const RandomCase& c, const Knob& knob, double value) {
+    RandomCase out = c;
     knob.set(out, value);
     return out;
 }
 
 // The parts of a case that a knob is of.
-inline Variation variation(const SensitiveCase& c, const Knob& knob) {
+inline Variation variation(const RandomCase& c, const Knob& knob) {
     const double p = knob.get(c), h = 0x1p-11 * std::fabs(p);
     Variation v{knob.name, {}};
     for (const auto& [offset, weight] : {std::pair{-2.0, 1.0}, {-1.0, -8.0}, {1.0, 8.0}, {2.0, -1.0}}) {
-        const SensitiveCase at = with(c, knob, p + offset * h);
+        const RandomCase at = with(c, knob, p + offset * h);
         Neighbour n;
         n.offset = offset * h;
         n.weight = weight / (12.0 * h);
-        n.train = at.train;
+        n.train = std::make_shared<const lostmotion::TrainRun>(at.train);
         n.inputs = at.inputs;
         n.start = at.start;
         if (c.control.present()) n.control = at.control;
@@ -171,16 +166,15 @@ struct SensitiveRecord {
     SensitivityOutput output;
 
     // all: of states and torques.
-    SensitiveRecord(const SensitiveCase& c, const std::vector<Variation>& variations, double duration,
-                    double interval) {
-        const lostmotion::TrainRun run(c.train);
+    SensitiveRecord(const RandomCase& c, const std::vector<Variation>& variations, double duration, double interval) {
+        const auto run = std::make_shared<const lostmotion::TrainRun>(c.train);
         TrainOptions options;
         options.duration = duration;
         options.sample_interval = interval;
         options.energy = false;
         options.control = c.control;
         samples = options.samples = static_cast<std::size_t>(duration / interval + 1.5);
-        channels = run.channels().size();
+        channels = run->channels().size();
         std::vector<int> all(channels);
         std::iota(all.begin(), all.end(), 0);
         options.channels = all;
@@ -188,12 +182,7 @@ struct SensitiveRecord {
         values.resize(channels * samples);
         derivatives.resize(variations.size() * channels * samples);
         output.out = derivatives.data();
-        if (variations.empty()) {
-            const auto [x, memory] = run.in_layout(c.start);
-            report = run.run(c.inputs, x, memory, options, values.data());
-        } else {
-            report = run_with_derivatives(run, c.inputs, c.start, variations, options, values.data(), output);
-        }
+        report = run_with_derivatives({run, c.inputs, c.start, options, variations}, values.data(), output);
     }
     bool done() const { return report.message.empty() && report.status == Status::done && !report.too_many_guards; }
 };
@@ -205,7 +194,7 @@ struct SensitivityTally {
 };
 
 // Central differences of sixth order with steps that halve; doubt: by how much they differ, and rounding.
-inline void differences_of_run(const SensitiveCase& c, const Knob& knob, double duration, double interval,
+inline void differences_of_run(const RandomCase& c, const Knob& knob, double duration, double interval,
                                std::vector<double>& best, std::vector<double>& doubt) {
     const double p = knob.get(c);
     std::vector<double> last;
@@ -240,7 +229,7 @@ inline void differences_of_run(const SensitiveCase& c, const Knob& knob, double 
     }
 }
 
-inline void compare_sensitivities(const SensitiveCase& c, const std::vector<Knob>& chosen, double duration,
+inline void compare_sensitivities(const RandomCase& c, const std::vector<Knob>& chosen, double duration,
                                   SensitivityTally& tally, double near = 1e-8, const char* tell = nullptr) {
     const double interval = duration / 20.0;
     std::vector<Variation> variations;
@@ -295,9 +284,9 @@ inline void compare_sensitivities(const SensitiveCase& c, const std::vector<Knob
 }
 
 // A random train, under controllers or not.
-inline SensitiveCase random_case(RandomTrains& random, int shafts, double duration, bool closed_loop) {
+inline RandomCase random_case(RandomTrains& random, int shafts, double duration, bool closed_loop) {
     const RandomRun r(random, shafts, duration);
-    SensitiveCase c{r.train, r.inputs, {}, {}};
+    RandomCase c{r.train, r.inputs, {}, {}};
     if (!closed_loop) return c;
     const Assembly a(r.train);
     c.control = random_control(random, a);
@@ -307,7 +296,7 @@ inline SensitiveCase random_case(RandomTrains& random, int shafts, double durati
 }
 
 // Some of the knobs of a case.
-inline std::vector<Knob> some_knobs(RandomTrains& random, const SensitiveCase& c, int count) {
+inline std::vector<Knob> some_knobs(RandomTrains& random, const RandomCase& c, int count) {
     std::vector<Knob> all = knobs(c), out;
     for (; count > 0 && !all.empty(); --count) {
         const auto k = static_cast<std::size_t>(random.pick(0, static_cast<int>(all.size()) - 1));

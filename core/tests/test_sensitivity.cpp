@@ -14,7 +14,7 @@ SensitivityTally compare_random(unsigned seed, int trains, bool closed_loop) {
     for (int n = 0; n < trains; ++n) {
         CAPTURE(n);
         RandomTrains random(seed + static_cast<unsigned>(n));
-        const SensitiveCase c = random_case(random, 5, 0.3, closed_loop);
+        const RandomCase c = random_case(random, 5, 0.3, closed_loop);
         compare_sensitivities(c, some_knobs(random, c, 1), 0.3, tally, 1e-8, "differs");
     }
     return tally;

@@ -9,7 +9,7 @@ namespace lostmotion {
 #define LOSTMOTION_TRAIN_KERNEL(TEMPLATE, D)                                                                           \
     TEMPLATE TrainReport run_train_exactly_in<D>(const typename TrainReader<D>::Model&, const std::vector<Signal>&,    \
                                                  std::span<const double>, std::span<const double>,                     \
-                                                 const TrainOptions&, double*, TrainWatcher<D>*);                      \
+                                                 const TrainOptions&, double*, TrainWatcher<D>*, TrainWorkspace<D>*);  \
     TEMPLATE TrainReport run_train_adaptively_in<D>(const typename TrainReader<D>::Model&, const std::vector<Signal>&, \
                                                     std::span<const double>, std::span<const double>,                  \
                                                     const TrainOptions&, double*);                                     \

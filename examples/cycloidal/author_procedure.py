@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import lostmotion as lm
+from lostmotion.identification.runs import run_log
 
 STEP = 5e-4  # [s] to which his analysis resamples
 LARGE = 100  # ramps from this number on are those to the largest torque
@@ -86,7 +87,7 @@ def tests_of(result: lm.IdentificationResult, *, simulated: bool) -> list[np.nda
     tests = []
     for log in result.logs:
         assert result.rig is not None
-        run = result.rig.run(log, result.values_for(log.name), result.chosen)
+        run = run_log(result.rig, log, result.values_for(log.name), result.chosen)
         position = np.degrees((run if simulated else log.measured)["position"])
         command, torque, ramp = (log.log.values(name) for name in ("command", "torque", "ramp"))
         tests.append(np.array([log.time, command, torque, position, ramp]))

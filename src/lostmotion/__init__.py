@@ -46,8 +46,12 @@ if TYPE_CHECKING:
     from .identification.campaign import write_campaign as write_campaign
     from .identification.design import Candidate as Candidate
     from .identification.design import design_experiment as design_experiment
+    from .identification.errors_of_logs import LogError as LogError
+    from .identification.identifiability import Undetermined as Undetermined
     from .identification.identify import IdentificationResult as IdentificationResult
     from .identification.identify import identify as identify
+    from .identification.intervals import Interval as Interval
+    from .identification.ladder import RungResult as RungResult
     from .identification.logs import Channel as Channel
     from .identification.logs import Log as Log
     from .identification.readers import read_log as read_log
@@ -190,7 +194,11 @@ _HOMES = {
     "errors": ("InputError", "MissingLibraryError"),
     "identification.campaign": ("write_campaign",),
     "identification.design": ("Candidate", "design_experiment"),
+    "identification.errors_of_logs": ("LogError",),
+    "identification.identifiability": ("Undetermined",),
     "identification.identify": ("IdentificationResult", "identify"),
+    "identification.intervals": ("Interval",),
+    "identification.ladder": ("RungResult",),
     "identification.logs": ("Channel", "Log"),
     "identification.readers": ("read_log",),
     "identification.task": ("Identification", "load_identification"),

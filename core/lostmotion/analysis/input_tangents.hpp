@@ -46,6 +46,11 @@ class InputTangents {
     // Rows of the vector that change within a regime, and those of them that a parameter changes beside the states.
     bool moves() const { return varying_ || !sine_places_.empty(); }
     bool frequency_varies() const { return frequency_varies_; }
+    // Whether the equations of both are the same.
+    bool moves_as(const InputTangents& o) const {
+        return parameters_ == o.parameters_ && size_ == o.size_ && varying_ == o.varying_ && sine_places_.empty() &&
+               o.sine_places_.empty();
+    }
     double fastest() const {  // [rad/s]
         double omega = 0.0;
         for (const auto& [i, k] : sine_places_) omega = std::fmax(omega, std::fabs(this->omega(i, k)));

@@ -35,16 +35,23 @@ struct RegimeTangent {
     Varied output_torque;   // gears x terms
     Varied contact_torque;  // contacts x terms
     std::vector<std::optional<model::Row>> channel;
-    Varied channel_varied;              // channels x terms
-    std::vector<model::Regime> beside;  // as VariedTrain::beside()
-    bool alike = true;                  // false: beside the parameter's value it has other guards
+    Varied channel_varied;  // channels x terms
+    Varied shift;           // guards x 1: of the memory beyond an edge, see Guard
+    bool alike = true;      // false: beside the parameter's value it has other guards
     TangentPropagator propagator;
 };
 
 class RegimeTangents {
  public:
-    RegimeTangents(const VariedTrain& trains, const InputTangents& inputs, std::vector<TrainChannel> channels)
-        : trains_(trains), inputs_(inputs), channels_(std::move(channels)) {}
+    RegimeTangents(std::shared_ptr<const VariedTrain> trains, std::shared_ptr<const InputTangents> inputs,
+                   std::vector<int> channels)
+        : varied_(std::move(trains)), given_(std::move(inputs)), numbers_(std::move(channels)) {
+        for (const int c : numbers_) channels_.push_back(train_channels(varied_->base())[static_cast<std::size_t>(c)]);
+    }
+    // Whether they are also those of another run: of the same trains, with inputs that move as these do.
+    bool serve(const VariedTrain& trains, const InputTangents& inputs, const std::vector<int>& channels) const {
+        return trains == *varied_ && inputs.moves_as(*given_) && channels == numbers_;
+    }
 
     // base: a length [s] over which the series of this regime converge.
     RegimeTangent& operator()(const model::Key& key, const model::Regime& regime) {
@@ -83,12 +90,13 @@ class RegimeTangents {
         t->output_torque = room(r.output_torque.size());
         t->contact_torque = room(r.contact_torque.size());
         t->channel_varied = room(channels_.size());
+        t->shift = Varied(static_cast<int>(r.guards.size()), 1, parameters);
         for (const TrainChannel& c : channels_) t->channel.push_back(channel_form(trains_.base(), r, c));
-        for (const auto& b : trains_.beside()) add(*t, *b);
+        for (const VariedTrain::Beside& b : trains_.beside()) add(*t, b);
         return t;
     }
     void add(RegimeTangent& t, const VariedTrain::Beside& b) const {
-        const model::Regime& at = t.beside.emplace_back(b.assembly.build(t.regime.key));
+        const model::Regime at = b.assembly().build(t.regime.key);
         const model::Regime& r = t.regime;
         const auto note = [&](Varied& to, std::size_t row, const model::Row& from, const model::Row& f) {
             for (int k = 0; k < layout().terms; ++k)
@@ -101,18 +109,22 @@ class RegimeTangents {
             t.alike = one.kind == other.kind && one.contact == other.contact && one.branch == other.branch &&
                       one.neighbour == other.neighbour;
             note(t.guard, g, one.form, other.form);
+            t.shift.at(static_cast<int>(g), 0)[b.parameter] += b.weight * (other.shift - one.shift);
         }
         for (std::size_t k = 0; k < r.output_torque.size(); ++k)
             note(t.output_torque, k, r.output_torque[k], at.output_torque[k]);
         for (std::size_t k = 0; k < r.contact_torque.size(); ++k)
             note(t.contact_torque, k, r.contact_torque[k], at.contact_torque[k]);
         for (std::size_t c = 0; c < channels_.size(); ++c)
-            if (t.channel[c]) note(t.channel_varied, c, *t.channel[c], *channel_form(b.assembly, at, channels_[c]));
+            if (t.channel[c]) note(t.channel_varied, c, *t.channel[c], *channel_form(b.assembly(), at, channels_[c]));
     }
 
-    const VariedTrain& trains_;
-    const InputTangents& inputs_;
-    const std::vector<TrainChannel> channels_;
+    const std::shared_ptr<const VariedTrain> varied_;
+    const std::shared_ptr<const InputTangents> given_;
+    const VariedTrain& trains_ = *varied_;
+    const InputTangents& inputs_ = *given_;
+    const std::vector<int> numbers_;
+    std::vector<TrainChannel> channels_;
     std::unordered_map<model::Key, std::unique_ptr<RegimeTangent>, model::KeyHash> all_;
     RegimeTangent* last_ = nullptr;
 };

@@ -14,6 +14,8 @@ class FormTangent {
  public:
     FormTangent(const model::Layout& n, const InputTangents& inputs) : n_(n), inputs_(inputs) {}
 
+    int parameters() const { return inputs_.parameters(); }
+
     double value(const model::Row& f, const double* w) const {
         double sum = 0.0;
         inputs_.each_term([&](int at, int term) { sum += f.c[static_cast<std::size_t>(term)] * w[at]; });
@@ -58,13 +60,14 @@ class ResetTangent {
     void tied_speeds(const std::int8_t* modes, const double* x, double* to) const {
         const model::Assembly& a = trains_.base();
         const model::Ties ties = tie(a, modes);
-        for (const auto& b : trains_.beside()) {
-            const model::Ties other = tie(b->assembly, modes);
+        for (const VariedTrain::Beside& b : trains_.beside()) {
+            if (!b.other_ratios) continue;
+            const model::Ties other = tie(b.assembly(), modes);
             for (std::size_t s = 0; s < a.train().shafts.size(); ++s) {
                 if (!ties.follows(static_cast<int>(s)) || ties.free[s] != other.free[s]) continue;
-                double& sum = to[a.places().shafts[s].speed * parameters_ + b->parameter];
+                double& sum = to[a.places().shafts[s].speed * parameters_ + b.parameter];
                 ties.each_share(static_cast<int>(s), [&](int k, double share) {
-                    sum += b->weight * (other.share[s][static_cast<std::size_t>(k)] - share) *
+                    sum += b.weight * (other.share[s][static_cast<std::size_t>(k)] - share) *
                            x[a.places().shafts[static_cast<std::size_t>(k)].speed];
                 });
             }
@@ -75,19 +78,16 @@ class ResetTangent {
         const model::Assembly& a = trains_.base();
         const int row = a.layout().first_memory + a.places().gears[gear].hysteresis;
         const double own = a.train().gears[gear].law.hysteresis_capacity(twist);
-        for (const auto& b : trains_.beside())
-            to[row * parameters_ + b->parameter] +=
-                b->weight * (b->assembly.train().gears[gear].law.hysteresis_capacity(twist) - own);
+        for (const VariedTrain::Beside& b : trains_.beside())
+            to[row * parameters_ + b.parameter] +=
+                b.weight * (b.assembly().train().gears[gear].law.hysteresis_capacity(twist) - own);
     }
     // Where an angle begins another turn.
     void turn(const RegimeTangent& before, std::size_t guard, double* to) const {
         const model::Guard& g = before.regime.guards[guard];
         if (g.memory == model::nowhere) return;
         const int row = trains_.base().layout().first_memory + g.memory;
-        for (std::size_t k = 0; k < before.beside.size() && before.alike; ++k) {
-            const auto& b = *trains_.beside()[k];
-            to[row * parameters_ + b.parameter] += b.weight * (before.beside[k].guards[guard].shift - g.shift);
-        }
+        add_scaled(to + row * parameters_, 1.0, before.shift.at(static_cast<int>(guard), 0), parameters_);
     }
     // A locked torque that keeps the value of a form.
     void kept(int row, const model::Row& was, const Varied& forms, int at, const double* w, const double* derivative,

@@ -7,6 +7,7 @@
 //     C(2h) = 2 C + C C,   L_p(2h) = 2 L_p + L_p C + C L_p.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -55,6 +56,14 @@ class TangentPropagator {
         dM_ = std::move(dM);
         base_ = base;
         levels_.clear();
+        entries_.clear();
+        for (int r = 0; r < moving_; ++r)
+            for (int c = 0; c < size_; ++c) {
+                const double* d = dM_.at(r, c);
+                const bool varies = r < varied_ && std::any_of(d, d + parameters_, [](double v) { return v != 0.0; });
+                const double rate = this->M(r, c);
+                if (rate != 0.0 || varies) entries_.push_back({r, c, rate, varies});
+            }
     }
     bool ready() const { return size_ > 0; }
 
@@ -63,13 +72,22 @@ class TangentPropagator {
         auto n = static_cast<std::uint64_t>(s / base_);
         for (; static_cast<double>(n) * base_ > s; --n) {
         }
+        const double rest = s - static_cast<double>(n) * base_;
+        if (n <= few)
+            for (; n > 0; --n) taylor(w, derivative, base_);
         for (int k = 63; k >= 0; --k)
             if (n >> k & 1) step(k, w, derivative);
-        taylor(w, derivative, s - static_cast<double>(n) * base_);
+        taylor(w, derivative, rest);
     }
 
  private:
-    static constexpr int order = 14;  // 0.25^14/14! < 1e-19
+    static constexpr std::uint64_t few = 12;  // base lengths, for which doubling does not pay
+    static constexpr int order = 14;          // 0.25^14/14! < 1e-19
+    struct Entry {                            // of M that is not zero or varies
+        int row, column;
+        double rate;
+        bool varied;
+    };
     struct Level {
         std::vector<double> C;  // moving x size
         Varied L;               // varied x size
@@ -98,6 +116,13 @@ class TangentPropagator {
         }
         apply(w, derivative);
     }
+    // Terms of the series over a share of the base length, within which they fall as 0.25^j/j!.
+    static int terms_for(double share) {
+        double term = 1.0;
+        int j = 0;
+        while (j < order && term > 1e-19) term *= 0.25 * share / ++j;
+        return j;
+    }
     void apply(double* w, double* derivative) const {
         for (int k = 0; k < moving_ * parameters_; ++k) derivative[k] += change_[static_cast<std::size_t>(k)];
         for (int r = 0; r < moving_; ++r) w[r] += change_[static_cast<std::size_t>(moving_ * parameters_ + r)];
@@ -115,17 +140,21 @@ class TangentPropagator {
             for (int p = 0; p < parameters_; ++p) t[p] = derivative[r * parameters_ + p];
             t[parameters_] = w[r];
         }
-        for (int j = 1; j <= order; ++j) {
-            next_.assign(whole, 0.0);
+        next_.assign(whole, 0.0);
+        const int last = terms_for(s / base_);
+        for (int j = 1; j <= last; ++j) {
+            std::fill_n(next_.begin(), static_cast<std::size_t>(moving_) * columns, 0.0);
+            if (j == 2) std::fill(next_.begin() + moving_ * (parameters_ + 1), next_.end(), 0.0);
             const double factor = s / j;
+            for (const Entry& e : entries_) {
+                double* to = next_.data() + e.row * (parameters_ + 1);
+                const double* t = term_.data() + e.column * (parameters_ + 1);
+                if (e.rate != 0.0) add_scaled(to, factor * e.rate, t, parameters_ + 1);
+                if (e.varied && t[parameters_] != 0.0)
+                    add_scaled(to, factor * t[parameters_], dM_.at(e.row, e.column), parameters_);
+            }
             for (int r = 0; r < moving_; ++r) {
-                double* to = next_.data() + r * (parameters_ + 1);
-                for (int c = 0; c < size_; ++c) {
-                    const double* t = term_.data() + c * (parameters_ + 1);
-                    if (M(r, c) != 0.0) add_scaled(to, factor * M(r, c), t, parameters_ + 1);
-                    if (r < varied_ && t[parameters_] != 0.0)
-                        add_scaled(to, factor * t[parameters_], dM_.at(r, c), parameters_);
-                }
+                const double* to = next_.data() + r * (parameters_ + 1);
                 for (int p = 0; p < parameters_; ++p) change_[static_cast<std::size_t>(r * parameters_ + p)] += to[p];
                 change_[static_cast<std::size_t>(moving_ * parameters_ + r)] += to[parameters_];
             }
@@ -186,6 +215,7 @@ class TangentPropagator {
     std::vector<double> M_;
     Varied dM_;
     double base_ = 0.0;
+    std::vector<Entry> entries_;
     std::vector<Level> levels_;
     std::vector<double> change_, term_, next_;
 };

@@ -2,7 +2,7 @@
 //
 // What a tick makes of their numbers s, of what they measure y and of their own parameters is a smooth function but for
 // limits and rounding to whole increments. Its derivative is found by differences along ds/dp, dy/dp and the parameter
-// at once: of four values beside, those that no limit parts from the present one. What an encoder of finite resolution
+// at once: of the values beside, those that no limit parts from the present one. What an encoder of finite resolution
 // reads does not depend on anything but at single instants: its derivative is 0.
 #pragma once
 
@@ -31,6 +31,12 @@ inline bool difference_beside_limits(const std::array<double, 5>& f, double h, d
     const bool to_left = std::fabs(left) < std::fabs(right);
     derivative = to_left ? (3.0 * f[2] - 4.0 * f[1] + f[0]) / (2.0 * h) : (-3.0 * f[2] + 4.0 * f[3] - f[4]) / (2.0 * h);
     return std::fmin(std::fabs(left), std::fabs(right)) <= 1e-2 * course + noise;
+}
+
+// Whether three values at equal distances lie in a straight line, as far as rounding lets one see.
+inline bool alike_beside(double left, double here, double right) {
+    const double size = std::fmax(std::fabs(left), std::fmax(std::fabs(here), std::fabs(right)));
+    return std::fabs(right - 2.0 * here + left) <= 1e-4 * std::fabs(right - left) + 2e-13 * size;
 }
 
 class TickTangent {
@@ -120,13 +126,12 @@ class TickTangent {
     void place(const ClosedLoop<D>& loop, const VariedTrain& trains) {
         const model::Layout& n = trains.base().layout();
         forms_ = forms_of(loop, n);
-        auto beside = trains.beside().begin();
         for (const Variation& v : variations_) {
             std::vector<Beside>& all = beside_.emplace_back();
             for (const Neighbour& at : v.neighbours) {
                 Beside& b = all.emplace_back(Beside{at.offset, at.weight, {}, {}});
                 if (at.control) b.laws = at.control->laws();
-                if (at.train) b.forms = forms_of(closed_loop_of<D>((*beside++)->assembly, control_, {}), n);
+                if (at.train) b.forms = forms_of(closed_loop_of<D>(at.train->assembly(), control_, {}), n);
             }
         }
         for (const AxisPlace<D>& p : loop.places)
@@ -173,34 +178,81 @@ class TickTangent {
         act(law, measured_, now_.data());
         double noise = 0.0;  // of what small numbers are differences of large ones
         for (int k = 0; k < count; ++k) noise = std::fmax(noise, 1e-10 * std::fabs(slots[k]));
+        values_.resize(static_cast<std::size_t>(5 * count));
         for (int p = 0; p < parameters_; ++p) {
             const std::vector<Beside>& all = beside_[static_cast<std::size_t>(p)];
-            const bool own = std::any_of(all.begin(), all.end(), [](const Beside& b) { return !b.laws.empty(); });
-            const double factor = own ? 1.0 : shrink;
-            const bool central = all.size() == 4 && all[0].offset < 0.0 && all[3].offset > 0.0;
-            values_.assign(static_cast<std::size_t>(5 * count), 0.0);
-            for (std::size_t j = 0; j < all.size(); ++j) {
-                const double offset = factor * all[j].offset;
-                for (int k = 0; k < count; ++k)
-                    at_[static_cast<std::size_t>(k)] =
-                        slots[k] + offset * slots_[static_cast<std::size_t>((first + k) * parameters_ + p)];
-                act(all[j].laws.empty() ? law : all[j].laws[a], measured(p, offset), at_.data());
-                for (int k = 0; k < count; ++k)
-                    values_[static_cast<std::size_t>(5 * k) + j + (central && j > 1 ? 1 : 0)] =
-                        at_[static_cast<std::size_t>(k)];
-            }
-            for (int k = 0; k < count; ++k) {
-                double& out = slots_[static_cast<std::size_t>((first + k) * parameters_ + p)];
-                double* f = &values_[static_cast<std::size_t>(5 * k)];
-                const double here = now_[static_cast<std::size_t>(k)];
-                out = 0.0;
-                if (!central) {
-                    for (std::size_t j = 0; j < all.size(); ++j) out += all[j].weight / factor * (f[j] - here);
-                    continue;
-                }
-                if (!difference_beside_limits({f[0], f[1], here, f[3], f[4]}, factor * all[2].offset, noise, out))
-                    error_ = "a limit of a controller that it only touches";
-            }
+            if (std::any_of(all.begin(), all.end(), [](const Beside& b) { return !b.laws.empty(); }))
+                vary_law(a, p, first, count, law, slots, act, noise);
+            else if (moves(p, first, count))
+                vary_motion(p, first, count, law, slots, act, noise);
+        }
+    }
+    // Whether anything that an axis remembers or measures changes with a parameter.
+    bool moves(int p, int first, int count) const {
+        for (int k = 0; k < count; ++k)
+            if (slots_[static_cast<std::size_t>((first + k) * parameters_ + p)] != 0.0) return true;
+        for (int k = 0; k < n_measured; ++k)
+            if (measured_derivative_[static_cast<std::size_t>(k * parameters_ + p)] != 0.0) return true;
+        return false;
+    }
+    // What `act` makes of the numbers at another value of a parameter: values_[5 k + to].
+    template <class Act>
+    void put(int to, int p, double offset, int first, int count, const control::Axis& law, const double* slots,
+             const Act& act) {
+        for (int k = 0; k < count; ++k)
+            at_[static_cast<std::size_t>(k)] =
+                slots[k] + offset * slots_[static_cast<std::size_t>((first + k) * parameters_ + p)];
+        act(law, measured(p, offset), at_.data());
+        for (int k = 0; k < count; ++k)
+            values_[static_cast<std::size_t>(5 * k + to)] = at_[static_cast<std::size_t>(k)];
+    }
+    void take(int p, int first, int count, double h, double noise) {
+        for (int k = 0; k < count; ++k) {
+            const double* f = &values_[static_cast<std::size_t>(5 * k)];
+            double& out = slots_[static_cast<std::size_t>((first + k) * parameters_ + p)];
+            if (!difference_beside_limits({f[0], f[1], now_[static_cast<std::size_t>(k)], f[3], f[4]}, h, noise, out))
+                error_ = "a limit of a controller that it only touches";
+        }
+    }
+    // Where the law itself depends on the parameter.
+    template <class Act>
+    void vary_law(std::size_t a, int p, int first, int count, const control::Axis& law, const double* slots,
+                  const Act& act, double noise) {
+        const std::vector<Beside>& all = beside_[static_cast<std::size_t>(p)];
+        const bool central = all.size() == 4 && all[0].offset < 0.0 && all[3].offset > 0.0;
+        for (std::size_t j = 0; j < all.size(); ++j)
+            put(static_cast<int>(j) + (central && j > 1 ? 1 : 0), p, all[j].offset, first, count,
+                all[j].laws.empty() ? law : all[j].laws[a], slots, act);
+        if (central) return take(p, first, count, all[2].offset, noise);
+        for (int k = 0; k < count; ++k) {
+            double& out = slots_[static_cast<std::size_t>((first + k) * parameters_ + p)];
+            out = 0.0;
+            for (std::size_t j = 0; j < all.size(); ++j)
+                out +=
+                    all[j].weight * (values_[static_cast<std::size_t>(5 * k) + j] - now_[static_cast<std::size_t>(k)]);
+        }
+    }
+    // Where only the motion does: two values beside, and two more if a limit parts them.
+    template <class Act>
+    void vary_motion(int p, int first, int count, const control::Axis& law, const double* slots, const Act& act,
+                     double noise) {
+        double h = std::numeric_limits<double>::infinity();
+        for (const Beside& b : beside_[static_cast<std::size_t>(p)]) h = std::fmin(h, shrink * std::fabs(b.offset));
+        put(1, p, -h, first, count, law, slots, act);
+        put(3, p, h, first, count, law, slots, act);
+        bool smooth = true;
+        for (int k = 0; k < count && smooth; ++k) {
+            const double *f = &values_[static_cast<std::size_t>(5 * k)], here = now_[static_cast<std::size_t>(k)];
+            smooth = alike_beside(f[1], here, f[3]);
+        }
+        if (!smooth) {
+            put(0, p, -2.0 * h, first, count, law, slots, act);
+            put(4, p, 2.0 * h, first, count, law, slots, act);
+            return take(p, first, count, h, noise);
+        }
+        for (int k = 0; k < count; ++k) {
+            const double* f = &values_[static_cast<std::size_t>(5 * k)];
+            slots_[static_cast<std::size_t>((first + k) * parameters_ + p)] = (f[3] - f[1]) / (2.0 * h);
         }
     }
 

@@ -11,14 +11,15 @@
 #include <vector>
 
 #include "reset_tangent.hpp"
+#include "sample_tangent.hpp"
+#include "start_tangent.hpp"
 #include "tick_tangent.hpp"
 
 namespace lostmotion {
 
 // What is asked for, and where it goes.
 struct SensitivityOutput {
-    double interval = 1e-3;      // [s]
-    std::size_t samples = 0;     // at k * interval
+    SampleTimes times;
     std::vector<int> channels;   // by their place among TrainRun::channels()
     double* out = nullptr;       // parameters x channels x samples; NaN from where the motion is not smooth
     double* axes_out = nullptr;  // parameters x (axes x signals) x samples, as TrainOptions::control_out
@@ -41,6 +42,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
           inputs_(inputs),
           regimes_(regimes),
           form_(trains.base().layout(), inputs),
+          samples_(trains, form_, regimes),
           resets_(trains, form_, inputs.parameters()),
           system_(trains.base()),
           laws_(system_),
@@ -50,7 +52,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
           parameters_(inputs.parameters()),
           w_(static_cast<std::size_t>(inputs.size())),
           derivative_(w_.size() * static_cast<std::size_t>(parameters_)) {
-        begin_at(variations, start);
+        start_memory_ = set_start(trains, variations, start, derivative_.data());
     }
 
     void begin(ExactSolver<System>& solver) override { solver_ = &solver; }
@@ -65,8 +67,8 @@ class TrainSensitivity final : public TrainWatcher<D> {
         time_ = s.begin;
         see_inputs(time_, false);
         if (!tangent_->propagator.ready()) regimes_.prepare(*tangent_, s.entry.propagator.length(0));
-        for (; next_ < output_.samples && is_due(s, instant(next_)); ++next_) {
-            advance(instant(next_));
+        for (; next_ < output_.times.count && is_due(s, output_.times[next_]); ++next_) {
+            advance(output_.times[next_]);
             read(next_);
         }
         advance(s.end);
@@ -75,12 +77,14 @@ class TrainSensitivity final : public TrainWatcher<D> {
 
     void switching(const SwitchingOf<System>& w) override {
         const std::array<InputsOf<D>, 2> before = inputs();
-        std::vector<double> left_w = w_, left = derivative_, shift(static_cast<std::size_t>(parameters_));
+        left_w_ = w_;
+        left_ = derivative_;
+        shift_.assign(static_cast<std::size_t>(parameters_), 0.0);
         const typename System::Regime& old = *regime_;
         const RegimeTangent& old_tangent = *tangent_;
         if (w.guard >= 0) {
-            if (!find_shift(w, before[1], shift.data())) end(w, "a condition that it only touches");
-        } else if (!inputs_.shift_of_breakpoint(w.time, shift.data())) {
+            if (!find_shift(w, before[1], shift_.data())) end(w, "a condition that it only touches");
+        } else if (!inputs_.shift_of_breakpoint(w.time, shift_.data())) {
             end(w, "inputs that jump together, at instants of different parameters");
         }
         const State x = state();
@@ -92,9 +96,9 @@ class TrainSensitivity final : public TrainWatcher<D> {
         auto jump = JacobianOf<D>::identity();
         const ResetRatesOf<D> rates = laws_.reset(r, jump);
         if (!rates.exact) end(w, "a torque at rest that comes to lie where contacts let it");
-        std::vector<double> set_anew(derivative_.size());
-        reset(r, old_tangent, left_w.data(), left.data(), set_anew.data());
-        apply(jump, rates, r, left.data(), shift.data(), set_anew.data());
+        set_anew_.assign(derivative_.size(), 0.0);
+        reset(r, old_tangent, left_w_.data(), left_.data(), set_anew_.data());
+        apply(jump, rates, r, left_.data(), shift_.data(), set_anew_.data());
     }
 
     void tick(const ClosedLoop<D>& loop, const ControlCourse& course, const State& x, const Memory& memory) override {
@@ -111,7 +115,16 @@ class TrainSensitivity final : public TrainWatcher<D> {
     using ComponentsRow = ComponentsOf<D>;
 
     double* row(int k) { return derivative_.data() + k * parameters_; }
-    double instant(std::size_t k) const { return static_cast<double>(k) * output_.interval; }
+    void read(std::size_t sample) {
+        const std::size_t channels = output_.channels.size();
+        for (std::size_t c = 0; c < channels; ++c) {
+            std::fill(value_.begin(), value_.end(), 0.0);
+            samples_.add(c, *tangent_, w_.data(), derivative_.data(), value_.data());
+            for (std::size_t p = 0; p < value_.size(); ++p)
+                output_.out[(p * channels + c) * output_.times.count + sample] =
+                    ended() ? std::numeric_limits<double>::quiet_NaN() : value_[p];
+        }
+    }
     static bool is_due(const Segment<System>& s, double t) {
         return t < s.end || (s.last && t <= s.end * (1.0 + 4.0 * std::numeric_limits<double>::epsilon()));
     }
@@ -177,25 +190,13 @@ class TrainSensitivity final : public TrainWatcher<D> {
         time_ = to;
     }
 
-    void begin_at(const std::vector<Variation>& variations, const TrainStart& start) {
-        const auto [x, memory] = in_layout(trains_.base(), start);
-        auto beside = trains_.beside().begin();
-        for (int p = 0; p < parameters_; ++p)
-            for (const Neighbour& n : variations[static_cast<std::size_t>(p)].neighbours) {
-                const model::Assembly& a = n.train ? (*beside++)->assembly : trains_.base();
-                const auto [x_n, memory_n] = in_layout(a, n.start ? *n.start : start);
-                for (std::size_t k = 0; k < x.size(); ++k) row(static_cast<int>(k))[p] += n.weight * (x_n[k] - x[k]);
-                for (std::size_t k = 0; k < memory.size(); ++k)
-                    row(n_.first_memory + static_cast<int>(k))[p] += n.weight * (memory_n[k] - memory[k]);
-            }
-        start_memory_ = memory;
-    }
     // What the search for the first regime has set: torques that the motion leaves open.
     void begin_motion(const Memory& memory) {
         see_inputs(0.0, false);
         const model::Regime& r = tangent_->regime;
         for (int c = 0; c < n_.contacts; ++c)
-            if (r.at_rest[static_cast<std::size_t>(c)] && sets_in_motion(c) && !ended()) {
+            if (r.at_rest[static_cast<std::size_t>(c)] && !ended() &&
+                sets_in_motion(trains_, form_, c, w_.data(), derivative_.data())) {
                 output_.ends_at = 0.0;
                 output_.ends_by = "a contact at rest that a parameter sets in motion at the start: " +
                                   model::contact_name(trains_.base(), c);
@@ -212,23 +213,6 @@ class TrainSensitivity final : public TrainWatcher<D> {
                 resets_.at_limit(n_.first_memory + locked, r.guards[static_cast<std::size_t>(limit)].form,
                                  tangent_->guard, limit, w_.data(), derivative_.data(), derivative_.data());
         }
-    }
-
-    bool sets_in_motion(int contact) const {
-        const model::Row speed = trains_.base().contact_speed(contact);
-        std::vector<double> change(static_cast<std::size_t>(parameters_)), size = change;
-        form_.add_motion(speed, derivative_.data(), 1.0, change.data());
-        for (const auto& b : trains_.beside())
-            change[static_cast<std::size_t>(b->parameter)] +=
-                b->weight *
-                (form_.value(b->assembly.contact_speed(contact), w_.data()) - form_.value(speed, w_.data()));
-        for (int k = 0; k < n_.states; ++k)
-            for (int p = 0; p < parameters_; ++p)
-                size[static_cast<std::size_t>(p)] += std::fabs(
-                    speed.c[static_cast<std::size_t>(k)] * derivative_[static_cast<std::size_t>(k * parameters_ + p)]);
-        for (std::size_t p = 0; p < change.size(); ++p)
-            if (std::fabs(change[p]) > 1e-6 * size[p]) return true;
-        return false;
     }
 
     // By how much the instant shifts at which a guard falls through zero. False if it only touches it.
@@ -310,72 +294,15 @@ class TrainSensitivity final : public TrainWatcher<D> {
         }
     }
 
-    void read(std::size_t sample) {
-        const std::vector<int>& all = output_.channels;
-        std::vector<double> value(static_cast<std::size_t>(parameters_));
-        for (std::size_t c = 0; c < all.size(); ++c) {
-            std::fill(value.begin(), value.end(), 0.0);
-            if (const auto& f = tangent_->channel[c]; f) {
-                form_.add_own(tangent_->channel_varied, static_cast<int>(c), w_.data(), 1.0, value.data());
-                form_.add_motion(*f, derivative_.data(), 1.0, value.data());
-            }
-            if (const int g = shared(regimes_.channels()[c]); g >= 0)
-                add_shared(static_cast<std::size_t>(g), value.data());
-            for (std::size_t p = 0; p < value.size(); ++p)
-                output_.out[(p * all.size() + c) * output_.samples + sample] =
-                    ended() ? std::numeric_limits<double>::quiet_NaN() : value[p];
-        }
-    }
-
-    // Of an input torque: its gear, if its input shaft is at rest and what that holds is shared by what is dry there;
-    // -1.
-    int shared(const TrainChannel& c) const {
-        if (c.kind != TrainChannel::input_torque) return -1;
-        const model::Gear& gear = trains_.base().train().gears[static_cast<std::size_t>(c.index)];
-        const int contact = trains_.base().places().shafts[static_cast<std::size_t>(gear.input)].contact;
-        return gear.has_dry_losses() && tangent_->regime.key.modes[static_cast<std::size_t>(contact)] == 0 ? c.index
-                                                                                                           : -1;
-    }
-    // What the contact of the input shaft holds is shared as the capacities are, T_1 + F l/C; see TrainReader. to: the
-    // derivatives of T_1.
-    void add_shared(std::size_t g, double* to) const {
-        const model::Train& train = trains_.base().train();
-        const model::Gear& gear = train.gears[g];
-        const model::Regime& r = tangent_->regime;
-        const int contact = trains_.base().places().shafts[static_cast<std::size_t>(gear.input)].contact;
-        const model::Row &friction = r.contact_torque[static_cast<std::size_t>(contact)], &output = r.output_torque[g];
-        const double F = form_.value(friction, w_.data()), T_2 = form_.value(output, w_.data());
-        const int s = F >= 0.0 ? 1 : -1;
-        std::size_t margin = 0;
-        while (r.guards[margin].kind != model::Guard::capacity || r.guards[margin].contact != contact ||
-               (r.guards[margin].neighbour > 0) != (s > 0))
-            ++margin;
-        const double C = form_.value(r.guards[margin].form, w_.data()) + s * F;
-        if (!(C > 0.0)) return;
-        const model::MeshLoss loss = gear.loss(s * T_2, 0.0);
-        const double l = loss.torque / gear.law.ratio, own = F * l / (C * C);
-        const double by_friction = l / C - s * own, by_output = F * s * loss.per_torque / (gear.law.ratio * C);
-        form_.add_own(tangent_->contact_torque, contact, w_.data(), by_friction, to);
-        form_.add_motion(friction, derivative_.data(), by_friction, to);
-        form_.add_own(tangent_->output_torque, static_cast<int>(g), w_.data(), by_output, to);
-        form_.add_motion(output, derivative_.data(), by_output, to);
-        form_.add_own(tangent_->guard, static_cast<int>(margin), w_.data(), -own, to);
-        form_.add_motion(r.guards[margin].form, derivative_.data(), -own, to);
-        for (const auto& b : trains_.beside()) {
-            const model::Gear& other = b->assembly.train().gears[g];
-            to[b->parameter] += b->weight * F / C * (other.loss(s * T_2, 0.0).torque / other.law.ratio - l);
-        }
-    }
-
     // What the controllers have shown until a time.
     void read_signals(const ClosedLoop<D>& loop, double until) {
         if (output_.axes_out == nullptr) return;
-        for (; next_signal_ < output_.samples && instant(next_signal_) < until; ++next_signal_) {
+        for (; next_signal_ < output_.times.count && output_.times[next_signal_] < until; ++next_signal_) {
             double* to = output_.axes_out + next_signal_;
             for (int p = 0; p < parameters_; ++p) {
                 int first = 0;
                 for (const control::Axis& a : loop.axes) {
-                    for (int s = 0; s < control::n_axis_signals; ++s, to += output_.samples)
+                    for (int s = 0; s < control::n_axis_signals; ++s, to += output_.times.count)
                         *to = ended() ? std::numeric_limits<double>::quiet_NaN() : ticks_.signal(first, s)[p];
                     first += a.slots();
                 }
@@ -387,6 +314,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
     const InputTangents& inputs_;
     RegimeTangents& regimes_;
     FormTangent form_;
+    SampleTangent samples_;
     ResetTangent resets_;
     const System system_;
     const ComponentLaws<System> laws_;
@@ -395,7 +323,8 @@ class TrainSensitivity final : public TrainWatcher<D> {
     const model::Layout& n_;
     int parameters_;
     std::vector<double> w_, derivative_;  // w; its derivatives, those of one entry together
-    std::vector<double> start_memory_;
+    std::vector<double> start_memory_, value_ = std::vector<double>(static_cast<std::size_t>(parameters_));
+    std::vector<double> left_w_, left_, shift_, set_anew_;  // of a switching
     Memory memory_{};
     ExactSolver<System>* solver_ = nullptr;
     const typename System::Regime* regime_ = nullptr;

@@ -16,7 +16,7 @@ namespace lostmotion {
 // At another value of a parameter; a part that is left out is as in the case itself.
 struct Neighbour {
     double offset = 0.0, weight = 0.0;  // p_i - p and weight_i, in units of the parameter and of its inverse
-    std::optional<model::Train> train;
+    std::shared_ptr<const TrainRun> train;
     std::optional<std::vector<Signal>> inputs;
     std::optional<TrainStart> start;
     std::optional<Control> control;
@@ -27,43 +27,62 @@ struct Variation {
     std::vector<Neighbour> neighbours;
 };
 
-// The trains beside a train, ready to compose regimes.
+// The trains beside a train.
 class VariedTrain {
  public:
     struct Beside {
         int parameter;
         double weight;
-        model::Assembly assembly;
+        std::shared_ptr<const TrainRun> run;
+        bool other_ratios;  // of gears, so that what contacts at rest tie together turns otherwise
 
-        Beside(int p, const Neighbour& n) : parameter(p), weight(n.weight), assembly(*n.train) {}
+        const model::Assembly& assembly() const { return run->assembly(); }
+        friend bool operator==(const Beside&, const Beside&) = default;
     };
 
-    VariedTrain(const model::Assembly& base, const std::vector<Variation>& all) : base_(base) {
+    // base must stay.
+    VariedTrain(const TrainRun& base, const std::vector<Variation>& all) : base_(base) {
         for (std::size_t p = 0; p < all.size(); ++p)
             for (const Neighbour& n : all[p].neighbours) add(static_cast<int>(p), all[p].name, n);
     }
     // Why derivatives do not exist, or empty.
     const std::string& error() const { return error_; }
-    const model::Assembly& base() const { return base_; }
-    const std::vector<std::unique_ptr<Beside>>& beside() const { return beside_; }
+    const model::Assembly& base() const { return base_.assembly(); }
+    const std::vector<Beside>& beside() const { return beside_; }
+    friend bool operator==(const VariedTrain& a, const VariedTrain& b) {
+        return &a.base_ == &b.base_ && a.beside_ == b.beside_;
+    }
 
  private:
     void add(int parameter, const std::string& name, const Neighbour& n) {
         if (!n.train || !error_.empty()) return;
-        error_ = model::check(*n.train);
-        if (!error_.empty()) {
-            error_ = "beside the value of " + name + ": " + error_;
+        if (!n.train->error().empty()) {
+            error_ = "beside the value of " + name + ": " + n.train->error();
             return;
         }
-        beside_.push_back(std::make_unique<Beside>(parameter, n));
-        const model::Layout &a = base_.layout(), &b = beside_.back()->assembly.layout();
+        const model::Layout &a = base().layout(), &b = n.train->assembly().layout();
         if (a.coupled != b.coupled || a.angles != b.angles || a.memory != b.memory || a.inputs != b.inputs ||
-            a.contacts != b.contacts || a.branches != b.branches)
+            a.contacts != b.contacts || a.branches != b.branches || !same_pieces(n.train->assembly().train())) {
             error_ = "beside the value of " + name + " the train has other states, contacts or pieces of laws";
+            return;
+        }
+        const auto &own = base().train().gears, &other = n.train->assembly().train().gears;
+        bool other_ratios = false;
+        for (std::size_t g = 0; g < own.size(); ++g)
+            other_ratios = other_ratios || own[g].law.ratio != other[g].law.ratio;
+        beside_.push_back({parameter, n.weight, n.train, other_ratios});
     }
 
-    const model::Assembly& base_;
-    std::vector<std::unique_ptr<Beside>> beside_;
+    // The curves of torques over angle: how many pieces they have follows from the error that is allowed.
+    bool same_pieces(const model::Train& other) const {
+        const model::Train& own = base().train();
+        for (std::size_t k = 0; k < own.angle_torques.size(); ++k)
+            if (own.angle_torques[k].torque.pieces() != other.angle_torques[k].torque.pieces()) return false;
+        return true;
+    }
+
+    const TrainRun& base_;
+    std::vector<Beside> beside_;
     std::string error_;
 };
 

@@ -1,4 +1,4 @@
-// Observer that evaluates the exact state at equidistant instants.
+// Observer that evaluates the exact state at the instants of a record.
 #pragma once
 
 #include <algorithm>
@@ -13,10 +13,12 @@
 #include "../kernel/stride.hpp"
 #include "../solver/exact_solver.hpp"
 #include "reader.hpp"
+#include "sample_times.hpp"
 
 namespace lostmotion {
 
-// Writes `count` samples at begin + k * interval, channel by channel: out[c * count + k] is that of channels[c].
+// Writes `count` samples at begin + k * interval, or at the instants of a list, channel by channel:
+// out[c * count + k] is that of channels[c].
 // Reader(model, regime, memory) reads them.
 template <class System, class Reader, class Model>
 class SamplerOf {
@@ -27,6 +29,11 @@ class SamplerOf {
     SamplerOf(const Model& model, double begin, double interval, std::size_t count, double* out,
               std::span<const int> channels)
         : model_(model), begin_(begin), interval_(interval), count_(count), out_(out), channels_(channels) {}
+
+    SamplerOf(const Model& model, const SampleTimes& times, double* out, std::span<const int> channels)
+        : SamplerOf(model, 0.0, times.interval, times.count, out, channels) {
+        listed_ = times.listed;
+    }
 
     // Polled now and then; true ends the run.
     bool (*interrupted)(void*) = nullptr;
@@ -45,7 +52,7 @@ class SamplerOf {
             p.constant = s.constant;
             p.first = next_;
             p.end = next_ = end;
-            p.at_once = LongStep<D>::pays(s.entry.propagator, s.end - s.begin);
+            p.at_once = listed_.empty() && LongStep<D>::pays(s.entry.propagator, s.end - s.begin);
             if (p.at_once) {
                 p.cursor = s.at;
                 if (instant(p.first) > s.begin) p.cursor.leap_to(instant(p.first));
@@ -83,7 +90,7 @@ class SamplerOf {
 
     [[gnu::noinline]] bool write(Piece& p) {
         auto& propagator = p.entry->propagator;
-        const int level = propagator.level_of(interval_);
+        const int level = listed_.empty() ? propagator.level_of(interval_) : -1;
         if (level < 0 && p.at_once) return write_at_once(p);
         const Reader reader(model_, p.entry->regime, p.memory);
         for (std::size_t next = p.first;;) {
@@ -137,14 +144,17 @@ class SamplerOf {
         const double whole = tick * std::floor(interval_ / tick);
         return whole < interval_ ? whole - tick : whole;
     }
-    double instant(std::size_t k) const { return begin_ + static_cast<double>(k) * interval_; }
+    double instant(std::size_t k) const {
+        return listed_.empty() ? begin_ + static_cast<double>(k) * interval_ : listed_[k];
+    }
     // The number of the first sample after a segment.
     std::size_t due(const Segment<System>& s) const {
         const auto within = [&](std::size_t k) {
             const double t = instant(k);
             return t < s.end || (s.last && t <= s.end * (1.0 + 4.0 * std::numeric_limits<double>::epsilon()));
         };
-        std::size_t k = std::clamp(static_cast<std::size_t>((s.end - begin_) * per_interval_), next_, count_);
+        std::size_t k = next_;
+        if (listed_.empty()) k = std::clamp(static_cast<std::size_t>((s.end - begin_) * per_interval_), next_, count_);
         while (k > next_ && !within(k - 1)) --k;
         while (k < count_ && within(k)) ++k;
         return k;
@@ -168,6 +178,7 @@ class SamplerOf {
     double begin_, interval_;
     double per_interval_ = 1.0 / interval_;  // rounded
     std::size_t count_, next_ = 0;
+    std::span<const double> listed_;  // [s]; none: equidistant
     double* out_;
     std::span<const int> channels_;
     std::array<std::optional<Piece>, max_pieces> pieces_;

@@ -40,6 +40,7 @@ struct TrainOptions {
     double duration = 1.0;                     // [s]
     double sample_interval = 1e-3;             // [s]
     std::size_t samples = 0;                   // instants k * sample_interval to record, from k = 0
+    std::vector<double> instants;              // these instead [s], ascending; exact solver, without control_out
     std::optional<std::vector<int>> channels;  // to record, by their place among TrainRun::channels(); left out, all
     bool energy = true;
     std::size_t max_switchings = 100000;  // kept; all are counted
@@ -48,6 +49,8 @@ struct TrainOptions {
     void* interrupted_context = nullptr;
     Control control;                // nothing: the inputs alone act
     double* control_out = nullptr;  // (axes x signals) x samples, as ControlRecord
+
+    SampleTimes times() const { return {sample_interval, instants.empty() ? samples : instants.size(), instants}; }
 };
 
 struct TrainSwitching {
@@ -180,6 +183,15 @@ class TrainWatcher {
     virtual void finish(const ClosedLoop<D>& loop) = 0;  // of controllers, at the end of the run
 };
 
+// A train with the regimes that its runs have met.
+template <class D>
+struct TrainWorkspace {
+    explicit TrainWorkspace(const model::Assembly& assembly) : system(assembly), cache(system) {}
+
+    const model::TrainSystem<D> system;
+    RegimeCache<model::TrainSystem<D>> cache;
+};
+
 template <class D>
 class TrainRecorder {
  public:
@@ -194,7 +206,7 @@ class TrainRecorder {
           out_(out),
           report_(report),
           channels_(options.channels ? *options.channels : all(m)),
-          sampler_(m, 0.0, options.sample_interval, options.samples, out, channels_),
+          sampler_(m, options.times(), out, channels_),
           meter_(m.assembly),
           dense_samples_(options.sample_interval, options.samples) {
         sampler_.interrupted = options.interrupted;
@@ -322,7 +334,6 @@ struct PackedRun {
 
     const model::Assembly& assembly;
     const TrainOptions& options;
-    model::TrainSystem<D> system{assembly};
     SignalsOf<D> signals;
     StartOf<D> start;
 };
@@ -333,22 +344,28 @@ inline std::string check_run(const model::Assembly& a, std::span<const double> s
     return wrong.empty() ? check_control(a, control) : wrong;
 }
 
-// By the exact solver. start: the states by the layout of the assembly, or nothing for rest.
+// By the exact solver. start: the states by the layout of the assembly, or nothing for rest. workspace: of the train,
+// for several runs with the same sample interval.
 template <class D>
 TrainReport run_train_exactly_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
                                  std::span<const double> start, std::span<const double> memory,
-                                 const TrainOptions& options, double* out, TrainWatcher<D>* watcher = nullptr) {
+                                 const TrainOptions& options, double* out, TrainWatcher<D>* watcher = nullptr,
+                                 TrainWorkspace<D>* workspace = nullptr) {
     TrainReport report;
     report.message = check_run(model.assembly, start, options.control);
     if (!report.message.empty()) return report;
     const PackedRun<D> c(model.assembly, inputs, start, memory, options);
     TrainRecorder<D> recorder(model, options, out, report, watcher);
-    ExactSolver<model::TrainSystem<D>> solver(c.system, c.signals, options.sample_interval, c.system.balanced_scale());
+    std::optional<TrainWorkspace<D>> own;
+    if (workspace == nullptr) workspace = &own.emplace(model.assembly);
+    const model::TrainSystem<D>& system = workspace->system;
+    ExactSolver<model::TrainSystem<D>> solver(system, c.signals, options.sample_interval, system.balanced_scale(),
+                                              &workspace->cache);
     if (watcher != nullptr) watcher->begin(solver);
     report.status = run_recorded(solver, c.start, options, recorder, c.in_train());
     recorder.end();
     report.steps = solver.event_checks();
-    report.ended(c.system, solver);
+    report.ended(system, solver);
     report.stored_begin = model::stored_energy(model.assembly, c.start.x);
     report.stored_end = model::stored_energy(model.assembly, solver.state());
     return report;
@@ -365,7 +382,8 @@ TrainReport run_train_adaptively_in(const typename TrainReader<D>::Model& model,
     if (!report.message.empty()) return report;
     const PackedRun<D> c(model.assembly, inputs, start, memory, options);
     TrainRecorder<D> recorder(model, options, out, report, nullptr);
-    AdaptiveSolver<System> solver(c.system, c.signals, options.tolerance, c.system.rated_scale());
+    const System system(model.assembly);
+    AdaptiveSolver<System> solver(system, c.signals, options.tolerance, system.rated_scale());
     struct {
         TrainRecorder<D>& recorder;
         AdaptiveSolver<System>& solver;
@@ -378,7 +396,7 @@ TrainReport run_train_adaptively_in(const typename TrainReader<D>::Model& model,
     } observer{recorder, solver};
     report.status = run_recorded(solver, c.start, options, observer, c.in_train());
     report.steps = solver.steps();
-    report.ended(c.system, solver);
+    report.ended(system, solver);
     report.stored_begin = model::stored_energy(model.assembly, c.start.x);
     report.stored_end = model::stored_energy(model.assembly, solver.state());
     return report;
@@ -393,10 +411,11 @@ TrainReport reach_train_in(const typename TrainReader<D>::Model& model, const st
     report.message = check_run(model.assembly, start, options.control);
     if (!report.message.empty()) return report;
     const PackedRun<D> c(model.assembly, inputs, start, memory, options);
-    ExactSolver<model::TrainSystem<D>> solver(c.system, c.signals, options.sample_interval, c.system.balanced_scale());
+    const model::TrainSystem<D> system(model.assembly);
+    ExactSolver<model::TrainSystem<D>> solver(system, c.signals, options.sample_interval, system.balanced_scale());
     NoObserver nothing;
     report.status = run_recorded(solver, c.start, options, nothing, c.in_train());
-    report.ended(c.system, solver);
+    report.ended(system, solver);
     if (report.status != Status::done) return report;
     point = point_of<D>(model, solver.regime(), solver.time(), solver.state(), solver.memory(),
                         inputs_at_end(solver, c.signals, options.control));

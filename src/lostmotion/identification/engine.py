@@ -1,19 +1,17 @@
-"""Runs of all logs, and how they change with the parameters: central differences, on several threads."""
+"""Runs of all logs, and how they change with the parameters: exactly, and by differences where that is not defined."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from .. import _core
-from ..errors import InputError
 from .parameters import FreeParameter
 from .prepare import Prepared
 from .rig import Rig
+from .runs import NoDerivativeError, run_logs
 
 STEP = 1e-2  # of a parameter's scale, in differences
 
@@ -45,49 +43,73 @@ class Engine:
         self.rig = rig
         self.threads = threads or os.cpu_count() or 1
         self.runs = 0
-        """so far"""
-
-    def residual(self, log: Prepared, values: Mapping[str, float], rung: int) -> np.ndarray:
-        """Measured less computed, times the weights of the samples, one row for each measured channel, SI; NaN where the rig has no motion."""
-        try:
-            seen = self.rig.run(log, values, rung)
-        except (InputError, _core.SolverError):
-            return np.full((len(log.measured), len(log.time)), np.nan)
-        return np.array([(log.measured[name] - seen[name]) * log.weight for name in log.measured])
+        """so far, without those for differences"""
+        self.by_differences: dict[str, str] = {}
+        """by parameter: why its derivatives are differences"""
+        self.touching: dict[str, str] = {}
+        """by log: why its derivatives are differences from some instant on, where they were last asked for"""
 
     def residuals(self, logs: Sequence[Prepared], point: Point, rung: int) -> list[np.ndarray]:
-        """Of each log, see `residual`."""
-        return self._each([lambda log=log: self.residual(log, point.of(log), rung) for log in logs])  # type: ignore[misc]
+        """Of each log measured less computed, times the weights of the samples, one row for each measured channel, SI; NaN where the rig has no motion."""
+        return self._residuals([(log, point.of(log)) for log in logs], rung)
 
     def jacobians(
         self, logs: Sequence[Prepared], point: Point, rung: int, parameters: Mapping[str, FreeParameter]
     ) -> list[np.ndarray]:
         """Of each log the derivative of its residuals by each parameter: channels x samples x parameters.
 
-        A parameter on its bound is changed to the inner side alone.
+        From where a motion only touches a condition it has no derivative: there, and of parameters by which there is none, it
+        is a central difference over a hundredth of the parameter's scale. One on its bound is changed to the inner side alone.
         """
-        work = []
-        for log in logs:
-            values = point.of(log)
-            for name, p in parameters.items():
-                h = STEP * p.step
-                up, down = min(values[name] + h, p.max), max(values[name] - h, p.min)
-                work += [(log, values | {name: x}) for x in (up, down)]
-        found = self._each([lambda log=log, v=v: self.residual(log, v, rung) for log, v in work])  # type: ignore[misc]
-        out, pairs = [], iter(zip(work, found, strict=True))
-        for log in logs:
-            columns = []
-            for name in parameters:
-                ((_, above), high), ((_, below), low) = next(pairs), next(pairs)
-                column = (high - low) / (above[name] - below[name])
-                columns.append(np.nan_to_num(column))
-            shape = (len(log.measured), len(log.time), 0)
-            out.append(np.stack(columns, axis=-1) if columns else np.zeros(shape))
+        names = list(parameters)
+        self.runs += len(logs)
+        requests = [(log, point.of(log)) for log in logs]
+        while True:
+            exact = {name: p for name, p in parameters.items() if name not in self.by_differences}
+            try:
+                found = run_logs(self.rig, requests, rung, exact, threads=self.threads)
+                break
+            except NoDerivativeError as refused:
+                self.by_differences[refused.name] = str(refused)
+        out = []
+        wanted: list[tuple[int, str]] = []
+        for k, (log, seen) in enumerate(zip(logs, found, strict=True)):
+            J = np.full((*seen.values.shape, len(names)), np.nan)
+            J[..., [names.index(name) for name in exact]] = -seen.derivatives * log.weight[:, None]
+            out.append(J)
+            self.touching.pop(log.name, None)
+            if seen.error is None and seen.ends_by:
+                self.touching[log.name] = seen.ends_by
+            whole = seen.error is None and not seen.ends_by
+            wanted += [(k, name) for name in names if not (whole and name in exact)]
+        for (k, name), column in zip(wanted, self._differences(requests, wanted, rung, parameters), strict=True):
+            J = out[k][..., names.index(name)]
+            J[...] = np.where(np.isnan(J), np.nan_to_num(column), J)
         return out
 
-    def _each(self, work: list[Callable[[], np.ndarray]]) -> list[np.ndarray]:
-        self.runs += len(work)
-        if self.threads == 1 or len(work) == 1:
-            return [piece() for piece in work]
-        with ThreadPoolExecutor(self.threads) as pool:
-            return list(pool.map(lambda piece: piece(), work))
+    def _differences(
+        self,
+        requests: Sequence[tuple[Prepared, Mapping[str, float]]],
+        wanted: Sequence[tuple[int, str]],
+        rung: int,
+        parameters: Mapping[str, FreeParameter],
+    ) -> list[np.ndarray]:
+        """Of residuals, for (number of a log, parameter)."""
+        work, widths = [], []
+        for k, name in wanted:
+            log, values = requests[k]
+            p = parameters[name]
+            h = STEP * p.step
+            above, below = min(values[name] + h, p.max), max(values[name] - h, p.min)
+            work += [(log, {**values, name: above}), (log, {**values, name: below})]
+            widths.append(above - below)
+        rows = self._residuals(work, rung) if work else []
+        return [(a - b) / w for a, b, w in zip(rows[::2], rows[1::2], widths, strict=True)]
+
+    def _residuals(self, requests: Sequence[tuple[Prepared, Mapping[str, float]]], rung: int) -> list[np.ndarray]:
+        self.runs += len(requests)
+        found = run_logs(self.rig, requests, rung, threads=self.threads)
+        return [
+            (np.array([log.measured[name] for name in log.measured]) - seen.values) * log.weight
+            for (log, _), seen in zip(requests, found, strict=True)
+        ]

@@ -12,6 +12,7 @@ from ..errors import InputError
 from .engine import Engine, Point
 from .parameters import FreeParameter
 from .prepare import Prepared
+from .runs import run_log
 from .task import FitOptions
 
 NORMAL = 1.2533  # of the mean of the magnitude of normally distributed errors, to their standard deviation
@@ -199,7 +200,7 @@ def search(
     residuals = problem.engine.residuals(problem.logs, start, problem.rung)
     for log, r in zip(problem.logs, residuals, strict=True):
         if not np.isfinite(r).all():
-            problem.engine.rig.run(log, start.of(log), problem.rung)  # raises what is wrong
+            run_log(problem.engine.rig, log, start.of(log), problem.rung)  # raises what is wrong
             raise InputError(f"{log.name}: the run of the rig has no finite values at the start values")
     point, damping, history = start, 1e-3, []
     names = list(problem.parameters)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
+from ..errors import InputError
 from ..inputs.operators import ARITHMETIC, COMPARISONS
 from ..inputs.validation import did_you_mean, shown
 
@@ -79,6 +81,37 @@ class Formula:
         if isinstance(found, complex) or (isinstance(found, float) and not math.isfinite(found)):
             raise ValueError(f"{self.text!r} has the value {found}, which is no finite number")
         return found
+
+
+@cache
+def formula(text: str) -> Formula:
+    """Read once.
+
+    Raises
+    ------
+    ValueError
+    """
+    return Formula(text)
+
+
+def names_in(text: str | float) -> frozenset[str]:
+    """What a formula names."""
+    return formula(text).names if isinstance(text, str) else frozenset()
+
+
+def number(text: str | float, known: Mapping[str, Any], key: str) -> float:
+    """The value of a formula.
+
+    Raises
+    ------
+    InputError
+    """
+    if isinstance(text, int | float):
+        return float(text)
+    try:
+        return float(formula(text).value(known))
+    except ValueError as problem:
+        raise InputError(f"key {key}: {problem}") from None
 
 
 def _refuse(node: ast.AST, text: str) -> None:

@@ -22,6 +22,7 @@ from .ladder import RungResult, chosen, climb, free_on, problem_of, start_point
 from .prepare import Prepared, prepared, read_all
 from .record import gear_sheet, scenario_text, sheet_text
 from .rig import Rig
+from .runs import run_log
 from .task import Identification, load_identification
 
 Notify = Callable[[str, int, float], None]
@@ -48,6 +49,10 @@ class IdentificationResult:
     """the rig with the values that were found, of the first log"""
     profiles: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     """by parameter, (value, rise of the loss)"""
+    by_differences: dict[str, str] = field(default_factory=dict)
+    """parameters whose derivatives were differences of runs, not exact: why"""
+    touching: dict[str, str] = field(default_factory=dict)
+    """logs whose derivatives were so from some instant on, at the values found: why"""
     rig: Rig | None = field(default=None, repr=False)
     logs: list[Prepared] = field(default_factory=list, repr=False)
 
@@ -93,7 +98,19 @@ class IdentificationResult:
                 if not math.isnan(mae):
                     n = sum(e.held_out == held_out and e.channel == channel for e in self.errors)
                     lines.append(f"  {channel}, {n} logs {what}: MAE {mae:.5g}, RMSE {rmse:.5g}")
-        return lines + [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
+        lines += [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
+        return lines + [f"  {text}" for text in self.differences()]
+
+    def differences(self) -> list[str]:
+        """Where the derivatives were differences of runs, and why."""
+        found = [f"{name}: derivatives by differences, since {why}" for name, why in self.by_differences.items()]
+        if self.touching:
+            first = next(iter(self.touching))
+            found.append(
+                f"{len(self.touching)} of {len(self.logs)} logs: derivatives by differences from some instant on; {first}: "
+                f"{self.touching[first]}"
+            )
+        return found
 
     def source(self) -> str:
         """What the values were identified from, for records."""
@@ -201,6 +218,8 @@ def identify_logs(
         {log.name: log.log.notes for log in logs if log.log.notes},
         rig.scenario_at(first, fit.point.of(first), best),
         found,
+        engine.by_differences,
+        {log.name: engine.touching[log.name] for log in train if log.name in engine.touching},
         rig,
         logs,
     )
@@ -211,6 +230,6 @@ def residual_table(result: IdentificationResult, variables: tuple[str, ...] = ()
     assert result.rig is not None
     out = {}
     for log in result.logs:
-        run = result.rig.run(log, result.values_for(log.name), result.chosen, variables)
+        run = run_log(result.rig, log, result.values_for(log.name), result.chosen, variables)
         out[log.name] = {"time": log.time, **{f"measured {n}": v for n, v in log.measured.items()}, **run}
     return out

@@ -13,9 +13,10 @@ from ..errors import InputError
 from .engine import Engine, Point
 from .errors_of_logs import LogError, log_errors
 from .fit import Fit, Problem, search
+from .formulas import number
 from .parameters import FreeParameter
 from .prepare import Prepared
-from .rig import Rig, number
+from .rig import Rig
 from .task import Identification
 
 GAIN = 0.01  # of the held-out error, by which a higher rung must be better to be taken

@@ -118,7 +118,7 @@ class FitOptions(Part):
     first: FormulaText | None = None
     """condition on the header of the logs with which the search begins, in place of `first_logs`: those without impacts"""
     sample_interval: Annotated[Time, Positive] | None = None
-    """of the runs; left out, that of the log, at most 2 ms"""
+    """of the runs behind a channel with a filter; left out, that of the log, at most 2 ms"""
 
 
 class Identification(Part):

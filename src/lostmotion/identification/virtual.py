@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from .formulas import number
 from .logs import Channel, Log
 from .prepare import Prepared, prepared
-from .rig import Rig, number
+from .rig import Rig
+from .runs import run_log
 
 
 def virtual_log(
@@ -55,7 +57,7 @@ def virtual_log(
         if m.channel not in plan.channels
     }
     log = prepared(task, replace(plan, channels={**zeros, **plan.channels}), rig.units)
-    run = rig.run(log, known, rung % len(rig.rungs()))
+    run = run_log(rig, log, known, rung % len(rig.rungs()))
     draw = np.random.default_rng(seed)
     channels = dict(plan.channels)
     for name, m in task.measured.items():

@@ -134,7 +134,7 @@ def core_variation(scenario: TrainScenario, key: str, beside: Sequence[Neighbour
         other = as_train(n.scenario)
         core, inputs, start, capacities = core_case(other)
         control = other.control() if scenario.controllers and not (of_start or of_inputs) else None
-        train = None if of_start or of_inputs else core
+        train = None if of_start or of_inputs else _core.ComposedTrain(core)
         out.append((n.offset, n.weight, train, None if of_start else inputs, (start, capacities), control))
     return key, out
 
@@ -144,7 +144,7 @@ def sensitive_case(scenario: TrainScenario, variations: Sequence[Any], control: 
     core, inputs, start, capacities = core_case(scenario)
     table = scenario.simulation
     return (
-        core,
+        _core.ComposedTrain(core),
         inputs,
         start,
         capacities,
@@ -153,6 +153,7 @@ def sensitive_case(scenario: TrainScenario, variations: Sequence[Any], control: 
         table.duration,
         table.sample_interval,
         table.samples,
+        [],
     )
 
 
@@ -196,6 +197,8 @@ class Sensitivities:
 class CoreDerivatives:
     """What the core returns of one run."""
 
+    error: str
+    """why the motion has no continuation; then there are no values"""
     values: np.ndarray
     """channels x instants"""
     derivatives: np.ndarray
@@ -204,15 +207,22 @@ class CoreDerivatives:
     """axes x signals x instants, of the controllers"""
     signal_derivatives: np.ndarray
     """parameters x axes x signals x instants"""
+    end_state: dict[str, float]
+    """by name"""
     ends_at: float
     """[s] from when on there are no derivatives; infinite if there are throughout"""
     ends_by: str
-    error: str
-    """why the motion has no continuation; then there are no values"""
 
 
-def run_cases(cases: Sequence[tuple[Any, ...]], channels: Sequence[str], threads: int = 1) -> list[CoreDerivatives]:
+def run_cases(
+    cases: Sequence[tuple[Any, ...]], channels: Sequence[str], threads: int = 1, *, signals: bool = True
+) -> list[CoreDerivatives]:
     """Runs with their derivatives, each as `sensitive_case` gives it, on several threads.
+
+    Parameters
+    ----------
+    signals
+        Also of what the controllers show; then the instants are the multiples of an interval.
 
     Raises
     ------
@@ -220,11 +230,10 @@ def run_cases(cases: Sequence[tuple[Any, ...]], channels: Sequence[str], threads
         What one of them asks for has no derivative.
     """
     out = []
-    for found in _core.run_sensitive_trains(list(cases), list(channels), threads):
-        problem, error, values, derivatives, signals, signal_derivatives, ends_at, ends_by = found
-        if problem:
-            raise InputError(f"sensitivities: {problem}")
-        out.append(CoreDerivatives(values, derivatives, signals, signal_derivatives, ends_at, ends_by, error))
+    for row in _core.run_sensitive_trains(list(cases), list(channels), signals, threads):
+        if row[0]:
+            raise InputError(f"sensitivities: {row[0]}")
+        out.append(CoreDerivatives(*row[1:]))
     return out
 
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Collection, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from .. import _core
 from ..control.axis import NO_LAWS, Bound, check_torques, core_control, motor_laws, turns
@@ -74,6 +74,7 @@ class TrainScenario(TrainElements):
     """of motors, which then have no command"""
     initial: TrainInitial = TrainInitial()
     simulation: SimulationTable
+    _train: DriveTrain | None = PrivateAttr(None)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -189,10 +190,17 @@ class TrainScenario(TrainElements):
 
     def train(self) -> DriveTrain:
         """The drive train without its surroundings."""
-        shafts = {
-            name: Shaft(**{key: getattr(s, key) for key in Shaft.model_fields}) for name, s in self.shafts.items()
-        }
-        return DriveTrain(shafts=shafts, **{table: getattr(self, table) for table in TrainElements.model_fields})
+        if self._train is None:
+            self._train = DriveTrain(shafts=self.plain_shafts(), **self.elements())
+        return self._train
+
+    def plain_shafts(self) -> dict[str, Shaft]:
+        """The shafts without the torques on them."""
+        return {name: Shaft(**{key: getattr(s, key) for key in Shaft.model_fields}) for name, s in self.shafts.items()}
+
+    def elements(self) -> dict[str, Any]:
+        """The tables of all else that makes the train."""
+        return {table: getattr(self, table) for table in TrainElements.model_fields}
 
     def loaded(self) -> list[str]:
         """Names of the shafts that a load torque acts on."""

@@ -1,0 +1,92 @@
+"""Scenarios that differ in a few numbers, made without checking again what does not differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, get_args, get_origin
+
+from pydantic import TypeAdapter, ValidationError
+
+from ..errors import InputError
+from ..inputs.named import Named
+from ..model.shaft import Shaft
+from ..model.train import DriveTrain
+from ..simulation.keys import set_values
+from ..simulation.train_scenario import TrainScenario
+
+
+class Variants:
+    """Scenarios like another one.
+
+    What parts of a train must have to do with each other is checked once for each set of keys that are changed; from then on
+    only the elements that differ are.
+    """
+
+    def __init__(self, scenario: TrainScenario) -> None:
+        self._like = scenario
+        self._data = scenario.model_dump()
+        self._shafts = scenario.plain_shafts()
+        self._checked: set[Any] = set()
+
+    def __call__(self, changes: Mapping[str, Any]) -> TrainScenario:
+        """The scenario with values by dotted key.
+
+        Raises
+        ------
+        InputError
+        """
+        data = dict(self._data)
+        set_values(data, changes.items())
+        shape = tuple((key, _shape(value)) for key, value in changes.items())
+        if shape in self._checked and (found := self._quickly(data)) is not None:
+            return found
+        scenario = TrainScenario(**data)
+        self._checked.add(shape)
+        return scenario
+
+    def _quickly(self, data: Mapping[str, Any]) -> TrainScenario | None:
+        """Nothing where the constructor has to say what is wrong."""
+        fields = {name: getattr(self._like, name) for name in TrainScenario.model_fields}
+        for table, elements in data.items():
+            before = self._data[table]
+            if elements is before:
+                continue
+            if (adapter := _element(table)) is None or elements.keys() != before.keys():
+                return None
+            try:
+                fields[table] = Named(
+                    {
+                        name: fields[table][name] if element is before[name] else adapter.validate_python(element)
+                        for name, element in elements.items()
+                    }
+                )
+            except (ValidationError, InputError):
+                return None
+        found = TrainScenario.model_construct(set(data), **fields)
+        shafts = {
+            name: self._shafts[name]
+            if shaft is self._like.shafts[name]
+            else Shaft.model_construct(None, **{key: getattr(shaft, key) for key in Shaft.model_fields})
+            for name, shaft in found.shafts.items()
+        }
+        found._train = DriveTrain.model_construct(None, shafts=Named(shafts), **found.elements())
+        return found
+
+
+@cache
+def _element(table: str) -> TypeAdapter[Any] | None:
+    """Of a table of elements by name: how one of them is read."""
+    kind = TrainScenario.model_fields[table].annotation
+    return TypeAdapter(get_args(kind)[1]) if get_origin(kind) is dict else None
+
+
+def _shape(value: Any) -> Any:
+    """What a value is, but for its numbers."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return float
+    if isinstance(value, list | tuple):
+        return tuple(map(_shape, value))
+    if isinstance(value, Mapping):
+        return tuple((key, _shape(inner)) for key, inner in value.items())
+    return value
