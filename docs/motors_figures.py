@@ -9,7 +9,7 @@ from two_motors_figures import DARK, DOTS, LIGHT, save
 
 import lostmotion as lm
 from lostmotion.reports.panels import Curve, Panel
-from lostmotion.sizing.thermal import TwoBodies
+from lostmotion.sizing.thermal import TwoBodies, mean_square
 
 CYCLE = 20.0  # s: one second of acceleration, 4 s of rest, one of braking, and so on
 
@@ -50,7 +50,7 @@ def write(out: Path) -> None:
     long = np.concatenate([n * CYCLE + time[:-1] for n in range(360)])  # from cold, cycle by cycle
     torque = np.tile(result["motor_torque"].values[:-1], 360)
     hours = long[:: len(time) - 1] / 3600.0
-    winding, case = (T[:: len(time) - 1] for T in bodies.course(long, torque, (25.0, 25.0)))
+    winding, case = (T[:: len(time) - 1] for T in bodies.course(long, mean_square(torque), (25.0, 25.0)))
     ends = [float(steady[f"{name}_temperature"][-1]) for name in ("winding", "case")]
     warming = (
         Curve("winding", hours, winding, DARK),
