@@ -40,6 +40,11 @@ fmu: $(VENV)/tools
 	$(BIN)/pip install -q --group portable
 	$(BIN)/python bindings/c/build.py fmu src/lostmotion/fmu_libraries
 
+# Those libraries, as far as this machine can run them: QEMU and Wine, if they are installed.
+.PHONY: test-fmu
+test-fmu: $(VENV)/built $(VENV)/portable
+	$(BIN)/pytest -n0 -rs tests/test_fmu_platforms.py
+
 # The live page, src/lostmotion/live_page/page.html, and its cores, one for each kernel, which the wheel carries.
 LIVE := src/lostmotion/live_page
 NODE := command -v npm >/dev/null || (echo 'npm is missing: without node the live page is not built'; false)

@@ -11,7 +11,7 @@ import pytest
 import lostmotion as lm
 from lostmotion.portable.description import numbers_of
 from lostmotion.portable.parameters import Effect, Parameter, Parameters, parameters_of, predicted
-from test_c_interface import INPUTS, INVALID, OK, VARIABLES, doubles, library  # noqa: F401
+from test_c_interface import INPUTS, INVALID, OK, STATES, VARIABLES, doubles, library  # noqa: F401
 from test_c_interface import Simulation as Stepped
 
 SAMPLES = 0
@@ -178,3 +178,46 @@ def test_a_law_of_ones_own_cannot_be_described() -> None:
 def test_what_is_zero_in_a_sum_can_be_changed() -> None:
     frictions = [Parameter(key, "N*m*s/rad", 0.0, (Effect(0, False, 0.0, 1.0),)) for key in ("shaft", "gear")]
     assert predicted(np.zeros(1), frictions, {"shaft": 0.25, "gear": 0.5}) == [0.75]
+
+
+def test_rates_and_guards_serve_an_integrator_of_the_caller_s_own(library: c.CDLL) -> None:  # noqa: F811
+    """Runge-Kutta's steps of 5 us through a stretch without an event: an error of some (rate * step)^4 = 1e-10."""
+    scenario = lm.load("paper-2dof-nl-small", ["initial.motor_speed=30", "initial.load_speed=0.3"])
+    described = Scenario(library, lm.description(scenario, parameters=False))
+    exact, placed = described.simulation(1e-3), described.simulation(1e-3)
+    n, guards = len(placed.names(STATES)), int(library.lm_guard_count(placed.handle))
+    library.lm_next_tick.restype = c.c_double
+    inputs, out, z = doubles([0.3, 2.0]), (c.c_double * n)(), (c.c_double * guards)()
+
+    def rates(time: float, x: np.ndarray) -> np.ndarray:
+        assert library.lm_place(placed.handle, c.c_double(time), doubles(x), inputs) == OK
+        assert library.lm_rates(placed.handle, out) == OK
+        assert library.lm_guards(placed.handle, z) == OK
+        assert min(z) > 0.0
+        return np.array(out)
+
+    assert library.lm_states(placed.handle, out) == OK
+    x, h = np.array(out), 5e-6
+    assert library.lm_place(placed.handle, c.c_double(0.0), doubles(x), inputs) == OK
+    assert library.lm_settle(placed.handle) == OK
+    assert library.lm_next_tick(placed.handle) == math.inf
+    for k in range(80):
+        a = rates(k * h, x)
+        b = rates((k + 0.5) * h, x + 0.5 * h * a)
+        d = rates((k + 0.5) * h, x + 0.5 * h * b)
+        x = x + h / 6.0 * (a + 2.0 * b + 2.0 * d + rates((k + 1) * h, x + h * d))
+    assert library.lm_accept(placed.handle) == 0
+    assert library.lm_advance(exact.handle, c.c_double(80 * h), inputs, inputs) == OK
+    assert library.lm_states(exact.handle, out) == OK
+    assert x == pytest.approx(np.array(out), rel=1e-8)
+    assert abs(x[0]) > 0.01
+
+
+def test_given_references_are_inputs(library: c.CDLL) -> None:  # noqa: F811
+    described = Scenario(library, lm.description(lm.load("position-axis"), parameters=False))
+    assert library.lm_scenario_give_references(described.handle, 1) == OK
+    assert described.simulation(1e-3).names(INPUTS) == ["load_torque", "reference"]
+    delayed = lm.load("position-axis", ["controller.position.reference_delay='1 ms'"])
+    described = Scenario(library, lm.description(delayed, parameters=False))
+    assert library.lm_scenario_give_references(described.handle, 1) == 100
+    assert "has to know the past of its reference" in described.error()

@@ -66,7 +66,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "characteristics": (lm.characteristics, {"response": RESPONSE, "drive": SCENARIO, "output": "load_speed"}),
     "check_drive": (lm.check_drive, {"scenario": SCENARIO}),
     "description": (lm.description, {"scenario": SCENARIO, "parameters": False}),
-    "export_fmu": (lm.export_fmu, {"scenario": SCENARIO, "path": "drive.fmu", "controllers": True, "libraries": None}),
+    "export_fmu": (lm.export_fmu, {"scenario": SCENARIO, "path": "drive.fmu", "fmi": 2, "controllers": True, "references": False, "libraries": None}),
     "energy_of": (lm.energy_of, {"dataset": RESULT}),
     "explain": (lm.explain, {"what": SCENARIO, "time": 0.01}),
     "frequency_response": (lm.frequency_response, {"drive": SCENARIO, "frequencies": [10.0], "amplitudes": [1.0], "source": "command", "mean_command": 0.0, "mean_load_torque": 0.0, "harmonics": 1, "refine": None, "threads": 1, "max_periods": 5, "law": None, "progress": dangle}),

@@ -31,7 +31,11 @@ FLAGS = (
     *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
 )
 # Of an FMU: no runs in one go.
-FMU_SOURCES = (HERE.parent / "fmu" / "fmi2.cpp", *(s for s in SOURCES if s.stem not in ("run", "explanation")))
+FMU_SOURCES = (
+    *(s for s in SOURCES if s.stem not in ("run", "explanation")),
+    HERE.parent / "fmu" / "fmi2.cpp",
+    HERE.parent / "fmu" / "fmi3.cpp",
+)
 # Of a live page: nothing else, and the kernel of its drive alone.
 PAGE_SOURCES = tuple(s for s in SOURCES if s.stem in ("run", "explanation", "scenario", "freestanding"))
 KERNELS = ("drive", "narrow", "middle", "wide")
@@ -136,7 +140,8 @@ def fmu(to: Path, optimisation: str = "-O2", platforms: Sequence[str] = tuple(PL
         arguments = ["-target", target, "-mcpu=baseline"] + ([] if "windows" in platform else ["-fPIC"])
         made = objects(FMU_SOURCES, arguments, optimisation, ROOT / "build" / "fmu" / platform)
         unfinished = library.with_suffix(".unfinished")
-        zig("cc", *arguments, "-shared", "-s", *made, "-o", unfinished)
+        whole = ["-Wl,-z,defs"] if "linux" in platform else []  # elsewhere a missing symbol ends the linking anyway
+        zig("cc", *arguments, "-shared", "-s", *whole, *made, "-o", unfinished)
         unfinished.replace(library)
         print(library, library.stat().st_size)
 

@@ -43,6 +43,7 @@ static string printed(const char* format, Number value) {
 }
 string to_string(double value) { return printed("%f", value); }
 string to_string(int value) { return printed("%d", value); }
+string to_string(unsigned value) { return printed("%u", value); }
 string to_string(long value) { return printed("%ld", value); }
 string to_string(unsigned long value) { return printed("%lu", value); }
 string to_string(long long value) { return printed("%lld", value); }

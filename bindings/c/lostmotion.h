@@ -25,7 +25,7 @@ extern "C" {
 #endif
 
 /* Rises with every change that a caller has to know of. */
-#define LM_INTERFACE_VERSION 2
+#define LM_INTERFACE_VERSION 3
 LM_API int lm_interface_version(void);
 
 enum {
@@ -80,6 +80,9 @@ LM_API int lm_scenario_set_reference(lm_scenario* scenario, size_t controller, c
 
 /* The value of an input at t = 0. */
 LM_API double lm_scenario_input_at_start(const lm_scenario* scenario, size_t input);
+
+/* Whether sampled controllers follow inputs of a simulation, in the place of their references in the scenario. */
+LM_API int lm_scenario_give_references(lm_scenario* scenario, int given);
 
 /* A run in one go. energy: whether to keep the energies. Beyond max_switchings the switchings are only counted. NULL if
  * nothing could run (lm_scenario_error); a motion that has no continuation gives a result with a status and an error.
@@ -216,7 +219,8 @@ LM_API const char* lm_error(const lm_simulation* simulation);
 /* What there is to name and count. */
 typedef enum {
     LM_STATES,    /* speeds, twists, angles, torques of DC motors */
-    LM_INPUTS,    /* commands that no sampled controller gives, load torques, references of continuous controllers */
+    LM_INPUTS,    /* commands that no sampled controller gives, load torques, references of continuous controllers, and
+                     those of sampled ones if they are to be given */
     LM_VARIABLES, /* all result variables, and what the controllers show */
     LM_CAPACITIES /* hysteresis capacities of gears, by the name of the gear */
 } lm_kind;
@@ -235,6 +239,8 @@ LM_API double lm_time(const lm_simulation* simulation);
 LM_API int lm_hold(lm_simulation* simulation, const double* inputs);
 /* Of an input of the simulation its number among those of the scenario, which has those of controllers too. */
 LM_API size_t lm_solver_input(const lm_simulation* simulation, size_t input);
+/* Of an input in the scenario, at t = 0. */
+LM_API double lm_input_at_start(const lm_simulation* simulation, size_t input);
 /* All variables at the present instant, with the inputs at their last values. */
 LM_API int lm_read(lm_simulation* simulation, double* variables);
 
@@ -248,6 +254,27 @@ LM_API int lm_set_state(lm_simulation* simulation, const double* state);
  * inputs). A direction or a result may be NULL. */
 LM_API int lm_directional_derivative(lm_simulation* simulation, const double* states, const double* inputs,
                                      double* rates, double* variables);
+
+/* --- as a hybrid system, which an integrator of the caller's own solves --- */
+
+/* Between two events dx/dt is smooth. One happens where a guard falls below zero, where an input jumps, and at each
+ * tick of sampled controllers: then lm_settle() finds the regime that follows. Not with field-oriented control inside.
+ *
+ * At a time [s], with these states and inputs, in the regime that it is in. */
+LM_API int lm_place(lm_simulation* simulation, double time, const double* states, const double* inputs);
+LM_API int lm_states(const lm_simulation* simulation, double* states);
+/* dx/dt of the states. */
+LM_API int lm_rates(lm_simulation* simulation, double* rates);
+/* In natural magnitudes, shifted by 1e-9, so that an integrator stops where the next regime is determinate; 1 if there
+ * is none at this place in the present regime. */
+LM_API size_t lm_guard_count(const lm_simulation* simulation);
+LM_API int lm_guards(lm_simulation* simulation, double* guards);
+/* Runs the ticks that are due and finds the regime that holds from here on; states may change by less than the shift,
+ * to what they are at rest. */
+LM_API int lm_settle(lm_simulation* simulation);
+LM_API double lm_next_tick(const lm_simulation* simulation); /* [s], INFINITY without sampled controllers */
+/* After each step of the integrator. 1: lm_settle() has to be called, since inputs take a torque at rest along. */
+LM_API int lm_accept(lm_simulation* simulation);
 
 /* --- a train in one go --- */
 

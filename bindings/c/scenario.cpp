@@ -80,6 +80,10 @@ double lm_scenario_input_at_start(const lm_scenario* scenario, size_t input) {
     return lm::value_at_start(s.inputs[input]);
 }
 
+int lm_scenario_give_references(lm_scenario* scenario, int given) {
+    return scenario->changed(scenario->description.give_references(given != 0));
+}
+
 size_t lm_scenario_parameter_count(const lm_scenario* scenario) { return scenario->description.parameters().size(); }
 static const lm::ScenarioParameter* parameter(const lm_scenario* scenario, size_t k) {
     const auto& all = scenario->description.parameters();

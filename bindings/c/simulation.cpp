@@ -26,6 +26,8 @@ const std::vector<std::string>* names_of(const lm_simulation& s, lm_kind kind) {
 }
 // The variable of the same name, or nullptr.
 const lm::Variable* variable_of(const lm_simulation& s, lm_kind kind, std::size_t k) {
+    const std::size_t free = s.simulation.free_inputs();
+    if (kind == LM_INPUTS && k >= free) return &s.simulation.names().references[k - free];
     const auto* names = names_of(s, kind);
     const lm::Variables& v = s.simulation.variables();
     const int place = names == nullptr ? static_cast<int>(k) : v.place((*names)[k]);
@@ -117,8 +119,12 @@ int lm_advance(lm_simulation* simulation, double interval, const double* begin, 
 double lm_time(const lm_simulation* simulation) { return simulation->simulation.time(); }
 
 size_t lm_solver_input(const lm_simulation* simulation, size_t input) {
-    return input < simulation->simulation.names().inputs.size() ? simulation->simulation.solver_input(input)
-                                                                : static_cast<size_t>(-1);
+    return input < simulation->simulation.free_inputs() ? simulation->simulation.solver_input(input)
+                                                        : static_cast<size_t>(-1);
+}
+double lm_input_at_start(const lm_simulation* simulation, size_t input) {
+    return input < simulation->simulation.names().inputs.size() ? simulation->simulation.input_at_start(input)
+                                                                : std::nan("");
 }
 int lm_hold(lm_simulation* simulation, const double* inputs) {
     const std::size_t n = simulation->simulation.names().inputs.size();
@@ -129,6 +135,31 @@ int lm_hold(lm_simulation* simulation, const double* inputs) {
 int lm_read(lm_simulation* simulation, double* variables) {
     return simulation->ended(simulation->simulation.read(variables));
 }
+
+int lm_place(lm_simulation* simulation, double time, const double* states, const double* inputs) {
+    lm::ScenarioSimulation& s = simulation->simulation;
+    const std::size_t n = s.names().states.size(), m = s.names().inputs.size();
+    if (s.has_windings())
+        return simulation->failed("a motor under field-oriented control is solved by this library alone, step by step");
+    if (!(std::isfinite(time) && finite(states, n) && (m == 0 || finite(inputs, m))))
+        return simulation->failed("the time, a state or an input is missing or not finite");
+    s.place(time, {states, n}, {inputs, m});
+    return LM_OK;
+}
+int lm_states(const lm_simulation* simulation, double* states) {
+    simulation->simulation.states(states);
+    return LM_OK;
+}
+int lm_rates(lm_simulation* simulation, double* rates) {
+    return simulation->ended(simulation->simulation.rates(rates));
+}
+size_t lm_guard_count(const lm_simulation* simulation) { return simulation->simulation.guard_count(); }
+int lm_guards(lm_simulation* simulation, double* guards) {
+    return simulation->ended(simulation->simulation.guards(guards));
+}
+int lm_settle(lm_simulation* simulation) { return simulation->ended(simulation->simulation.settle()); }
+double lm_next_tick(const lm_simulation* simulation) { return simulation->simulation.next_tick(); }
+int lm_accept(lm_simulation* simulation) { return simulation->simulation.accept() ? 1 : 0; }
 
 size_t lm_state_size(const lm_simulation* simulation) { return simulation->simulation.state_size(); }
 int lm_get_state(const lm_simulation* simulation, double* state) {

@@ -1,5 +1,6 @@
-// Functions of FMI 2.0 for Co-Simulation. Types and statuses as in the standard, fmi-standard.org, version 2.0.4,
-// chapters 2.1 and 4.2.
+// Functions of FMI 2.0. Types and statuses as in the standard, fmi-standard.org, version 2.0.4, chapters 2.1, 3.2 and
+// 4.2.
+#include <algorithm>
 #include <cstring>
 #include <string>
 #include <vector>
@@ -52,6 +53,12 @@ Component& of(void* component) { return *static_cast<Component*>(component); }
 
 using State = std::vector<double>;
 
+// Of fmi2NewDiscreteStates.
+struct EventInfo {
+    Boolean needed, terminate, nominals_changed, states_changed, next_defined;
+    double next;
+};
+
 }  // namespace
 
 FMU_API const char* fmi2GetTypesPlatform() { return "default"; }
@@ -66,9 +73,9 @@ FMU_API void* fmi2Instantiate(const char* name, int type, const char* guid, cons
         return nullptr;
     };
     if (callbacks == nullptr || name == nullptr) return nullptr;
-    if (type != 1) return refused("this FMU is for Co-Simulation");
     const std::string directory = lm::path_of_uri(resources == nullptr ? "" : resources);
-    auto* made = new Component{name, *callbacks, lm::Instance(directory)};
+    auto* made = new Component{name, *callbacks,
+                               lm::Instance(directory, type == 0 ? lm::Kind::model_exchange : lm::Kind::co_simulation)};
     std::string problem = made->instance.problem();
     if (problem.empty() && guid != nullptr && made->instance.identifier() != guid)
         problem = "the identifier of modelDescription.xml is not that of the resources";
@@ -180,3 +187,41 @@ FMU_API int fmi2GetBooleanStatus(void*, int kind, Boolean* value) {
     return lm::ok;
 }
 FMU_API int fmi2GetStringStatus(void*, int, const char**) { return lm::discard; }
+
+// --- Model Exchange ---
+
+FMU_API int fmi2EnterEventMode(void*) { return lm::ok; }
+FMU_API int fmi2NewDiscreteStates(void* c, EventInfo* info) {
+    lm::Instance::Settled settled;
+    const lm::Ended e = of(c).instance.settle(settled);
+    *info = {0, 0, 0, settled.states_changed, settled.has_next, settled.next};
+    return of(c).ended(e);
+}
+FMU_API int fmi2EnterContinuousTimeMode(void*) { return lm::ok; }
+FMU_API int fmi2CompletedIntegratorStep(void* c, Boolean, Boolean* enter_event_mode, Boolean* terminate) {
+    bool event = false;
+    const lm::Ended e = of(c).instance.accept(event);
+    *enter_event_mode = event;
+    *terminate = 0;
+    return of(c).ended(e);
+}
+FMU_API int fmi2SetTime(void* c, double time) { return of(c).ended(of(c).instance.set_time(time)); }
+FMU_API int fmi2SetContinuousStates(void* c, const double* x, std::size_t n) {
+    return of(c).ended(of(c).instance.set_states(x, n));
+}
+FMU_API int fmi2GetContinuousStates(void* c, double* x, std::size_t n) {
+    return of(c).ended(of(c).instance.get_states(x, n));
+}
+FMU_API int fmi2GetDerivatives(void* c, double* out, std::size_t n) {
+    return of(c).ended(of(c).instance.get_derivatives(out, n));
+}
+FMU_API int fmi2GetEventIndicators(void* c, double* out, std::size_t n) {
+    return of(c).ended(of(c).instance.get_guards(out, n));
+}
+FMU_API int fmi2GetNominalsOfContinuousStates(void* c, double* out, std::size_t n) {
+    const std::vector<double>& nominals = of(c).instance.nominals();
+    if (n != nominals.size())
+        return of(c).ended(of(c).instance.failed("the number of continuous states is another one"));
+    std::copy(nominals.begin(), nominals.end(), out);
+    return lm::ok;
+}

@@ -1,7 +1,5 @@
-// An instance of the FMU, whatever the version of the standard: a scenario from the resources, step by step.
-//
-// Value references: 0 is the time, 1000 + k the k-th input and 3000 + k the k-th output, in the order of the resource
-// names.txt, 10000 + k the k-th parameter of the description (src/lostmotion/portable/fmu_model.py has the same).
+// An instance of the FMU, whatever the version of the standard: a scenario from the resources, step by step
+// (Co-Simulation), or at the points of the importer's integrator (Model Exchange).
 #pragma once
 
 #include <algorithm>
@@ -13,15 +11,14 @@
 #include <utility>
 #include <vector>
 
-#include "../c/lostmotion.h"
-#include "resources.hpp"
+#include "variables.hpp"
 
 namespace lostmotion::fmu {
 
-enum Reference : unsigned { time_reference = 0, first_input = 1000, first_output = 3000, first_parameter = 10000 };
-
 // How a call has ended: FMI 2 and 3 number them alike.
 enum Ended : int { ok = 0, warning = 1, discard = 2, error = 3, fatal = 4 };
+
+enum class Kind { model_exchange, co_simulation };
 
 struct Free {
     void operator()(lm_scenario* s) const { lm_scenario_free(s); }
@@ -31,14 +28,17 @@ struct Free {
 class Instance {
  public:
     // directory: of the resources. What is wrong with them is in problem().
-    explicit Instance(const std::string& directory) : path_(directory + "/scenario.bin") {
-        problem_ = read();
+    Instance(const std::string& directory, Kind kind) : kind_(kind), path_(directory + "/scenario.bin") {
+        const std::string names = directory + "/names.txt";
+        problem_ = variables_.read(names);
+        if (problem_.empty()) problem_ = read();
         if (problem_.empty()) begin();
-        if (problem_.empty()) problem_ = read_names(directory + "/names.txt");
+        if (problem_.empty()) problem_ = variables_.find(simulation_.get(), names);
+        if (problem_.empty() && kind_ == Kind::model_exchange && place() != ok) problem_ = sentence_;
     }
-    // By which modelDescription.xml and resources know each other.
-    const std::string& identifier() const { return identifier_; }
+    const std::string& identifier() const { return variables_.identifier; }
     const std::string& problem() const { return problem_; }
+    Kind kind() const { return kind_; }
 
     // Back to the beginning, with the values of the parameters that the file has.
     Ended reset() {
@@ -47,37 +47,41 @@ class Instance {
         begin();
         return ok;
     }
-    void set_start_time(double t) { start_ = t; }
+    void set_start_time(double t) { start_ = time_ = t; }
     void exit_initialization() { running_ = true; }
-    double time() const { return start_ + lm_time(simulation_.get()); }
+    double time() const { return is_exchange() ? time_ : start_ + lm_time(simulation_.get()); }
 
     // --- values by reference ---
 
     Ended get(unsigned reference, double& value) {
         if (reference == time_reference) {
             value = time();
-            return ok;
-        }
-        if (const double* input = input_of(reference)) {
-            value = *input;
-            return ok;
-        }
-        if (is_parameter(reference)) {
+        } else if (const std::size_t* k = variables_.input(reference)) {
+            value = inputs_[*k];
+        } else if (const std::size_t* rate = variables_.input_rate(reference)) {
+            value = rates_[*rate];
+        } else if (is_parameter(reference)) {
             value = lm_scenario_get(scenario_.get(), reference - first_parameter);
-            return ok;
+        } else if (const std::size_t* output = variables_.output(reference)) {
+            if (const Ended e = refresh(); e != ok) return e;
+            value = values_[*output];
+        } else {
+            return get_of_state(reference, value);
         }
-        if (!is_output(reference)) return unknown(reference);
-        if (const Ended e = refresh(); e != ok) return e;
-        value = variables_[outputs_[reference - first_output]];
         return ok;
     }
     Ended set(unsigned reference, double value) {
         if (!std::isfinite(value)) return failed("a value is not finite");
-        if (double* input = input_of(reference)) {
-            if (*input != value) read_ = false;
-            *input = value;
+        if (const std::size_t* k = variables_.input(reference)) {
+            if (inputs_[*k] == value) return ok;
+            inputs_[*k] = value;
+            read_ = false;
+            moved_ = true;
+            if (!running_) changed_ = true;
             return ok;
         }
+        if (variables_.input_rate(reference) != nullptr)
+            return set_input_rate(reference - first_input_rate + first_input, 1, value);
         if (!is_parameter(reference)) return unknown(reference);
         const std::size_t k = reference - first_parameter;
         if (lm_scenario_get(scenario_.get(), k) == value) return ok;
@@ -90,44 +94,121 @@ class Instance {
     // Of an input, by its own reference; only the first derivative is taken.
     Ended set_input_rate(unsigned reference, int order, double rate) {
         if (order != 1) return failed("an input has its first time derivative alone");
-        if (!is_input(reference)) return unknown(reference);
+        const std::size_t* k = variables_.input(reference);
+        if (k == nullptr) return unknown(reference);
         if (!std::isfinite(rate)) return failed("the derivative of an input is not finite");
-        rates_[input_places_[reference - first_input]] = rate;
+        rates_[*k] = rate;
         return ok;
     }
 
-    // --- steps ---
+    // Of variables or derivatives in a direction of inputs and states.
+    Ended directional_derivative(const unsigned* unknowns, std::size_t n_unknowns, const unsigned* knowns,
+                                 const double* seed, std::size_t n_knowns, double* out) {
+        if (const Ended e = refresh(); e != ok) return e;
+        std::vector<double> dx(states_.size()), du(inputs_.size()), rates(states_.size()), variables(values_.size());
+        for (std::size_t k = 0; k < n_knowns; ++k) {
+            if (const std::size_t* input = variables_.input(knowns[k]))
+                du[*input] += seed[k];
+            else if (const std::size_t* state = variables_.state(knowns[k]))
+                dx[*state] += seed[k];
+            else if (variables_.input_rate(knowns[k]) == nullptr)
+                return unknown(knowns[k]);
+        }
+        if (lm_directional_derivative(simulation_.get(), dx.data(), du.data(), rates.data(), variables.data()) != LM_OK)
+            return failed();
+        for (std::size_t k = 0; k < n_unknowns; ++k) {
+            if (const std::size_t* output = variables_.output(unknowns[k]))
+                out[k] = variables[*output];
+            else if (const std::size_t* derivative = variables_.derivative(unknowns[k]))
+                out[k] = rates[*derivative];
+            else
+                return unknown(unknowns[k]);
+        }
+        return ok;
+    }
+
+    // --- Co-Simulation ---
 
     // from: communication point; rounding apart it is where the last step has ended.
     Ended step(double from, double interval) {
+        if (is_exchange()) return failed("this instance is for Model Exchange");
         if (!(std::isfinite(interval) && interval >= 1e-12 && interval <= 1e12))
             return failed("the communication step must lie between 1e-12 s and 1e12 s");
         if (!(std::fabs(from - time()) <= 1e-3 * interval + 1e-9 * std::fabs(from)))
             return failed("the communication point is " + std::to_string(from) + " s, but the FMU is at " +
                           std::to_string(time()) + " s");
         if (const Ended e = apply(); e != ok) return e;
-        std::vector<double> end = inputs_;
-        for (std::size_t k = 0; k < end.size(); ++k) end[k] += rates_[k] * interval;
-        if (lm_advance(simulation_.get(), interval, inputs_.data(), end.data()) != LM_OK) return failed();
+        end_ = inputs_;
+        for (std::size_t k = 0; k < end_.size(); ++k) end_[k] += rates_[k] * interval;
+        if (lm_advance(simulation_.get(), interval, inputs_.data(), end_.data()) != LM_OK) return failed();
         read_ = false;
         return ok;
     }
 
-    // Of variables in a direction of the inputs.
-    Ended directional_derivative(const unsigned* unknowns, std::size_t n_unknowns, const unsigned* knowns,
-                                 const double* seed, std::size_t n_knowns, double* out) {
-        if (const Ended e = refresh(); e != ok) return e;
-        std::vector<double> du(inputs_.size()), rates(variables_.size());
-        for (std::size_t k = 0; k < n_knowns; ++k) {
-            if (!is_input(knowns[k])) return unknown(knowns[k]);
-            du[input_places_[knowns[k] - first_input]] += seed[k];
+    // --- Model Exchange ---
+
+    std::size_t state_count() const { return variables_.states.size(); }
+    // As many as are declared, which may be more than the simulation has guards.
+    std::size_t indicator_count() const { return variables_.indicators; }
+    const std::vector<double>& nominals() const { return variables_.nominals; }
+    Ended set_time(double t) {
+        if (!std::isfinite(t)) return failed("the time is not finite");
+        time_ = t;
+        moved_ = true;
+        read_ = false;
+        return ok;
+    }
+    Ended set_states(const double* x, std::size_t n) {
+        if (n != state_count()) return failed("the FMU has " + std::to_string(state_count()) + " continuous states");
+        for (std::size_t k = 0; k < n; ++k) {
+            if (!std::isfinite(x[k])) return failed("a continuous state is not finite", discard);
+            states_[variables_.states[k]] = x[k];
         }
-        if (lm_directional_derivative(simulation_.get(), nullptr, du.data(), nullptr, rates.data()) != LM_OK)
-            return failed();
-        for (std::size_t k = 0; k < n_unknowns; ++k) {
-            if (!is_output(unknowns[k])) return unknown(unknowns[k]);
-            out[k] = rates[outputs_[unknowns[k] - first_output]];
-        }
+        moved_ = true;
+        read_ = false;
+        return ok;
+    }
+    Ended get_states(double* x, std::size_t n) {
+        if (n != state_count()) return failed("the FMU has " + std::to_string(state_count()) + " continuous states");
+        if (const Ended e = place(); e != ok) return e;
+        for (std::size_t k = 0; k < n; ++k) x[k] = states_[variables_.states[k]];
+        return ok;
+    }
+    Ended get_derivatives(double* out, std::size_t n) {
+        if (n != state_count()) return failed("the FMU has " + std::to_string(state_count()) + " continuous states");
+        if (const Ended e = place(); e != ok) return e;
+        scratch_.resize(states_.size());
+        if (lm_rates(simulation_.get(), scratch_.data()) != LM_OK) return failed();
+        for (std::size_t k = 0; k < n; ++k) out[k] = scratch_[variables_.states[k]];
+        return ok;
+    }
+    Ended get_guards(double* out, std::size_t n) {
+        if (n != indicator_count() || n < lm_guard_count(simulation_.get()))
+            return failed("the FMU has " + std::to_string(indicator_count()) + " event indicators");
+        if (const Ended e = place(); e != ok) return e;
+        std::fill_n(out, n, 1.0);
+        return lm_guards(simulation_.get(), out) == LM_OK ? ok : failed();
+    }
+    struct Settled {
+        bool states_changed = false, has_next = false;
+        double next = 0.0;  // [s], of the next tick of the controllers
+    };
+    // In event mode; of an instance for Co-Simulation nothing.
+    Ended settle(Settled& out) {
+        if (!is_exchange()) return ok;
+        if (const Ended e = place(); e != ok) return e;
+        const std::vector<double> before = states_;
+        if (lm_settle(simulation_.get()) != LM_OK) return failed();
+        lm_states(simulation_.get(), states_.data());
+        const double tick = lm_next_tick(simulation_.get());
+        out = {states_ != before, std::isfinite(tick), start_ + tick};
+        read_ = false;
+        return ok;
+    }
+    // After a step of the integrator. event: whether event mode has to be entered.
+    Ended accept(bool& event) {
+        if (const Ended e = place(); e != ok) return e;
+        event = lm_accept(simulation_.get()) != 0;
         return ok;
     }
 
@@ -137,7 +218,7 @@ class Instance {
         return head + parameters() + 2 * inputs_.size() + lm_state_size(simulation_.get());
     }
     Ended get_state(std::vector<double>& to) {
-        if (const Ended e = apply(); e != ok) return e;
+        if (const Ended e = is_exchange() ? place() : apply(); e != ok) return e;
         to = {mark, static_cast<double>(state_size()), start_, running_ ? 1.0 : 0.0};
         for (std::size_t k = 0; k < parameters(); ++k) to.push_back(lm_scenario_get(scenario_.get(), k));
         to.insert(to.end(), inputs_.begin(), inputs_.end());
@@ -165,7 +246,9 @@ class Instance {
         running_ = from[3] != 0.0;
         inputs_.assign(inputs, rates);
         rates_.assign(rates, rates + inputs_.size());
-        read_ = false;
+        time_ = start_ + lm_time(simulation_.get());
+        lm_states(simulation_.get(), states_.data());
+        read_ = moved_ = false;
         return ok;
     }
 
@@ -180,6 +263,7 @@ class Instance {
     static constexpr double mark = 19534.0;
     static constexpr std::size_t head = 4;
 
+    bool is_exchange() const { return kind_ == Kind::model_exchange; }
     std::string read() {
         std::vector<double> numbers;
         std::FILE* file = std::fopen(path_.c_str(), "rb");
@@ -190,84 +274,89 @@ class Instance {
         std::fclose(file);
         char wrong[500];
         scenario_.reset(lm_scenario_read(numbers.data(), numbers.size(), wrong, sizeof wrong));
-        return scenario_ ? "" : path_ + ": " + wrong;
-    }
-    // Lines: the identifier, then "input" or "output" and a name each.
-    std::string read_names(const std::string& path) {
-        const std::string text = text_of_file(path);
-        std::size_t at = 0;
-        const auto line = [&] {
-            const std::size_t end = std::min(text.find('\n', at), text.size());
-            const std::string found = text.substr(at, end - at);
-            at = end + 1;
-            return found;
-        };
-        identifier_ = line();
-        if (identifier_.empty()) return path + " cannot be read";
-        while (at < text.size()) {
-            const std::string here = line(), kind = here.substr(0, here.find(' '));
-            const std::string name = here.substr(std::min(here.size(), kind.size() + 1));
-            const bool input = kind == "input";
-            const lm_kind of = input ? LM_INPUTS : LM_VARIABLES;
-            const std::size_t n = lm_count(simulation_.get(), of);
-            std::size_t k = 0;
-            while (k < n && name != lm_name(simulation_.get(), of, k)) ++k;
-            if (k == n) return path + ": there is no " + kind + " '" + name + "'";
-            (input ? input_places_ : outputs_).push_back(k);
-        }
-        return {};
+        if (!scenario_) return path_ + ": " + wrong;
+        if (!variables_.references_given || lm_scenario_give_references(scenario_.get(), 1) == LM_OK) return {};
+        return lm_scenario_error(scenario_.get());
     }
     void begin() {
         make_simulation();
         lm_simulation* s = simulation_.get();
         inputs_.assign(lm_count(s, LM_INPUTS), 0.0);
         rates_.assign(inputs_.size(), 0.0);
-        variables_.assign(lm_count(s, LM_VARIABLES), 0.0);
-        for (std::size_t k = 0; k < inputs_.size(); ++k)
-            inputs_[k] = lm_scenario_input_at_start(scenario_.get(), lm_solver_input(s, k));
-        changed_ = read_ = false;
+        values_.assign(lm_count(s, LM_VARIABLES), 0.0);
+        for (std::size_t k = 0; k < inputs_.size(); ++k) inputs_[k] = lm_input_at_start(s, k);
     }
     double usual_step() const { return lm_scenario_interval(scenario_.get()); }
-    void make_simulation() { simulation_.reset(lm_simulation_from(scenario_.get(), usual_step())); }
+    void make_simulation() {
+        simulation_.reset(lm_simulation_from(scenario_.get(), usual_step()));
+        states_.assign(lm_count(simulation_.get(), LM_STATES), 0.0);
+        lm_states(simulation_.get(), states_.data());
+        changed_ = read_ = false;
+        moved_ = true;
+    }
     // The parameters as they are set into the simulation.
     Ended apply() {
         if (!changed_) return ok;
         if (running_) {
             if (lm_go_on_with(simulation_.get(), scenario_.get(), usual_step()) != LM_OK) return failed();
+            changed_ = false;
         } else {
             make_simulation();
         }
-        changed_ = false;
+        return ok;
+    }
+    // In Model Exchange: where the importer's integrator is.
+    Ended place() {
+        if (const Ended e = apply(); e != ok) return e;
+        if (!moved_ || !is_exchange()) return ok;
+        if (lm_place(simulation_.get(), time_ - start_, states_.data(), inputs_.data()) != LM_OK) return failed();
+        moved_ = false;
         return ok;
     }
     // The variables of this instant.
     Ended refresh() {
+        if (const Ended e = place(); e != ok) return e;
         if (read_) return ok;
-        if (const Ended e = apply(); e != ok) return e;
-        if (lm_hold(simulation_.get(), inputs_.data()) != LM_OK) return failed();
-        if (lm_read(simulation_.get(), variables_.data()) != LM_OK) return failed();
+        if (!is_exchange() && lm_hold(simulation_.get(), inputs_.data()) != LM_OK) return failed();
+        if (lm_read(simulation_.get(), values_.data()) != LM_OK) return failed();
         read_ = true;
+        return ok;
+    }
+    // A state, its derivative, or an event indicator.
+    Ended get_of_state(unsigned reference, double& value) {
+        const bool guard = reference >= first_guard && reference - first_guard < indicator_count();
+        const std::size_t *state = variables_.state(reference), *derivative = variables_.derivative(reference);
+        if (!guard && state == nullptr && derivative == nullptr) return unknown(reference);
+        if (const Ended e = refresh(); e != ok) return e;
+        scratch_.assign(guard ? std::max(indicator_count(), lm_guard_count(simulation_.get())) : states_.size(), 1.0);
+        if (state != nullptr) {
+            lm_states(simulation_.get(), scratch_.data());
+            value = scratch_[*state];
+            return ok;
+        }
+        if ((guard ? lm_guards : lm_rates)(simulation_.get(), scratch_.data()) != LM_OK) return failed();
+        value = scratch_[guard ? reference - first_guard : *derivative];
         return ok;
     }
     std::size_t parameters() const { return lm_scenario_parameter_count(scenario_.get()); }
     bool is_parameter(unsigned r) const { return r >= first_parameter && r - first_parameter < parameters(); }
-    bool is_input(unsigned r) const { return r >= first_input && r - first_input < input_places_.size(); }
-    bool is_output(unsigned r) const { return r >= first_output && r - first_output < outputs_.size(); }
-    double* input_of(unsigned r) { return is_input(r) ? &inputs_[input_places_[r - first_input]] : nullptr; }
     Ended failed() { return failed(lm_error(simulation_.get())); }
     Ended unknown(unsigned reference) {
         return failed("there is no variable with the value reference " + std::to_string(reference) +
                       ", or not for this use");
     }
 
-    std::string path_, problem_, identifier_, sentence_;
+    Kind kind_;
+    std::string path_, problem_, sentence_;
+    Variables variables_;
     std::unique_ptr<lm_scenario, Free> scenario_;
     std::unique_ptr<lm_simulation, Free> simulation_;
-    std::vector<double> inputs_, rates_, variables_;   // by their numbers in the simulation
-    std::vector<std::size_t> input_places_, outputs_;  // of those that are declared
-    double start_ = 0.0;
+    std::vector<double> inputs_, rates_, end_, values_, states_;  // by their numbers in the simulation
+    std::vector<double> scratch_;
+    double start_ = 0.0, time_ = 0.0;  // [s]; time_: of the importer's integrator
     bool running_ = false;
-    bool changed_ = false;  // parameters, since the simulation was made
+    bool changed_ = false;  // parameters, since the simulation was made, or inputs before it runs
+    bool moved_ = true;     // the importer's integrator, or an input, since it was placed
     bool read_ = false;     // the variables are those of this instant
 };
 

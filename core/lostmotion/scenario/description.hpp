@@ -92,6 +92,12 @@ class ScenarioDescription {
         use_given();
         return {};
     }
+    std::string give_references(bool given) {
+        if (std::string error = given ? check_given_references(scenario_) : ""; !error.empty()) return error;
+        references_given_ = given;
+        use_given();
+        return {};
+    }
 
  private:
     template <class F>
@@ -148,6 +154,7 @@ class ScenarioDescription {
         if (times_) std::tie(scenario_.duration, scenario_.sample_interval) = *times_;
         for (const auto& [k, signal] : inputs_) scenario_.inputs[k] = signal;
         for (const auto& [k, reference] : references_) scenario_.control.axes[k].law.reference = reference;
+        scenario_.references_given = references_given_;
     }
 
     // The scenario with the parameters as they are.
@@ -178,6 +185,7 @@ class ScenarioDescription {
 
     std::string error_;
     Scenario scenario_;
+    bool references_given_ = false;
     std::vector<double> body_;  // as it was given
     std::vector<ScenarioParameter> parameters_;
     std::vector<double> initial_;  // values of the parameters that belong to it

@@ -77,7 +77,7 @@ inline Status directional_derivative(ScenarioSimulation& s, const double* states
     if (status != Status::done) return status;
     std::vector<double> dx(s.names().states.size()), du(s.solver_inputs());
     if (states != nullptr) std::copy_n(states, dx.size(), dx.begin());
-    for (std::size_t k = 0; k < s.names().inputs.size() && inputs != nullptr; ++k) du[s.solver_input(k)] = inputs[k];
+    for (std::size_t k = 0; k < s.free_inputs() && inputs != nullptr; ++k) du[s.solver_input(k)] = inputs[k];
     if (s.drive() != nullptr)
         direction::of_drive(*s.drive(), dx.data(), du.data(), rates, variables);
     else

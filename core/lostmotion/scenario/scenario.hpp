@@ -19,6 +19,7 @@ struct Scenario {
     std::vector<double> start;                  // states, in their order
     std::vector<double> hysteresis_capacities;  // of each gear [N m]
     Control control;
+    bool references_given = false;  // step by step, in the place of those of the controllers; not in descriptions
     double duration = 1.0, sample_interval = 1e-3;  // [s]
 
     std::size_t samples() const { return static_cast<std::size_t>(duration / sample_interval * (1.0 + 1e-12)) + 1; }
@@ -86,6 +87,15 @@ inline std::vector<FreeInput> free_inputs(const Scenario& s) {
     for (std::size_t k = 0; k < names.size(); ++k)
         if (!controlled[k]) out.push_back({names[k], k});
     return out;
+}
+
+// Why references cannot be given step by step, or empty.
+inline std::string check_given_references(const Scenario& s) {
+    for (const ControlledAxis& axis : s.control.axes)
+        if (axis.law.reference_delay > 0.0)
+            return "a controller has a reference_delay, for which it has to know the past of its reference; set it to "
+                   "0";
+    return {};
 }
 
 // What is wrong with a scenario whose numbers are all in range, or empty.

@@ -1,6 +1,7 @@
 // A scenario, a drive or a train step by step, whichever kernel it takes.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <memory>
@@ -11,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "../simulation/hybrid.hpp"
 #include "../simulation/train_stepping.hpp"
 #include "variables.hpp"
 
@@ -67,12 +69,16 @@ class ScenarioSimulation {
 
     struct Names {
         std::vector<std::string> states, inputs, capacities;
+        std::vector<Variable> references;  // those of sampled controllers that are inputs, the last of them
     };
     const Names& names() const { return names_; }
     const Variables& variables() const { return variables_; }
     // How many inputs the solver has, those of controllers among them, and which of them is the k-th of the names.
     std::size_t solver_inputs() const { return begin_.size(); }
     std::size_t solver_input(std::size_t k) const { return free_[k]; }
+    std::size_t free_inputs() const { return free_.size(); }
+    // Of an input in the scenario, at t = 0.
+    double input_at_start(std::size_t k) const { return at_start_[k]; }
 
     // use(simulation) with that of its kernel.
     template <class Use>
@@ -120,6 +126,7 @@ class ScenarioSimulation {
             begin_[free_[k]] = begin[k];
             end_[free_[k]] = end[k];
         }
+        set_references(begin, end, interval);
         if (drive_) return drive_->advance(interval, begin_[0], end_[0], begin_[1], end_[1]);
         return train_->advance(interval, begin_, end_);
     }
@@ -131,7 +138,61 @@ class ScenarioSimulation {
             for (std::size_t k = 0; k < free_.size(); ++k) snapshot.input[free_[k]] = inputs[k];
             s.restore(snapshot);
         });
+        set_references(inputs, inputs, 1.0);
     }
+
+    // --- as a hybrid system, which an integrator of the caller's own solves ---
+
+    // Windings exchange torque and speed with the solver within a tick.
+    bool has_windings() const {
+        return std::any_of(laws_.begin(), laws_.end(), [](const control::Axis& a) { return !!a.field_orientation; });
+    }
+    // At a time, with states by names().states and inputs by names().inputs, in the regime that it is in.
+    void place(double time, std::span<const double> states, std::span<const double> inputs) {
+        with([&]<class S>(S& s) {
+            auto x = s.snapshot().x;
+            auto u = s.snapshot().input;
+            for (std::size_t k = 0; k < states.size(); ++k) x[place_of<typename S::D>(k)] = states[first_[k]];
+            for (std::size_t k = 0; k < free_.size(); ++k) u[free_[k]] = inputs[k];
+            s.place(time, x, u);
+        });
+        set_references(inputs, inputs, 1.0);
+    }
+    void states(double* out) const {
+        with([&]<class S>(const S& s) {
+            for (std::size_t k = 0; k < names_.states.size(); ++k) out[k] = s.snapshot().x[place_of<typename S::D>(k)];
+        });
+    }
+    // Of the states.
+    Status rates(double* out) {
+        return with([&]<class S>(S& s) {
+            const Status status = s.find_regime();
+            if (status != Status::done) return status;
+            const auto rates = s.rates();
+            for (std::size_t k = 0; k < names_.states.size(); ++k) out[k] = rates[place_of<typename S::D>(k)];
+            return status;
+        });
+    }
+    std::size_t guard_count() const {
+        return with([]<class S>(const S&) { return static_cast<std::size_t>(S::n_guards); });
+    }
+    Status guards(double* out) {
+        return with([&](auto& s) {
+            const Status status = s.find_regime();
+            if (status == Status::done) std::ranges::copy(s.guards(), out);
+            return status;
+        });
+    }
+    Status settle() {
+        return with([](auto& s) { return s.settle(); });
+    }
+    double next_tick() const {
+        return with([](const auto& s) { return s.next_tick(); });
+    }
+    bool accept() {
+        return with([](auto& s) { return s.find_regime() == Status::done && s.accept(); });
+    }
+
     // All variables at the present instant, with the inputs at their last values.
     Status read(double* out) {
         const Status status = with([](auto& s) { return s.find_regime(); });
@@ -210,10 +271,16 @@ class ScenarioSimulation {
             names_.states = model::state_names(train_->assembly());
             for (const model::Gear& g : scenario.train.gears) names_.capacities.push_back(g.name);
         }
-        for (const FreeInput& i : free_inputs(scenario)) {
+        for (const std::string& name : names_.states)
+            first_.push_back(static_cast<std::size_t>(std::find(names_.states.begin(), names_.states.end(), name) -
+                                                      names_.states.begin()));
+        for (const FreeInput& i : lostmotion::free_inputs(scenario)) {
             free_.push_back(i.number);
             names_.inputs.push_back(i.name);
+            at_start_.push_back(i.number < scenario.inputs.size() ? value_at_start(scenario.inputs[i.number]) : 0.0);
         }
+        for (std::size_t a = 0; a < control_.axes.size() && scenario.references_given; ++a)
+            name_reference(scenario, control_.axes[a]);
         begin_.resize(scenario.form == Scenario::of_drive
                           ? std::size_t{n_inputs}
                           : static_cast<std::size_t>(train_->assembly().layout().inputs));
@@ -226,6 +293,35 @@ class ScenarioSimulation {
         identity_ = 0xcbf29ce484222325u;
         for (const auto* list : {&names_.states, &names_.inputs})
             for (const std::string& name : *list) mix(identity_, name.data(), name.size());
+    }
+
+    void name_reference(const Scenario& scenario, const ControlledAxis& axis) {
+        const auto m = static_cast<std::size_t>(axis.motor);
+        const std::string of = scenario.form == Scenario::of_drive ? "" : scenario.train.motors[m].name + "_";
+        const control::Axis::Mode mode = axis.law.mode;
+        names_.references.push_back({of + "reference",
+                                     mode == control::Axis::position_mode ? "rad"
+                                     : mode == control::Axis::speed_mode  ? "rad/s"
+                                                                          : "N*m",
+                                     mode == control::Axis::position_mode ? "angle that the controller is to follow"
+                                     : mode == control::Axis::speed_mode  ? "speed that the controller is to follow"
+                                                                          : "torque of the motor that is to act"});
+        names_.inputs.push_back(names_.references.back().name);
+        at_start_.push_back(axis.law.reference.at(0.0).value);
+    }
+    // The last inputs, each in a straight line from its first to its second value.
+    void set_references(std::span<const double> begin, std::span<const double> end, double interval) {
+        for (std::size_t a = 0; a < names_.references.size(); ++a) {
+            const std::size_t k = free_.size() + a;
+            with([&](auto& s) { s.set_reference(a, begin[k], (end[k] - begin[k]) / interval); });
+        }
+    }
+    // Of a state, by its number among the names, that in the kernel.
+    template <class D>
+    std::size_t place_of(std::size_t k) const {
+        if (drive_) return k;
+        const auto coupled = static_cast<std::size_t>(train_->assembly().layout().coupled);
+        return k < coupled ? k : k - coupled + static_cast<std::size_t>(D::coupled);
     }
 
     static void mix(std::uint64_t& hash, const void* bytes, std::size_t n) {
@@ -263,7 +359,9 @@ class ScenarioSimulation {
     std::vector<std::size_t> torques_;  // variables of the motors that the laws turn
     Variables variables_;
     Names names_;
-    std::vector<std::size_t> free_;  // inputs that no controller gives
+    std::vector<std::size_t> free_;   // inputs that no controller gives
+    std::vector<std::size_t> first_;  // of each state the first of its name
+    std::vector<double> at_start_;    // of each input
     std::vector<double> begin_, end_;
     std::uint64_t identity_ = 0;
 };

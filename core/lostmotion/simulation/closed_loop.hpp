@@ -172,6 +172,12 @@ class ClosedLoopRun {
         });
         return solver_.begin(0.0, x, memory);
     }
+    // The next tick, at the state that the solver has.
+    bool tick() {
+        struct {
+        } nobody;
+        return run_tick(solver_.state(), solver_.memory(), nobody);
+    }
     // To t_end, the ticks up to it included unless they fall on it. record(t): what the controllers show holds until t.
     template <class Observer, class Record>
     Status advance(double t_end, Observer& observer, Record&& record) {

@@ -1,6 +1,8 @@
 // A motion step by step: for control loops, co-simulation and learning.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <optional>
 
 #include "../drive/contact.hpp"
@@ -81,13 +83,34 @@ class SimulationOf {
     // must have one.
     Status find_regime();
     const Regime& regime();
+    // What the controller of an axis follows from now on: value + rate (t - now), in the place of its reference.
+    void set_reference(std::size_t axis, double value, double rate) {
+        laws_[axis].reference = {{{now_.time, {value, rate}}}, {}};
+    }
+
+    // --- as a hybrid system, which an integrator of the caller's own solves: hybrid.hpp. Not with windings. ---
+
+    // At a time, a state and inputs, in the regime that it is in.
+    void place(double time, const StateOf<D>& x, const Inputs& input);
+    StateOf<D> rates();
+    // The guards, each over its natural magnitude; 1 beyond the last. One that falls below zero ends the regime.
+    static constexpr int n_guards = D::guards;
+    std::array<double, n_guards> guards();
+    // The ticks that are due, and the regime that follows where guards have fallen or inputs have changed.
+    Status settle();
+    double next_tick() const;  // [s], infinity without controllers
+    // After a step of the integrator: whether the regime has to be settled, since inputs take a torque at rest along.
+    bool accept();
 
  private:
+    const typename System::Guard* lowest_guard();
+    Status follow(const typename System::Guard* fired);
     // The solver at the present state, with the inputs running over the interval.
     void resume(Inputs& begin, Inputs& end, double interval);
     Status begin_motion();
     void keep(Inputs input, bool steady);
 
+    const System& system_;
     ExactSolver<System> solver_;
     int inputs_;
     Snapshot now_;
@@ -98,7 +121,7 @@ class SimulationOf {
 
 template <class System>
 SimulationOf<System>::SimulationOf(const System& system, const StateOf<D>& scale, double step, int inputs)
-    : solver_(system, ramped_inputs<D>(inputs), step, scale), inputs_(inputs) {}
+    : system_(system), solver_(system, ramped_inputs<D>(inputs), step, scale), inputs_(inputs) {}
 
 template <class System>
 Status SimulationOf<System>::advance(double interval, Inputs begin, Inputs end) {

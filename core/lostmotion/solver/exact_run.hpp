@@ -77,6 +77,7 @@ class ExactSolver {
     const Key& key() const { return key_; }
     const Regime& regime() { return cache_.regime(key_); }
     const Regime& regime(const Key& key) { return cache_.regime(key); }
+    Cache& cache() { return cache_; }
     const std::vector<InputBasis>& basis() const { return rotations_.basis(); }
     double unit() const { return unit_; }
     Contact stopped_at() const { return stopped_at_; }

@@ -23,6 +23,14 @@ def fmu(
             help="With the controllers of the scenario inside, or motors turned by commands.",
         ),
     ] = True,
+    fmi: Annotated[int, typer.Option("--fmi", metavar="2|3", help="Version of the standard: 2.0 or 3.0.")] = 2,
+    references: Annotated[
+        bool,
+        typer.Option(
+            "--reference-inputs",
+            help="The references of sampled controllers are inputs, in the place of those of the scenario.",
+        ),
+    ] = False,
     libraries: Annotated[
         Path | None,
         typer.Option(
@@ -30,13 +38,13 @@ def fmu(
         ),
     ] = None,
 ) -> None:
-    """Write a scenario as an FMU (FMI 2.0, Co-Simulation) for Simulink, Modelica tools and others.
+    """Write a scenario as an FMU (Co-Simulation and Model Exchange) for Simulink, Modelica tools and others.
 
     Inputs are commands, load torques and references of continuous controllers; outputs are the result variables; parameters have the keys of the scenario file.
 
     \b
     lostmotion fmu drive.toml -o drive.fmu
-    lostmotion fmu position-axis -o axis.fmu --set load.inertia="3 kg*m^2"
+    lostmotion fmu position-axis -o axis.fmu --fmi 3 --set load.inertia="3 kg*m^2"
     """
     from ..errors import InputError
     from ..portable.fmu import export_fmu
@@ -47,5 +55,12 @@ def fmu(
     try_file(output)
     loaded = load(scenario, overrides or ())
     with busy("Finding out what its parameters change"):
-        export_fmu(loaded, output, controllers=controllers, libraries=libraries)
+        export_fmu(
+            loaded,
+            output,
+            fmi=fmi,
+            controllers=controllers,
+            references=references,
+            libraries=libraries,
+        )
     print(f"{output}")

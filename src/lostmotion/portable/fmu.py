@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import zipfile
 from collections.abc import Mapping
@@ -14,27 +15,45 @@ import numpy as np
 
 from .. import _core
 from ..atomic_writer import write_whole
+from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.quantities import Count
 from ..model.signals import CommandSignal, Signal
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.train_variables import axis_variables, train_variables
 from ..simulation.variables import VARIABLES
+from . import fmi2, fmi3
 from .description import numbers_of
-from .fmu_model import Declared, Model, model_description, page
+from .fmu_model import Declared, Model, page
 from .parameters import Parameter, parameters_of
 
 # Directories of the libraries in an FMU, by the names that the builds have here.
-PLATFORMS: Mapping[str, Mapping[str, str]] = {
-    "2.0": {
+# FMI 2.0 leaves those beside x86-64 to the tools; these are the names of FMI 3.0.
+_OTHERS = {
+    "aarch64-linux": "aarch64-linux/lostmotion.so",
+    "aarch64-windows": "aarch64-windows/lostmotion.dll",
+    "aarch64-darwin": "aarch64-darwin/lostmotion.dylib",
+}
+PLATFORMS: Mapping[int, Mapping[str, str]] = {
+    2: {
         "x86_64-linux": "linux64/lostmotion.so",
         "x86_64-windows": "win64/lostmotion.dll",
         "x86_64-darwin": "darwin64/lostmotion.dylib",
-    }
+        **_OTHERS,
+    },
+    3: {
+        "x86_64-linux": "x86_64-linux/lostmotion.so",
+        "x86_64-windows": "x86_64-windows/lostmotion.dll",
+        "x86_64-darwin": "x86_64-darwin/lostmotion.dylib",
+        **_OTHERS,
+    },
 }
 LIBRARIES = files("lostmotion") / "fmu_libraries"
+# How many guards the kernels of the core have room for; event indicators beyond those of a regime are 1.
+GUARDS = {Scenario: 16, TrainScenario: 64}
 
 
 @checked
@@ -42,13 +61,16 @@ def export_fmu(
     scenario: Scenario | TrainScenario,
     path: str | Path,
     *,
+    fmi: Count = 2,
     controllers: bool = True,
+    references: bool = False,
     libraries: str | Path | None = None,
 ) -> None:
-    """Write a scenario as an FMU of FMI 2.0 for Co-Simulation, which no compiler is needed for.
+    """Write a scenario as an FMU for Co-Simulation and Model Exchange, which no compiler is needed for.
 
-    Its inputs are the commands, load torques and references of continuous controllers; sampled controllers are inside, with
-    their references. Its outputs are the result variables, its parameters the values of the scenario by their keys.
+    Its inputs are the commands, load torques and references of continuous controllers; sampled controllers are inside. Its
+    outputs are the result variables, its parameters the values of the scenario by their keys. With field-oriented control inside,
+    or where the scenario itself has no run, it is for Co-Simulation alone.
 
     Parameters
     ----------
@@ -56,46 +78,57 @@ def export_fmu(
         Its signals give the inputs their values at t = 0 only; from then on the importer gives them.
     path
         Of the file, with the extension ``.fmu``.
+    fmi
+        Version of the standard: 2 is 2.0, 3 is 3.0.
     controllers
         False: without them, so that the commands of their motors are inputs.
+    references
+        True: the references of sampled controllers are inputs, too, named ``reference`` or ``<motor>_reference``; False: those of
+        the scenario are inside.
     libraries
         Directory with the libraries of the platforms, as ``make fmu`` builds them; default those of this installation.
 
     Raises
     ------
     InputError
-        The scenario cannot be used without Python, there is no library, or the file cannot be written.
+        The scenario cannot be used without Python, a controller has to know the past of its reference, there is no library, or
+        the file cannot be written.
     """
     path = Path(path)
     if path.suffix != ".fmu":
         raise InputError(f"{path}: must end in .fmu")
+    if fmi not in PLATFORMS:
+        raise InputError(f"fmi: {fmi} must be 2 (FMI 2.0) or 3 (FMI 3.0)")
     if not controllers:
         scenario = without_controllers(scenario)
-    binaries = _libraries(LIBRARIES if libraries is None else Path(libraries), PLATFORMS["2.0"])
-    parameters = tuple(p for p in parameters_of(scenario, numbers_of).parameters if not _of_signals(scenario, p.key))
+    if references:
+        _check_references(scenario)
+    binaries = _libraries(LIBRARIES if libraries is None else Path(libraries), PLATFORMS[fmi])
+    parameters = tuple(
+        p for p in parameters_of(scenario, numbers_of).parameters if not _of_signals(scenario, p.key, references)
+    )
     values = [
         (p.key, p.unit, p.value, [(e.place, e.reciprocal, e.offset, e.slope) for e in p.effects]) for p in parameters
     ]
     resource = np.array(_core.write_description(numbers_of(scenario).tolist(), values)).astype("<f8").tobytes()
-    model = _model(scenario, parameters, hashlib.sha256(resource).hexdigest()[:32])
+    model = _model(scenario, parameters, hashlib.sha256(resource).hexdigest()[:32], references)
+    icon = (files("lostmotion") / "portable" / "icon.png").read_bytes()
 
     def write(to: Path) -> None:
         with zipfile.ZipFile(to, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr("modelDescription.xml", model_description(model))
+            archive.writestr("modelDescription.xml", (fmi2 if fmi == 2 else fmi3).model_description(model))
             archive.writestr("resources/scenario.bin", resource)
-            archive.writestr("resources/names.txt", names_of(model))
+            archive.writestr("resources/names.txt", model.names())
             archive.writestr("documentation/index.html", page(model))
+            if fmi == 2:
+                archive.writestr("model.png", icon)
+            else:
+                archive.writestr("terminalsAndIcons/terminalsAndIcons.xml", fmi3.terminals(model))
+                archive.writestr("terminalsAndIcons/icon.png", icon)
             for name, content in binaries.items():
                 archive.writestr(f"binaries/{name}", content)
 
     write_whole(path, write)
-
-
-def names_of(model: Model) -> str:
-    """What the library reads to know which variable has which value reference."""
-    inputs = [f"input {v.name}\n" for v in model.inputs]
-    outputs = [f"output {v.name}\n" for v in model.outputs]
-    return "".join([f"{model.guid}\n", *inputs, *outputs])
 
 
 def without_controllers(scenario: Scenario | TrainScenario) -> Scenario | TrainScenario:
@@ -120,45 +153,86 @@ def _libraries(directory: Any, places: Mapping[str, str]) -> dict[str, bytes]:
     return found
 
 
-def _of_signals(scenario: Scenario | TrainScenario, key: str) -> bool:
+def _check_references(scenario: Scenario | TrainScenario) -> None:
+    """Whether the references of sampled controllers can be inputs."""
+    for motor, controller in scenario.axes().items():
+        if controller.position is not None and controller.position.reference_delay > 0.0:
+            raise InputError(
+                f"controller of {motor}: has a position.reference_delay, for which it has to know the past of its reference; "
+                "set it to 0, or leave the references inside"
+            )
+
+
+def _of_signals(scenario: Scenario | TrainScenario, key: str, references: bool) -> bool:
     """Whether a key is that of a signal, which in an FMU the importer gives."""
     parts = key.split(".")
     if isinstance(scenario, Scenario):
-        return parts[0] == "command" or parts[:2] == ["load", "torque"]
+        given = references and parts[:2] == ["controller", "reference"]
+        return given or parts[0] == "command" or parts[:2] == ["load", "torque"]
     of_shaft = parts[0] == "shafts" and parts[2:3] == ["torque"]
-    continuous = parts[0] == "controllers" and parts[1] in scenario.continuous() and parts[2] == "reference"
-    return parts[0] == "command" or of_shaft or continuous
+    of_controller = parts[0] == "controllers" and parts[2] == "reference"
+    return parts[0] == "command" or of_shaft or (of_controller and (references or parts[1] in scenario.continuous()))
 
 
-def _model(scenario: Scenario | TrainScenario, parameters: tuple[Parameter, ...], guid: str) -> Model:
+# What a reference is of: its unit and meaning, as of the core.
+_REFERENCES = {
+    "position": ("rad", "angle that the controller is to follow"),
+    "speed": ("rad/s", "speed that the controller is to follow"),
+    "torque": ("N*m", "torque of the motor that is to act"),
+}
+
+
+def _model(
+    scenario: Scenario | TrainScenario, parameters: tuple[Parameter, ...], guid: str, references_given: bool
+) -> Model:
     """What modelDescription.xml says."""
     signals: Mapping[str, Signal[Any]]
+    axes = scenario.axes() if isinstance(scenario, TrainScenario) else _unnamed(scenario)
+    shown = {v.name for v in axis_variables(axes)}
     if isinstance(scenario, TrainScenario):
         core = scenario.core()
-        variables = (*train_variables(scenario.train(), core), *axis_variables(scenario.axes()))
-        controlled = {f"{motor}_command" for motor in scenario.axes()}
+        variables = (*train_variables(scenario.train(), core), *axis_variables(axes))
+        controlled = {f"{motor}_command" for motor in axes}
         names, signals = core.input_names(), scenario.signals()
     else:
-        variables = (
-            VARIABLES if scenario.controller is None else (*VARIABLES, *axis_variables({"": scenario.controller}))
-        )
+        variables = (*VARIABLES, *axis_variables(axes))
         controlled = set() if scenario.controller is None else {"command"}
         names, signals = ["command", "load_torque"], {"command": scenario.command, "load_torque": scenario.load.torque}
-    sizes = _sizes(scenario)
+    sizes, states = _sizes(scenario)
     inputs = [name for name in names if name not in controlled]
-    by_name = {v.name: Declared(v.name, v.unit, v.meaning, sizes.get(v.name, 0.0)) for v in variables}
+    held = controlled | shown  # from tick to tick
+    by_name = {
+        v.name: Declared(
+            v.name, v.unit, v.meaning, sizes.get(v.name, 0.0), v.name in held or v.name.endswith("contact")
+        )
+        for v in variables
+    }
+    windings = any(c.current.kind == "field_oriented" for c in axes.values())
+    given = {f"{motor}_reference" if motor else "reference": c for motor, c in axes.items() if references_given}
+    references = [Declared(name, *_REFERENCES[c.reference.kind], 0.0) for name, c in given.items()]
     return Model(
         title=scenario.title or "drive",
         guid=guid,
         duration=scenario.simulation.duration,
         step=scenario.simulation.sample_interval,
-        inputs=[by_name[name] for name in inputs],
-        starts=[_at_start(signals[name]) for name in inputs],
+        inputs=[*(by_name[name] for name in inputs), *references],
+        starts=[
+            *(_at_start(signals[name]) for name in inputs),
+            *(float(c.reference.at(0.0)[0]) for c in given.values()),
+        ],
         # The quotient of two outputs is undefined while the drive stands, which no tool expects.
         outputs=[v for name, v in by_name.items() if name not in inputs and name != "efficiency"],
+        states=[] if windings else [by_name.get(s) or Declared(s, "1", "state of a controller", 0.0) for s in states],
+        indicators=GUARDS[type(scenario)],
         parameters=list(parameters),
+        references_given=references_given,
         note=scenario.gearbox.note if isinstance(scenario, Scenario) else "",
     )
+
+
+def _unnamed(scenario: Scenario) -> dict[str, Controller]:
+    """The controller of a drive, whose variables do not bear the name of a motor."""
+    return {} if scenario.controller is None else {"": scenario.controller}
 
 
 def _at_start(signal: Signal[Any]) -> float:
@@ -167,11 +241,12 @@ def _at_start(signal: Signal[Any]) -> float:
     return float(signal.breakpoint_list()[0][1]) + sines
 
 
-def _sizes(scenario: Scenario | TrainScenario) -> dict[str, float]:
-    """The largest magnitudes of the variables in a run of the scenario; nothing if it has none."""
+def _sizes(scenario: Scenario | TrainScenario) -> tuple[dict[str, float], list[str]]:
+    """The largest magnitudes of the variables in a run of the scenario, and its states; nothing if it has none."""
     try:
         result = run(scenario, energy=False)
     except (_core.SolverError, InputError):
-        return {}
+        return {}, []
     largest = {name: float(np.max(np.abs(values), initial=0.0)) for name, values in result.values.items()}
-    return {name: size for name, size in largest.items() if np.isfinite(size)}
+    states = [name for name in json.loads(result.attrs["end_state"]) if not name.endswith("hysteresis_capacity")]
+    return {name: size for name, size in largest.items() if np.isfinite(size)}, states

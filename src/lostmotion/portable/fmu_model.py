@@ -1,4 +1,4 @@
-"""What the modelDescription.xml of an FMU says, and its page."""
+"""What an FMU declares, whatever the version of the standard, and its page."""
 
 from __future__ import annotations
 
@@ -12,8 +12,16 @@ from ..simulation.results import installed_version
 from ..units.grammar import read_unit
 from .parameters import Parameter
 
-# bindings/fmu/instance.hpp has the same.
-FIRST_INPUT, FIRST_OUTPUT, FIRST_PARAMETER = 1000, 3000, 10000
+# bindings/fmu/variables.hpp has the same.
+FIRST_INPUT, FIRST_INPUT_RATE, FIRST_OUTPUT, FIRST_STATE, FIRST_DERIVATIVE, FIRST_INDICATOR, FIRST_PARAMETER = (
+    1000,
+    2000,
+    3000,
+    5000,
+    6000,
+    7000,
+    10000,
+)
 
 # Powers of kg, m, s, A, K, rad.
 _BASE = {
@@ -52,6 +60,18 @@ class Declared:
     meaning: str
     size: float
     """largest magnitude in a run of the scenario, 0 if it is not known"""
+    discrete: bool = False
+    """whether it changes at events alone"""
+
+    @property
+    def decade(self) -> int:
+        """The power of ten nearest to its size."""
+        return round(math.log10(self.size)) if self.size > 0.0 else 0
+
+    @property
+    def nominal(self) -> dict[str, str]:
+        """The attribute of this name, if the size is known."""
+        return {"nominal": f"1e{self.decade}"} if self.size > 0.0 and not self.discrete else {}
 
 
 @dataclass(frozen=True)
@@ -66,59 +86,55 @@ class Model:
     starts: list[float]
     """values of the inputs at t = 0"""
     outputs: list[Declared]
+    states: list[Declared]
+    """of Model Exchange; empty: the FMU is for Co-Simulation alone"""
+    indicators: int
+    """how many event indicators there are"""
     parameters: list[Parameter]
+    references_given: bool
+    """whether the references of sampled controllers are inputs"""
     note: str
 
+    def names(self) -> str:
+        """What the library reads to know which variable has which value reference: bindings/fmu/variables.hpp."""
+        lines = [self.guid, *(["references"] if self.references_given else []), f"indicators {self.indicators}"]
+        lines += [f"input {v.name}" for v in self.inputs] + [f"output {v.name}" for v in self.outputs]
+        return "\n".join([*lines, *(f"state {v.name} {v.decade}" for v in self.states)]) + "\n"
 
-def model_description(model: Model) -> bytes:
-    """modelDescription.xml of FMI 2.0."""
-    root = ET.Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=model.title,
-        guid=model.guid,
-        generationTool=f"lostmotion {installed_version()}",
-        variableNamingConvention="flat",
+
+def rate_unit(unit: str) -> str:
+    """The unit of the time derivative of a quantity."""
+    return {"rad/s": "rad/s^2"}.get(unit, f"{unit}/s")
+
+
+def add_units(root: ET.Element, model: Model, *, input_rates: bool) -> None:
+    """The units of all variables, as FMI 2 and 3 have them.
+
+    Parameters
+    ----------
+    input_rates
+        Whether the time derivatives of the inputs are variables too.
+    """
+    units = (
+        {v.unit for v in (*model.inputs, *model.outputs, *model.states)} | {p.unit for p in model.parameters} | {"s"}
     )
-    ET.SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier="lostmotion",
-        canHandleVariableCommunicationStepSize="true",
-        canInterpolateInputs="true",
-        canNotUseMemoryManagementFunctions="true",
-        canGetAndSetFMUstate="true",
-        canSerializeFMUstate="true",
-        providesDirectionalDerivative="true",
-    )
-    units = sorted({v.unit for v in (*model.inputs, *model.outputs)} | {p.unit for p in model.parameters} | {"s"})
+    rates = {rate_unit(v.unit): v.unit for v in (*model.states, *(model.inputs if input_rates else ()))}
+    powers = {rate: _powers(unit, per_second=True) for rate, unit in rates.items()}
+    powers |= {unit: _powers(unit) for unit in units}
     definitions = ET.SubElement(root, "UnitDefinitions")
-    for unit in units:
-        _add_unit(definitions, unit)
-    categories = ET.SubElement(root, "LogCategories")
-    ET.SubElement(categories, "Category", name="logStatusError")
-    ET.SubElement(categories, "Category", name="logStatusDiscard")
-    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime=repr(model.duration), stepSize=repr(model.step))
-    variables = ET.SubElement(root, "ModelVariables")
-    _add_variables(variables, model)
-    structure = ET.SubElement(root, "ModelStructure")
-    first = 2 + len(model.inputs)
-    for list_name in ("Outputs", "InitialUnknowns"):
-        listed = ET.SubElement(structure, list_name)
-        for k in range(len(model.outputs)):
-            ET.SubElement(listed, "Unknown", index=str(first + k))
-    ET.indent(root)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'.encode()
+    for unit in sorted(powers):
+        element = ET.SubElement(definitions, "Unit", name=unit)
+        ET.SubElement(element, "BaseUnit", {n: str(p) for n, p in zip(_NAMES, powers[unit], strict=True) if p})
+        for name, factor in _DISPLAY.get(unit, ()):
+            ET.SubElement(element, "DisplayUnit", name=name, factor=repr(factor))
 
 
-def _add_unit(definitions: ET.Element, unit: str) -> None:
-    element = ET.SubElement(definitions, "Unit", name=unit)
-    powers = [0] * len(_NAMES)
+def _powers(unit: str, *, per_second: bool = False) -> list[int]:
+    """Of the base units."""
+    powers = [0, 0, -1 if per_second else 0, 0, 0, 0]
     for name, n in _product(unit).items():
         powers = [a + n * b for a, b in zip(powers, _BASE[name], strict=True)]
-    ET.SubElement(element, "BaseUnit", {n: str(p) for n, p in zip(_NAMES, powers, strict=True) if p})
-    for name, factor in _DISPLAY.get(unit, ()):
-        ET.SubElement(element, "DisplayUnit", name=name, factor=repr(factor))
+    return powers
 
 
 def _product(unit: str) -> Mapping[str, int]:
@@ -128,31 +144,37 @@ def _product(unit: str) -> Mapping[str, int]:
     return read_unit(unit)
 
 
-def _add_variables(variables: ET.Element, model: Model) -> None:
-    def add(name: str, reference: int, meaning: str, real: dict[str, str], **attributes: str) -> None:
-        named = {"name": name, "valueReference": str(reference), "description": meaning}
-        scalar = ET.SubElement(variables, "ScalarVariable", named | attributes)
-        ET.SubElement(scalar, "Real", real)
-
-    add("time", 0, "time", {"unit": "s"}, causality="independent", variability="continuous")
-    for k, (v, start) in enumerate(zip(model.inputs, model.starts, strict=True)):
-        real = {"unit": v.unit} | _nominal(v) | {"start": repr(start)}
-        add(v.name, FIRST_INPUT + k, v.meaning, real, causality="input", variability="continuous")
-    for k, v in enumerate(model.outputs):
-        discrete = v.name.endswith("contact")
-        real = {"unit": v.unit} | ({} if discrete else _nominal(v))
-        kind = "discrete" if discrete else "continuous"
-        add(v.name, FIRST_OUTPUT + k, v.meaning, real, causality="output", variability=kind, initial="calculated")
-    for k, p in enumerate(model.parameters):
-        fixed = p.key.startswith("initial.")
-        meaning = f"value of the key {p.key}" + (", at t = 0" if fixed else "")
-        real = {"unit": p.unit, "start": repr(p.value)}
-        kind = "fixed" if fixed else "tunable"
-        add(p.key, FIRST_PARAMETER + k, meaning, real, causality="parameter", variability=kind, initial="exact")
+def generation_tool() -> str:
+    """The attribute generationTool."""
+    return f"lostmotion {installed_version()}"
 
 
-def _nominal(v: Declared) -> dict[str, str]:
-    return {"nominal": f"{v.size:.3g}"} if v.size > 0.0 else {}
+def add_log_categories(root: ET.Element) -> None:
+    """The categories of messages."""
+    categories = ET.SubElement(root, "LogCategories")
+    ET.SubElement(categories, "Category", name="logStatusError")
+    ET.SubElement(categories, "Category", name="logStatusDiscard")
+
+
+def add_default_experiment(root: ET.Element, model: Model) -> None:
+    """Duration and sample interval of the scenario."""
+    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime=repr(model.duration), stepSize=repr(model.step))
+
+
+def parameter_meaning(p: Parameter) -> str:
+    """What a parameter is."""
+    return f"value of the key {p.key}" + (", at t = 0" if is_of_start(p) else "")
+
+
+def is_of_start(p: Parameter) -> bool:
+    """Whether a parameter is read at t = 0 alone."""
+    return p.key.startswith("initial.")
+
+
+def document(root: ET.Element) -> bytes:
+    """As a file."""
+    ET.indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'.encode()
 
 
 def page(model: Model) -> str:
@@ -166,15 +188,21 @@ def page(model: Model) -> str:
     outputs = [(v.name, v.unit, v.meaning) for v in model.outputs]
     parameters = [(p.key, p.unit, repr(p.value)) for p in model.parameters]
     note = f"<p>{html.escape(model.note)}</p>" if model.note else ""
+    exchange = (
+        "<p>In Model Exchange the importer's integrator has these equations between two events; stuck and slipping "
+        "contacts, the pieces of the laws and the ticks of sampled controllers are found at events.</p>"
+        if model.states
+        else ""
+    )
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(model.title)}</title>'
         "<style>body{font-family:sans-serif;max-width:60em;margin:2em auto;padding:0 1em}table{border-collapse:collapse}"
         "td,th{border:1px solid #999;padding:.2em .6em;text-align:left}</style>"
         f"<h1>{html.escape(model.title)}</h1>{note}"
-        "<p>A geared servo drive, solved exactly between communication points: its result does not depend on their distance where "
-        "the inputs run in straight lines between them. Give the inputs their time derivatives (fmi2SetRealInputDerivatives); "
-        "without these they are held over a step. Values are in SI units.</p>"
-        f"<h2>Inputs</h2>{table(inputs, ('name', 'unit', 'meaning'))}"
+        "<p>A geared servo drive, in Co-Simulation solved exactly between communication points: its result does not depend on their "
+        "distance where the inputs run in straight lines between them. Give the inputs their time derivatives (FMI 2.0: "
+        "fmi2SetRealInputDerivatives; FMI 3.0: the inputs der(...)); without these they are held over a step. Values are in SI units.</p>"
+        f"{exchange}<h2>Inputs</h2>{table(inputs, ('name', 'unit', 'meaning'))}"
         f"<h2>Outputs</h2>{table(outputs, ('name', 'unit', 'meaning'))}"
         "<h2>Parameters</h2><p>By their keys in the scenario file. They can be changed between communication points, those of the "
         f"start before the first.</p>{table(parameters, ('key', 'unit', 'value'))}</html>\n"

@@ -1,0 +1,260 @@
+// Functions of FMI 3.0 for Co-Simulation and Model Exchange. Types and statuses as in the standard, fmi-standard.org,
+// version 3.0.1, chapter 2.2 and after.
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "instance.hpp"
+
+namespace lm = lostmotion::fmu;
+
+#if defined _WIN32
+#define FMU_API extern "C" __declspec(dllexport)
+#else
+#define FMU_API extern "C" __attribute__((visibility("default")))
+#endif
+
+namespace {
+
+using Reference = unsigned int;
+using Logger = void (*)(void* environment, int status, const char* category, const char* message);
+
+struct Component {
+    Logger log;
+    void* environment;
+    lm::Instance instance;
+
+    int ended(lm::Ended status) {
+        if (status != lm::ok && log != nullptr)
+            log(environment, status, status == lm::discard ? "logStatusDiscard" : "logStatusError",
+                instance.sentence().c_str());
+        return status;
+    }
+    int failed(const char* sentence) { return ended(instance.failed(sentence)); }
+};
+Component& of(void* component) { return *static_cast<Component*>(component); }
+
+using State = std::vector<double>;
+
+void* instantiate(const char* token, const char* resources, void* environment, Logger log, lm::Kind kind) {
+    auto* made = new Component{log, environment, lm::Instance(lm::path_of_uri(resources ? resources : ""), kind)};
+    std::string problem = made->instance.problem();
+    if (problem.empty() && token != nullptr && made->instance.identifier() != token)
+        problem = "the token of modelDescription.xml is not that of the resources";
+    if (problem.empty()) return made;
+    delete made;
+    if (log != nullptr) log(environment, lm::error, "logStatusError", problem.c_str());
+    return nullptr;
+}
+
+}  // namespace
+
+FMU_API const char* fmi3GetVersion() { return "3.0"; }
+FMU_API int fmi3SetDebugLogging(void*, bool, std::size_t, const char* const*) { return lm::ok; }
+
+FMU_API void* fmi3InstantiateModelExchange(const char*, const char* token, const char* resources, bool, bool,
+                                           void* environment, Logger log) {
+    return instantiate(token, resources, environment, log, lm::Kind::model_exchange);
+}
+FMU_API void* fmi3InstantiateCoSimulation(const char*, const char* token, const char* resources, bool, bool, bool, bool,
+                                          const Reference*, std::size_t, void* environment, Logger log, void*) {
+    return instantiate(token, resources, environment, log, lm::Kind::co_simulation);
+}
+FMU_API void* fmi3InstantiateScheduledExecution(const char*, const char*, const char*, bool, bool, void* environment,
+                                                Logger log, void*, void*, void*) {
+    if (log != nullptr)
+        log(environment, lm::error, "logStatusError", "this FMU is for Co-Simulation and Model Exchange");
+    return nullptr;
+}
+FMU_API void fmi3FreeInstance(void* c) { delete static_cast<Component*>(c); }
+
+FMU_API int fmi3EnterInitializationMode(void* c, bool, double, double start, bool, double) {
+    of(c).instance.set_start_time(start);
+    return lm::ok;
+}
+FMU_API int fmi3ExitInitializationMode(void* c) {
+    of(c).instance.exit_initialization();
+    return lm::ok;
+}
+FMU_API int fmi3EnterEventMode(void*) { return lm::ok; }
+FMU_API int fmi3EnterStepMode(void*) { return lm::ok; }
+FMU_API int fmi3EnterConfigurationMode(void*) { return lm::ok; }
+FMU_API int fmi3ExitConfigurationMode(void*) { return lm::ok; }
+FMU_API int fmi3Terminate(void*) { return lm::ok; }
+FMU_API int fmi3Reset(void* c) { return of(c).ended(of(c).instance.reset()); }
+
+FMU_API int fmi3GetFloat64(void* c, const Reference* r, std::size_t n, double* value, std::size_t n_values) {
+    if (n != n_values) return of(c).failed("each variable has one value");
+    for (std::size_t k = 0; k < n; ++k)
+        if (const lm::Ended e = of(c).instance.get(r[k], value[k]); e != lm::ok) return of(c).ended(e);
+    return lm::ok;
+}
+FMU_API int fmi3SetFloat64(void* c, const Reference* r, std::size_t n, const double* value, std::size_t n_values) {
+    if (n != n_values) return of(c).failed("each variable has one value");
+    for (std::size_t k = 0; k < n; ++k)
+        if (const lm::Ended e = of(c).instance.set(r[k], value[k]); e != lm::ok) return of(c).ended(e);
+    return lm::ok;
+}
+// There are variables of type Float64 alone.
+static int none(void* c, std::size_t n) {
+    return n == 0 ? int{lm::ok} : of(c).failed("this FMU has variables of type Float64 alone");
+}
+#define OTHER_TYPE(NAME, TYPE)                                                                                     \
+    FMU_API int fmi3Get##NAME(void* c, const Reference*, std::size_t n, TYPE*, std::size_t) { return none(c, n); } \
+    FMU_API int fmi3Set##NAME(void* c, const Reference*, std::size_t n, const TYPE*, std::size_t) { return none(c, n); }
+OTHER_TYPE(Float32, float)
+OTHER_TYPE(Int8, std::int8_t)
+OTHER_TYPE(UInt8, std::uint8_t)
+OTHER_TYPE(Int16, std::int16_t)
+OTHER_TYPE(UInt16, std::uint16_t)
+OTHER_TYPE(Int32, std::int32_t)
+OTHER_TYPE(UInt32, std::uint32_t)
+OTHER_TYPE(Int64, std::int64_t)
+OTHER_TYPE(UInt64, std::uint64_t)
+OTHER_TYPE(Boolean, bool)
+#undef OTHER_TYPE
+FMU_API int fmi3GetString(void* c, const Reference*, std::size_t n, const char**, std::size_t) { return none(c, n); }
+FMU_API int fmi3SetString(void* c, const Reference*, std::size_t n, const char* const*, std::size_t) {
+    return none(c, n);
+}
+FMU_API int fmi3GetBinary(void* c, const Reference*, std::size_t n, std::size_t*, const std::uint8_t**, std::size_t) {
+    return none(c, n);
+}
+FMU_API int fmi3SetBinary(void* c, const Reference*, std::size_t n, const std::size_t*, const std::uint8_t* const*,
+                          std::size_t) {
+    return none(c, n);
+}
+FMU_API int fmi3GetClock(void* c, const Reference*, std::size_t n, bool*) { return none(c, n); }
+FMU_API int fmi3SetClock(void* c, const Reference*, std::size_t n, const bool*) { return none(c, n); }
+FMU_API int fmi3GetIntervalDecimal(void* c, const Reference*, std::size_t n, double*, int*) { return none(c, n); }
+FMU_API int fmi3GetIntervalFraction(void* c, const Reference*, std::size_t n, std::uint64_t*, std::uint64_t*, int*) {
+    return none(c, n);
+}
+FMU_API int fmi3GetShiftDecimal(void* c, const Reference*, std::size_t n, double*) { return none(c, n); }
+FMU_API int fmi3GetShiftFraction(void* c, const Reference*, std::size_t n, std::uint64_t*, std::uint64_t*) {
+    return none(c, n);
+}
+FMU_API int fmi3SetIntervalDecimal(void* c, const Reference*, std::size_t n, const double*) { return none(c, n); }
+FMU_API int fmi3SetIntervalFraction(void* c, const Reference*, std::size_t n, const std::uint64_t*,
+                                    const std::uint64_t*) {
+    return none(c, n);
+}
+FMU_API int fmi3SetShiftDecimal(void* c, const Reference*, std::size_t n, const double*) { return none(c, n); }
+FMU_API int fmi3SetShiftFraction(void* c, const Reference*, std::size_t n, const std::uint64_t*, const std::uint64_t*) {
+    return none(c, n);
+}
+FMU_API int fmi3ActivateModelPartition(void* c, Reference, double) { return of(c).failed("this FMU has no clocks"); }
+FMU_API int fmi3GetNumberOfVariableDependencies(void* c, Reference, std::size_t*) {
+    return of(c).failed("dependencies are those of modelDescription.xml");
+}
+FMU_API int fmi3GetVariableDependencies(void* c, Reference, std::size_t*, Reference*, std::size_t*, int*, std::size_t) {
+    return of(c).failed("dependencies are those of modelDescription.xml");
+}
+
+FMU_API int fmi3GetFMUState(void* c, void** state) {
+    auto* to = static_cast<State*>(*state);
+    if (to == nullptr) to = new State;
+    *state = to;
+    return of(c).ended(of(c).instance.get_state(*to));
+}
+FMU_API int fmi3SetFMUState(void* c, void* state) {
+    const auto& from = *static_cast<State*>(state);
+    return of(c).ended(of(c).instance.set_state(from.data(), from.size()));
+}
+FMU_API int fmi3FreeFMUState(void*, void** state) {
+    delete static_cast<State*>(*state);
+    *state = nullptr;
+    return lm::ok;
+}
+FMU_API int fmi3SerializedFMUStateSize(void*, void* state, std::size_t* size) {
+    *size = sizeof(double) * static_cast<State*>(state)->size();
+    return lm::ok;
+}
+FMU_API int fmi3SerializeFMUState(void* c, void* state, std::uint8_t* bytes, std::size_t size) {
+    const auto& from = *static_cast<State*>(state);
+    if (size != sizeof(double) * from.size()) return of(c).failed("the size is another one");
+    std::memcpy(bytes, from.data(), size);
+    return lm::ok;
+}
+FMU_API int fmi3DeserializeFMUState(void* c, const std::uint8_t* bytes, std::size_t size, void** state) {
+    if (size == 0 || size != sizeof(double) * of(c).instance.state_size())
+        return of(c).failed("these bytes are no state of this FMU");
+    auto* to = static_cast<State*>(*state);
+    if (to == nullptr) to = new State;
+    *state = to;
+    to->resize(size / sizeof(double));
+    std::memcpy(to->data(), bytes, size);
+    return lm::ok;
+}
+
+FMU_API int fmi3GetDirectionalDerivative(void* c, const Reference* unknown, std::size_t n_unknown,
+                                         const Reference* known, std::size_t n_known, const double* seed, std::size_t,
+                                         double* out, std::size_t) {
+    return of(c).ended(of(c).instance.directional_derivative(unknown, n_unknown, known, seed, n_known, out));
+}
+FMU_API int fmi3GetAdjointDerivative(void* c, const Reference*, std::size_t, const Reference*, std::size_t,
+                                     const double*, std::size_t, double*, std::size_t) {
+    return of(c).failed("adjoint derivatives are not given");
+}
+FMU_API int fmi3GetOutputDerivatives(void* c, const Reference*, std::size_t n, const std::int32_t*, double*,
+                                     std::size_t) {
+    return n == 0 ? int{lm::ok} : of(c).failed("derivatives of outputs are not given");
+}
+
+// --- Co-Simulation ---
+
+FMU_API int fmi3DoStep(void* c, double from, double interval, bool, bool* event, bool* terminate, bool* early,
+                       double* last) {
+    const lm::Ended e = of(c).instance.step(from, interval);
+    *event = *terminate = *early = false;
+    *last = of(c).instance.time();
+    return of(c).ended(e);
+}
+
+// --- Model Exchange ---
+
+FMU_API int fmi3EvaluateDiscreteStates(void*) { return lm::ok; }
+FMU_API int fmi3UpdateDiscreteStates(void* c, bool* needed, bool* terminate, bool* nominals_changed,
+                                     bool* states_changed, bool* next_defined, double* next) {
+    lm::Instance::Settled settled;
+    const lm::Ended e = of(c).instance.settle(settled);
+    *needed = *terminate = *nominals_changed = false;
+    *states_changed = settled.states_changed;
+    *next_defined = settled.has_next;
+    *next = settled.next;
+    return of(c).ended(e);
+}
+FMU_API int fmi3EnterContinuousTimeMode(void*) { return lm::ok; }
+FMU_API int fmi3CompletedIntegratorStep(void* c, bool, bool* enter_event_mode, bool* terminate) {
+    *enter_event_mode = *terminate = false;
+    return of(c).ended(of(c).instance.accept(*enter_event_mode));
+}
+FMU_API int fmi3SetTime(void* c, double time) { return of(c).ended(of(c).instance.set_time(time)); }
+FMU_API int fmi3SetContinuousStates(void* c, const double* x, std::size_t n) {
+    return of(c).ended(of(c).instance.set_states(x, n));
+}
+FMU_API int fmi3GetContinuousStates(void* c, double* x, std::size_t n) {
+    return of(c).ended(of(c).instance.get_states(x, n));
+}
+FMU_API int fmi3GetContinuousStateDerivatives(void* c, double* out, std::size_t n) {
+    return of(c).ended(of(c).instance.get_derivatives(out, n));
+}
+FMU_API int fmi3GetEventIndicators(void* c, double* out, std::size_t n) {
+    return of(c).ended(of(c).instance.get_guards(out, n));
+}
+FMU_API int fmi3GetNominalsOfContinuousStates(void* c, double* out, std::size_t n) {
+    const std::vector<double>& nominals = of(c).instance.nominals();
+    if (n != nominals.size()) return of(c).failed("the number of continuous states is another one");
+    std::copy(nominals.begin(), nominals.end(), out);
+    return lm::ok;
+}
+FMU_API int fmi3GetNumberOfEventIndicators(void* c, std::size_t* n) {
+    *n = of(c).instance.indicator_count();
+    return lm::ok;
+}
+FMU_API int fmi3GetNumberOfContinuousStates(void* c, std::size_t* n) {
+    *n = of(c).instance.state_count();
+    return lm::ok;
+}

@@ -1,0 +1,110 @@
+// A motion as a hybrid system for an integrator that is not ours: rates, guards, and what follows at an event.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "stepping.hpp"
+
+namespace lostmotion {
+
+// A guard has fallen where it lies below zero by this share of its natural magnitude: an integrator finds a crossing to
+// its tolerance only, and behind it the next mode is determinate.
+inline constexpr double fallen = 1e-9;
+
+template <class System>
+void SimulationOf<System>::place(double time, const StateOf<D>& x, const Inputs& input) {
+    now_.time = time;
+    now_.x = x;
+    now_.input = input;
+    now_.steady = false;
+    now_.course.forget();
+    Inputs same = input;
+    resume(now_.input, same, 1.0);
+}
+
+template <class System>
+StateOf<typename System::Dims> SimulationOf<System>::rates() {
+    const Regime& r = regime();
+    StateOf<D> out{};
+    for (int k = 0; k < D::states; ++k) out[k] = evaluate<D>(r.rate[k], now_.x, now_.memory, now_.input);
+    return out;
+}
+
+template <class System>
+auto SimulationOf<System>::guards() -> std::array<double, n_guards> {
+    const Regime& r = regime();
+    const auto& entry = solver_.cache().entry(now_.key);
+    std::array<double, n_guards> out;
+    out.fill(1.0);
+    for (int g = 0; g < r.n_guards; ++g) {
+        if (r.guards[g].behind) continue;
+        const double natural = entry.near_event[g] / far_from_event;
+        out[static_cast<std::size_t>(g)] =
+            evaluate<D>(r.guards[g].form, now_.x, now_.memory, now_.input) / (natural > 0.0 ? natural : 1.0) + fallen;
+    }
+    return out;
+}
+
+template <class System>
+auto SimulationOf<System>::lowest_guard() -> const typename System::Guard* {
+    const auto values = guards();
+    const auto lowest = std::min_element(values.begin(), values.end());
+    // The integrator may have stopped just before the zero.
+    return *lowest < 0.5 * fallen ? &regime().guards[static_cast<std::size_t>(lowest - values.begin())] : nullptr;
+}
+
+// The next regime after a guard has fallen, or, if there is none, after inputs have changed.
+template <class System>
+Status SimulationOf<System>::follow(const typename System::Guard* fired) {
+    if (fired != nullptr && fired->kind == System::Guard::outside) return Status::outside;
+    InstantOf<D> now;
+    now.time = now_.time;
+    now.x = now_.x;
+    now.memory = now_.memory;
+    now.input[0] = now_.input;
+    for (std::size_t k = 0; k < now_.input.size(); ++k) now.input_magnitudes[k] = std::fabs(now_.input[k]);
+    const Inputs before = fired != nullptr ? now_.input : now_.course.input;
+    const Found found = system_.next(solver_.cache(), now, fired, now_.key, before);
+    if (found != Found::yes) return status_of(found);
+    now_.x = now.x;
+    now_.memory = now.memory;
+    now_.course = {};
+    now_.course.input = now_.input;
+    return Status::done;
+}
+
+template <class System>
+Status SimulationOf<System>::settle() {
+    constexpr int most = 100;
+    Status status = find_regime();
+    while (status == Status::done && controllers_ && !loop_.ticks.before(now_.time, next_tick())) {
+        Inputs same = now_.input;
+        resume(now_.input, same, 1.0);
+        if (!controllers_->tick()) return Status::controller;
+        now_.control = controllers_->course();
+        controllers_->write_commands(now_.input);
+    }
+    for (int k = 0; status == Status::done; ++k) {
+        const typename System::Guard* fired = lowest_guard();
+        if (fired == nullptr && k > 0) break;
+        if (k == most) return Status::zeno;
+        status = follow(fired);
+    }
+    return status;
+}
+
+template <class System>
+double SimulationOf<System>::next_tick() const {
+    return controllers_ ? loop_.ticks.time(now_.control.next) : std::numeric_limits<double>::infinity();
+}
+
+template <class System>
+bool SimulationOf<System>::accept() {
+    if (follows_inputs(regime()) && !(now_.input == now_.course.input)) return true;
+    now_.course.input = now_.input;
+    return false;
+}
+
+}  // namespace lostmotion
