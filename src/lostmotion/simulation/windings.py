@@ -16,7 +16,7 @@ from .train_scenario import TrainScenario
 
 ATTRIBUTE = "error_bound"
 UNITS = {"current": "A", "torque": "N*m", "speed": "rad/s"}
-FEWEST = 10  # samples of the currents in an electrical revolution, by the rule of thumb of makers of drives
+FEWEST = 10  # samples of the currents in an electrical revolution, by the rule of thumb of manufacturers of drives
 AGREEMENT = 1e-10  # relative, to which the passes and rounding hold currents and speeds
 
 
