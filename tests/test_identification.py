@@ -16,6 +16,7 @@ from lostmotion.data_sheets.records import read_sheets
 from lostmotion.identification.engine import Engine, Point
 from lostmotion.identification.formulas import Formula
 from lostmotion.identification.identify import IdentificationResult, identify_task
+from lostmotion.identification.intervals import reach
 from lostmotion.identification.ladder import free_on, start_point
 from lostmotion.identification.logs import Channel
 from lostmotion.identification.prepare import prepared, read_all
@@ -84,6 +85,19 @@ def test_a_product_that_alone_is_determined_is_named(logs: Path) -> None:
         "only the ratio" in u.text and "torque_constant" in u.text and "stall torque" in u.text
         for u in result.undetermined
     )
+    for name in ("torque_constant", "resistance"):
+        assert result.intervals[name].low <= TRUTH[name] <= result.intervals[name].high
+
+
+def test_parameters_that_are_undetermined_together_go_on_until_one_is_at_its_bound() -> None:
+    """Along (1, -1/2, 0): the first by its own bound up, by the second's down; without bounds for ever, and no part, no change."""
+    directions = np.array([[1.0], [-0.5], [1e-9]])
+    down, up = reach(directions, np.array([[-8.0, 2.0], [-3.0, 1.5], [-1.0, 1.0]]))
+    np.testing.assert_allclose(up, [2.0, 1.5, 0.0], atol=1e-12)
+    np.testing.assert_allclose(down, [-3.0, -1.0, 0.0], atol=1e-12)
+    down, up = reach(directions, np.array([[-8.0, np.inf], [-np.inf, 1.5], [-1.0, 1.0]]))
+    np.testing.assert_array_equal(up, [np.inf, 1.5, 0.0])
+    np.testing.assert_allclose(down, [-3.0, -np.inf, 0.0])
 
 
 def test_the_jacobian_is_that_of_a_larger_difference(logs: Path) -> None:

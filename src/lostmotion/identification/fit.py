@@ -107,8 +107,18 @@ def slope_of(p: FreeParameter, value: float) -> float:
 
 def moved(p: FreeParameter, value: float, change: float) -> float:
     """The value after a change of the scaled parameter, within its bounds."""
+    if math.isinf(change):
+        return p.min if change < 0.0 else p.max
     new = value * 1.1 ** min(max(change, -500.0), 500.0) if p.logarithmic else value + p.step * change
     return min(max(new, p.min), p.max)
+
+
+def room_of(p: FreeParameter, value: float) -> tuple[float, float]:
+    """Changes of the scaled parameter that lead to its lower and upper bound."""
+    if not p.logarithmic:
+        return (p.min - value) / p.step, (p.max - value) / p.step
+    low = math.log(p.min / value) / math.log(1.1) if p.min > 0.0 else -math.inf
+    return low, math.log(p.max / value) / math.log(1.1)
 
 
 @dataclass

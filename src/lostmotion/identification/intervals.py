@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .fit import Fit, Problem, moved, search, slope_of
+from ..errors import need
+from .fit import Fit, Problem, moved, room_of, search, slope_of
 
 RESAMPLES = 2000
 LEVEL = 0.95
+PART_OF_DIRECTION = 1e-4  # of the largest part: a parameter with less has none, but for rounding
 CHI_SQUARE = 1.920729  # half the 95 % point of chi-square with one degree of freedom
 
 
@@ -28,8 +30,8 @@ def bootstrap(problem: Problem, fit: Fit, seed: int = 0) -> dict[str, Interval]:
     """By resampling blocks of the residuals, with one Gauss-Newton step for each sample.
 
     The pieces of the gradient of half a second each are drawn anew with replacement, so that errors that last, as those of a
-    model that is not quite right do, widen the interval. It is at least that of independent errors: a few blocks say little. Directions that the logs do not determine get their own width from the
-    priors alone, or none: then the interval is that of the bounds.
+    model that is not quite right do, widen the interval. It is at least that of independent errors: a few blocks say little.
+    Along the directions that neither logs nor priors determine, the parameters go on together until one is at its bound.
     """
     names = list(problem.parameters)
     if not names:
@@ -41,11 +43,8 @@ def bootstrap(problem: Problem, fit: Fit, seed: int = 0) -> dict[str, Interval]:
             H[k, k] += (slopes[k] / deviation) ** 2
     blocks = np.vstack(fit.scores)
     blocks = blocks - blocks.mean(axis=0)
-    loose = np.zeros(len(names), dtype=bool)
     values, vectors = np.linalg.eigh(H)
     weak = values < 1e-8 * max(float(values.max()), 1e-300)
-    if weak.any():
-        loose = np.abs(vectors[:, weak]).max(axis=1) > 0.1
     inverse = vectors[:, ~weak] @ np.diag(1.0 / values[~weak]) @ vectors[:, ~weak].T
     draw = np.random.default_rng(seed)
     count = draw.multinomial(len(blocks), np.full(len(blocks), 1.0 / len(blocks)), size=RESAMPLES)
@@ -53,12 +52,45 @@ def bootstrap(problem: Problem, fit: Fit, seed: int = 0) -> dict[str, Interval]:
     low, high = np.percentile(steps, [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)], axis=0)
     normal = 1.96 * np.sqrt(np.diag(inverse))  # of independent errors
     low, high = np.minimum(low, -normal), np.maximum(high, normal)
+    if weak.any():
+        room = [room_of(problem.parameters[name], fit.point.values[name]) for name in names]
+        down, up = reach(vectors[:, weak], np.array(room))
+        low, high = low + down, high + up
     found = {}
     for k, name in enumerate(names):
         p, value = problem.parameters[name], fit.point.values[name]
-        ends = (p.min, p.max) if loose[k] else (moved(p, value, low[k]), moved(p, value, high[k]))
-        found[name] = Interval(*ends, "bootstrap")
+        found[name] = Interval(moved(p, value, low[k]), moved(p, value, high[k]), "bootstrap")
     return found
+
+
+def reach(directions: np.ndarray, room: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How far each parameter can go, down and up, if all go together along some of the directions and stay within their room.
+
+    Parameters
+    ----------
+    directions : array (parameters, directions)
+        Of scaled parameters.
+    room : array (parameters, 2)
+        Changes that lead to the lower and upper bound; infinite where there is none.
+    """
+    need("scipy", "Intervals of what logs do not determine", "identify")
+    from scipy.optimize import linprog
+
+    none = np.abs(directions) < PART_OF_DIRECTION * np.abs(directions).max(axis=0)
+    directions = np.where(none, 0.0, directions)
+    sides = np.vstack([directions, -directions])
+    limits = np.concatenate([room[:, 1], -room[:, 0]])
+    some = np.isfinite(limits)
+    ends = np.zeros((2, len(room)))
+    for k, row in enumerate(directions):
+        if not row.any():
+            continue
+        for end, sign in enumerate((-1.0, 1.0)):
+            best = linprog(
+                -sign * row, A_ub=sides[some] if some.any() else None, b_ub=limits[some], bounds=(None, None)
+            )
+            ends[end, k] = sign * (math.inf if best.fun is None else -best.fun)
+    return ends[0], ends[1]
 
 
 def profile(problem: Problem, fit: Fit, name: str, points: int = 3) -> tuple[Interval, list[tuple[float, float]]]:
