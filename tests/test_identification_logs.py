@@ -102,6 +102,61 @@ def test_every_format_gives_the_same_log(tmp_path: Path, name: str, write: Calla
         assert log.header["mass"] == 0.5
 
 
+def as_mcap(path: Path, encoding: str = "json") -> None:
+    """A position at TIME, a goal every 40 ms; publish times, beside which log times are late."""
+    mcap = pytest.importorskip("mcap.writer")
+    begin = 1_700_000_000_000_000_000
+    with path.open("wb") as stream:
+        writer = mcap.Writer(stream)
+        writer.start()
+        schema = writer.register_schema("joint", "jsonschema", b"{}")
+        state = writer.register_channel("/servo/state", encoding, schema)
+        goal = writer.register_channel("/servo/goal", encoding, schema)
+        for k, (t, x) in enumerate(zip(TIME, ANGLE, strict=True)):
+            at = begin + round(1e9 * t)
+            message = {"joint": {"position": [x, -x]}, "enabled": True, "name": "servo"}
+            writer.add_message(state, at + 3_000_000, json.dumps(message).encode(), at)
+            if k % 4 == 0:
+                writer.add_message(goal, at + 3_000_000, json.dumps({"position": 2.0 * t}).encode(), at)
+        writer.add_metadata("rig", {"mass": "0.5", "unit": "left"})
+        writer.finish()
+
+
+def test_messages_of_an_mcap_file_are_channels_at_the_times_of_one_topic(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    as_mcap(path)
+    log = read_log(path)
+    assert log.time == pytest.approx(TIME, abs=1e-9)
+    assert set(log.channels) == {
+        "servo/state.joint.position[0]",
+        "servo/state.joint.position[1]",
+        "servo/state.enabled",
+        "servo/goal.position",
+    }
+    assert log.values("servo/state.joint.position[1]") == pytest.approx(-ANGLE)
+    goal = log.values("servo/goal.position")
+    assert goal[:197] == pytest.approx(2.0 * TIME[:197], abs=1e-9)  # straight lines up to the last message
+    assert log.header == {"mass": 0.5, "unit": "left"}
+    assert any("servo/goal" in note for note in log.notes)
+    assert read_log(path, time="/servo/goal").time == pytest.approx(TIME[::4], abs=1e-9)
+    with pytest.raises(lm.InputError, match="has no topic servo/stat in JSON"):
+        read_log(path, time="servo/stat")
+
+
+def test_an_mcap_file_that_is_not_in_json_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    as_mcap(path, "cdr")
+    with pytest.raises(lm.InputError, match=r"has no topic in JSON \(cdr\); record with") as refused:
+        read_log(path)
+    assert "\n" not in str(refused.value)
+    as_mcap(path)
+    for content in (path.read_bytes()[:-300], path.read_bytes()[:300], b"something else"):
+        path.write_bytes(content)
+        with pytest.raises(lm.InputError, match="is not an MCAP file that mcap reads") as refused:
+            read_log(path)
+        assert "\n" not in str(refused.value)
+
+
 def test_a_pattern_that_names_no_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(lm.InputError, match="names no log"):
         find_logs(["*.json"], tmp_path)

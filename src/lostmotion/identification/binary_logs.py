@@ -90,7 +90,7 @@ def read_parquet_log(path: Path, *, time: str = "") -> Log:
         columns[name] = column.to_numpy()
     log = _of_variables(path, columns, units, time)
     return Log(
-        log.name, log.time, log.channels, {**log.header, **{k: _as_number(v) for k, v in header.items()}}, log.notes
+        log.name, log.time, log.channels, {**log.header, **{k: as_number(v) for k, v in header.items()}}, log.notes
     )
 
 
@@ -163,7 +163,7 @@ def _of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[str, 
     channels = {
         n: Channel(v.astype(float), units.get(n, "")) for n, v in vectors.items() if n != name and len(v) == len(values)
     }
-    header = {n: _as_number(v) for n, v in variables.items() if np.ndim(v) == 0 and not isinstance(v, bytes)}
+    header = {n: as_number(v) for n, v in variables.items() if np.ndim(v) == 0 and not isinstance(v, bytes)}
     other = [f"{n} ({len(v)})" for n, v in vectors.items() if len(v) != len(values)]
     log = Log(path.name, values, channels, {k: v for k, v in header.items() if isinstance(v, int | float | str)})
     return (
@@ -173,7 +173,8 @@ def _of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[str, 
     )
 
 
-def _as_number(value: Any) -> Any:
+def as_number(value: Any) -> Any:
+    """A text that is a number, as one; anything else as it is."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.item()
     try:
