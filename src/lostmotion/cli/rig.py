@@ -86,7 +86,9 @@ def rig(
 
 
 def _print_comparisons(report: RigReport) -> None:
+    if report.comparisons:
+        print(f"  {'':<44} {'sheet':>10} {'rig':>10} {'rig/sheet - 1':>14}")
     for c in report.comparisons:
-        unit = "" if c.unit == "1" else f" {c.unit}"
+        unit = "" if c.unit == "1" else f" [{c.unit}]"
         remark = f"  ({c.remark})" if c.remark else ""
-        print(f"  {c.quantity:<44} {c.catalogue:>10.5g} {c.rig:>10.5g} {c.difference:>+9.1e}{unit}{remark}")
+        print(f"  {c.quantity + unit:<44} {c.catalogue:>10.5g} {c.rig:>10.5g} {c.difference:>+14.1e}{remark}")

@@ -39,7 +39,7 @@ def track(
     Writes track.html (one page) and its figures and tables: errors over time, over the speed of the target, and with wrong losses, at other temperatures, with
     wear; what each cause contributes.
 
-    \\b
+    \b
     lostmotion track tracking-loss-map --after "2 s"
     lostmotion track axes.toml --view "traverse=6.65 deg" --view "elevation=5.27 deg" -o sheet
     """

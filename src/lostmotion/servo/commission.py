@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -41,7 +42,7 @@ class LoopSheet:
     """[s]"""
     margins: Margins
     bandwidth: Bandwidth
-    """from reference to measured value, nothing fed forward"""
+    """from reference to measured value, both of the reference's shaft, nothing fed forward"""
     with_feedforward: Bandwidth | None
     """of the outermost loop, where something is fed forward"""
     frequency: np.ndarray
@@ -201,10 +202,6 @@ def loop_sheet(axis: Axis, regime: Regime, loop: str) -> LoopSheet:
     """Of one loop in one regime."""
     cut, closed = (SampledLoop(axis, regime, loop, is_cut) for is_cut in (True, False))
     f = frequencies(cut, closed)
-
-    def response(x: object) -> np.ndarray:
-        return closed.response(x, feedforward=False)
-
     fed = None
     c = axis.controller
     ahead = (
@@ -213,17 +210,17 @@ def loop_sheet(axis: Axis, regime: Regime, loop: str) -> LoopSheet:
         c.feedforward.viscous_friction,
     )
     if loop == c.reference.kind and any(ahead):
-        fed = bandwidth_of(f, closed.response)
+        fed = bandwidth_of(f, partial(closed.closed_loop, feedforward=True))
     return LoopSheet(
         loop,
         regime.name,
         closed.sample_time,
         margins(cut, closed),
-        bandwidth_of(f, response),
+        bandwidth_of(f, closed.closed_loop),
         fed,
         f,
         cut.open_loop(f),
-        response(f),
+        closed.closed_loop(f),
     )
 
 

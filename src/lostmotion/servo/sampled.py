@@ -322,6 +322,11 @@ class SampledLoop:
             inputs[:, 1], inputs[:, 2] = 1j * w, -w * w
         return self._samples(signal or f"{self.loop}_measured", w, lambda _, G: inputs @ G.T, inputs)
 
+    def closed_loop(self, frequency: Any, *, feedforward: bool = False) -> np.ndarray:
+        """As `response`, with what is measured as the reference has it: the speed of the motor as that of the reference's shaft [Hz]."""
+        of_load = self.loop == "speed" and self.axis.controller.reference.kind == "speed"
+        return self.response(frequency, feedforward=feedforward) / (self.axis.ratio if of_load else 1.0)
+
     def open_loop(self, frequency: Any) -> np.ndarray:
         """L(exp(j w T)) of the loop that is cut: what comes back, with the sign turned, for what enters its controller [Hz]."""
         w = _angular(frequency)

@@ -300,7 +300,7 @@ def _judge(axis: Axis, points: list[Regime], goal: str, peak: float) -> tuple[fl
             if loop != outer:
                 continue
             if goal == "bandwidth":
-                values.append(bandwidth_of(f, lambda x, c=closed: c.response(x, feedforward=False)).three_decibels)  # type: ignore[misc]
+                values.append(bandwidth_of(f, closed.closed_loop).three_decibels)
             else:
                 most = float(np.abs(closed.compliance(f, axis.motor_shaft, axis.shaft)).max())
                 values.append(1.0 / most if most > 0.0 else math.inf)  # not where the load sticks
@@ -328,7 +328,7 @@ def _lowest_bandwidth(axis: Axis, loop: str) -> float:
                 f"rule: its gains are unstable in the regime {regime.name}, where the exact sampled loop has delays and compliance that "
                 'the rule does not know; take rule = "margins"'
             )
-        b = bandwidth_of(frequencies(closed), lambda x, c=closed: c.response(x, feedforward=False))  # type: ignore[misc]
+        b = bandwidth_of(frequencies(closed), closed.closed_loop)
         found += [x for x in (b.three_decibels, b.ninety_degrees) if not math.isnan(x)]
     return min(found, default=0.5 / axis.controller.loop_time(loop))
 
