@@ -41,8 +41,9 @@ enum class Kernel { all, drive, narrow, middle, wide };
 #ifndef LOSTMOTION_KERNEL
 #define LOSTMOTION_KERNEL all
 #endif
-constexpr bool holds(Kernel k) { return Kernel::LOSTMOTION_KERNEL == Kernel::all || Kernel::LOSTMOTION_KERNEL == k; }
-inline constexpr bool holds_trains = Kernel::LOSTMOTION_KERNEL != Kernel::drive;
+inline constexpr Kernel built = Kernel::LOSTMOTION_KERNEL;
+constexpr bool holds(Kernel k) { return built == Kernel::all || built == k; }
+inline constexpr bool holds_trains = built != Kernel::drive;
 
 template <int coupled_, int angles_, int inputs_, int memory_, int contacts_, int guards_>
 struct Dims {
