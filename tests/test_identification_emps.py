@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from conftest import ROOT
+from lostmotion.identification.engine import Engine, Point
+from lostmotion.identification.ladder import free_on, start_point
 from lostmotion.identification.prepare import Prepared, prepared, read_all
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.runs import run_log
+from lostmotion.identification.start import regressed
 from lostmotion.identification.task import Identification, load_identification
 
 EMPS = ROOT / "examples" / "emps"
@@ -49,6 +52,19 @@ def rig_and_logs(file: str) -> tuple[Rig, list[Prepared]]:
     task = Identification(**data)
     rig = Rig(task, EMPS)
     return rig, [prepared(task, log, rig.units) for log in read_all(task, EMPS)]
+
+
+@needs_data
+def test_the_regression_of_inverse_dynamics_is_that_of_the_description() -> None:
+    """Which has it from the same kind of regression, with its own filters, of the same log; here from half the values."""
+    rig, logs = rig_and_logs("identify.toml")
+    train = [log for log in logs if not log.held_out]
+    start = start_point(rig.task, train)
+    half = {name: (1.0 if name == "offset" else 0.5) * value for name, value in start.values.items()}
+    _, found = regressed(rig, Engine(rig), train, Point(half, start.nuisance), free_on(rig.task, 0))
+    assert set(found.found) == {"mass", "viscous_friction", "coulomb_friction", "offset"}
+    for name, value in found.found.items():
+        assert value == pytest.approx(PUBLISHED[name], rel=0.05)
 
 
 @needs_data

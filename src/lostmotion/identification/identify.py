@@ -18,11 +18,12 @@ from .errors_of_logs import LogError, total
 from .fit import Fit, Problem
 from .identifiability import Undetermined, at_bounds, undetermined
 from .intervals import Interval, bootstrap, profile
-from .ladder import RungResult, chosen, climb, free_on, problem_of, start_point
+from .ladder import RungResult, begun_with, chosen, climb, free_on, problem_of, start_point
 from .prepare import Prepared, prepared, read_all
 from .record import gear_sheet, scenario_text, sheet_text
 from .rig import Rig
 from .runs import run_log
+from .start import Regression, regressed
 from .task import Identification, load_identification
 
 Notify = Callable[[str, int, float], None]
@@ -53,6 +54,8 @@ class IdentificationResult:
     """parameters whose derivatives were differences of runs, not exact: why"""
     touching: dict[str, str] = field(default_factory=dict)
     """logs whose derivatives were so from some instant on, at the values found: why"""
+    start: Regression = field(default_factory=Regression)
+    """where the search began"""
     rig: Rig | None = field(default=None, repr=False)
     logs: list[Prepared] = field(default_factory=list, repr=False)
 
@@ -99,7 +102,7 @@ class IdentificationResult:
                     n = sum(e.held_out == held_out and e.channel == channel for e in self.errors)
                     lines.append(f"  {channel}, {n} logs {what}: MAE {mae:.5g}, RMSE {rmse:.5g}")
         lines += [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
-        return lines + [f"  {text}" for text in self.differences()]
+        return lines + [f"  {text}" for text in [*self.differences(), *self.starts()]]
 
     def differences(self) -> list[str]:
         """Where the derivatives were differences of runs, and why."""
@@ -111,6 +114,10 @@ class IdentificationResult:
                 f"{self.touching[first]}"
             )
         return found
+
+    def starts(self) -> list[str]:
+        """Which start values came from a regression, and why others did not; empty if the task wants none."""
+        return self.start.lines(self.task.parameters) if self.task.fit.regression else []
 
     def source(self) -> str:
         """What the values were identified from, for records."""
@@ -197,7 +204,10 @@ def identify_logs(
 ) -> IdentificationResult:
     """As `identify`, of logs that have been prepared."""
     task, engine = rig.task, Engine(rig, threads)
-    rungs = climb(rig, engine, logs, start_point(task, logs), notify)
+    point, start = start_point(task, logs), Regression()
+    if task.fit.regression and (fitted := [log for log in logs if not log.held_out]):
+        point, start = regressed(rig, engine, begun_with(task, fitted), point, free_on(task, 0))
+    rungs = climb(rig, engine, logs, point, notify)
     best = chosen(rungs)
     fit, free = rungs[best].fit, free_on(task, best)
     train = [log for log in logs if not log.held_out]
@@ -220,6 +230,7 @@ def identify_logs(
         found,
         engine.by_differences,
         {log.name: engine.touching[log.name] for log in train if log.name in engine.touching},
+        start,
         rig,
         logs,
     )

@@ -14,6 +14,7 @@ from .engine import Engine, Point
 from .errors_of_logs import LogError, log_errors
 from .fit import Fit, Problem, search
 from .formulas import number
+from .motion import windows
 from .parameters import FreeParameter
 from .prepare import Prepared
 from .rig import Rig
@@ -70,6 +71,11 @@ def several(logs: Sequence[Prepared], count: int) -> list[Prepared]:
         key=lambda log: repr(sorted((k, v) for k, v in log.log.header.items() if isinstance(v, int | float | str))),
     )
     return [ordered[round(k * (len(ordered) - 1) / (count - 1))] for k in range(count)] if count > 1 else ordered[:1]
+
+
+def begun_with(task: Identification, train: Sequence[Prepared]) -> list[Prepared]:
+    """The logs with which a search begins."""
+    return [log for log in train if log.first] or several(train, task.fit.first_logs)
 
 
 def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, notify: Notify) -> list[RungResult]:
@@ -129,13 +135,16 @@ def _starts(point: Point, tried: dict[str, tuple[float, ...]]) -> Iterator[Point
 
 
 def _one(rig: Rig, engine: Engine, train: list[Prepared], rung: int, start: Point, name: str, notify: Notify) -> Fit:
-    """Some logs first, then all."""
+    """Some logs first, in windows that become longer where the task says so, then all."""
     options = rig.task.fit
-    few = [log for log in train if log.first] or several(train, options.first_logs)
+    few = begun_with(rig.task, train)
 
     def tell(iteration: int, cost: float) -> None:
         notify(name, iteration, cost)
 
+    for length in options.horizon:
+        cut = windows(rig, few, start, rung, length)
+        start = search(problem_of(rig, engine, cut, rung), start, iterations=options.iterations, notify=tell).point
     fit = search(problem_of(rig, engine, few, rung), start, iterations=options.iterations, notify=tell)
     if len(few) == len(train):
         return fit

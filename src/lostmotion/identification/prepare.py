@@ -28,6 +28,8 @@ class Segment:
     begin: int
     end: int
     phase: int
+    initial: Mapping[str, float] | None = None
+    """measured state at which a run begins anew, by dotted key of the scenario; None: it goes on from the segment before"""
 
 
 @dataclass

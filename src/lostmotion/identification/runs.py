@@ -137,6 +137,7 @@ class _Course:
         self._state: dict[str, float] | None = None
         self._state_by: dict[str, np.ndarray] = {}
         self._ends_by = ""
+        self._smooth = True
         self._error: Exception | None = None
         self.channels: tuple[str, ...] = ()
         self.case: tuple[Any, ...] = ()
@@ -177,7 +178,9 @@ class _Course:
 
     def _make_case(self, segment: Segment, begin: float, end: float) -> None:
         rig = self._rig
-        changes = rig.changes(self._known, self._rung, segment.phase)
+        if segment.initial is not None:
+            self._state, self._state_by, self._smooth = None, {}, True
+        changes = _begun(rig.changes(self._known, self._rung, segment.phase), segment)
         built = rig.built(changes)
         acting = Acting(rig.task, self._log, self._known, begin, end)
         start, capacities = rig.start(self._log, built, changes) if self._state is None else (self._state, {})
@@ -190,9 +193,9 @@ class _Course:
         shown = [name for terms in self._terms for name in terms]
         self.channels = tuple(dict.fromkeys([*shown, *(built.smooth if len(self._log.segments) > 1 else ())]))
         variations = []
-        if not self._ends_by:
+        if self._smooth:
             variations = [
-                (name, self._beside(name, p, changes, built, acting, segment.phase)) for name, p in self._by.items()
+                (name, self._beside(name, p, changes, built, acting, segment)) for name, p in self._by.items()
             ]
         self.train = built.composed
         self.case = (
@@ -209,10 +212,10 @@ class _Course:
         )
 
     def _beside(
-        self, name: str, p: FreeParameter, changes: Mapping[str, Any], built: Built, acting: Acting, phase: int
+        self, name: str, p: FreeParameter, changes: Mapping[str, Any], built: Built, acting: Acting, segment: Segment
     ) -> list[Any]:
         """What is other beside the value of a parameter, as the core takes it."""
-        rig, task = self._rig, self._rig.task
+        rig, task, phase = self._rig, self._rig.task, segment.phase
         keys = rig.keys_of(name, self._rung, phase)
         of_rig = [key for key in keys if not key.startswith("initial.")]
         acts = {i for i, c in task.inputs.items() if any(name in names_in(getattr(c, k)) for k in NUMBERS)}
@@ -228,7 +231,7 @@ class _Course:
         for offset, weight in stencil(self._values[name], p, long=bool(axes)):
             known = {**self._known, name: self._values[name] + offset}
             try:
-                there = {**changes, **rig.changes(known, self._rung, phase, keys)}
+                there = _begun({**changes, **rig.changes(known, self._rung, phase, keys)}, segment)
                 at = rig.built(there) if of_rig else built
             except InputError as error:
                 raise NoDerivativeError(name, f"beside the value of {name}: {error}") from None
@@ -257,7 +260,8 @@ class _Course:
             self._error = _core.SolverError(row.error)
             return
         derivatives = row.derivatives
-        if self._ends_by or row.ends_by:
+        if row.ends_by:
+            self._smooth = False
             self._ends_by = self._ends_by or f"{row.ends_by}, {self._begin + row.ends_at:.3g} s"
         if len(derivatives) < len(self._by):
             derivatives = np.full((len(self._by), *row.values.shape), np.nan)
@@ -274,7 +278,7 @@ class _Course:
             self._rows_by[k].append(by)
         if len(self._log.segments) > 1:
             self._state = {name: value for name, value in row.end_state.items() if name in place}
-            if not self._ends_by:
+            if self._smooth:
                 rows = [place[name] for name in self._state]
                 self._state_by = {name: derivatives[p][rows, -1] for p, name in enumerate(self._by)}
 
@@ -322,6 +326,14 @@ def _refuse_held_delay(task: Identification, name: str, references: set[str]) ->
             raise NoDerivativeError(
                 name, f"{name}: delays {i}, which is held between samples and read by a sampled controller at its ticks"
             )
+
+
+def _begun(changes: Mapping[str, Any], segment: Segment) -> dict[str, Any]:
+    """With the measured state at which a segment begins, in place of that of the rig."""
+    if segment.initial is None:
+        return dict(changes)
+    own = {k: v for k, v in changes.items() if not k.startswith(("initial.angles", "initial.speeds"))}
+    return {**own, **segment.initial}
 
 
 def _ends(log: Prepared, segment: Segment) -> tuple[float, float]:

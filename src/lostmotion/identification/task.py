@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -11,7 +12,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.named import nothing
 from ..inputs.part import Part
-from ..inputs.quantities import NotNegative, Number, Positive, Time, Whole
+from ..inputs.quantities import NotNegative, Number, Positive, Switch, Time, Whole
 from ..inputs.toml_files import read_toml
 from ..inputs.validation import did_you_mean
 from ..model.train import Elements
@@ -117,8 +118,20 @@ class FitOptions(Part):
     """of which the search begins, before it takes all"""
     first: FormulaText | None = None
     """condition on the header of the logs with which the search begins, in place of `first_logs`: those without impacts"""
+    regression: Switch = True
+    """start values by linear regression of inverse dynamics, where the rig allows it and its runs are nearer to the logs"""
+    horizon: tuple[Annotated[Time, Positive], ...] = ()
+    """lengths of windows, rising: the logs are fitted in windows of the first, each run of which begins at the angle and the speed
+    measured there, then of the next, and at last whole"""
     sample_interval: Annotated[Time, Positive] | None = None
     """of the runs behind a channel with a filter; left out, that of the log, at most 2 ms"""
+
+    @model_validator(mode="after")
+    def _horizon_grows(self) -> Self:
+        for a, b in itertools.pairwise(self.horizon):
+            if b <= a:
+                raise ValueError(f"has horizon with {b:g} s after {a:g} s; windows must become longer")
+        return self
 
 
 class Identification(Part):

@@ -69,6 +69,7 @@ def write_identification(directory: Path, name: str, result: IdentificationResul
         "parameters": parameters,
         "undetermined": [u.text for u in result.undetermined],
         "bounds": [*result.at_bounds, *result.differences()],
+        "starts": result.starts(),
         "header": header,
         "errors": errors,
         "notes": result.notes,

@@ -1,0 +1,162 @@
+"""Inverse dynamics: the torque that is missing at a measured shaft if the rig moves as a log shows.
+
+All shafts turn with the measured one by fixed ratios n, so that with its speed w and acceleration a
+
+    r = sum n (J n a + b n w + T_C sign(n w) + M_Z - M(n phi) - T)
+
+over shafts, with the motors' torques T and those over the angle M. At the right values r is 0 but for noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from ..control.axis import turns
+from ..errors import InputError
+from ..model.losses import ConstantEfficiency, MeshEfficiency
+from ..model.motor import ShaftMotor
+from ..simulation.train_scenario import TrainScenario
+from .acting import NUMBERS
+from .formulas import number
+from .motion import Position, measured_course
+from .prepare import Prepared
+from .rig import Rig
+
+PAUSE = 3.0  # times the sample interval: there the samples are taken as two pieces
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A piece of a log in one phase, at equal distances in time, with filtered derivatives."""
+
+    log: Prepared
+    phase: int
+    time: np.ndarray
+    angle: np.ndarray
+    speed: np.ndarray
+    acceleration: np.ndarray
+    blocks: np.ndarray
+    """samples of each piece in which the shaft turns in one direction: blocks x samples"""
+
+
+def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], position: Position, width: int) -> list[Stretch]:
+    """All of a log that is long enough.
+
+    Parameters
+    ----------
+    width
+        Samples of the filter, cubics by least squares (Savitzky and Golay 1964), and of a block; odd.
+    """
+    at, x = measured_course(rig, log, position.channel, known)
+    h, found = log.log.interval, []
+    for segment in log.segments:
+        of = slice(segment.begin, segment.end)
+        own, values = at[of], x[of]
+        for piece in np.split(np.arange(len(own)), np.flatnonzero(np.diff(own) > PAUSE * h) + 1):
+            if len(piece) < 3 * width:
+                continue
+            t = np.arange(own[piece[0]], own[piece[-1]], h)
+            if len(t) < 3 * width:
+                continue
+            even = np.interp(t, own[piece], values[piece])
+            q, w, a = (savgol_filter(even, width, 3, deriv=d, delta=h)[width // 2 : -(width // 2)] for d in (0, 1, 2))
+            blocks = np.arange(len(q) // width * width).reshape(-1, width)
+            blocks = blocks[np.all(w[blocks] > 0.0, axis=1) | np.all(w[blocks] < 0.0, axis=1)]
+            if len(blocks):
+                found.append(Stretch(log, segment.phase, t[width // 2 : -(width // 2)], q, w, a, blocks))
+    return found
+
+
+def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, position: Position) -> np.ndarray:
+    """r of each block [N·m].
+
+    Raises
+    ------
+    InputError
+        The rig is not one that moves as one shaft, or a torque is not known: why.
+    """
+    scenario = rig.built(rig.changes(known, rung, s.phase)).scenario
+    _check(scenario)
+    train = scenario.train()
+    ratios: dict[str, float] = {}
+    for name in scenario.shafts:
+        n = turns(train, name, position.shaft)
+        if n is None:
+            raise InputError(f"shaft {name} does not turn with {position.shaft} by a fixed ratio")
+        ratios[name] = n
+    inertia, viscous, dry = 0.0, 0.0, np.zeros(len(s.time))
+    other = np.zeros(len(s.time))
+    for name, shaft in scenario.shafts.items():
+        n = ratios[name]
+        inertia, viscous = inertia + n**2 * shaft.inertia, viscous + n**2 * shaft.viscous_friction
+        slipping, _, speeds, torques = shaft.friction()
+        dry += abs(n) * (np.interp(np.abs(n * s.speed), speeds, torques) if speeds else slipping)
+        if shaft.torque is not None:
+            other += n * _acting(rig, s, known, scenario, f"{name}_load_torque")
+    for gear in scenario.gears.values():
+        n = ratios[gear.input]
+        inertia, viscous = inertia + n**2 * gear.inertia, viscous + n**2 * gear.viscous_friction
+    for name, motor in scenario.motors.items():
+        n = ratios[motor.shaft]
+        inertia += n**2 * motor.rotor_inertia
+        dry += abs(n) * motor.friction_torque
+        other -= n * _motor_torque(rig, s, known, scenario, name, motor)
+    for t in (*scenario.gravity.values(), *scenario.angle_torques.values()):
+        n, curve = ratios[t.shaft], t.core()
+        other -= n * np.array([curve(phi) for phi in (n * s.angle).tolist()])
+    r = inertia * s.acceleration + viscous * s.speed + dry * np.sign(s.speed) + other
+    return np.asarray(r[s.blocks].mean(axis=1))
+
+
+def _check(scenario: TrainScenario) -> None:
+    """Whether its torques are those of the formula above."""
+    for table in ("clutches", "freewheels", "brakes"):
+        if names := list(getattr(scenario, table)):
+            raise InputError(f"{table}.{names[0]} holds or lets go as it likes")
+    for name, gear in scenario.gears.items():
+        losses = gear.losses
+        lossless = (isinstance(losses, ConstantEfficiency) and losses.efficiency == 1.0) or (
+            isinstance(losses, MeshEfficiency) and losses.efficiencies() == (1.0, 1.0)
+        )
+        if not lossless or gear.transmission_error is not None:
+            raise InputError(f"gears.{name} has losses over the load or a transmission error")
+    for name, shaft in scenario.shafts.items():
+        if shaft.drag is not None:
+            raise InputError(f"shafts.{name} has a drag over the speed")
+
+
+def _motor_torque(
+    rig: Rig, s: Stretch, known: Mapping[str, Any], scenario: TrainScenario, name: str, motor: ShaftMotor
+) -> np.ndarray:
+    """Measured, or of the command of a torque source."""
+    for channel, m in rig.task.measured.items():
+        if m.variable == f"{name}_torque" and m.filter_time == 0.0:
+            return np.asarray(np.interp(s.time, *measured_course(rig, s.log, channel, known)))
+    if name in scenario.controllers:
+        raise InputError(f"motors.{name} is under its controller, and no channel shows its torque")
+    if motor.kind != "torque_source":
+        raise InputError(f"motors.{name} has a voltage as its command, and no channel shows its torque")
+    torque = motor.rated_torque * _acting(rig, s, known, scenario, f"{name}_command")
+    limit = np.inf if motor.torque_limit is None else motor.torque_limit
+    return np.asarray(np.clip(torque, -limit, limit))
+
+
+def _acting(rig: Rig, s: Stretch, known: Mapping[str, Any], scenario: TrainScenario, name: str) -> np.ndarray:
+    """An input of the log, or a constant of the scenario."""
+    channel = rig.task.inputs.get(name)
+    if channel is None:
+        signal = scenario.signals()[name]
+        points = signal.breakpoint_list()
+        if signal.sine_list() or len(points) > 1 or any(points[0][2:]):
+            raise InputError(f"{name} changes with time, and is not among the inputs")
+        return np.full(len(s.time), points[0][1])
+    scale, offset, delay = (number(getattr(channel, key), known, f"inputs.{name}.{key}") for key in NUMBERS)
+    at, values = s.log.time + delay, s.log.inputs[name]
+    if channel.interpolation == "linear":
+        return np.asarray(scale * np.interp(s.time, at, values) + offset)
+    return np.asarray(scale * values[np.maximum(np.searchsorted(at, s.time, side="right") - 1, 0)] + offset)

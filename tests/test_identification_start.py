@@ -1,0 +1,268 @@
+"""Where a search begins: start values by regression of inverse dynamics, and windows that become longer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from identification_logs import SERVO, TRUTH, servo_plans, servo_task, write_servo_logs
+from lostmotion.identification.engine import Engine, Point
+from lostmotion.identification.identify import identify_logs
+from lostmotion.identification.ladder import free_on, start_point
+from lostmotion.identification.logs import Channel, Log
+from lostmotion.identification.motion import windows
+from lostmotion.identification.prepare import Prepared, prepared, read_all
+from lostmotion.identification.rig import Rig
+from lostmotion.identification.start import regressed
+from lostmotion.identification.task import Identification
+from lostmotion.identification.virtual import virtual_log
+
+AXIS = """
+[shafts.rotor]
+torque = { mean = 0.0 }
+[shafts.arm]
+inertia = 0.02
+[motors.drive]
+shaft = "rotor"
+kind = "torque_source"
+rated_torque = 1.0
+rotor_inertia = 1e-4
+[gears.belt]
+input = "rotor"
+output = "arm"
+ratio = 5
+[gravity.weight]
+shaft = "arm"
+mass = 1.0
+radius = 0.1
+[simulation]
+duration = "1 s"
+sample_interval = "1 ms"
+"""
+DC = {
+    "shaft": "rotor",
+    "kind": "dc",
+    "rotor_inertia": 1e-4,
+    "rated_torque": 1.0,
+    "rated_speed": 300.0,
+    "rated_voltage": 24.0,
+}
+DC |= {"electrical_time_constant": 1e-3, "armature_voltage_constant": 5.0}
+NOISE = 1e-4  # rad
+VALUES = {"inertia": 0.03, "viscous": 0.02, "coulomb": 0.15, "weight": 0.8, "offset": 0.02, "radius": 0.1}
+SWING = VALUES | {"coulomb": 0.01, "viscous": 0.004, "offset": 0.0}
+
+
+def axis_rig(directory: Path, starts: dict[str, float], **fit: Any) -> Rig:
+    """An arm behind a belt, torque and arm angle recorded."""
+    (directory / "axis.toml").write_text(AXIS)
+    task = Identification(
+        scenario="axis.toml",
+        logs={"files": ["*.csv"]},
+        inputs={"drive_command": {"channel": "torque", "interpolation": "linear"}},
+        measured={"angle": {"channel": "angle", "variable": "arm_angle"}},
+        set={
+            "shafts.arm.inertia": "inertia",
+            "shafts.arm.viscous_friction": "viscous",
+            "shafts.arm.friction_torque": "coulomb",
+            "shafts.rotor.torque": "offset",
+            "gravity.weight.mass": "weight",
+            "gravity.weight.radius": "radius",
+            "initial.angles.arm": "first_angle",
+        },
+        parameters={
+            name: {"start": start, "min": -1.0 if name == "offset" else 1e-4, "max": 20.0, "fixed": name == "radius"}
+            | ({"scale": 0.05} if name == "offset" else {})
+            for name, start in {"radius": 0.1, **starts}.items()
+        },
+        fit={"iterations": 20, **fit},
+    )
+    return Rig(task, directory)
+
+
+def axis_logs(rig: Rig, values: dict[str, float]) -> list[Prepared]:
+    """Two driven motions of 3 s."""
+    time = np.arange(0.0, 3.0, 1e-3)
+    torques = [0.4 * (np.sin((4.0 + k) * time) + 0.6 * np.sin(11.0 * time + k)) for k in range(2)]
+    return [axis_log(rig, values, time, torque, 0.0, k) for k, torque in enumerate(torques)]
+
+
+def free_swings(rig: Rig, values: dict[str, float]) -> list[Prepared]:
+    """Two of 5 s, some seven periods, without a torque."""
+    time = np.arange(0.0, 5.0, 2e-3)
+    return [axis_log(rig, values, time, np.zeros(len(time)), 1.0 + 0.5 * k, k) for k in range(2)]
+
+
+def axis_log(
+    rig: Rig, values: dict[str, float], time: np.ndarray, torque: np.ndarray, begin: float, seed: int
+) -> Prepared:
+    plan = Log(f"{seed}", time, {"torque": Channel(torque), "angle": Channel(np.full(len(time), begin))})
+    return prepared(rig.task, virtual_log(rig, plan, values, noise={"angle": NOISE}, seed=seed), rig.units)
+
+
+@pytest.mark.parametrize("factor", [10.0, 0.1])
+def test_starts_ten_times_off_become_near_by_regression(tmp_path: Path, factor: float) -> None:
+    starts = {name: factor * VALUES[name] for name in ("inertia", "viscous", "coulomb", "weight")} | {"offset": 0.0}
+    rig = axis_rig(tmp_path, starts)
+    result = identify_logs(rig, axis_logs(rig, VALUES), threads=1)
+    assert set(result.start.found) == {*starts} and not result.start.kept
+    for name in starts:
+        # The filter takes some of the fastest motion; as starts, values within 5 % are near.
+        assert result.start.found[name] == pytest.approx(VALUES[name], rel=0.05)
+        assert result.values[name] == pytest.approx(VALUES[name], rel=0.01)
+    assert result.error()[1] < 1.05 * NOISE
+    assert "in place of" in str(result)
+
+
+def test_parameters_of_which_the_torques_are_no_sum_keep_their_starts(tmp_path: Path) -> None:
+    """Of mass and radius of the weight the first in the file enters linearly, and then the second does not."""
+    starts = {name: 3.0 * VALUES[name] for name in ("weight", "radius")} | {
+        "inertia": 0.03,
+        "coulomb": 0.15,
+        "viscous": 0.02,
+    }
+    rig = axis_rig(tmp_path, {**starts, "offset": 0.02})
+    data = rig.task.model_dump()
+    data["set"]["gravity.weight.radius"] = "radius"
+    data["parameters"]["radius"]["fixed"] = False
+    data["parameters"]["inertia"] |= {"tolerance": 0.1}
+    data["parameters"]["coulomb"] |= {"max": 0.151, "start": 0.149, "min": 0.148}
+    rig = Rig(Identification(**data), tmp_path)
+    logs = axis_logs(rig, VALUES | {"coulomb": 0.3})
+    point, start = regressed(rig, Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
+    assert "prior" in start.kept["inertia"]
+    assert "not linear" in start.kept["weight"]  # `radius`, of the two the first in the file, is found
+    assert "out of its bounds" in start.kept["coulomb"]
+    assert point.values["inertia"] == starts["inertia"] and point.values["coulomb"] == 0.149
+    assert set(start.found) == {"radius", "viscous", "offset"}
+    assert start.found["radius"] == pytest.approx(VALUES["weight"] * VALUES["radius"] / starts["weight"], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (
+            {"gears.belt.losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.9, "backdrive_efficiency": 0.8}},
+            "belt",
+        ),
+        ({"motors.drive.kind": "dc"}, "voltage as its command"),
+        ({"shafts.arm.drag": {"kind": "quadratic", "coefficient": 0.1, "max_speed": 9.0}}, "drag"),
+        ({"command.drive": {"amplitude": 1.0, "frequency": 1.0}}, "changes with time"),
+    ],
+)
+def test_where_the_torques_are_not_known_the_starts_stay(tmp_path: Path, change: dict[str, Any], why: str) -> None:
+    starts = dict(VALUES)
+    del starts["radius"]
+    rig = axis_rig(tmp_path, starts)
+    logs = axis_logs(rig, VALUES)
+    data = rig.task.model_dump()
+    if "command.drive" in change:
+        data["inputs"] = {}
+    if "motors.drive.kind" in change:
+        change |= {"motors.drive": DC}
+        del change["motors.drive.kind"]
+    data["set"] |= change
+    rig = Rig(Identification(**data), tmp_path)
+    begin = start_point(rig.task, logs)
+    point, start = regressed(rig, Engine(rig, threads=1), logs, begin, free_on(rig.task, 0))
+    assert point == begin and not start.found
+    assert why in start.why_not
+    assert "start values as given" in start.lines(rig.task.parameters)[0]
+
+
+def test_a_closed_loop_without_a_channel_of_its_torque_keeps_the_starts(tmp_path: Path) -> None:
+    rig = write_servo_logs(tmp_path, TRUTH, rung=0, count=1)
+    logs = [prepared(rig.task, log, rig.units) for log in read_all(rig.task, tmp_path)]
+    _, start = regressed(rig, Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
+    assert "under its controller, and no channel shows its torque" in start.why_not
+
+
+def test_a_measured_torque_serves_in_a_closed_loop(tmp_path: Path) -> None:
+    """The reference moves in straight lines: held, it makes the torque a saw tooth, of which samples would show the tips alone."""
+    rig = Rig(servo_task(tmp_path), SERVO)
+    data = rig.task.model_dump()
+    data["measured"]["position"]["deviation"] = 1e-3
+    data["measured"]["torque"] = {"channel": "torque", "variable": "servo_torque", "deviation": 0.01}
+    data["inputs"]["servo_reference"]["interpolation"] = "linear"
+    rig = Rig(Identification(**data), SERVO)
+    truth = TRUTH | {"load_friction": 0.0, "angle_offset": 0.0}
+    logs = []
+    for k, plan in enumerate(servo_plans(2, duration=4.0, rate=500.0)):
+        noise = {"position": NOISE, "torque": 0.01}
+        logs.append(prepared(rig.task, virtual_log(rig, plan, truth, rung=0, noise=noise, seed=k), rig.units))
+    begin = start_point(rig.task, logs)
+    known = ("torque_constant", "resistance", "dead_time")
+    begin = Point(begin.values | {name: truth[name] for name in known}, begin.nuisance)
+    _, start = regressed(rig, Engine(rig, threads=1), logs, begin, free_on(rig.task, 0))
+    for name in ("armature", "coulomb_friction"):
+        assert start.found[name] == pytest.approx(truth[name], rel=0.15)
+    assert "delay" in start.kept["dead_time"]
+
+
+def test_pauses_leave_too_few_samples(tmp_path: Path) -> None:
+    rig = axis_rig(tmp_path, {k: v for k, v in VALUES.items() if k != "radius"})
+    logs = []
+    for log in axis_logs(rig, VALUES):
+        gaps = 0.01 * np.floor(np.arange(len(log.time)) / 15)
+        logs.append(replace(log, time=log.time + gaps, log=replace(log.log, time=log.time + gaps)))
+    _, start = regressed(rig, Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
+    assert "too short" in start.why_not or "without a pause" in start.why_not
+
+
+def swing_rig(directory: Path, **fit: Any) -> Rig:
+    """Of which weight and friction are sought, the weight from 0.4 of its value: its period is 1.6 times too long."""
+    rig = axis_rig(directory, {**SWING, "weight": 0.4 * SWING["weight"]}, regression=False, **fit)
+    data = rig.task.model_dump()
+    for name in ("inertia", "offset"):
+        data["parameters"][name]["fixed"] = True
+    return Rig(Identification(**data), directory)
+
+
+def test_windows_that_grow_find_what_whole_logs_miss(tmp_path: Path) -> None:
+    whole, growing = swing_rig(tmp_path), swing_rig(tmp_path, horizon=["0.25 s"])
+    missed = identify_logs(whole, free_swings(whole, SWING), threads=1)
+    assert missed.error()[1] > 0.1  # rad: another minimum
+    found = identify_logs(growing, free_swings(growing, SWING), threads=1)
+    assert found.error()[1] < 1.05 * NOISE
+    for name in ("weight", "viscous", "coulomb"):
+        assert found.values[name] == pytest.approx(SWING[name], rel=0.01)
+
+
+def test_runs_in_windows_begin_at_what_was_measured_and_have_exact_derivatives(tmp_path: Path) -> None:
+    rig = swing_rig(tmp_path)
+    logs = free_swings(rig, SWING)
+    far, near = start_point(rig.task, logs), Point(dict(SWING, radius=0.1), {})
+    cut, engine = windows(rig, logs, far, 0, 0.25), Engine(rig, threads=1)
+    assert [len(log.segments) for log in cut] == [20, 20]
+    # The slope of a cubic through 2 m + 1 samples at a distance h has the variance 25/4 * 3/(m (m + 1) (2 m + 1)) (NOISE/h)^2; at
+    # the end of a window it has become an error of the angle 0.25 s times as large.
+    m, h = 16, 2e-3
+    slope = NOISE / h * np.sqrt(25.0 / 4.0 * 3.0 / (m * (m + 1) * (2 * m + 1)))
+    for r in engine.residuals(cut, near, 0):
+        assert NOISE < np.std(r) < np.hypot(NOISE, 0.25 * slope)
+    free = {"weight": rig.task.parameters["weight"]}
+    h = 1e-5
+    up, down = (
+        engine.residuals(cut, Point({**near.values, "weight": near.values["weight"] + s * h}, {}), 0) for s in (1, -1)
+    )
+    for J, a, b in zip(engine.jacobians(cut, near, 0, free), up, down, strict=True):
+        assert J[..., 0] == pytest.approx((a - b) / (2.0 * h), abs=1e-4 * np.abs(J).max())
+
+
+def test_windows_are_refused_where_they_cannot_be(tmp_path: Path) -> None:
+    with pytest.raises(lm.InputError, match="windows must become longer"):
+        swing_rig(tmp_path, horizon=["1 s", "0.5 s"])
+    rig = swing_rig(tmp_path)
+    logs = free_swings(rig, SWING)
+    with pytest.raises(lm.InputError, match="fewer than 5 samples"):
+        windows(rig, logs, start_point(rig.task, logs), 0, 5e-3)
+    data = rig.task.model_dump()
+    data["measured"]["angle"]["filter_time"] = 0.01
+    rig = Rig(Identification(**data), tmp_path)
+    with pytest.raises(lm.InputError, match="no measured channel is the angle of a shaft"):
+        windows(rig, logs, start_point(rig.task, logs), 0, 1.0)
