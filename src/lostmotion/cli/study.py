@@ -53,7 +53,7 @@ def study(
 
     \b
     lostmotion study tolerance.toml -o tolerance
-    lostmotion study show tolerance --best peak_twist
+    lostmotion study show tolerance --best peak_load_speed
     """
     from ..errors import InputError
 

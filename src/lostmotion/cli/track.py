@@ -70,15 +70,16 @@ def track(
 def _print_summary(title: str, budget: PointingBudget) -> None:
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     from ..reports.pointing import budget_rows, header, view_line
 
     print(title)
     table = Table(box=None, pad_edge=False)
     for k, name in enumerate(header(budget)):
-        table.add_column(name, justify="left" if k < 2 else "right")
+        table.add_column(Text(name), justify="left" if k < 2 else "right")
     for row in budget_rows(budget):
-        table.add_row(*row)
+        table.add_row(*map(Text, row))
     Console(width=160).print(table)
     if budget.view is not None:
         print(f"  {view_line(budget)}")
