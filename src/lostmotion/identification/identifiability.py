@@ -69,17 +69,31 @@ def undetermined(task: Identification, fit: Fit, parameters: Mapping[str, FreePa
             for n, x in zip(names, vector, strict=True)
             if abs(x) >= PART * abs(vector[largest])
         }
-        found.append(Undetermined(changes, float(width * abs(vector[largest])), _sentence(task, changes)))
+        sizes = {n: float(x) for n, x in zip(names, size, strict=True)}
+        found.append(
+            Undetermined(changes, float(width * abs(vector[largest])), _sentence(task, changes, sizes, parameters))
+        )
     return found
 
 
-def _sentence(task: Identification, changes: Mapping[str, float]) -> str:
+def _sentence(
+    task: Identification,
+    changes: Mapping[str, float],
+    sizes: Mapping[str, float],
+    parameters: Mapping[str, FreeParameter],
+) -> str:
     names = sorted(changes, key=lambda n: -abs(changes[n]))
     remedy = _remedy(task, names)
     if len(names) == 1:
         return f"{names[0]} is not determined by these logs; {remedy}"
     a, b, *more = names
     ratio = changes[b] / changes[a]
+    # Of values that are nearly the same, a sum looks like a product: what is the more alike decides.
+    ratio_of_sizes = ratio * sizes[b] / sizes[a]
+    nearer = abs(abs(ratio_of_sizes) - 1.0) < abs(abs(ratio) - 1.0)
+    if not more and nearer and abs(abs(ratio_of_sizes) - 1.0) < ALIKE and parameters[a].unit == parameters[b].unit:
+        what, sign = ("sum", "+") if ratio < 0.0 else ("difference", "-")
+        return f"only the {what} {a} {sign} {b} is determined; {remedy}"
     if not more and abs(abs(ratio) - 1.0) < ALIKE:
         what = "product" if ratio < 0.0 else "ratio"
         sign = "*" if ratio < 0.0 else "/"
