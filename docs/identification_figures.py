@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 import lostmotion as lm
+from lostmotion.identification.runs import run_log
 from lostmotion.reports import plots
 from lostmotion.reports.panels import Curve, Panel
 
@@ -20,7 +21,7 @@ def loops(name: str, result: lm.IdentificationResult) -> list[Panel]:
     """Torque against position of the log that was held out, in a small and in a large ramp."""
     assert result.rig is not None
     (log,) = [log for log in result.logs if log.held_out]
-    run = result.rig.run(log, result.values_for(log.name), result.chosen)["position"]
+    run = run_log(result.rig, log, result.values_for(log.name), result.chosen)["position"]
     torque, ramp = log.log.values("torque"), log.log.values("ramp")
     panels = []
     for number, what in ((2, "ramp to 4 N·m"), (101, "ramp to 25 N·m")):
