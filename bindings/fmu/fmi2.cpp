@@ -1,28 +1,19 @@
 // Functions of FMI 2.0. Types and statuses as in the standard, fmi-standard.org, version 2.0.4, chapters 2.1, 3.2 and
 // 4.2.
-#include <algorithm>
-#include <cstring>
 #include <string>
-#include <vector>
 
-#include "instance.hpp"
+#include "component.hpp"
 
 namespace lm = lostmotion::fmu;
-
-#if defined _WIN32
-#define FMU_API extern "C" __declspec(dllexport)
-#else
-#define FMU_API extern "C" __attribute__((visibility("default")))
-#endif
 
 namespace {
 
 using Boolean = int;
 using Reference = unsigned int;
-using Logger = void (*)(void* environment, const char* instance, int status, const char* category, const char* message,
-                        ...);
+using Log = void (*)(void* environment, const char* instance, int status, const char* category, const char* message,
+                     ...);
 struct Callbacks {
-    Logger log;
+    Log log;
     void* (*allocate)(std::size_t, std::size_t);
     void (*release)(void*);
     void (*step_finished)(void*, int);
@@ -36,22 +27,17 @@ std::string as_format(const std::string& sentence) {
     return format;
 }
 
-struct Component {
+struct Logger {
     std::string name;
     Callbacks callbacks;
-    lm::Instance instance;
 
-    int ended(lm::Ended status) {
-        if (status != lm::ok && callbacks.log != nullptr)
-            callbacks.log(callbacks.environment, name.c_str(), status,
-                          status == lm::discard ? "logStatusDiscard" : "logStatusError",
-                          as_format(instance.sentence()).c_str());
-        return status;
+    void operator()(int status, const char* category, const std::string& sentence) const {
+        if (callbacks.log == nullptr) return;
+        callbacks.log(callbacks.environment, name.c_str(), status, category, as_format(sentence).c_str());
     }
 };
+using Component = lm::Component<Logger>;
 Component& of(void* component) { return *static_cast<Component*>(component); }
-
-using State = std::vector<double>;
 
 // Of fmi2NewDiscreteStates.
 struct EventInfo {
@@ -67,21 +53,9 @@ FMU_API int fmi2SetDebugLogging(void*, Boolean, std::size_t, const char* const*)
 
 FMU_API void* fmi2Instantiate(const char* name, int type, const char* guid, const char* resources,
                               const Callbacks* callbacks, Boolean, Boolean) {
-    const auto refused = [&](const std::string& sentence) -> void* {
-        if (callbacks != nullptr && callbacks->log != nullptr)
-            callbacks->log(callbacks->environment, name, lm::error, "logStatusError", as_format(sentence).c_str());
-        return nullptr;
-    };
     if (callbacks == nullptr || name == nullptr) return nullptr;
-    const std::string directory = lm::path_of_uri(resources == nullptr ? "" : resources);
-    auto* made = new Component{name, *callbacks,
-                               lm::Instance(directory, type == 0 ? lm::Kind::model_exchange : lm::Kind::co_simulation)};
-    std::string problem = made->instance.problem();
-    if (problem.empty() && guid != nullptr && made->instance.identifier() != guid)
-        problem = "the identifier of modelDescription.xml is not that of the resources";
-    if (problem.empty()) return made;
-    delete made;
-    return refused(problem);
+    return Component::made({name, *callbacks}, guid, "identifier", resources,
+                           type == 0 ? lm::Kind::model_exchange : lm::Kind::co_simulation);
 }
 FMU_API void fmi2FreeInstance(void* c) { delete static_cast<Component*>(c); }
 
@@ -98,19 +72,12 @@ FMU_API int fmi2Terminate(void*) { return lm::ok; }
 FMU_API int fmi2Reset(void* c) { return of(c).ended(of(c).instance.reset()); }
 
 FMU_API int fmi2GetReal(void* c, const Reference* r, std::size_t n, double* value) {
-    for (std::size_t k = 0; k < n; ++k)
-        if (const lm::Ended e = of(c).instance.get(r[k], value[k]); e != lm::ok) return of(c).ended(e);
-    return lm::ok;
+    return of(c).get_values(r, n, value);
 }
 FMU_API int fmi2SetReal(void* c, const Reference* r, std::size_t n, const double* value) {
-    for (std::size_t k = 0; k < n; ++k)
-        if (const lm::Ended e = of(c).instance.set(r[k], value[k]); e != lm::ok) return of(c).ended(e);
-    return lm::ok;
+    return of(c).set_values(r, n, value);
 }
-// There are numbers alone.
-static int none(void* c, std::size_t n) {
-    return n == 0 ? int{lm::ok} : of(c).ended(of(c).instance.failed("this FMU has variables of type Real alone"));
-}
+static int none(void* c, std::size_t n) { return of(c).none(n, "this FMU has variables of type Real alone"); }
 FMU_API int fmi2GetInteger(void* c, const Reference*, std::size_t n, int*) { return none(c, n); }
 FMU_API int fmi2GetBoolean(void* c, const Reference*, std::size_t n, Boolean*) { return none(c, n); }
 FMU_API int fmi2GetString(void* c, const Reference*, std::size_t n, const char**) { return none(c, n); }
@@ -118,40 +85,18 @@ FMU_API int fmi2SetInteger(void* c, const Reference*, std::size_t n, const int*)
 FMU_API int fmi2SetBoolean(void* c, const Reference*, std::size_t n, const Boolean*) { return none(c, n); }
 FMU_API int fmi2SetString(void* c, const Reference*, std::size_t n, const char* const*) { return none(c, n); }
 
-FMU_API int fmi2GetFMUstate(void* c, void** state) {
-    auto* to = static_cast<State*>(*state);
-    if (to == nullptr) to = new State;
-    *state = to;
-    return of(c).ended(of(c).instance.get_state(*to));
-}
-FMU_API int fmi2SetFMUstate(void* c, void* state) {
-    const auto& from = *static_cast<State*>(state);
-    return of(c).ended(of(c).instance.set_state(from.data(), from.size()));
-}
-FMU_API int fmi2FreeFMUstate(void*, void** state) {
-    delete static_cast<State*>(*state);
-    *state = nullptr;
-    return lm::ok;
-}
+FMU_API int fmi2GetFMUstate(void* c, void** state) { return of(c).get_state(state); }
+FMU_API int fmi2SetFMUstate(void* c, void* state) { return of(c).set_state(state); }
+FMU_API int fmi2FreeFMUstate(void*, void** state) { return Component::free_state(state); }
 FMU_API int fmi2SerializedFMUstateSize(void*, void* state, std::size_t* size) {
-    *size = sizeof(double) * static_cast<State*>(state)->size();
+    *size = Component::size_of(state);
     return lm::ok;
 }
 FMU_API int fmi2SerializeFMUstate(void* c, void* state, char* bytes, std::size_t size) {
-    const auto& from = *static_cast<State*>(state);
-    if (size != sizeof(double) * from.size()) return of(c).ended(of(c).instance.failed("the size is another one"));
-    std::memcpy(bytes, from.data(), size);
-    return lm::ok;
+    return of(c).serialize(state, bytes, size);
 }
 FMU_API int fmi2DeSerializeFMUstate(void* c, const char* bytes, std::size_t size, void** state) {
-    if (size == 0 || size != sizeof(double) * of(c).instance.state_size())
-        return of(c).ended(of(c).instance.failed("these bytes are no state of this FMU"));
-    auto* to = static_cast<State*>(*state);
-    if (to == nullptr) to = new State;
-    *state = to;
-    to->resize(size / sizeof(double));
-    std::memcpy(to->data(), bytes, size);
-    return lm::ok;
+    return of(c).deserialize(bytes, size, state);
 }
 
 FMU_API int fmi2GetDirectionalDerivative(void* c, const Reference* unknown, std::size_t n_unknown,
@@ -166,15 +111,13 @@ FMU_API int fmi2SetRealInputDerivatives(void* c, const Reference* r, std::size_t
     return lm::ok;
 }
 FMU_API int fmi2GetRealOutputDerivatives(void* c, const Reference*, std::size_t n, const int*, double*) {
-    return n == 0 ? int{lm::ok} : of(c).ended(of(c).instance.failed("derivatives of outputs are not given"));
+    return of(c).none(n, "derivatives of outputs are not given");
 }
 
 FMU_API int fmi2DoStep(void* c, double from, double interval, Boolean) {
     return of(c).ended(of(c).instance.step(from, interval));
 }
-FMU_API int fmi2CancelStep(void* c) {
-    return of(c).ended(of(c).instance.failed("no step is under way: steps are done when they return"));
-}
+FMU_API int fmi2CancelStep(void* c) { return of(c).failed("no step is under way: steps are done when they return"); }
 FMU_API int fmi2GetStatus(void*, int, int*) { return lm::discard; }
 FMU_API int fmi2GetRealStatus(void* c, int kind, double* value) {
     if (kind != 2) return lm::discard;  // the last successful time
@@ -219,9 +162,5 @@ FMU_API int fmi2GetEventIndicators(void* c, double* out, std::size_t n) {
     return of(c).ended(of(c).instance.get_guards(out, n));
 }
 FMU_API int fmi2GetNominalsOfContinuousStates(void* c, double* out, std::size_t n) {
-    const std::vector<double>& nominals = of(c).instance.nominals();
-    if (n != nominals.size())
-        return of(c).ended(of(c).instance.failed("the number of continuous states is another one"));
-    std::copy(nominals.begin(), nominals.end(), out);
-    return lm::ok;
+    return of(c).get_nominals(out, n);
 }

@@ -1,52 +1,30 @@
 // Functions of FMI 3.0 for Co-Simulation and Model Exchange. Types and statuses as in the standard, fmi-standard.org,
 // version 3.0.1, chapter 2.2 and after.
-#include <algorithm>
 #include <cstdint>
-#include <cstring>
 #include <string>
-#include <vector>
 
-#include "instance.hpp"
+#include "component.hpp"
 
 namespace lm = lostmotion::fmu;
-
-#if defined _WIN32
-#define FMU_API extern "C" __declspec(dllexport)
-#else
-#define FMU_API extern "C" __attribute__((visibility("default")))
-#endif
 
 namespace {
 
 using Reference = unsigned int;
-using Logger = void (*)(void* environment, int status, const char* category, const char* message);
+using Log = void (*)(void* environment, int status, const char* category, const char* message);
 
-struct Component {
-    Logger log;
+struct Logger {
+    Log log;
     void* environment;
-    lm::Instance instance;
 
-    int ended(lm::Ended status) {
-        if (status != lm::ok && log != nullptr)
-            log(environment, status, status == lm::discard ? "logStatusDiscard" : "logStatusError",
-                instance.sentence().c_str());
-        return status;
+    void operator()(int status, const char* category, const std::string& sentence) const {
+        if (log != nullptr) log(environment, status, category, sentence.c_str());
     }
-    int failed(const char* sentence) { return ended(instance.failed(sentence)); }
 };
+using Component = lm::Component<Logger>;
 Component& of(void* component) { return *static_cast<Component*>(component); }
 
-using State = std::vector<double>;
-
-void* instantiate(const char* token, const char* resources, void* environment, Logger log, lm::Kind kind) {
-    auto* made = new Component{log, environment, lm::Instance(lm::path_of_uri(resources ? resources : ""), kind)};
-    std::string problem = made->instance.problem();
-    if (problem.empty() && token != nullptr && made->instance.identifier() != token)
-        problem = "the token of modelDescription.xml is not that of the resources";
-    if (problem.empty()) return made;
-    delete made;
-    if (log != nullptr) log(environment, lm::error, "logStatusError", problem.c_str());
-    return nullptr;
+void* instantiate(const char* token, const char* resources, void* environment, Log log, lm::Kind kind) {
+    return Component::made({log, environment}, token, "token", resources, kind);
 }
 
 }  // namespace
@@ -55,15 +33,15 @@ FMU_API const char* fmi3GetVersion() { return "3.0"; }
 FMU_API int fmi3SetDebugLogging(void*, bool, std::size_t, const char* const*) { return lm::ok; }
 
 FMU_API void* fmi3InstantiateModelExchange(const char*, const char* token, const char* resources, bool, bool,
-                                           void* environment, Logger log) {
+                                           void* environment, Log log) {
     return instantiate(token, resources, environment, log, lm::Kind::model_exchange);
 }
 FMU_API void* fmi3InstantiateCoSimulation(const char*, const char* token, const char* resources, bool, bool, bool, bool,
-                                          const Reference*, std::size_t, void* environment, Logger log, void*) {
+                                          const Reference*, std::size_t, void* environment, Log log, void*) {
     return instantiate(token, resources, environment, log, lm::Kind::co_simulation);
 }
 FMU_API void* fmi3InstantiateScheduledExecution(const char*, const char*, const char*, bool, bool, void* environment,
-                                                Logger log, void*, void*, void*) {
+                                                Log log, void*, void*, void*) {
     if (log != nullptr)
         log(environment, lm::error, "logStatusError", "this FMU is for Co-Simulation and Model Exchange");
     return nullptr;
@@ -86,21 +64,12 @@ FMU_API int fmi3Terminate(void*) { return lm::ok; }
 FMU_API int fmi3Reset(void* c) { return of(c).ended(of(c).instance.reset()); }
 
 FMU_API int fmi3GetFloat64(void* c, const Reference* r, std::size_t n, double* value, std::size_t n_values) {
-    if (n != n_values) return of(c).failed("each variable has one value");
-    for (std::size_t k = 0; k < n; ++k)
-        if (const lm::Ended e = of(c).instance.get(r[k], value[k]); e != lm::ok) return of(c).ended(e);
-    return lm::ok;
+    return n == n_values ? of(c).get_values(r, n, value) : of(c).failed("each variable has one value");
 }
 FMU_API int fmi3SetFloat64(void* c, const Reference* r, std::size_t n, const double* value, std::size_t n_values) {
-    if (n != n_values) return of(c).failed("each variable has one value");
-    for (std::size_t k = 0; k < n; ++k)
-        if (const lm::Ended e = of(c).instance.set(r[k], value[k]); e != lm::ok) return of(c).ended(e);
-    return lm::ok;
+    return n == n_values ? of(c).set_values(r, n, value) : of(c).failed("each variable has one value");
 }
-// There are variables of type Float64 alone.
-static int none(void* c, std::size_t n) {
-    return n == 0 ? int{lm::ok} : of(c).failed("this FMU has variables of type Float64 alone");
-}
+static int none(void* c, std::size_t n) { return of(c).none(n, "this FMU has variables of type Float64 alone"); }
 #define OTHER_TYPE(NAME, TYPE)                                                                                     \
     FMU_API int fmi3Get##NAME(void* c, const Reference*, std::size_t n, TYPE*, std::size_t) { return none(c, n); } \
     FMU_API int fmi3Set##NAME(void* c, const Reference*, std::size_t n, const TYPE*, std::size_t) { return none(c, n); }
@@ -153,40 +122,18 @@ FMU_API int fmi3GetVariableDependencies(void* c, Reference, std::size_t*, Refere
     return of(c).failed("dependencies are those of modelDescription.xml");
 }
 
-FMU_API int fmi3GetFMUState(void* c, void** state) {
-    auto* to = static_cast<State*>(*state);
-    if (to == nullptr) to = new State;
-    *state = to;
-    return of(c).ended(of(c).instance.get_state(*to));
-}
-FMU_API int fmi3SetFMUState(void* c, void* state) {
-    const auto& from = *static_cast<State*>(state);
-    return of(c).ended(of(c).instance.set_state(from.data(), from.size()));
-}
-FMU_API int fmi3FreeFMUState(void*, void** state) {
-    delete static_cast<State*>(*state);
-    *state = nullptr;
-    return lm::ok;
-}
+FMU_API int fmi3GetFMUState(void* c, void** state) { return of(c).get_state(state); }
+FMU_API int fmi3SetFMUState(void* c, void* state) { return of(c).set_state(state); }
+FMU_API int fmi3FreeFMUState(void*, void** state) { return Component::free_state(state); }
 FMU_API int fmi3SerializedFMUStateSize(void*, void* state, std::size_t* size) {
-    *size = sizeof(double) * static_cast<State*>(state)->size();
+    *size = Component::size_of(state);
     return lm::ok;
 }
 FMU_API int fmi3SerializeFMUState(void* c, void* state, std::uint8_t* bytes, std::size_t size) {
-    const auto& from = *static_cast<State*>(state);
-    if (size != sizeof(double) * from.size()) return of(c).failed("the size is another one");
-    std::memcpy(bytes, from.data(), size);
-    return lm::ok;
+    return of(c).serialize(state, bytes, size);
 }
 FMU_API int fmi3DeserializeFMUState(void* c, const std::uint8_t* bytes, std::size_t size, void** state) {
-    if (size == 0 || size != sizeof(double) * of(c).instance.state_size())
-        return of(c).failed("these bytes are no state of this FMU");
-    auto* to = static_cast<State*>(*state);
-    if (to == nullptr) to = new State;
-    *state = to;
-    to->resize(size / sizeof(double));
-    std::memcpy(to->data(), bytes, size);
-    return lm::ok;
+    return of(c).deserialize(bytes, size, state);
 }
 
 FMU_API int fmi3GetDirectionalDerivative(void* c, const Reference* unknown, std::size_t n_unknown,
@@ -200,7 +147,7 @@ FMU_API int fmi3GetAdjointDerivative(void* c, const Reference*, std::size_t, con
 }
 FMU_API int fmi3GetOutputDerivatives(void* c, const Reference*, std::size_t n, const std::int32_t*, double*,
                                      std::size_t) {
-    return n == 0 ? int{lm::ok} : of(c).failed("derivatives of outputs are not given");
+    return of(c).none(n, "derivatives of outputs are not given");
 }
 
 // --- Co-Simulation ---
@@ -245,10 +192,7 @@ FMU_API int fmi3GetEventIndicators(void* c, double* out, std::size_t n) {
     return of(c).ended(of(c).instance.get_guards(out, n));
 }
 FMU_API int fmi3GetNominalsOfContinuousStates(void* c, double* out, std::size_t n) {
-    const std::vector<double>& nominals = of(c).instance.nominals();
-    if (n != nominals.size()) return of(c).failed("the number of continuous states is another one");
-    std::copy(nominals.begin(), nominals.end(), out);
-    return lm::ok;
+    return of(c).get_nominals(out, n);
 }
 FMU_API int fmi3GetNumberOfEventIndicators(void* c, std::size_t* n) {
     *n = of(c).instance.indicator_count();
