@@ -2,8 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-FORMATTED := $(wildcard core/lostmotion/*/*.hpp core/tests/*.[ch]pp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.[ch]pp bindings/fmu/*.[ch]pp examples/*.c benchmarks/*.[ch]pp)
-SOURCES := $(wildcard core/lostmotion/*/*.hpp bindings/*.cpp bindings/*.hpp scenarios/*.toml) CMakeLists.txt pyproject.toml
+FORMATTED := $(wildcard core/lostmotion/*/*.hpp core/kernels/*.[ch]pp core/tests/*.[ch]pp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.[ch]pp bindings/fmu/*.[ch]pp examples/*.c benchmarks/*.[ch]pp)
+SOURCES := $(wildcard core/lostmotion/*/*.hpp core/kernels/* bindings/*.[ch]pp bindings/c/*.[ch]* bindings/fmu/*.[ch]pp scenarios/*.toml) CMakeLists.txt pyproject.toml
 
 .PHONY: demo test bench docs lint format clean
 .DELETE_ON_ERROR:
@@ -24,11 +24,11 @@ test-core: $(VENV)/tools
 	$(BIN)/cmake --build build/core
 	$(BIN)/ctest --test-dir build/core --output-on-failure --parallel 2
 
-# The library of the C interface, bindings/c/lostmotion.h.
+# The library of the C interface, bindings/c/lostmotion.h, from what the extension for any processor is made of.
 .PHONY: c-library
-c-library: $(VENV)/tools
-	$(BIN)/cmake -S . -B build/c -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_C=ON -DLOSTMOTION_WERROR=ON >build/c.log
-	$(BIN)/cmake --build build/c
+c-library: $(VENV)/built
+	directory=$$(ls -td build/python-*/ | head -1) && $(BIN)/cmake --build $$directory --target lostmotion_c && \
+		mkdir -p build/c && cp $$directory/liblostmotion.* build/c/
 	@echo 'cc -I$(abspath bindings/c) PROGRAM.c -L$(abspath build/c) -llostmotion -lm'
 
 # The same library as WebAssembly, and as the libraries of FMUs for all platforms, by the Zig compiler.
@@ -44,6 +44,28 @@ fmu: $(VENV)/tools
 .PHONY: test-fmu
 test-fmu: $(VENV)/built $(VENV)/portable
 	$(BIN)/pytest -n0 -rs tests/test_fmu_platforms.py
+
+# Wheels for all platforms, dist/*.whl, by the Zig compiler; the headers of Python 3.12 have to be at hand.
+.PHONY: wheels
+wheels: page $(VENV)/portable
+	$(BIN)/pip install -q --group release
+	$(BIN)/python bindings/wheels.py dist
+	$(BIN)/twine check --strict dist/*.whl
+	$(BIN)/abi3audit --strict dist/*abi3*.whl
+	$(MAKE) test-wheels
+
+# In environments of their own, which take what they need from the package index.
+.PHONY: test-wheels aarch64-python
+test-wheels: $(VENV)/built
+	$(BIN)/pytest -n0 -rs tests/test_wheels.py
+# Debian's Python for aarch64, which QEMU runs.
+ARM := build/aarch64
+ARM_PACKAGES := python3.11-minimal libpython3.11-minimal libpython3.11-stdlib libc6 libgcc-s1 libstdc++6 zlib1g libexpat1 libffi8 \
+	libbz2-1.0 liblzma5 libsqlite3-0 libssl3 libuuid1 libcrypt1
+aarch64-python:
+	dpkg --add-architecture arm64 && apt-get update -q
+	mkdir -p $(ARM)/packages && cd $(ARM)/packages && apt-get download -q $(ARM_PACKAGES:=:arm64)
+	for p in $(ARM)/packages/*.deb; do dpkg -x $$p $(ARM); done
 
 # The live page, src/lostmotion/live_page/page.html, and its cores, one for each kernel, which the wheel carries.
 LIVE := src/lostmotion/live_page

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "arrays.hpp"
-#include "lostmotion/simulation/train_stepping.hpp"
+#include "kernels/kernels.hpp"
 
 namespace lostmotion::binding {
 

@@ -1,7 +1,6 @@
 """FMUs under FMPy: valid, the same bits as step by step in Python, state and rollback, parameters and errors."""
 
 import math
-import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
@@ -16,15 +15,10 @@ from lostmotion.portable import fmu as exporting
 from lostmotion.portable.parameters import Parameters
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
-LIBRARIES = ROOT / "build" / "c" / "fmu"
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="make c-library builds the FMU's library for Linux")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def library() -> None:
-    """`make test` builds it; a checkout that only runs pytest builds it here."""
-    if not (LIBRARIES / "x86_64-linux" / "lostmotion.so").exists():
-        subprocess.run(["make", "c-library"], cwd=ROOT, check=True)
+LIBRARIES = exporting.LIBRARIES
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="FMPy runs the library for this platform, tests know Linux alone"
+)
 
 
 class Slave:

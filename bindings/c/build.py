@@ -22,23 +22,26 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+KERNEL_SOURCES = {name: ROOT / "core" / "kernels" / f"{name}.cpp" for name in ("wide", "middle", "narrow")}
 # The longest to compile first.
-SOURCES = tuple(
-    HERE / f"{name}.cpp" for name in ("run", "simulation", "explanation", "scenario", "train", "freestanding")
+SOURCES = (
+    *KERNEL_SOURCES.values(),
+    *(HERE / f"{name}.cpp" for name in ("run", "simulation", "explanation", "scenario", "train", "freestanding")),
 )
-FLAGS = (
-    *("-std=gnu++20", "-g0", "-fvisibility=hidden", "-fno-exceptions", "-fno-rtti", "-fno-sanitize=all"),
+CORE_FLAGS = (
+    *("-std=gnu++20", "-g0", "-fvisibility=hidden", "-fno-sanitize=all", f"-I{ROOT / 'core'}"),
     *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
 )
+FLAGS = (*CORE_FLAGS, "-fno-exceptions", "-fno-rtti")
 # Of an FMU: no runs in one go.
 FMU_SOURCES = (
     *(s for s in SOURCES if s.stem not in ("run", "explanation")),
     HERE.parent / "fmu" / "fmi2.cpp",
     HERE.parent / "fmu" / "fmi3.cpp",
 )
-# Of a live page: nothing else, and the kernel of its drive alone.
+# Of a live page, beside the kernel of its drive: nothing else.
 PAGE_SOURCES = tuple(s for s in SOURCES if s.stem in ("run", "explanation", "scenario", "freestanding"))
-KERNELS = ("drive", "narrow", "middle", "wide")
+KERNELS = ("drive", *KERNEL_SOURCES)
 # The oldest C library that the libraries for Linux need, and the names of the libraries.
 PLATFORMS = {
     "x86_64-linux": ("x86_64-linux-gnu.2.17", "lostmotion.so"),
@@ -54,7 +57,7 @@ STACK = 1 << 20
 
 def newest(sources: Sequence[Path]) -> float:
     """When any of these, or of the core's headers, was changed last."""
-    headers = [*(ROOT / "core" / "lostmotion").rglob("*.hpp"), *HERE.glob("*.h*"), Path(__file__)]
+    headers = [*(ROOT / "core").rglob("*.hpp"), *HERE.glob("*.h*"), Path(__file__)]
     return max(path.stat().st_mtime for path in (*headers, *sources))
 
 
@@ -66,7 +69,9 @@ def zig(command: str, *arguments: str | Path) -> None:
     subprocess.run(words, env=environment, check=True)
 
 
-def objects(sources: Sequence[Path], target: Sequence[str], optimisation: str, directory: Path) -> list[Path]:
+def objects(
+    sources: Sequence[Path], target: Sequence[str], optimisation: str, directory: Path, flags: Sequence[str] = FLAGS
+) -> list[Path]:
     """The object files of some sources, those compiled anew that are older than the core."""
     directory.mkdir(parents=True, exist_ok=True)
     made = [directory / f"{source.stem}.o" for source in sources]
@@ -76,7 +81,7 @@ def objects(sources: Sequence[Path], target: Sequence[str], optimisation: str, d
     def compiled(pair: tuple[Path, Path]) -> None:
         source, to = pair
         unfinished = to.with_suffix(".unfinished.o")
-        zig("c++", "-c", *target, *FLAGS, optimisation, f"-I{ROOT / 'core'}", source, "-o", unfinished)
+        zig("c++", "-c", *target, *flags, optimisation, source, "-o", unfinished)
         unfinished.replace(to)
         os.utime(to, (latest, latest))  # what is edited in the meantime is newer
 
@@ -117,7 +122,8 @@ def page_core(kernel: str, optimisation: str = "-O3") -> Path:
     to = directory / "core.wasm"
     with (directory / ".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
-        made = objects(PAGE_SOURCES, (*WASM, f"-DLOSTMOTION_KERNEL={kernel}"), optimisation, directory)
+        sources = (KERNEL_SOURCES[kernel], *PAGE_SOURCES) if kernel in KERNEL_SOURCES else PAGE_SOURCES
+        made = objects(sources, (*WASM, f"-DLOSTMOTION_KERNEL={kernel}"), optimisation, directory)
         calls = ROOT / "page" / "src" / "core.ts"
         if not to.exists() or to.stat().st_mtime < max(p.stat().st_mtime for p in (*made, calls)):
             linked(to, made, *(f"--export={name}" for name in called_by_page()))

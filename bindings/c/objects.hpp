@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "kernels/kernels.hpp"
 #include "lostmotion/scenario/simulation.hpp"
 #include "train.hpp"
 

@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <string>
 
+#include "kernels/kernels.hpp"
 #include "random_trains.hpp"
-#include "train_kernels.hpp"
 #include "train_steps.hpp"
 
 namespace lostmotion::model {

@@ -6,9 +6,9 @@
 #include <random>
 
 #include "drive_runs.hpp"
+#include "kernels/kernels.hpp"
 #include "lostmotion/scenario/simulation.hpp"
 #include "random_trains.hpp"
-#include "train_kernels.hpp"
 
 using namespace lostmotion;
 

@@ -4,9 +4,9 @@
 #include <cstring>
 
 #include "drive_runs.hpp"
+#include "kernels/kernels.hpp"
 #include "lostmotion/analysis/train_explain.hpp"
 #include "random_trains.hpp"
-#include "train_kernels.hpp"
 
 TEST_SUITE_BEGIN("train_stepping");
 

@@ -1,4 +1,4 @@
-#include "train_kernels.hpp"
+#include "kernels.hpp"
 
 namespace lostmotion {
 LOSTMOTION_TRAIN_KERNEL(template, model::Middle)

@@ -1,6 +1,8 @@
-// What solves trains takes minutes to compile: once for all tests, each kernel in a file of its own.
+// What solves trains takes minutes to compile: each kernel in a file of its own, once for all that is built with the
+// same options.
 #pragma once
 
+#include "lostmotion/simulation/hybrid.hpp"
 #include "lostmotion/simulation/train_stepping.hpp"
 
 namespace lostmotion {
