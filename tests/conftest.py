@@ -1,6 +1,7 @@
 """Shared by the tests."""
 
 import os
+import signal
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
@@ -21,6 +22,10 @@ SCENARIOS = [path for path in ALL_SCENARIOS if path not in TRAINS]
 """in the short form"""
 CONTROLLED = [path for path in ALL_SCENARIOS if "[controller" in path.read_text()]
 """with a controller"""
+
+# A shell that runs the tests in the background has Ctrl-C ignored, which the processes that they interrupt would inherit.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
