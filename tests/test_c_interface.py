@@ -1,6 +1,7 @@
 """The C interface: the same bits as Python, by way of its header alone."""
 
 import ctypes as c
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT, TRAINS
+from lostmotion.model.angle_torques import TorqueCurve
 from lostmotion.model.parameters import numbers
 from lostmotion.model.torsion import Rigid
 from lostmotion.simulation.train_state import start_values
@@ -26,6 +28,15 @@ class Parameter(c.Structure):
 
 class Curve(c.Structure):
     _fields_ = [("breaks", c.POINTER(c.c_double)), ("slopes", c.POINTER(c.c_double)), ("n_breaks", c.c_size_t)]
+
+
+class PeriodicCurve(c.Structure):
+    _fields_ = [
+        ("period", c.c_double),
+        ("angles", c.POINTER(c.c_double)),
+        ("values", c.POINTER(c.c_double)),
+        ("n", c.c_size_t),
+    ]
 
 
 class Signal(c.Structure):
@@ -50,8 +61,8 @@ def library() -> c.CDLL:
     lib = c.CDLL(str(LIBRARY))
     for name in ("lm_train_new", "lm_simulation_new"):
         getattr(lib, name).restype = c.c_void_p
-    for name in ("lm_train_error", "lm_error", "lm_name", "lm_unit", "lm_parameter_key", "lm_parameter_unit"):
-        getattr(lib, name).restype = c.c_char_p
+    for name in ("train_error", "error", "name", "unit", "meaning", "parameter_key", "parameter_unit"):
+        getattr(lib, f"lm_{name}").restype = c.c_char_p
     for name in ("lm_count", "lm_state_size", "lm_parameter_count"):
         getattr(lib, name).restype = c.c_size_t
     lib.lm_time.restype = c.c_double
@@ -85,6 +96,15 @@ class Train:
             self.add("lm_add_gear", name, g.input, g.output, *parameters, curve, None, both, g.mesh_damping, None)
         for name, b in train.brakes.items():
             self.add("lm_add_brake", name, b.shaft, b.torque, b.breakaway_torque or 0.0)
+        for name, k in train.clutches.items():
+            function = {"friction": "lm_add_clutch", "safety": "lm_add_safety_clutch"}[k.kind]
+            self.add(function, name, k.input, k.output, k.torque, k.breakaway_torque or 0.0)
+        for name, f in train.freewheels.items():
+            self.add("lm_add_freewheel", name, f.input, f.output)
+        for name, t in train.angle_torques.items():
+            assert isinstance(t, TorqueCurve)
+            curve = PeriodicCurve(t.period, doubles(t.angles), doubles(t.torques), len(t.angles))
+            self.add("lm_add_angle_torque", name, t.shaft, c.byref(curve))
 
     def parameters(self, part: Any, table: str) -> tuple[Any, int]:
         given = numbers(part, table)
@@ -188,6 +208,50 @@ def test_stepping_from_a_kept_state_repeats_bit_for_bit(worm: Simulation) -> Non
         assert worm.advance(1e-3, inputs) == OK
     assert np.array_equal(first, worm.read())
     assert worm.lib.lm_time(worm.handle) == pytest.approx(0.5, abs=1e-12)
+
+
+def test_clutches_freewheels_and_torques_over_an_angle_have_the_bits_of_python(library: c.CDLL) -> None:
+    """A motor drives by a clutch, a freewheel and a safety clutch, which slips on the cogging of the last shaft."""
+    scenario = lm.TrainScenario(
+        shafts={
+            "a": {"inertia": 0.01},
+            "b": {"inertia": 0.02},
+            "c": {"inertia": 0.03, "friction_torque": 0.05},
+            "d": {"inertia": 0.2, "viscous_friction": 0.4, "torque": 0.0},
+        },
+        motors={"motor": {"shaft": "a", "kind": "torque_source", "rated_torque": 4.0, "rotor_inertia": 0.01}},
+        clutches={
+            "clutch": {"input": "a", "output": "b", "torque": 3.0, "breakaway_torque": 3.5},
+            "limiter": {"kind": "safety", "input": "c", "output": "d", "torque": 1.5},
+        },
+        freewheels={"freewheel": {"input": "b", "output": "c"}},
+        angle_torques={"cogging": {"kind": "curve", "shaft": "d", "angles": [0, 1.5, 4], "torques": [0, 1.2, -1.2]}},
+        command={"clutch": {"mean": 1.0}},
+        simulation={"duration": 1.0, "sample_interval": 1e-3},
+    )
+    python, there = lm.Simulation(scenario, step=1e-3), Train(library, scenario).simulation(1e-3)
+    inputs = there.names(INPUTS)
+    assert {"motor_command", "clutch_command", "d_load_torque"} == set(inputs)
+    modes: dict[str, set[float]] = {"limiter_contact": set(), "freewheel_contact": set()}
+    for k in range(600):
+        given = {"motor_command": (0.9, 0.2, -0.3)[k // 200], "clutch_command": 1.0, "d_load_torque": 0.2}
+        python.advance(1e-3, **given)
+        assert there.advance(1e-3, [given[name] for name in inputs]) == OK, there.error()
+        for name, met in modes.items():
+            met.add(python[name])
+    told, wanted = dict(zip(there.names(VARIABLES), there.read(), strict=True)), python.read()
+    assert {name: told[name] for name in wanted} == pytest.approx(wanted, rel=0.0, abs=0.0, nan_ok=True)
+    assert all(len(met) > 1 for met in modes.values())
+
+
+def test_variables_have_the_units_and_meanings_of_python(library: c.CDLL, worm: Simulation) -> None:
+    assert library.lm_interface_version() == int(
+        re.search(r"LM_INTERFACE_VERSION (\d+)", (ROOT / "bindings" / "c" / "lostmotion.h").read_text()).group(1)  # type: ignore[union-attr]
+    )
+    result = lm.simulate(lm.load("worm-lowering", {"simulation.duration": 0.01}))
+    for k, name in enumerate(worm.names(VARIABLES)):
+        assert library.lm_unit(worm.handle, VARIABLES, c.c_size_t(k)).decode() == result[name].attrs["units"]
+        assert library.lm_meaning(worm.handle, VARIABLES, c.c_size_t(k)).decode() == result[name].attrs["long_name"]
 
 
 def test_directional_derivatives_are_those_of_finite_differences(worm: Simulation) -> None:

@@ -11,7 +11,7 @@ import pytest
 import lostmotion as lm
 from lostmotion.portable.description import numbers_of
 from lostmotion.portable.parameters import Effect, Parameter, Parameters, parameters_of, predicted
-from test_c_interface import INPUTS, INVALID, OK, STATES, VARIABLES, doubles, library  # noqa: F401
+from test_c_interface import INPUTS, INVALID, OK, STATES, VARIABLES, Signal, doubles, library  # noqa: F401
 from test_c_interface import Simulation as Stepped
 
 SAMPLES = 0
@@ -103,6 +103,125 @@ def test_a_state_under_a_controller_is_continued_bit_for_bit_and_damage_is_seen(
     kept[3] += 1e-9
     assert other.lib.lm_set_state(other.handle, kept) == INVALID
     assert other.error() == "these numbers are not those of a state of this simulation"
+
+
+def explained(scenario: Scenario, time: float) -> dict[int, dict[str, list[float]]]:
+    """Contacts (0) and motors (1) by name, as lm_scenario_explain tells them."""
+    lib = scenario.lib
+    lib.lm_scenario_explain.restype = c.c_void_p
+    lib.lm_explanation_count.restype = c.c_size_t
+    lib.lm_explanation_name.restype = c.c_char_p
+    lib.lm_explanation_values.restype = c.POINTER(c.c_double)
+    told = c.c_void_p(lib.lm_scenario_explain(scenario.handle, c.c_double(time)))
+    assert told, scenario.error()
+    out = {
+        what: {
+            lib.lm_explanation_name(told, what, c.c_size_t(k)).decode(): [
+                lib.lm_explanation_values(told, what, c.c_size_t(k))[i] for i in range(numbers)
+            ]
+            for k in range(lib.lm_explanation_count(told, what))
+        }
+        for what, numbers in ((0, 5), (1, 2))
+    }
+    lib.lm_explanation_free(told)
+    return out
+
+
+@pytest.mark.parametrize("name", ["paper-2dof-nl-small", "worm-lowering", "two-motors-one-ring"])
+def test_an_explanation_is_that_of_python(library: c.CDLL, name: str) -> None:  # noqa: F811
+    scenario, time = lm.load(name), 0.3
+    told, wanted = (
+        explained(Scenario(library, lm.description(scenario, parameters=False)), time),
+        lm.explain(scenario, time),
+    )
+    contacts = {
+        contact.name: [contact.mode, contact.speed, contact.torque, contact.capacity_forward, contact.capacity_backward]
+        for contact in wanted.contacts
+    }
+    assert told[0].keys() == contacts.keys()
+    for contact, values in contacts.items():
+        assert told[0][contact] == pytest.approx(values, rel=1e-11, abs=1e-12)
+    commands = (
+        {"motor": [wanted.command_forward, wanted.command_backward]}
+        if isinstance(wanted, lm.Explanation)
+        else {m.name: [m.command_forward, m.command_backward] for m in wanted.motors}
+    )
+    assert told[1].keys() == commands.keys()
+    for motor, values in commands.items():
+        assert told[1][motor] == pytest.approx(values, rel=1e-11)
+
+
+def test_signals_references_and_times_are_replaced(library: c.CDLL, axis: Scenario) -> None:  # noqa: F811
+    lib, load = library, Signal(doubles([(0.0, 0.3, 0.0), (0.4, 0.3, -0.5)]), 2, doubles([(0.1, 3.0, 0.5)]), 1)
+    place = 1  # command, then load torque
+    assert lib.lm_scenario_set_signal(axis.handle, c.c_size_t(place), c.byref(load)) == OK, axis.error()
+    lib.lm_scenario_input_at_start.restype = c.c_double
+    at_start = lib.lm_scenario_input_at_start(axis.handle, c.c_size_t(place))
+    assert at_start == pytest.approx(0.3 + 0.1 * math.sin(0.5), rel=1e-15)
+    pieces = doubles([(0.0, 0.1, 0.0, 0.0, 0.0), (0.2, 0.1, 0.4, 0.0, 0.0)])
+    assert lib.lm_scenario_set_reference(axis.handle, c.c_size_t(0), pieces, c.c_size_t(2), None, c.c_size_t(0)) == OK
+    assert lib.lm_scenario_set_times(axis.handle, c.c_double(0.8), c.c_double(2e-3)) == OK
+    for name in ("duration", "interval"):
+        getattr(lib, f"lm_scenario_{name}").restype = c.c_double
+    assert (lib.lm_scenario_duration(axis.handle), lib.lm_scenario_interval(axis.handle)) == (0.8, 2e-3)
+    sine = {"amplitude": 0.1, "frequency": 3.0, "phase": 0.5}
+    falling = {"begin": 0.4, "duration": 10.0, "rise": -5.0}
+    changes = {
+        "load.torque": {"mean": 0.3, "ramps": [falling], "sines": [sine]},
+        "controller.reference": {
+            "kind": "position", "mean": 0.1, "ramps": [{"begin": 0.2, "duration": 10.0, "rise": 4.0}]
+        },
+        "simulation.duration": 0.8,
+        "simulation.sample_interval": 2e-3,
+    }  # fmt: skip
+    told, wanted = axis.run(), lm.simulate(lm.load("position-axis").replace(**changes))
+    for name in ("load_angle", "position_reference", "load_torque", "motor_torque"):
+        scale = float(np.abs(wanted[name]).max())
+        assert np.allclose(told[name], wanted[name], rtol=0.0, atol=1e-9 * scale), name
+    assert lib.lm_scenario_set_times(axis.handle, c.c_double(-1.0), c.c_double(1e-3)) == INVALID
+    assert (
+        lib.lm_scenario_set_reference(axis.handle, c.c_size_t(7), pieces, c.c_size_t(2), None, c.c_size_t(0)) == INVALID
+    )
+
+
+def test_a_result_tells_how_far_it_came(library: c.CDLL) -> None:  # noqa: F811
+    scenario = lm.load("paper-2dof-nl-large")
+    there, wanted = Scenario(library, lm.description(scenario, parameters=False)), lm.simulate(scenario)
+    library.lm_scenario_title.restype = c.c_char_p
+    for name in ("time", "left_data_at"):
+        getattr(library, f"lm_result_{name}").restype = c.c_double
+    for name in ("switchings", "switching_count"):
+        getattr(library, f"lm_result_{name}").restype = c.c_size_t
+    assert library.lm_scenario_title(there.handle).decode() == scenario.title
+    result = c.c_void_p(library.lm_scenario_run(there.handle, 1, c.c_size_t(5)))
+    assert library.lm_result_time(result) == scenario.simulation.duration
+    assert library.lm_result_left_data_at(result) == math.inf
+    assert library.lm_result_switchings(result) == 5
+    assert library.lm_result_switching_count(result) == wanted.attrs["switching_count"] > 5
+    library.lm_result_free(result)
+
+
+def test_a_simulation_goes_on_with_another_inertia(library: c.CDLL) -> None:  # noqa: F811
+    """A free load: the torque of the gear gives it half the acceleration at twice the inertia."""
+    scenario = lm.load("paper-2dof-nl-small", {"load.friction_torque": 0.0, "load.viscous_friction": 0.0})
+    there = Scenario(library, lm.description(scenario))
+    simulation = there.simulation(1e-3)
+    place = simulation.names(INPUTS).index("command")
+    inputs = [0.3 if k == place else 0.0 for k in range(len(simulation.names(INPUTS)))]
+    for _ in range(50):
+        assert simulation.advance(1e-3, inputs) == OK, simulation.error()
+    names = simulation.names(VARIABLES)
+    before = dict(zip(names, simulation.read(), strict=True))
+    assert there.set("load.inertia", 2.0 * scenario.load.inertia) == OK
+    assert library.lm_go_on_with(simulation.handle, there.handle, c.c_double(1e-3)) == OK, simulation.error()
+    assert library.lm_time(simulation.handle) == pytest.approx(0.05, rel=1e-12)
+    h = 1e-7
+    assert simulation.advance(h, inputs) == OK
+    after = dict(zip(names, simulation.read(), strict=True))
+    assert after["load_angle"] == pytest.approx(before["load_angle"], abs=1e-5)
+    acceleration = (after["load_speed"] - before["load_speed"]) / h
+    assert acceleration == pytest.approx(before["output_torque"] / (2.0 * scenario.load.inertia), rel=1e-3)
+    assert library.lm_go_on_with(simulation.handle, there.handle, c.c_double(-1.0)) == INVALID
 
 
 SMALL = ("load.inertia", "gearbox.ratio", "motor.friction_torque", "command.amplitude", "gearbox.hysteresis.efficiency")

@@ -73,6 +73,22 @@ def test_a_train_stepped_follows_its_run(path: Path) -> None:
         assert simulation[str(name)] == pytest.approx(float(run[name][-1]), rel=1e-9, abs=1e-9 * size), name
 
 
+def test_an_angle_that_no_gear_hands_on_is_no_variable_of_stepping_either() -> None:
+    """Behind a clutch the angle is not recorded; runs and steps have the same variables."""
+    scenario = lm.TrainScenario(
+        shafts={"engine": {"inertia": 0.01}, "wheel": {"inertia": 0.1, "torque": 0.0}},
+        motors={"motor": {"shaft": "engine", "kind": "torque_source", "rated_torque": 2.0, "rotor_inertia": 0.01}},
+        clutches={"clutch": {"input": "engine", "output": "wheel", "torque": 1.0}},
+        command={"motor": {"mean": 0.8}, "clutch": {"mean": 1.0}},
+        simulation={"duration": 0.1, "sample_interval": 0.01},
+    )
+    simulation, run = lm.Simulation(scenario, step=0.01), lm.simulate(scenario)
+    assert set(simulation.read()) == {str(name) for name in run}
+    for _ in range(10):
+        simulation.advance(0.01, motor_command=0.8, clutch_command=1.0)
+    assert simulation["wheel_speed"] == pytest.approx(float(run["wheel_speed"][-1]), rel=1e-12)
+
+
 def _value(signal: Any, t: float) -> float:
     """Of a signal at an instant: mean, sine, steps and nothing else."""
     sine = signal.amplitude * math.sin(2.0 * math.pi * signal.frequency * t + signal.phase) if signal.amplitude else 0.0

@@ -25,7 +25,19 @@ def train_variables(train: DriveTrain, core: _core.Train) -> tuple[Variable, ...
     """
     channels = [Variable(name, "", unit or "1", meaning) for name, unit, meaning in core.channels()]
     known = {channel.name for channel in channels}
-    return (*channels, *(variable for variable in _derived(train) if variable.name not in known))
+    integrated = [name for name in train.shafts if f"{name}_angle" in known]
+    following = {shaft for shaft, *_ in angles_through_gears(train, integrated)}
+    angles = (
+        Variable(f"{name}_angle", "", "rad", "angle of the shaft", derived=True)
+        for name in train.shafts
+        if name in following
+    )
+    twists = (
+        Variable(f"{name}_twist", "", "rad", "angle of input/ratio less that of output", derived=True)
+        for name in train.gears
+        if f"{name}_twist" not in known
+    )
+    return (*channels, *angles, *twists)
 
 
 ALL_SIGNALS = tuple(name for name, _, _ in _core.axis_signals())
@@ -71,13 +83,6 @@ def named_signals(controllers: Mapping[str, Controller], values: Any) -> dict[st
         for name, row in zip((*ALL_SIGNALS, *WINDING_SIGNALS), rows, strict=False)
         if name in signals_of(controller)
     }
-
-
-def _derived(train: DriveTrain) -> Iterator[Variable]:
-    for name in train.shafts:
-        yield Variable(f"{name}_angle", "", "rad", "angle of the shaft", derived=True)
-    for name in train.gears:
-        yield Variable(f"{name}_twist", "", "rad", "angle of input/ratio less that of output", derived=True)
 
 
 def angles_through_gears(train: DriveTrain, known: Collection[str]) -> Iterator[tuple[str, str, str, bool]]:
