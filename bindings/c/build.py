@@ -57,7 +57,7 @@ STACK = 1 << 20
 
 def newest(sources: Sequence[Path]) -> float:
     """When any of these, or of the core's headers, was changed last."""
-    headers = [*(ROOT / "core").rglob("*.hpp"), *HERE.glob("*.h*"), Path(__file__)]
+    headers = [*(ROOT / "core").rglob("*.hpp"), *(ROOT / "bindings").rglob("*.h*"), Path(__file__)]
     return max(path.stat().st_mtime for path in (*headers, *sources))
 
 
