@@ -136,6 +136,7 @@ def compiled(sources: Sequence[Path], platform: Platform, cpu: str, directory: P
     return objects(sources, target, "-O3", BUILD / platform.name / directory, (*CORE_FLAGS, *flags))
 
 
+@cache
 def import_library(platform: Platform, python: Python) -> Path:
     """For Windows: of all that Python's headers declare."""
     of_python = headers(python.version)

@@ -25,7 +25,7 @@ QEMU = shutil.which("qemu-aarch64")
 # The builds of the core by the name of the processor in the tag.
 BUILDS = {"x86_64": {"any", "avx2", "avx512"}, "amd64": {"any", "avx2", "avx512"}, "aarch64": {"any"}, "arm64": {"any"}}
 FMU_PLATFORMS = {f"{p}-{s}" for p in ("x86_64", "aarch64") for s in ("linux", "windows", "darwin")}
-NEEDED = ["[study]"]
+NEEDED = "[study]"
 """by tests/golden.py"""
 
 pytestmark = pytest.mark.skipif(not WHEELS, reason="there are no wheels in dist/: make wheels")
@@ -72,7 +72,7 @@ def same_bits(
 
 
 def of_linux(abi: str) -> str:
-    return next((t for t in WHEELS if abi in t and t.endswith("linux_2_17_x86_64")), "") if WHEELS else ""
+    return next((t for t in WHEELS if abi in t and t.endswith("linux_2_17_x86_64")), "")
 
 
 @pytest.mark.parametrize(("version", "abi"), [("3.11", "cp311-cp311"), ("3.12", "cp312-abi3"), ("3.13", "cp312-abi3")])
@@ -92,7 +92,7 @@ def test_an_installed_wheel_gives_the_same_bits(version: str, abi: str, tmp_path
     subprocess.run([python, "-m", "venv", tmp_path / "venv"], check=True)
     own = str(tmp_path / "venv" / "bin" / "python")
     pip = [own, "-m", "pip", "install", "-q", "--only-binary=:all:"]
-    subprocess.run([*pip, *(f"{WHEELS[of_linux(abi)]}{extra}" for extra in NEEDED)], check=True)
+    subprocess.run([*pip, f"{WHEELS[of_linux(abi)]}{NEEDED}"], check=True)
     for build in sorted(BUILDS["x86_64"]):
         same_bits([own], build=build, home=tmp_path)
 
@@ -103,6 +103,6 @@ def test_the_wheel_for_aarch64_gives_the_same_bits_under_qemu(tmp_path: Path) ->
         pytest.skip("for aarch64: its wheel, qemu-user and make aarch64-python")
     platforms = [f"--platform=manylinux_2_{minor}_aarch64" for minor in (17, 28)]
     pip = [sys.executable, "-m", "pip", "install", "-q", "--python-version=3.11", "--only-binary=:all:", *platforms]
-    subprocess.run([*pip, f"--target={tmp_path}", *(f"{WHEELS[tag]}{extra}" for extra in NEEDED)], check=True)
+    subprocess.run([*pip, f"--target={tmp_path}", f"{WHEELS[tag]}{NEEDED}"], check=True)
     python = [QEMU, "-L", str(ARM), str(ARM / "usr" / "bin" / "python3.11")]
     same_bits(python, home=tmp_path, packages=str(tmp_path), but=TARGETS)
