@@ -143,7 +143,7 @@ $(VENV)/tools: pyproject.toml
 	touch $@
 
 $(VENV)/built: $(VENV)/tools $(SOURCES)
-	@echo 'Compiling the core in up to three builds; this takes one to four minutes.'
+	@echo 'Compiling the core in up to two builds; this takes one to five minutes.'
 	$(BIN)/pip install -q --no-build-isolation --config-settings=cmake.define.LOSTMOTION_WERROR=ON --editable ".[all]"
 	touch $@
 

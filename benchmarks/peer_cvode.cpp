@@ -6,7 +6,9 @@
 #include <sunmatrix/sunmatrix_dense.h>
 
 #include <cstdio>
+#include <memory>
 #include <numeric>
+#include <stdexcept>
 
 #include "cascade.hpp"
 #include "lostmotion/simulation/drive_control.hpp"
@@ -111,6 +113,9 @@ class Cvode {
     }
     Cvode(const Cvode&) = delete;
     Cvode& operator=(const Cvode&) = delete;
+    // What only synchronous motors under field orientation ask of a solver: none here has them.
+    std::unique_ptr<Cvode> twin() const { throw std::logic_error("no second solver"); }
+    void follow(const Cvode&) {}
     ~Cvode() {
         CVodeFree(&memory_);
         SUNLinSolFree(solver_);
@@ -299,7 +304,7 @@ void compare_cascade(const Drive& drive) {
     constexpr int instants = 100;
     const auto follow = [&](auto& solver, auto&& keep) {
         ClosedLoopRun run(solver, loop);
-        Status status = run.begin({}, {});
+        Status status = run.begin({}, {}, nothing);
         for (int k = 1; k <= instants && status == Status::done; ++k) {
             status = run.advance(static_cast<double>(k) / instants, nothing, [](double) {});
             keep(solver.state());

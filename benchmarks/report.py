@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-VECTORS = {"avx512": ", AVX-512", "avx2": ", AVX2"}  # of a build
+VECTORS = {"avx2": ", AVX2"}  # of a build
 
 
 def best(repeats: int, work: Callable[[], object], clock: Callable[[], float] = time.perf_counter) -> float:

@@ -29,7 +29,7 @@ LIBRARIES = ROOT / "src" / "lostmotion" / "fmu_libraries"
 PAGE = ROOT / "src" / "lostmotion" / "live_page" / "page.html"
 # The builds of the core, as in CMakeLists.txt: the processors they are for.
 BUILDS = {
-    "x86_64": {"any": "baseline", "avx2": "x86_64+avx2", "avx512": "x86_64+avx512dq+avx512vl"},
+    "x86_64": {"any": "baseline", "avx2": "x86_64+avx2"},
     "aarch64": {"any": "baseline"},
 }
 # Headers of the limited API leave stdio.h out.

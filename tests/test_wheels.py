@@ -23,7 +23,7 @@ WHEELS = {p.name.split("-", 2)[2].removesuffix(".whl"): p for p in sorted(DIST.g
 ARM = ROOT / "build" / "aarch64"
 QEMU = shutil.which("qemu-aarch64")
 # The builds of the core by the name of the processor in the tag.
-BUILDS = {"x86_64": {"any", "avx2", "avx512"}, "amd64": {"any", "avx2", "avx512"}, "aarch64": {"any"}, "arm64": {"any"}}
+BUILDS = {"x86_64": {"any", "avx2"}, "amd64": {"any", "avx2"}, "aarch64": {"any"}, "arm64": {"any"}}
 FMU_PLATFORMS = {f"{p}-{s}" for p in ("x86_64", "aarch64") for s in ("linux", "windows", "darwin")}
 NEEDED = "[study]"
 """by tests/golden.py"""

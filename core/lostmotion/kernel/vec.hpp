@@ -16,9 +16,7 @@ struct VecOf {
     typedef double Type __attribute__((vector_size(8 * n)));
 };
 
-#if defined __AVX512DQ__ && defined __AVX512VL__
-inline constexpr int vec_width = 8;
-#elif defined __AVX__
+#ifdef __AVX__
 inline constexpr int vec_width = 4;
 #else
 inline constexpr int vec_width = 2;
@@ -98,19 +96,9 @@ struct Pack {
     [[gnu::always_inline]] Pack spread() const {
         const Part v = part[k / width];
         constexpr int at = k % width;
-#if defined __AVX512DQ__ && defined __AVX512VL__
-        if constexpr (width == 8) {  // first its half: a choice among all eight would need its index in a register
-            const __m512d half = _mm512_maskz_shuffle_f64x2(0xff, v, v, at < 4 ? 0x44 : 0xee);
-            Pack out;
-            for (Part& p : out.part) p = _mm512_maskz_permutex_pd(0xff, half, 0x55 * (at % 4));
-            return out;
-        }
-#endif
         Pack all;
         for (Part& p : all.part) {
-            if constexpr (width == 8)
-                p = __builtin_shufflevector(v, v, at, at, at, at, at, at, at, at);
-            else if constexpr (width == 4)
+            if constexpr (width == 4)
                 p = __builtin_shufflevector(v, v, at, at, at, at);
             else
                 p = __builtin_shufflevector(v, v, at, at);
@@ -187,9 +175,7 @@ Pack<n> at_most(Pack<n> a, double bound) {
 }
 // Where a > b, as bits, the first number lowest.
 inline unsigned above(Vec a, Vec b) {
-#if defined __AVX512DQ__ && defined __AVX512VL__
-    return _mm512_cmp_pd_mask(a, b, _CMP_GT_OQ);
-#elif defined __AVX__
+#ifdef __AVX__
     return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(a, b, _CMP_GT_OQ)));
 #elif defined __SSE2__
     return static_cast<unsigned>(_mm_movemask_pd(_mm_cmpgt_pd(a, b)));
