@@ -45,6 +45,11 @@ fmu: $(VENV)/tools
 test-fmu: $(VENV)/built $(VENV)/portable
 	$(BIN)/pytest -n0 -rs tests/test_fmu_platforms.py
 
+# FMUs with inputs and reference results, as the FMI cross-check asks for them.
+.PHONY: cross-check
+cross-check: $(VENV)/built
+	$(BIN)/python bindings/fmu/cross_check.py build/cross-check
+
 # Wheels for all platforms, dist/*.whl, by the Zig compiler; the headers of Python 3.12 have to be at hand.
 .PHONY: wheels
 wheels: page $(VENV)/portable

@@ -17,6 +17,7 @@ import identification
 import live
 import one_run
 import studies
+import tasks
 import trains
 from report import Report, best
 
@@ -91,6 +92,7 @@ def main() -> None:
     identification.section(report)
     costs.section(report, scenario, build, programs)
     studies.section(report, scenario)
+    tasks.section(report)
     start_up_section(report)
     live.section(report)
     print(report.text())

@@ -39,6 +39,8 @@ class Report:
             return "| " + " | ".join(aligned) + " |"
 
         rule = "|".join(("-" * (w + 1) + ":") if k else "-" * (w + 2) for k, w in enumerate(widths))
+        if self.lines and self.lines[-1]:
+            self.add("")
         self.add(line(header), f"|{rule}|", *(line(r) for r in rows))
 
     def text(self) -> str:

@@ -15,7 +15,6 @@ from lostmotion.portable import fmu as exporting
 from lostmotion.portable.parameters import Parameters
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
-LIBRARIES = exporting.LIBRARIES
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="FMPy runs the library for this platform, tests know Linux alone"
 )
@@ -86,7 +85,7 @@ class Slave:
 @pytest.fixture(scope="module")
 def paper(tmp_path_factory: Any) -> Path:
     path = tmp_path_factory.mktemp("fmu") / "paper.fmu"
-    lm.export_fmu(lm.load("paper-2dof-nl-small"), path, libraries=LIBRARIES)
+    lm.export_fmu(lm.load("paper-2dof-nl-small"), path)
     return path
 
 
@@ -105,7 +104,7 @@ def exported(path: Path, to: Path, monkeypatch: Any) -> Path:
     """Without parameters: to find them takes seconds."""
     without_parameters(monkeypatch)
     out = to / f"{path.stem}.fmu"
-    lm.export_fmu(lm.load(path), out, libraries=LIBRARIES)
+    lm.export_fmu(lm.load(path), out)
     return out
 
 
@@ -116,7 +115,7 @@ def test_the_description_of_every_scenario_is_valid(path: Path, tmp_path: Path, 
     without_parameters(monkeypatch)
     for version in (2, 3):
         out = tmp_path / f"{version}.fmu"
-        lm.export_fmu(lm.load(path), out, fmi=version, libraries=LIBRARIES)
+        lm.export_fmu(lm.load(path), out, fmi=version)
         assert validate_fmu(str(out)) == []
 
 
@@ -262,7 +261,7 @@ def test_a_jam_ends_in_an_error_with_the_sentence_of_python(tmp_path: Path, monk
     with pytest.raises(lm.SolverError) as jammed:
         lm.simulate(scenario)
     path = tmp_path / "jam.fmu"
-    lm.export_fmu(scenario, path, libraries=LIBRARIES)
+    lm.export_fmu(scenario, path)
     slave = Slave(path, tmp_path / "open")
     with pytest.raises(FMICallException):
         slave.step(1e-3, drum_load_torque=(20.0, 20.0))
@@ -277,7 +276,7 @@ def test_a_jam_ends_in_an_error_with_the_sentence_of_python(tmp_path: Path, monk
 def test_a_path_that_cannot_be_written_is_refused(arguments: Any, said: str, tmp_path: Path, monkeypatch: Any) -> None:
     without_parameters(monkeypatch)
     with pytest.raises(lm.InputError, match=said):
-        lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / arguments[0], libraries=LIBRARIES)
+        lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / arguments[0])
 
 
 def test_without_a_library_there_is_no_fmu(tmp_path: Path, monkeypatch: Any) -> None:
@@ -289,7 +288,7 @@ def test_without_a_library_there_is_no_fmu(tmp_path: Path, monkeypatch: Any) -> 
 def test_without_its_controller_the_motor_is_turned_by_an_input(tmp_path: Path, monkeypatch: Any) -> None:
     without_parameters(monkeypatch)
     path = tmp_path / "plant.fmu"
-    lm.export_fmu(lm.load("position-axis"), path, controllers=False, libraries=LIBRARIES)
+    lm.export_fmu(lm.load("position-axis"), path, controllers=False)
     inputs = [v.name for v in fmpy.read_model_description(str(path)).modelVariables if v.causality == "input"]
     assert inputs == ["command", "load_torque"]
 

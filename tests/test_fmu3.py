@@ -10,7 +10,7 @@ import pytest
 import lostmotion as lm
 from lostmotion.portable import fmu as exporting
 from lostmotion.portable.parameters import Parameters
-from test_fmu import LIBRARIES, Slave, pytestmark
+from test_fmu import Slave, pytestmark
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
 __all__ = ["pytestmark"]
@@ -58,7 +58,7 @@ class Slave3:
 def test_steps_have_the_bits_of_python(name: str, tmp_path: Path) -> None:
     scenario = lm.load(name)
     interval = scenario.simulation.sample_interval
-    lm.export_fmu(scenario, tmp_path / "drive.fmu", fmi=3, libraries=LIBRARIES)
+    lm.export_fmu(scenario, tmp_path / "drive.fmu", fmi=3)
     slave = Slave3(tmp_path / "drive.fmu", tmp_path / "open")
     python = lm.Simulation(scenario, step=interval)
     for k in range(150):
@@ -82,7 +82,7 @@ def test_steps_have_the_bits_of_python(name: str, tmp_path: Path) -> None:
 
 def test_terminals_name_variables_that_there_are(tmp_path: Path) -> None:
     path = tmp_path / "drive.fmu"
-    lm.export_fmu(lm.load("worm-lowering"), path, fmi=3, libraries=LIBRARIES)
+    lm.export_fmu(lm.load("worm-lowering"), path, fmi=3)
     with zipfile.ZipFile(path) as archive:
         root = ET.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
         assert archive.read("terminalsAndIcons/icon.png").startswith(b"\x89PNG")
@@ -103,7 +103,7 @@ def test_a_reference_as_input_acts_as_that_of_the_scenario(fmi: int, tmp_path: P
     slaves = []
     for given in (False, True):
         path = tmp_path / f"{given}.fmu"
-        lm.export_fmu(scenario, path, fmi=fmi, references=given, libraries=LIBRARIES)
+        lm.export_fmu(scenario, path, fmi=fmi, references=given)
         inputs = [v.name for v in fmpy.read_model_description(str(path)).modelVariables if v.causality == "input"]
         assert ("reference" in inputs) == given
         slaves.append((Slave if fmi == 2 else Slave3)(path, tmp_path / str(given)))
@@ -124,9 +124,9 @@ def test_a_reference_as_input_acts_as_that_of_the_scenario(fmi: int, tmp_path: P
 def test_a_reference_whose_past_has_to_be_known_stays_inside(tmp_path: Path) -> None:
     scenario = lm.load("position-axis", ["controller.position.reference_delay='1 ms'"])
     with pytest.raises(lm.InputError, match="reference_delay, for which it has to know the past"):
-        lm.export_fmu(scenario, tmp_path / "axis.fmu", references=True, libraries=LIBRARIES)
+        lm.export_fmu(scenario, tmp_path / "axis.fmu", references=True)
 
 
 def test_another_version_is_refused(tmp_path: Path) -> None:
     with pytest.raises(lm.InputError, match=r"fmi: 1 must be 2 \(FMI 2.0\) or 3 \(FMI 3.0\)"):
-        lm.export_fmu(lm.load("speed-axis"), tmp_path / "axis.fmu", fmi=1, libraries=LIBRARIES)
+        lm.export_fmu(lm.load("speed-axis"), tmp_path / "axis.fmu", fmi=1)

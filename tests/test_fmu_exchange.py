@@ -12,7 +12,7 @@ import pytest
 import lostmotion as lm
 from lostmotion.portable import fmu as exporting
 from lostmotion.portable.parameters import Parameters
-from test_fmu import LIBRARIES, pytestmark
+from test_fmu import pytestmark
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
 __all__ = ["pytestmark"]
@@ -71,7 +71,7 @@ def signals(scenario: Any, names: list[str]) -> np.ndarray:
 
 
 def under_cvode(scenario: Any, path: Path, fmi: int, variables: list[str], **options: Any) -> Any:
-    lm.export_fmu(scenario, path, fmi=fmi, libraries=LIBRARIES, **options)
+    lm.export_fmu(scenario, path, fmi=fmi, **options)
     description = fmpy.read_model_description(str(path))
     names = [v.name for v in description.modelVariables if v.causality == "input" and not v.name.startswith("der(")]
     rates = [v.name for v in description.modelVariables if v.causality == "input" and v.name.startswith("der(")]
@@ -161,7 +161,7 @@ def model(tmp_path: Path) -> Any:
     scenario = lm.load(
         "paper-2dof-nl-small", ["initial.motor_speed=20", "initial.load_speed=0.2", "initial.twist=2e-4"]
     )
-    lm.export_fmu(scenario, path, libraries=LIBRARIES)
+    lm.export_fmu(scenario, path)
     model = Model(path, tmp_path / "open")
     yield model
     model.fmu.terminate()
@@ -224,7 +224,7 @@ def test_the_state_in_model_exchange_can_be_set_back(model: Model) -> None:
 
 def test_with_windings_inside_there_is_co_simulation_alone(tmp_path: Path) -> None:
     path = tmp_path / "axis.fmu"
-    lm.export_fmu(lm.load("field-weakening"), path, libraries=LIBRARIES)
+    lm.export_fmu(lm.load("field-weakening"), path)
     description = fmpy.read_model_description(str(path))
     assert description.modelExchange is None
     assert description.coSimulation is not None
