@@ -56,7 +56,8 @@ wheels: page $(VENV)/portable
 	$(BIN)/pip install -q --group release
 	$(BIN)/python bindings/wheels.py dist
 	$(BIN)/twine check --strict dist/*.whl
-	$(BIN)/abi3audit --strict dist/*abi3*.whl
+	rm -rf build/audit && for wheel in dist/*abi3*.whl; do $(BIN)/python -m zipfile -e $$wheel build/audit/$$(basename $$wheel); done
+	$(BIN)/abi3audit --strict --assume-minimum-abi3 3.12 build/audit/*/lostmotion/*.abi3.so build/audit/*/lostmotion/*.pyd
 	$(MAKE) test-wheels
 
 # In environments of their own, which take what they need from the package index.

@@ -149,6 +149,8 @@ def fmu(to: Path, optimisation: str = "-O2", platforms: Sequence[str] = tuple(PL
         whole = ["-Wl,-z,defs"] if "linux" in platform else []  # elsewhere a missing symbol ends the linking anyway
         zig("cc", *arguments, "-shared", "-s", *whole, *made, "-o", unfinished)
         unfinished.replace(library)
+        for spare in library.parent.glob("*.lib"):  # the linker for Windows writes an import library beside it
+            spare.unlink()
         print(library, library.stat().st_size)
 
 
