@@ -104,8 +104,8 @@ def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, noti
             if best is None or fit.cost < best.cost:
                 best = fit
         assert best is not None
-        if found and found[-1].fit.cost < best.cost * (1.0 - 1e-9) and not entry.set:
-            # The rung contains that below: begin there, with what is new switched off.
+        if found and found[-1].fit.cost < best.cost * (1.0 - 1e-9):
+            # The rung should contain that below: begin there, with what is new switched off.
             below = {n: p.off if p.off is not None else p.start for n, p in added.items()}
             again = _one(
                 rig,
@@ -148,8 +148,7 @@ def _one(rig: Rig, engine: Engine, train: list[Prepared], rung: int, start: Poin
     fit = search(problem_of(rig, engine, few, rung), start, iterations=options.iterations, notify=tell)
     if len(few) == len(train):
         return fit
-    rest = options.iterations if options.first is not None else min(3, options.iterations)
-    return search(problem_of(rig, engine, train, rung), fit.point, iterations=rest, notify=tell)
+    return search(problem_of(rig, engine, train, rung), fit.point, iterations=options.iterations, notify=tell)
 
 
 def _means(task: Identification, errors: list[LogError], fit: Fit) -> tuple[float, float]:
