@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import json
 import tomllib
@@ -69,6 +70,7 @@ def test_without_static_friction_errors_shrink_in_a_fixed_ratio_forever() -> Non
     np.testing.assert_allclose(e[1:8] / e[:7], ratio, rtol=0.0, atol=1e-12 / np.abs(e[:7]).min())
 
 
+@functools.cache
 def hunting(excess: float) -> tuple[float, float]:
     """Amplitude [rad] and period [s] of the limit cycle by F_s - F_c: a slip from (e, 0, -excess) ends at -e."""
     one, two = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -excess / J])
