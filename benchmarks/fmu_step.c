@@ -6,19 +6,13 @@
  */
 #define _POSIX_C_SOURCE 200809L
 #include <dlfcn.h>
-#include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <time.h>
+
+#include "../tests/fmu_callbacks.h"
 
 enum { STEPS = 20000, ROUNDS = 9, most = 16 };
 static const double interval = 1e-3;
 
-static void check(int well, const char* what) {
-    if (well) return;
-    fprintf(stderr, "%s failed\n", what);
-    exit(1);
-}
 static double now(void) {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
@@ -28,19 +22,6 @@ static double now(void) {
 static double corner(int step) {
     const int k = step % 1000;
     return 1e-3 * (double)(k < 250 ? k : k < 750 ? 500 - k : k - 1000);
-}
-
-typedef struct {
-    void (*log)(void*, const char*, int, const char*, const char*, ...);
-    void* (*allocate)(size_t, size_t);
-    void (*release)(void*);
-    void (*step_finished)(void*, int);
-    void* environment;
-} Callbacks;
-
-static void say(void* environment, const char* name, int status, const char* category, const char* message, ...) {
-    (void)environment, (void)name, (void)status, (void)category;
-    fprintf(stderr, "%s\n", message);
 }
 
 #define FUNCTION(LIBRARY, PREFIX, NAME, RESULT, ...)                                             \

@@ -3,10 +3,9 @@
  *     fmu_driver LIBRARY RESOURCES_URI GUID INPUTS OUTPUTS STEPS INTERVAL
  */
 #include <inttypes.h>
-#include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
+
+#include "fmu_callbacks.h"
 
 #if defined _WIN32
 #include <windows.h>
@@ -17,24 +16,6 @@ static void* found(void* library, const char* name) { return (void*)GetProcAddre
 static void* opened(const char* path) { return dlopen(path, RTLD_NOW | RTLD_LOCAL); }
 static void* found(void* library, const char* name) { return dlsym(library, name); }
 #endif
-
-typedef struct {
-    void (*log)(void*, const char*, int, const char*, const char*, ...);
-    void* (*allocate)(size_t, size_t);
-    void (*release)(void*);
-    void (*step_finished)(void*, int);
-    void* environment;
-} Callbacks;
-
-static void say(void* environment, const char* name, int status, const char* category, const char* message, ...) {
-    (void)environment, (void)name, (void)status, (void)category;
-    fprintf(stderr, "%s\n", message);
-}
-static void check(int well, const char* what) {
-    if (well) return;
-    fprintf(stderr, "%s failed\n", what);
-    exit(1);
-}
 
 enum { most = 64 };
 
