@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .targets import try_directory, writing
-from .terminal import busy, progress
+from .terminal import busy
 
 if TYPE_CHECKING:
     from ..identification.identify import IdentificationResult
+
+NOTES = 10  # lines of them in the terminal
 
 
 def identify(
@@ -38,9 +40,12 @@ def identify(
     need("jinja2", "The page of an identification", "report")
     from ..identification.identify import identify as run
 
-    with progress(1, "Identifying") as step, busy("Identifying"):
-        result = run(file, profiles=profiles)
-        step()
+    with busy("Identifying") as tell:
+
+        def notify(rung: str, iteration: int, cost: float) -> None:
+            tell(f"{rung}, iteration {iteration}, cost {cost:.5g}")
+
+        result = run(file, profiles=profiles, progress=notify)
     with writing(output), busy("Drawing"):
         from ..reports.identification import write_identification
 
@@ -58,6 +63,7 @@ def _print_summary(result: IdentificationResult) -> None:
         print(line)
     if result.notes:
         print(f"Notes on {len(result.notes)} logs:")
-        for name, notes in result.notes.items():
-            for note in notes:
-                print(f"  {name}: {note}")
+        lines = [f"  {name}: {note}" for name, notes in result.notes.items() for note in notes]
+        print(*lines[:NOTES], sep="\n")
+        if len(lines) > NOTES:
+            print(f"  and {len(lines) - NOTES} more, all on the page")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import NoReturn, Protocol
 
@@ -60,13 +60,22 @@ def _unseen(done: int | None = None) -> None:
 
 
 SILENCE = 0.5  # [s] after which something must be seen
+REFRESH = 0.2  # [s]
 
 
 @contextmanager
-def busy(what: str) -> Iterator[None]:
-    """What is being done and since when, on stderr where that is a terminal, for work whose length is not known."""
+def busy(what: str) -> Iterator[Callable[[str], None]]:
+    """What is being done and since when, on stderr where that is a terminal, for work whose length is not known.
+
+    Gives a function that takes how far it has got.
+    """
+    words = [what]
+
+    def tell(how_far: str) -> None:
+        words[0] = f"{what}: {how_far}"
+
     if not sys.stderr.isatty():
-        yield
+        yield tell
         return
 
     def show() -> None:
@@ -75,8 +84,9 @@ def busy(what: str) -> Iterator[None]:
 
         columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
         with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-            bar.add_task(what, total=None)
-            done.wait()
+            task = bar.add_task(what, total=None)
+            while not done.wait(REFRESH):
+                bar.update(task, description=words[0])
 
     def wait() -> None:
         if not done.wait(SILENCE):
@@ -86,7 +96,7 @@ def busy(what: str) -> Iterator[None]:
     shown = threading.Thread(target=wait, daemon=True)
     shown.start()
     try:
-        yield
+        yield tell
     finally:
         done.set()
         shown.join()

@@ -177,7 +177,7 @@ def _stalls(log: Log) -> Log:
     count = int(np.diff(edges)[longest])
     if moved.any() and count > STALL * len(log.time) and count > 20:
         return log.noted(
-            f"no channel changes in {count} samples from {log.time[edges[longest] + 1]:.4g} s on; the recorder may have stalled"
+            f"no channel changes in {count} samples from {log.time[edges[longest] + 1]:.4g} s on; it rests, or the recorder has stalled"
         )
     return log
 
