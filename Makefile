@@ -13,7 +13,10 @@ unexport MAKEFLAGS
 demo: $(VENV)/built
 	$(BIN)/lostmotion reproduce -o out
 
-test: lint test-core c-library test-page $(VENV)/built
+test: lint test-core test-python test-page
+
+.PHONY: test-python
+test-python: c-library page-where-node
 	$(BIN)/pip install -q --group portable --group examples
 	$(BIN)/pytest
 
@@ -94,9 +97,11 @@ $(VENV)/portable: $(VENV)/tools
 	touch $@
 
 # In Chromium; left out where there is no node.
-.PHONY: test-page
-test-page: $(VENV)/built
-	@$(NODE) || exit 0; $(MAKE) page && { command -v chromium >/dev/null || { apt-get update -q && apt-get install -qy chromium; }; } && cd page && npm run --silent lint && npm test --silent
+.PHONY: page-where-node test-page
+page-where-node: $(VENV)/built
+	@$(NODE) || exit 0; $(MAKE) page
+test-page: page-where-node
+	@$(NODE) || exit 0; { command -v chromium >/dev/null || { apt-get update -q && apt-get install -qy chromium; }; } && cd page && npm run --silent lint && npm test --silent
 
 # 100,000 random drives of each kind; CASES and SEED choose others.
 CASES ?= 100000
