@@ -13,7 +13,7 @@ unexport MAKEFLAGS
 demo: $(VENV)/built
 	$(BIN)/lostmotion reproduce -o out
 
-test: lint test-core test-python test-page
+test: lint test-core test-page test-python
 
 .PHONY: test-python
 test-python: c-library page-where-node
