@@ -9,7 +9,6 @@ MODEL_ref.csv, MODEL_ref.opt and README.md. The references are exact runs with t
 from __future__ import annotations
 
 import argparse
-import csv
 import shutil
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -18,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import lostmotion as lm
+from lostmotion.reports.pages import table_csv
 
 MODELS = {"PaperDrive": "paper-2dof-nl-small", "PositionAxis": "position-axis"}
 PLATFORM = "linux64"
@@ -43,10 +43,7 @@ def with_lines(scenario: lm.Scenario) -> tuple[lm.Scenario, dict[str, np.ndarray
 
 def write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     """The columns with a header of their names."""
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(zip(*(c.tolist() for c in columns.values()), strict=True))
+    path.write_text(table_csv(columns, zip(*(c.tolist() for c in columns.values()), strict=True)))
 
 
 def write_model(directory: Path, model: str, name: str) -> None:
