@@ -6,6 +6,15 @@
 
 namespace lostmotion::binding {
 
+// Input, amplitude, frequency [Hz], phase [rad].
+using Sines = std::vector<std::tuple<int, double, double, double>>;
+inline InputSines input_sines(const Sines& sines) {
+    InputSines out;
+    for (const auto& [input, amplitude, frequency, phase] : sines)
+        out.push_back({input, {amplitude, frequency, phase}});
+    return out;
+}
+
 inline void advance(Simulation& s, double interval, double c0, double c1, double m0, double m1) {
     s.set_interrupt(poll_signals, nullptr);
     Status status;
@@ -21,7 +30,7 @@ template <class Use>
 nb::tuple now(Simulation& s, Use&& use) {
     check(s.find_regime(), s.time(), s.stopped_at());
     const auto& n = s.snapshot();
-    return use(s.drive(), s.regime(), n.x, n.memory, n.input);
+    return use(s.drive(), s.regime(), n.x, n.memory, s.inputs());
 }
 
 // To t = 0, with the contacts still to be found.
@@ -121,10 +130,10 @@ inline void bind_stepping(nb::module_& m) {
     of_drive
         .def(
             "__init__",
-            [](Simulation* self, const SharedDrive& d, double step, const BoundControl& control) {
-                new (self) Simulation(d.drive, step, control_of(control));
+            [](Simulation* self, const SharedDrive& d, double step, const BoundControl& control, const Sines& sines) {
+                new (self) Simulation(d.drive, step, control_of(control), input_sines(sines));
             },
-            "drive"_a, "step"_a, "control"_a, nb::keep_alive<1, 4>())
+            "drive"_a, "step"_a, "control"_a, "sines"_a, nb::keep_alive<1, 4>())
         .def("advance", &advance, "interval"_a, "command_begin"_a, "command_end"_a, "load_begin"_a, "load_end"_a)
         .def("read",
              [](Simulation& s) {
@@ -146,13 +155,14 @@ inline void bind_stepping(nb::module_& m) {
     of_train
         .def(
             "__init__",
-            [](TrainSimulation* self, const TrainDescription& t, double step, const BoundControl& bound) {
+            [](TrainSimulation* self, const TrainDescription& t, double step, const BoundControl& bound,
+               const Sines& sines) {
                 const Control control = control_of(bound);
                 if (const std::string error = check_control(model::Assembly(t.train), control); !error.empty())
                     throw nb::value_error(error.c_str());
-                new (self) TrainSimulation(t.train, step, control);
+                new (self) TrainSimulation(t.train, step, control, input_sines(sines));
             },
-            "train"_a, "step"_a, "control"_a, nb::keep_alive<1, 4>())
+            "train"_a, "step"_a, "control"_a, "sines"_a, nb::keep_alive<1, 4>())
         .def("advance", &advance_train, "interval"_a, "begin"_a, "end"_a)
         .def("read", &read_train)
         .def(

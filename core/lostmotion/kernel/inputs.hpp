@@ -16,11 +16,21 @@
 
 namespace lostmotion {
 
+// How far beyond a whole number of periods, in periods.
+inline double fraction_of_turn(double frequency, double time) {
+    const double turns = frequency * time, part = turns - std::floor(turns);
+    // After a thousand periods the rounding of their number would be seen.
+    return turns < 0x1p10 ? part : part + std::fma(frequency, time, -turns);
+}
+
 // amplitude * sin(2 pi frequency t + phase)
 struct Sine {
     double amplitude = 0.0;  // unit of the signal
     double frequency = 0.0;  // [Hz]
     double phase = 0.0;      // [rad]
+
+    double angle(double time) const { return 2.0 * std::numbers::pi * fraction_of_turn(frequency, time) + phase; }
+    double at(double time) const { return amplitude * sine_cosine(angle(time)).sin; }
 };
 
 // From `time` on the piecewise-linear part is value + slope * (t - time), until the next breakpoint.
@@ -81,11 +91,15 @@ double next_breakpoint(const std::array<Signal, n>& signals, double t) {
     return next;
 }
 
-// Inputs of which the first will be set to ramps from outside, step by step.
+// Sines by the number of their input.
+using InputSines = std::vector<std::pair<int, Sine>>;
+
+// Inputs of which the first will be set to ramps from outside, step by step; the sines are added to them.
 template <class D>
-SignalsOf<D> ramped_inputs(int count = D::inputs) {
+SignalsOf<D> ramped_inputs(int count = D::inputs, const InputSines& sines = {}) {
     SignalsOf<D> signals;
     for (int i = 0; i < count; ++i) signals[i].breakpoints[0].slope = 1.0;
+    for (const auto& [input, sine] : sines) signals[static_cast<std::size_t>(input)].sines.push_back(sine);
     return signals;
 }
 
@@ -128,13 +142,6 @@ std::vector<InputBasis> input_basis(const std::array<Signal, n>& signals) {
     }
     while (basis.empty() || basis.size() % 2 != 0) basis.push_back({InputBasis::nothing, 0, 0.0});
     return basis;
-}
-
-// How far beyond a whole number of periods, in periods.
-inline double fraction_of_turn(double frequency, double time) {
-    const double turns = frequency * time, part = turns - std::floor(turns);
-    // After a thousand periods the rounding of their number would be seen.
-    return turns < 0x1p10 ? part : part + std::fma(frequency, time, -turns);
 }
 
 // Rotation of a pair of functions over a length of time: cos and sin of the angle (of a ramp, 1 and 0).
@@ -238,8 +245,7 @@ class InputState {
         int q = 0;
         for (int i = 0; i < n_inputs; ++i)
             for (const Sine& s : (*signals_)[i].sines) {
-                const double angle = 2.0 * std::numbers::pi * fraction_of_turn(s.frequency, t) + s.phase;
-                const auto [sine, cosine] = sine_cosine(angle);
+                const auto [sine, cosine] = sine_cosine(s.angle(t));
                 weights_[q++] = s.amplitude * sine;
                 weights_[q++] = s.amplitude * cosine;
             }

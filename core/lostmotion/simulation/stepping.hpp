@@ -32,7 +32,7 @@ class SimulationOf {
         StateOf<D> x{};
         typename D::Memory memory{};
         typename System::Key key;
-        Inputs input{};  // last values, for reading variables
+        Inputs input{};  // last values of those that are given, for reading variables
         bool started = false;
         bool steady = false;  // the inputs were constant in the last interval
         CourseOf<D> course;   // what is known of the motion in the present regime beside its state
@@ -40,8 +40,10 @@ class SimulationOf {
     };
 
     // scale: natural sizes of the states. step: the usual interval [s]; others are allowed, this one is fastest.
-    // inputs: how many the system has.
-    SimulationOf(const System& system, const StateOf<D>& scale, double step, int inputs = D::inputs);
+    // inputs: how many the system has. sines: that are added all the time to what the inputs are given, by time since
+    // 0.
+    SimulationOf(const System& system, const StateOf<D>& scale, double step, int inputs = D::inputs,
+                 const InputSines& sines = {});
     SimulationOf(const SimulationOf&) = delete;
     SimulationOf& operator=(const SimulationOf&) = delete;
 
@@ -70,6 +72,8 @@ class SimulationOf {
     double time() const { return now_.time; }
     typename D::Contact stopped_at() const { return solver_.stopped_at(); }
     const Snapshot& snapshot() const { return now_; }
+    // At the present instant, sines included.
+    Inputs inputs() const;
     void restore(const Snapshot& s) { now_ = s; }
     void set_interrupt(bool (*poll)(void*), void* context) {
         solver_.interrupted = poll;
@@ -113,6 +117,7 @@ class SimulationOf {
     const System& system_;
     ExactSolver<System> solver_;
     int inputs_;
+    InputSines sines_;
     Snapshot now_;
     std::vector<control::Axis> laws_;
     ClosedLoop<D> loop_;
@@ -120,13 +125,21 @@ class SimulationOf {
 };
 
 template <class System>
-SimulationOf<System>::SimulationOf(const System& system, const StateOf<D>& scale, double step, int inputs)
-    : system_(system), solver_(system, ramped_inputs<D>(inputs), step, scale), inputs_(inputs) {}
+SimulationOf<System>::SimulationOf(const System& system, const StateOf<D>& scale, double step, int inputs,
+                                   const InputSines& sines)
+    : system_(system), solver_(system, ramped_inputs<D>(inputs, sines), step, scale), inputs_(inputs), sines_(sines) {}
+
+template <class System>
+auto SimulationOf<System>::inputs() const -> Inputs {
+    Inputs u = now_.input;
+    for (const auto& [input, sine] : sines_) u[static_cast<std::size_t>(input)] += sine.at(now_.time);
+    return u;
+}
 
 template <class System>
 Status SimulationOf<System>::advance(double interval, Inputs begin, Inputs end) {
     resume(begin, end, interval);
-    const bool steady = begin == end, unchanged = now_.steady && steady && begin == now_.input;
+    const bool steady = begin == end && sines_.empty(), unchanged = now_.steady && steady && begin == now_.input;
     NoObserver nothing;
     Status status = Status::done;
     if (!now_.started)
@@ -199,8 +212,9 @@ struct OwnDrive {
 
 class Simulation : private OwnDrive, public SimulationOf<SwitchedDrive> {
  public:
-    Simulation(const Drive& drive, double step, const Control& control = {})
-        : OwnDrive(drive), SimulationOf(own_system, own_drive.balanced_scale(), step) {
+    Simulation(const Drive& drive, double step, const Control& control = {}, const InputSines& sines = {})
+        : OwnDrive(drive),
+          SimulationOf(own_system, own_drive.balanced_scale(), step, SwitchedDrive::Dims::inputs, sines) {
         if (control.present())
             close_loop(control, [&](const auto& laws) { return closed_loop_of(own_drive, control, laws); });
     }
@@ -213,7 +227,7 @@ class Simulation : private OwnDrive, public SimulationOf<SwitchedDrive> {
     // Variables at the present instant, with the inputs at their last values.
     Reading reading() {
         const Regime& r = regime();
-        return Reader(drive(), r, snapshot().memory)(snapshot().x, snapshot().input);
+        return Reader(drive(), r, snapshot().memory)(snapshot().x, inputs());
     }
 };
 

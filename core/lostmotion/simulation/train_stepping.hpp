@@ -26,7 +26,7 @@ class TrainSimulationIn : private OwnTrain<D>, public SimulationOf<model::TrainS
     using Base = SimulationOf<model::TrainSystem<D>>;
 
  public:
-    TrainSimulationIn(const TrainRun& run, double step, const Control& control);
+    TrainSimulationIn(const TrainRun& run, double step, const Control& control, const InputSines& sines);
 
     bool too_many_guards() const { return Own::own_system.overflowed(); }
     TrainPoint point();
@@ -34,8 +34,9 @@ class TrainSimulationIn : private OwnTrain<D>, public SimulationOf<model::TrainS
 };
 
 template <class D>
-TrainSimulationIn<D>::TrainSimulationIn(const TrainRun& run, double step, const Control& control)
-    : Own(run), Base(Own::own_system, Own::own_system.balanced_scale(), step, run.assembly().layout().inputs) {
+TrainSimulationIn<D>::TrainSimulationIn(const TrainRun& run, double step, const Control& control,
+                                        const InputSines& sines)
+    : Own(run), Base(Own::own_system, Own::own_system.balanced_scale(), step, run.assembly().layout().inputs, sines) {
     if (control.present())
         Base::close_loop(control,
                          [&](const auto& laws) { return closed_loop_of<D>(Own::model.assembly, control, laws); });
@@ -45,21 +46,22 @@ template <class D>
 TrainPoint TrainSimulationIn<D>::point() {
     const auto& now = Base::snapshot();
     const auto& r = Base::regime();
-    return point_of<D>(Own::model, r, now.time, now.x, now.memory, now.input);
+    return point_of<D>(Own::model, r, now.time, now.x, now.memory, Base::inputs());
 }
 
 template <class D>
 std::vector<double> TrainSimulationIn<D>::values() {
     const auto& r = Base::regime();
-    return TrainReader<D>(Own::model, r, Base::snapshot().memory)(Base::snapshot().x, Base::snapshot().input);
+    return TrainReader<D>(Own::model, r, Base::snapshot().memory)(Base::snapshot().x, Base::inputs());
 }
 
 class TrainSimulation {
  public:
     // The train must have passed the check, and its controllers theirs.
-    TrainSimulation(const model::Train& train, double step, const Control& control = {}) : run_(train) {
+    TrainSimulation(const model::Train& train, double step, const Control& control = {}, const InputSines& sines = {})
+        : run_(train) {
         run_.in_kernel([&]<class D>(const typename TrainReader<D>::Model&) {
-            in_ = std::make_unique<TrainSimulationIn<D>>(run_, step, control);
+            in_ = std::make_unique<TrainSimulationIn<D>>(run_, step, control, sines);
         });
     }
     const model::Assembly& assembly() const { return run_.assembly(); }
@@ -102,10 +104,11 @@ class TrainSimulation {
     }
 
  private:
+    template <class... D>
+    using In = std::variant<std::unique_ptr<TrainSimulationIn<D>>...>;
+
     TrainRun run_;
-    std::variant<std::unique_ptr<TrainSimulationIn<model::Narrow>>, std::unique_ptr<TrainSimulationIn<model::Middle>>,
-                 std::unique_ptr<TrainSimulationIn<model::Wide>>>
-        in_;
+    std::conditional_t<built == Kernel::all, In<model::Narrow, model::Middle, model::Wide>, In<model::Widest>> in_;
 };
 
 }  // namespace lostmotion

@@ -73,42 +73,23 @@ class ClosedLoop:
     def __init__(self, plant: Plant, source: str, amplitude: float, window: Window, law: Any) -> None:
         assert plant.closed is not None
         self.plant, self.window = plant, window
-        self.simulation = Simulation(under_sine(plant, source, amplitude, window.frequency), law=law)
+        self.simulation = _UnderSine(plant, source, amplitude, window.frequency, law)
         self.core = self.simulation._core
-        self.constants = {name: plant.signals[name].mean for name in self.simulation.inputs}
-        self.source = source if source in self.constants else None
-        self.wave = self._wave(amplitude)
+        self.constants: dict[str, Any] = {name: plant.signals[name].mean for name in self.simulation.inputs}
         self.begin = 0  # tick at which the window begins
         self._running = list(running_slots(self.simulation._control))
         self.windows = self.jumps = 0
         self._to(0)
 
-    def _wave(self, amplitude: float) -> np.ndarray:
-        """The source at the samples. Between them it runs in straight lines, whose first harmonic is sinc^2 as large."""
-        w = self.window
-        inner = math.pi * w.periods / w.samples
-        return np.asarray(amplitude * (inner / math.sin(inner)) ** 2 * np.sin(w.angle(w.offsets)))
-
     def _to(self, sample: int) -> None:
-        """Advances to a sample of the window, from the one before if the source is one of the inputs."""
+        """Advances to a sample of the window."""
         w = self.window
         ticks = self.begin + (sample * w.stride + 0.5) / w.points
-        inputs: dict[str, Any] = dict(self.constants)
-        if self.source is not None:
-            mean, n = inputs[self.source], len(self.wave)
-            inputs[self.source] = (mean + self.wave[(sample - 1) % n], mean + self.wave[sample % n])
-        self.simulation.advance(ticks * w.tick - self.simulation.time, **inputs)
-
-    @property
-    def _stops(self) -> range:
-        """Samples at which an input changes its slope, after the first one up to the first of the next window."""
-        n = self.window.samples
-        return range(n, n + 1) if self.source is None else range(1, n + 1)
+        self.simulation.advance(ticks * w.tick - self.simulation.time, **self.constants)
 
     def follow(self) -> None:
         """Over one window."""
-        for sample in self._stops:
-            self._to(sample)
+        self._to(self.window.samples)
         self._next()
 
     def _next(self) -> None:
@@ -147,6 +128,14 @@ class ClosedLoop:
         slots = np.array(control[1:])
         slots[np.delete(np.arange(len(slots)), self._running)] = v[m:]
         self.core.set_state(time, v[:n], v[n:m], key, inputs, started, forgotten, [control[0], *slots.tolist()])
+
+
+class _UnderSine(Simulation):
+    """With references that are constant but for the source, which is a sine; as a load torque it is an input of the simulation."""
+
+    def __init__(self, plant: Plant, source: str, amplitude: float, frequency: float, law: Any) -> None:
+        self._sines = {source: (amplitude, frequency)}
+        super().__init__(under_sine(plant, source, amplitude, frequency), law=law)
 
 
 def running_slots(control: Bound) -> Iterator[int]:

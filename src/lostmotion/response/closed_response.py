@@ -18,15 +18,14 @@ from ..simulation.train_scenario import TrainScenario
 from ..simulation.train_variables import signals_of
 from .closed_loop import AxisSignal, ClosedLoop, Motion, Search, mean_of
 from .plant import Plant
-from .windows import CORNERS, SAMPLES, Window, fitting
+from .windows import Window, fitting
 
 
-def windows_for(plant: Plant, source: str, frequencies: Sequence[float]) -> list[Window]:
+def windows_for(plant: Plant, frequencies: Sequence[float]) -> list[Window]:
     """The nearest frequencies whose periods fit the sample times, each once."""
     assert plant.closed is not None
     tick, frame = frame_of(plant.closed)
-    samples = SAMPLES if source in plant.references else CORNERS
-    found = [fitting(f, tick, frame, samples) for f in frequencies]
+    found = [fitting(f, tick, frame) for f in frequencies]
     return list({w.frequency: w for w in reversed(found)}.values())[::-1]
 
 

@@ -20,7 +20,7 @@ from .closed_response import respond_closed, windows_for
 from .linear import python_control
 from .plant import Plant, known_output, plant_or_loop
 from .shooting import MAX_PERIODS, SAMPLES_PER_PERIOD, floquet_multipliers, is_stable, reason_of, respond
-from .windows import CORNERS, SAMPLES
+from .windows import SAMPLES
 
 if TYPE_CHECKING:
     import control
@@ -51,8 +51,7 @@ def frequency_response(
     Of a scenario with controllers the sine is that of a reference or a load torque. Its periods have to fit the sample times: where
     ten of them do not, the nearest frequency is taken that does. Encoders with steps may keep the motion from repeating; then the
     harmonics are means over many periods, and ``spread`` says how far they vary. Variables of controllers are taken
-    at their samples, those of the drive between two ticks, at least 256 times a period. A load torque runs in at least 2048 straight
-    lines a period, its first harmonic as asked for and the others, from the 2047th on, below a millionth of it.
+    at their samples, those of the drive between two ticks, at least 256 times a period.
 
     Parameters
     ----------
@@ -168,14 +167,14 @@ def _of_open_loop(
 def _of_closed_loop(
     plant: Plant, amplitudes: Sequence[float], source: str, frequencies: Sequence[float], **options: Any
 ) -> xarray.Dataset:
-    windows = windows_for(plant, source, frequencies)
+    windows = windows_for(plant, frequencies)
     r = respond_closed(plant, source, amplitudes, windows, **options)
     shape = (len(amplitudes), len(windows))
     meaning = "deviation of the output's first harmonic from period to period / its mean"
     out = _labelled(r, plant, amplitudes, [w.frequency for w in windows], source)
     asked = ("frequency", [w.asked for w in windows], {"units": "Hz", "long_name": "frequency that was asked for"})
     out = out.assign_coords(asked_frequency=asked)
-    out.attrs["samples_per_period"] = SAMPLES if source in plant.references else CORNERS
+    out.attrs["samples_per_period"] = SAMPLES
     return out.assign(
         spread=(("amplitude", "frequency"), r["spread"].reshape(shape), {"units": "1", "long_name": meaning})
     )

@@ -10,7 +10,6 @@ TOGETHER = 10  # periods that may be taken as one, so that they fit
 NEAR = 1e-3  # relative distance of a frequency from that which is asked for, within which fewer periods are preferred
 EXACT = 1e-9  # the same, below which it counts as that which is asked for
 SAMPLES = 256  # a period, at least, of what is looked at
-CORNERS = 2048  # the same of a sine that is made of straight lines
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,7 @@ class Window:
         return np.asarray(2.0 * np.pi * (np.mod(self.periods * offsets, self.ticks) / self.ticks))
 
 
-def fitting(frequency: float, tick: float, frame: int, samples: int = SAMPLES) -> Window:
+def fitting(frequency: float, tick: float, frame: int) -> Window:
     """The window of the frequency that is nearest.
 
     Parameters
@@ -64,11 +63,9 @@ def fitting(frequency: float, tick: float, frame: int, samples: int = SAMPLES) -
         Base tick [s].
     frame
         In ticks.
-    samples
-        Of a period, at least.
     """
     length = 1.0 / (frequency * frame * tick)  # of a period, in frames
-    every = max(int(length / samples), 1)  # frames from sample to sample
+    every = max(int(length / SAMPLES), 1)  # frames from sample to sample
 
     def off(k: int, unit: int = 1) -> tuple[int, float]:
         """Frames for k periods, and how far the frequency is off then."""
@@ -82,8 +79,8 @@ def fitting(frequency: float, tick: float, frame: int, samples: int = SAMPLES) -
     k = k or next((k for k in range(1, TOGETHER + 1) if off(k)[1] <= NEAR), 0)
     k = k or min(range(1, TOGETHER + 1), key=lambda k: off(k)[1])
     frames = off(k)[0]
-    if frames >= samples * k:
+    if frames >= SAMPLES * k:
         every = next(q for q in range(every, 0, -1) if frames % q == 0)
         return Window(frequency, tick, frame, k, frames, every * frame, 1)
-    points = -(-samples * k // (frames * frame))
+    points = -(-SAMPLES * k // (frames * frame))
     return Window(frequency, tick, frame, k, frames, 1, points)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, overload
 
@@ -94,6 +94,9 @@ class Simulation:
     >>> ring.advance(1e-3, m1_command=0.4, m2_command=-0.4)           # doctest: +SKIP
     """
 
+    _sines: Mapping[str, tuple[float, float]] = {}
+    """amplitude and frequency [Hz] of sines that act on inputs beside what `advance` gives, from t = 0 on"""
+
     @checked
     def __init__(
         self,
@@ -131,7 +134,7 @@ class Simulation:
         else:
             self._drive = drive_of(drive)
             core = scenario.core() if isinstance(scenario, Scenario) else self._drive.core()
-            self._core = _core.Simulation(core, step, self._control)
+            self._core = _core.Simulation(core, step, self._control, self._acting_always(("command", "load_torque")))
             self._derived = {"efficiency": self._efficiency, "motor_power": self._motor_power}
             self._initial = drive.start() if isinstance(drive, Scenario) else Initial()
         self._add_signals(scenario)
@@ -185,8 +188,8 @@ class Simulation:
         scenario = what if isinstance(what, TrainScenario) else None
         core = train.core(shafts) if scenario is None else scenario.core(loaded=shafts)
         self._drive, self._scenario, self._core_train = train, scenario, core
-        self._core = _core.TrainSimulation(core, step, self._control)
         self._input_places = {name: k for k, name in enumerate(core.input_names())}
+        self._core = _core.TrainSimulation(core, step, self._control, self._acting_always(core.input_names()))
         self._loaded = tuple(shafts)
         given = {f"{name}_load_torque" for name in shafts} | self._controlled()
         self._required = {name for name in core.input_names() if name not in given}
@@ -352,6 +355,10 @@ class Simulation:
     def _exchanging(control: Bound) -> Bound:
         """The controllers, as often as they exchange torque and speed with the mechanics."""
         return control
+
+    def _acting_always(self, names: Sequence[str]) -> list[tuple[int, float, float, float]]:
+        """The sines by the numbers of their inputs, with a phase of 0."""
+        return [(k, *self._sines[name], 0.0) for k, name in enumerate(names) if name in self._sines]
 
     def _step(self, *values: Any) -> None:
         before = None if self._bound is None else self._bound.coarse.state
