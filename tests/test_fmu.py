@@ -1,6 +1,7 @@
 """FMUs under FMPy: valid, the same bits as step by step in Python, state and rollback, parameters and errors."""
 
 import math
+import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
@@ -237,6 +238,58 @@ def test_what_is_wrong_is_said_in_the_words_of_the_project(drive: Slave) -> None
         drive.fmu.doStep(0.5, 1e-3)
     assert drive.said[-1] == "the communication point is 0.500000 s, but the FMU is at 0.000000 s"
     drive.step(1e-3, command=(0.1, 0.1))
+
+
+# Instantiates the FMU of a directory with resources that are cut and changed at random; prints how many it refused.
+DAMAGED = """
+import random, sys
+from pathlib import Path
+from fmpy import fmi2
+
+directory, guid = Path(sys.argv[1]), sys.argv[2]
+said = []
+log = fmi2.fmi2CallbackLoggerTYPE(lambda *words: said.append(words[-1].decode(errors="replace")))
+callbacks = fmi2.fmi2CallbackFunctions()
+callbacks.logger = log
+callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+fmu = fmi2.FMU2Slave(guid=guid, unzipDirectory=str(directory), modelIdentifier="lostmotion", instanceName="drive")
+random.seed(1)
+refused = 0
+for name in ("names.txt", "scenario.bin"):
+    file = directory / "resources" / name
+    whole = file.read_bytes()
+    cuts = [whole[:n] for n in range(0, len(whole), 1 if name == "names.txt" else 97)]
+    changed = []
+    for _ in range(400):
+        some = bytearray(whole)
+        for _ in range(random.randint(1, 4)):
+            some[random.randrange(len(some))] = random.randrange(256)
+        changed.append(bytes(some))
+    for content in (*cuts, *changed):
+        file.write_bytes(content)
+        before = len(said)
+        try:
+            fmu.instantiate(callbacks=callbacks)
+        except Exception:
+            refused += 1
+            assert len(said) > before and said[-1], content
+        else:
+            fmu.freeInstance()
+            fmu = fmi2.FMU2Slave(guid=guid, unzipDirectory=str(directory), modelIdentifier="lostmotion", instanceName="drive")
+    file.write_bytes(whole)
+fmu.instantiate(callbacks=callbacks)
+print(refused)
+"""
+
+
+def test_damaged_resources_are_refused_and_never_crash(paper: Path, tmp_path: Path) -> None:
+    fmpy.extract(str(paper), unzipdir=str(tmp_path))
+    guid = fmpy.read_model_description(str(paper)).guid
+    words = [sys.executable, "-c", DAMAGED, str(tmp_path), guid]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 1000
 
 
 def test_a_jam_ends_in_an_error_with_the_sentence_of_python(tmp_path: Path, monkeypatch: Any) -> None:

@@ -42,7 +42,7 @@ struct Variables {
         const auto word = [&](char end) {
             const std::size_t to = std::min(text.find(end, at), text.size());
             const std::string found = text.substr(at, to - at);
-            at = to + 1;
+            at = std::min(to + 1, text.size());
             return found;
         };
         identifier = word('\n');
