@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import json
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -39,12 +41,17 @@ def content(page: str, name: str) -> str:
     return re.search(rf'<script [^>]*id="{name}">(.*?)</script>', page, re.S).group(1)  # type: ignore[union-attr]
 
 
+def description(page: str) -> Any:
+    """That the page unpacks."""
+    return json.loads(gzip.decompress(base64.b64decode(content(page, "description"))))
+
+
 @pytest.mark.usefixtures("built")
 def test_the_page_holds_the_core_and_the_scenario() -> None:
     scenario = lm.load("paper-2dof-nl-small", SHORT)
     page = live_page.page(scenario, "drive")
     assert base64.b64decode(content(page, "core")) == b"\x1f\x8bdrive"
-    described = json.loads(content(page, "description"))
+    described = description(page)
     assert described["title"] == scenario.title
     assert lm.Scenario(**described["scenario"]) == scenario
 
@@ -96,7 +103,7 @@ def test_what_follows_a_target_cannot_be_changed() -> None:
 def test_no_title_ends_the_script_that_holds_it() -> None:
     title = '</script><script>alert("1")</script><!--'
     page = live_page.page(lm.load("paper-2dof-nl-small", SHORT).replace(title=title))
-    assert json.loads(content(page, "description"))["title"] == title
+    assert description(page)["title"] == title
     assert page.count("<script") == SOURCE.count("<script")
 
 
@@ -164,10 +171,7 @@ def test_the_command_writes_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyP
     done = run(app, ["live", "paper-2dof-nl-small", "--set", "simulation.duration=0.1"])
     assert done.output.endswith("Page written to paper-2dof-nl-small.html\n")
     assert opened == [(tmp_path / "paper-2dof-nl-small.html").as_uri()]
-    assert (
-        json.loads(content((tmp_path / "paper-2dof-nl-small.html").read_text(), "description"))["name"]
-        == "paper-2dof-nl-small"
-    )
+    assert description((tmp_path / "paper-2dof-nl-small.html").read_text())["name"] == "paper-2dof-nl-small"
     run(app, ["live", "paper-2dof-nl-small", "-o", "a.html", "--no-open"])
     assert len(opened) == 1
     refused = run(app, ["live", "paper-2dof-nl-small", "-o", "a.pdf"])

@@ -1,5 +1,6 @@
 /** What Python writes into the page: what the core takes, what is drawn, and what can be changed. All values in SI. */
 import type { CoreInput } from "./core_input";
+import { unpacked } from "./wasm";
 
 export interface Description {
   name: string;
@@ -103,7 +104,6 @@ export interface Table {
 }
 
 /** The description in the page. */
-export function read(document: Document): Description {
-  const text = document.getElementById("description")?.textContent ?? "";
-  return JSON.parse(text) as Description;
+export async function read(document: Document): Promise<Description> {
+  return JSON.parse(new TextDecoder().decode(await unpacked(document, "description"))) as Description;
 }

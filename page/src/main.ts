@@ -19,7 +19,7 @@ import { StandCard } from "./stand_card";
 import { Strip } from "./strip";
 import { TimeCharts } from "./time_charts";
 import { format } from "./units";
-import { coreBytes } from "./wasm";
+import { unpacked } from "./wasm";
 
 const LONG = 8; // ms of a run from which on the next one is worked out beside the page, which then goes on moving
 
@@ -181,7 +181,7 @@ function tell(changes: Changes, { scenario }: Description): void {
   if (parent !== window) parent.postMessage({ lostmotion: { values: Object.fromEntries(changes), scenario } }, "*");
 }
 
-const bytes = await coreBytes(document);
-new Page(await Core.load(bytes), read(document), bytes);
+const [bytes, description] = await Promise.all([unpacked(document, "core"), read(document)]);
+new Page(await Core.load(bytes), description, bytes);
 // The charts are drawn with the first frame; the second begins when that is shown.
 requestAnimationFrame(() => requestAnimationFrame(() => performance.mark("first-plot")));

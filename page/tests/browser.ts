@@ -25,11 +25,14 @@ export function launch(): Promise<Browser> {
 function script(file: string, id: string): string {
   return new RegExp(`<script [^>]*id="${id}">(.*?)</script>`, "s").exec(readFileSync(file, "utf-8"))![1]!;
 }
+function unpacked(file: string, id: string): Buffer<ArrayBuffer> {
+  return Buffer.from(gunzipSync(Buffer.from(script(file, id), "base64")));
+}
 export function coreOf(file: string): Buffer<ArrayBuffer> {
-  return Buffer.from(gunzipSync(Buffer.from(script(file, "core"), "base64")));
+  return unpacked(file, "core");
 }
 export function descriptionOf(file: string): Description {
-  return JSON.parse(script(file, "description")) as Description;
+  return JSON.parse(unpacked(file, "description").toString("utf-8")) as Description;
 }
 
 export interface Expected {

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import json
 from pathlib import Path
-from typing import Any
 
 from ..atomic_writer import write_bytes
 from ..errors import InputError
@@ -41,7 +41,9 @@ def page(scenario: Scenario | TrainScenario, name: str = "drive") -> str:
     for part in (TEMPLATE, core):
         if not part.is_file():
             raise InputError(f"{part}: is missing, since the live page is not built; run `make page`, which needs node")
-    places = {"CORE": base64.b64encode(core.read_bytes()).decode(), "DESCRIPTION": _as_script(describe(scenario, name))}
+    described = json.dumps(describe(scenario, name), ensure_ascii=False, allow_nan=False).encode()
+    packed = {"CORE": core.read_bytes(), "DESCRIPTION": gzip.compress(described, 9, mtime=0)}
+    places = {place: base64.b64encode(content).decode() for place, content in packed.items()}
     text = TEMPLATE.read_text(encoding="utf-8")
     for place, content in places.items():
         before, found, after = text.partition(f'">\n      {place}\n')
@@ -59,8 +61,3 @@ def write_page(path: Path, scenario: Scenario | TrainScenario) -> None:
     InputError
     """
     write_bytes(path, page(scenario, path.stem).encode())
-
-
-def _as_script(data: Any) -> str:
-    """JSON that may stand in a script element: what could end it is written as an escape."""
-    return json.dumps(data, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
