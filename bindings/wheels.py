@@ -21,7 +21,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import nanobind
-from c.build import CORE_FLAGS, KERNEL_SOURCES, PLATFORMS, ROOT, fmu, objects, zig
+from c.build import CORE_FLAGS, KERNELS, PLATFORMS, ROOT, fmu, objects, zig
 
 HERE = Path(__file__).resolve().parent
 BUILD = ROOT / "build" / "wheels"
@@ -133,7 +133,9 @@ def compiled(sources: Sequence[Path], platform: Platform, cpu: str, directory: P
     """Object files for a platform and its processors."""
     position = [] if platform.system == "windows" else ["-fPIC"]
     target = ["-target", platform.target, f"-mcpu={cpu}", *position]
-    return objects(sources, target, "-O3", BUILD / platform.name / directory, (*CORE_FLAGS, *flags))
+    return objects(
+        [[source] for source in sources], target, "-O3", BUILD / platform.name / directory, (*CORE_FLAGS, *flags)
+    )
 
 
 @cache
@@ -171,7 +173,7 @@ def extensions(platform: Platform, python: Python, to: Path) -> None:
     extension(platform, python, "_instruction_set", [*chooser, *nano], to)
     for build, cpu in BUILDS[platform.processor].items():
         name = f"_core_{build}"
-        kernels = compiled(list(KERNEL_SOURCES.values()), platform, cpu, Path(build))
+        kernels = compiled(list(KERNELS.values()), platform, cpu, Path(build))
         own = compiled([HERE / "module.cpp"], platform, cpu, Path(python.tag) / build, *flags, f"-DCORE_MODULE={name}")
         extension(platform, python, name, [*own, *kernels, *nano], to)
 

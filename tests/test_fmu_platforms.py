@@ -32,8 +32,17 @@ RUNNERS: dict[str, tuple[str, list[str] | None]] = {
     ),
     "x86_64-windows": ("x86_64-windows-gnu", [WINE] if WINE else None),
 }
-SCENARIOS = ("paper-2dof-nl-small", "position-axis", "worm-lowering", "belt-before-gearbox", "two-motors-one-ring")
 STEPS, INTERVAL = 200, 1e-3
+
+
+def scenarios() -> list[str]:
+    """All that are shipped, but for those whose references follow a target: they are numpy's, which is not equal on all processors."""
+    shipped = {name: lm.load(name) for name in lm.shipped_scenarios()}
+    return [
+        name
+        for name, scenario in shipped.items()
+        if not any(getattr(c.reference, "target", None) for c in scenario.axes().values())
+    ]
 
 
 def built_driver(platform: str, to: Path) -> Path:
@@ -71,13 +80,13 @@ def test_other_platforms_give_the_bits_of_python(platform: str, tmp_path: Path, 
     pytest.importorskip("ziglang", reason="ziglang is missing: .venv/bin/pip install --group portable")
     fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
     runner = RUNNERS[platform][1]
-    if not list((BUILT / platform).glob("lostmotion.*")):
+    if not list((BUILT / platform).glob("drive.*")):
         pytest.skip(f"`make fmu` has not built the library for {platform}")
     if runner is None:
         pytest.skip(f"nothing here runs programs for {platform}")
     monkeypatch.setattr(exporting, "parameters_of", lambda *_: Parameters((), {}))
     driver = built_driver(platform, tmp_path)
-    for name in SCENARIOS:
+    for name in scenarios():
         scenario = lm.load(name)
         path = tmp_path / f"{name}.fmu"
         lm.export_fmu(scenario, path, libraries=BUILT)

@@ -18,38 +18,38 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-KERNEL_SOURCES = {name: ROOT / "core" / "kernels" / f"{name}.cpp" for name in ("wide", "middle", "narrow")}
 # The longest to compile first.
-SOURCES = (
-    *KERNEL_SOURCES.values(),
-    *(HERE / f"{name}.cpp" for name in ("run", "simulation", "explanation", "scenario", "train", "freestanding")),
-)
+KERNELS = {name: ROOT / "core" / "kernels" / f"{name}.cpp" for name in ("wide", "middle", "narrow", "drive")}
+# Sources that are compiled as one, in less time and to less code.
+Group = Sequence[Path]
+INTERFACE = [HERE / f"{name}.cpp" for name in ("run", "simulation", "explanation", "scenario", "train", "freestanding")]
 CORE_FLAGS = (
     *("-std=gnu++20", "-g0", "-fvisibility=hidden", "-fno-sanitize=all", f"-I{ROOT / 'core'}"),
     *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
 )
 FLAGS = (*CORE_FLAGS, "-fno-exceptions", "-fno-rtti")
-# Of an FMU: no runs in one go.
-FMU_SOURCES = (
-    *(s for s in SOURCES if s.stem not in ("run", "explanation")),
-    HERE.parent / "fmu" / "fmi2.cpp",
-    HERE.parent / "fmu" / "fmi3.cpp",
-)
+# Of an FMU, beside the kernel of its drive or train: no runs in one go.
+FMU_SOURCES = [
+    *(s for s in INTERFACE if s.stem in ("simulation", "scenario", "freestanding")),
+    *(HERE.parent / "fmu" / f"{name}.cpp" for name in ("fmi2", "fmi3")),
+]
+# Each FMU and each platform adds to its size: no functions but those of FMI, no tables for exceptions.
+FMU_FLAGS = (*FLAGS, "-DLM_API=", "-ffunction-sections", "-fdata-sections", "-fno-asynchronous-unwind-tables")
 # Of a live page, beside the kernel of its drive: nothing else.
-PAGE_SOURCES = tuple(s for s in SOURCES if s.stem in ("run", "explanation", "scenario", "freestanding"))
-KERNELS = ("drive", *KERNEL_SOURCES)
-# The oldest C library that the libraries for Linux need, and the names of the libraries.
+PAGE_SOURCES = [s for s in INTERFACE if s.stem in ("run", "explanation", "scenario", "freestanding")]
+# With the oldest C library that the libraries for Linux need, and the extension of their names.
 PLATFORMS = {
-    "x86_64-linux": ("x86_64-linux-gnu.2.17", "lostmotion.so"),
-    "aarch64-linux": ("aarch64-linux-gnu.2.17", "lostmotion.so"),
-    "x86_64-windows": ("x86_64-windows-gnu", "lostmotion.dll"),
-    "aarch64-windows": ("aarch64-windows-gnu", "lostmotion.dll"),
-    "x86_64-darwin": ("x86_64-macos", "lostmotion.dylib"),
-    "aarch64-darwin": ("aarch64-macos", "lostmotion.dylib"),
+    "x86_64-linux": ("x86_64-linux-gnu.2.17", ".so"),
+    "aarch64-linux": ("aarch64-linux-gnu.2.17", ".so"),
+    "x86_64-windows": ("x86_64-windows-gnu", ".dll"),
+    "aarch64-windows": ("aarch64-windows-gnu", ".dll"),
+    "x86_64-darwin": ("x86_64-macos", ".dylib"),
+    "aarch64-darwin": ("aarch64-macos", ".dylib"),
 }
 WASM = ("-target", "wasm32-wasi", "-msimd128")
 STACK = 1 << 20
@@ -69,25 +69,29 @@ def zig(command: str, *arguments: str | Path) -> None:
     subprocess.run(words, env=environment, check=True)
 
 
-def objects(
-    sources: Sequence[Path], target: Sequence[str], optimisation: str, directory: Path, flags: Sequence[str] = FLAGS
-) -> list[Path]:
-    """The object files of some sources, those compiled anew that are older than the core."""
+def compiled(
+    group: Group, target: Sequence[str], optimisation: str, directory: Path, flags: Sequence[str] = FLAGS
+) -> Path:
+    """The object file of a group, named after the last of it, compiled anew if it is older than the core."""
     directory.mkdir(parents=True, exist_ok=True)
-    made = [directory / f"{source.stem}.o" for source in sources]
-    latest = newest(sources)
-    old = [(s, o) for s, o in zip(sources, made, strict=True) if not o.exists() or o.stat().st_mtime < latest]
-
-    def compiled(pair: tuple[Path, Path]) -> None:
-        source, to = pair
-        unfinished = to.with_suffix(".unfinished.o")
-        zig("c++", "-c", *target, *flags, optimisation, source, "-o", unfinished)
-        unfinished.replace(to)
-        os.utime(to, (latest, latest))  # what is edited in the meantime is newer
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(compiled, old))
+    *before, last = group
+    made, latest = directory / f"{last.stem}.o", newest(group)
+    if made.exists() and made.stat().st_mtime >= latest:
+        return made
+    unfinished = made.with_suffix(".unfinished.o")
+    included = [word for source in before for word in ("-include", source)]
+    zig("c++", "-c", *target, *flags, optimisation, *included, last, "-o", unfinished)
+    unfinished.replace(made)
+    os.utime(made, (latest, latest))  # what is edited in the meantime is newer
     return made
+
+
+def objects(
+    groups: Sequence[Group], target: Sequence[str], optimisation: str, directory: Path, flags: Sequence[str] = FLAGS
+) -> list[Path]:
+    """The object files of some groups."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(lambda group: compiled(group, target, optimisation, directory, flags), groups))
 
 
 def linked(to: Path, made: Sequence[Path], *exports: str) -> None:
@@ -103,7 +107,8 @@ def wasm(to: Path, optimisation: str = "-O3") -> Path:
     to.parent.mkdir(parents=True, exist_ok=True)
     with (to.parent / f".{to.name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
-        made = objects(SOURCES, WASM, optimisation, to.parent / f"{to.stem}-objects")
+        groups = [*([kernel] for kernel in KERNELS.values()), INTERFACE]
+        made = objects(groups, WASM, optimisation, to.parent / f"{to.stem}-objects")
         if not to.exists() or to.stat().st_mtime < max(o.stat().st_mtime for o in made):
             linked(to, made, "--export=malloc", "--export=free", "--export-dynamic")
     return to
@@ -122,36 +127,50 @@ def page_core(kernel: str, optimisation: str = "-O3") -> Path:
     to = directory / "core.wasm"
     with (directory / ".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
-        sources = (KERNEL_SOURCES[kernel], *PAGE_SOURCES) if kernel in KERNEL_SOURCES else PAGE_SOURCES
-        made = objects(sources, (*WASM, f"-DLOSTMOTION_KERNEL={kernel}"), optimisation, directory)
+        # For size, but for what solves: of drives that is compiled where it is called.
+        fast = [KERNELS[kernel], *(s for s in PAGE_SOURCES if kernel == "drive" and s.stem == "run")]
+        target = (*WASM, f"-DLOSTMOTION_KERNEL={kernel}")
+        made = [
+            compiled(fast, target, optimisation, directory),
+            compiled([s for s in PAGE_SOURCES if s not in fast], target, "-Oz", directory),
+        ]
         calls = ROOT / "page" / "src" / "core.ts"
         if not to.exists() or to.stat().st_mtime < max(p.stat().st_mtime for p in (*made, calls)):
             linked(to, made, *(f"--export={name}" for name in called_by_page()))
     return to
 
 
-def page(to: Path, optimisation: str = "-O3", kernels: Sequence[str] = KERNELS) -> None:
+def page(to: Path, optimisation: str = "-O3", kernels: Sequence[str] = tuple(KERNELS)) -> None:
     """The cores of live pages as these carry them, KERNEL.wasm.gz."""
-    for kernel in kernels:
-        packed = gzip.compress(page_core(kernel, optimisation).read_bytes(), 9, mtime=0)
-        (to / f"{kernel}.wasm.gz").write_bytes(packed)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for kernel, core in zip(kernels, pool.map(lambda k: page_core(k, optimisation), kernels), strict=True):
+            (to / f"{kernel}.wasm.gz").write_bytes(gzip.compress(core.read_bytes(), 9, mtime=0))
+
+
+def fmu_library(to: Path, platform: str, kernel: str, optimisation: str = "-O2") -> None:
+    """The library of FMUs for a platform and a kernel: the kernel for speed, the rest for size."""
+    target, extension = PLATFORMS[platform]
+    library = to / platform / f"{kernel}{extension}"
+    library.parent.mkdir(parents=True, exist_ok=True)
+    arguments = ["-target", target, "-mcpu=baseline", *([] if "windows" in platform else ["-fPIC"])]
+    flags, directory = (*FMU_FLAGS, f"-DLOSTMOTION_KERNEL={kernel}"), ROOT / "build" / "fmu" / platform / kernel
+    made = [
+        compiled([KERNELS[kernel]], arguments, optimisation, directory, flags),
+        compiled(FMU_SOURCES, arguments, "-Oz", directory, flags),
+    ]
+    unfinished = library.with_suffix(".unfinished")
+    whole = {"linux": ["-Wl,-z,defs", "-Wl,--gc-sections"], "darwin": ["-Wl,-dead_strip"]}
+    zig("cc", *arguments, "-shared", "-s", *whole.get(platform.partition("-")[2], []), *made, "-o", unfinished)
+    unfinished.replace(library)
+    for spare in library.parent.glob("*.lib"):  # the linker for Windows writes an import library beside it
+        spare.unlink()
+    print(library, library.stat().st_size)
 
 
 def fmu(to: Path, optimisation: str = "-O2", platforms: Sequence[str] = tuple(PLATFORMS)) -> None:
-    """The libraries of FMUs, each in a directory named after its platform."""
-    for platform in platforms:
-        target, name = PLATFORMS[platform]
-        library = to / platform / name
-        library.parent.mkdir(parents=True, exist_ok=True)
-        arguments = ["-target", target, "-mcpu=baseline"] + ([] if "windows" in platform else ["-fPIC"])
-        made = objects(FMU_SOURCES, arguments, optimisation, ROOT / "build" / "fmu" / platform)
-        unfinished = library.with_suffix(".unfinished")
-        whole = ["-Wl,-z,defs"] if "linux" in platform else []  # elsewhere a missing symbol ends the linking anyway
-        zig("cc", *arguments, "-shared", "-s", *whole, *made, "-o", unfinished)
-        unfinished.replace(library)
-        for spare in library.parent.glob("*.lib"):  # the linker for Windows writes an import library beside it
-            spare.unlink()
-        print(library, library.stat().st_size)
+    """The libraries of FMUs, KERNEL.so or alike, each in a directory named after its platform."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(lambda of: fmu_library(to, *of, optimisation), product(platforms, KERNELS)))
 
 
 def main() -> None:

@@ -35,6 +35,7 @@ _LIBCPP_BEGIN_NAMESPACE_STD
 void __libcpp_verbose_abort(const char*, ...) noexcept { __builtin_trap(); }
 
 template class basic_string<char>;
+template string operator+(const char*, const string&);
 
 template <class Number>
 static string printed(const char* format, Number value) {

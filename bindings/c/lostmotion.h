@@ -18,10 +18,13 @@
 extern "C" {
 #endif
 
+/* Defined as nothing, where a library keeps the functions to itself. */
+#ifndef LM_API
 #if defined _WIN32
 #define LM_API __declspec(dllexport)
 #else
 #define LM_API __attribute__((visibility("default")))
+#endif
 #endif
 
 /* Rises with every change that a caller has to know of. */

@@ -4,8 +4,7 @@
 
 #include "component.hpp"
 
-namespace lm = lostmotion::fmu;
-
+namespace lostmotion::fmi2 {
 namespace {
 
 using Boolean = int;
@@ -36,7 +35,7 @@ struct Logger {
         callbacks.log(callbacks.environment, name.c_str(), status, category, as_format(sentence).c_str());
     }
 };
-using Component = lm::Component<Logger>;
+using Component = fmu::Component<Logger>;
 Component& of(void* component) { return *static_cast<Component*>(component); }
 
 // Of fmi2NewDiscreteStates.
@@ -49,26 +48,26 @@ struct EventInfo {
 
 FMU_API const char* fmi2GetTypesPlatform() { return "default"; }
 FMU_API const char* fmi2GetVersion() { return "2.0"; }
-FMU_API int fmi2SetDebugLogging(void*, Boolean, std::size_t, const char* const*) { return lm::ok; }
+FMU_API int fmi2SetDebugLogging(void*, Boolean, std::size_t, const char* const*) { return fmu::ok; }
 
 FMU_API void* fmi2Instantiate(const char* name, int type, const char* guid, const char* resources,
                               const Callbacks* callbacks, Boolean, Boolean) {
     if (callbacks == nullptr || name == nullptr) return nullptr;
     return Component::made({name, *callbacks}, guid, "identifier", resources,
-                           type == 0 ? lm::Kind::model_exchange : lm::Kind::co_simulation);
+                           type == 0 ? fmu::Kind::model_exchange : fmu::Kind::co_simulation);
 }
 FMU_API void fmi2FreeInstance(void* c) { delete static_cast<Component*>(c); }
 
 FMU_API int fmi2SetupExperiment(void* c, Boolean, double, double start, Boolean, double) {
     of(c).instance.set_start_time(start);
-    return lm::ok;
+    return fmu::ok;
 }
-FMU_API int fmi2EnterInitializationMode(void*) { return lm::ok; }
+FMU_API int fmi2EnterInitializationMode(void*) { return fmu::ok; }
 FMU_API int fmi2ExitInitializationMode(void* c) {
     of(c).instance.exit_initialization();
-    return lm::ok;
+    return fmu::ok;
 }
-FMU_API int fmi2Terminate(void*) { return lm::ok; }
+FMU_API int fmi2Terminate(void*) { return fmu::ok; }
 FMU_API int fmi2Reset(void* c) { return of(c).ended(of(c).instance.reset()); }
 
 FMU_API int fmi2GetReal(void* c, const Reference* r, std::size_t n, double* value) {
@@ -90,7 +89,7 @@ FMU_API int fmi2SetFMUstate(void* c, void* state) { return of(c).set_state(state
 FMU_API int fmi2FreeFMUstate(void*, void** state) { return Component::free_state(state); }
 FMU_API int fmi2SerializedFMUstateSize(void*, void* state, std::size_t* size) {
     *size = Component::size_of(state);
-    return lm::ok;
+    return fmu::ok;
 }
 FMU_API int fmi2SerializeFMUstate(void* c, void* state, char* bytes, std::size_t size) {
     return of(c).serialize(state, bytes, size);
@@ -106,9 +105,9 @@ FMU_API int fmi2GetDirectionalDerivative(void* c, const Reference* unknown, std:
 FMU_API int fmi2SetRealInputDerivatives(void* c, const Reference* r, std::size_t n, const int* order,
                                         const double* value) {
     for (std::size_t k = 0; k < n; ++k)
-        if (const lm::Ended e = of(c).instance.set_input_rate(r[k], order[k], value[k]); e != lm::ok)
+        if (const fmu::Ended e = of(c).instance.set_input_rate(r[k], order[k], value[k]); e != fmu::ok)
             return of(c).ended(e);
-    return lm::ok;
+    return fmu::ok;
 }
 FMU_API int fmi2GetRealOutputDerivatives(void* c, const Reference*, std::size_t n, const int*, double*) {
     return of(c).none(n, "derivatives of outputs are not given");
@@ -118,32 +117,32 @@ FMU_API int fmi2DoStep(void* c, double from, double interval, Boolean) {
     return of(c).ended(of(c).instance.step(from, interval));
 }
 FMU_API int fmi2CancelStep(void* c) { return of(c).failed("no step is under way: steps are done when they return"); }
-FMU_API int fmi2GetStatus(void*, int, int*) { return lm::discard; }
+FMU_API int fmi2GetStatus(void*, int, int*) { return fmu::discard; }
 FMU_API int fmi2GetRealStatus(void* c, int kind, double* value) {
-    if (kind != 2) return lm::discard;  // the last successful time
-    return of(c).ended(of(c).instance.get(lm::time_reference, *value));
+    if (kind != 2) return fmu::discard;  // the last successful time
+    return of(c).ended(of(c).instance.get(fmu::time_reference, *value));
 }
-FMU_API int fmi2GetIntegerStatus(void*, int, int*) { return lm::discard; }
+FMU_API int fmi2GetIntegerStatus(void*, int, int*) { return fmu::discard; }
 FMU_API int fmi2GetBooleanStatus(void*, int kind, Boolean* value) {
-    if (kind != 3) return lm::discard;  // terminated
+    if (kind != 3) return fmu::discard;  // terminated
     *value = 0;
-    return lm::ok;
+    return fmu::ok;
 }
-FMU_API int fmi2GetStringStatus(void*, int, const char**) { return lm::discard; }
+FMU_API int fmi2GetStringStatus(void*, int, const char**) { return fmu::discard; }
 
 // --- Model Exchange ---
 
-FMU_API int fmi2EnterEventMode(void*) { return lm::ok; }
+FMU_API int fmi2EnterEventMode(void*) { return fmu::ok; }
 FMU_API int fmi2NewDiscreteStates(void* c, EventInfo* info) {
-    lm::Instance::Settled settled;
-    const lm::Ended e = of(c).instance.settle(settled);
+    fmu::Instance::Settled settled;
+    const fmu::Ended e = of(c).instance.settle(settled);
     *info = {0, 0, 0, settled.states_changed, settled.has_next, settled.next};
     return of(c).ended(e);
 }
-FMU_API int fmi2EnterContinuousTimeMode(void*) { return lm::ok; }
+FMU_API int fmi2EnterContinuousTimeMode(void*) { return fmu::ok; }
 FMU_API int fmi2CompletedIntegratorStep(void* c, Boolean, Boolean* enter_event_mode, Boolean* terminate) {
     bool event = false;
-    const lm::Ended e = of(c).instance.accept(event);
+    const fmu::Ended e = of(c).instance.accept(event);
     *enter_event_mode = event;
     *terminate = 0;
     return of(c).ended(e);
@@ -164,3 +163,5 @@ FMU_API int fmi2GetEventIndicators(void* c, double* out, std::size_t n) {
 FMU_API int fmi2GetNominalsOfContinuousStates(void* c, double* out, std::size_t n) {
     return of(c).get_nominals(out, n);
 }
+
+}  // namespace lostmotion::fmi2

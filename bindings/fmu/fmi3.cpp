@@ -5,8 +5,7 @@
 
 #include "component.hpp"
 
-namespace lm = lostmotion::fmu;
-
+namespace lostmotion::fmi3 {
 namespace {
 
 using Reference = unsigned int;
@@ -20,47 +19,47 @@ struct Logger {
         if (log != nullptr) log(environment, status, category, sentence.c_str());
     }
 };
-using Component = lm::Component<Logger>;
+using Component = fmu::Component<Logger>;
 Component& of(void* component) { return *static_cast<Component*>(component); }
 
-void* instantiate(const char* token, const char* resources, void* environment, Log log, lm::Kind kind) {
+void* instantiate(const char* token, const char* resources, void* environment, Log log, fmu::Kind kind) {
     return Component::made({log, environment}, token, "token", resources, kind);
 }
 
 }  // namespace
 
 FMU_API const char* fmi3GetVersion() { return "3.0"; }
-FMU_API int fmi3SetDebugLogging(void*, bool, std::size_t, const char* const*) { return lm::ok; }
+FMU_API int fmi3SetDebugLogging(void*, bool, std::size_t, const char* const*) { return fmu::ok; }
 
 FMU_API void* fmi3InstantiateModelExchange(const char*, const char* token, const char* resources, bool, bool,
                                            void* environment, Log log) {
-    return instantiate(token, resources, environment, log, lm::Kind::model_exchange);
+    return instantiate(token, resources, environment, log, fmu::Kind::model_exchange);
 }
 FMU_API void* fmi3InstantiateCoSimulation(const char*, const char* token, const char* resources, bool, bool, bool, bool,
                                           const Reference*, std::size_t, void* environment, Log log, void*) {
-    return instantiate(token, resources, environment, log, lm::Kind::co_simulation);
+    return instantiate(token, resources, environment, log, fmu::Kind::co_simulation);
 }
 FMU_API void* fmi3InstantiateScheduledExecution(const char*, const char*, const char*, bool, bool, void* environment,
                                                 Log log, void*, void*, void*) {
     if (log != nullptr)
-        log(environment, lm::error, "logStatusError", "this FMU is for Co-Simulation and Model Exchange");
+        log(environment, fmu::error, "logStatusError", "this FMU is for Co-Simulation and Model Exchange");
     return nullptr;
 }
 FMU_API void fmi3FreeInstance(void* c) { delete static_cast<Component*>(c); }
 
 FMU_API int fmi3EnterInitializationMode(void* c, bool, double, double start, bool, double) {
     of(c).instance.set_start_time(start);
-    return lm::ok;
+    return fmu::ok;
 }
 FMU_API int fmi3ExitInitializationMode(void* c) {
     of(c).instance.exit_initialization();
-    return lm::ok;
+    return fmu::ok;
 }
-FMU_API int fmi3EnterEventMode(void*) { return lm::ok; }
-FMU_API int fmi3EnterStepMode(void*) { return lm::ok; }
-FMU_API int fmi3EnterConfigurationMode(void*) { return lm::ok; }
-FMU_API int fmi3ExitConfigurationMode(void*) { return lm::ok; }
-FMU_API int fmi3Terminate(void*) { return lm::ok; }
+FMU_API int fmi3EnterEventMode(void*) { return fmu::ok; }
+FMU_API int fmi3EnterStepMode(void*) { return fmu::ok; }
+FMU_API int fmi3EnterConfigurationMode(void*) { return fmu::ok; }
+FMU_API int fmi3ExitConfigurationMode(void*) { return fmu::ok; }
+FMU_API int fmi3Terminate(void*) { return fmu::ok; }
 FMU_API int fmi3Reset(void* c) { return of(c).ended(of(c).instance.reset()); }
 
 FMU_API int fmi3GetFloat64(void* c, const Reference* r, std::size_t n, double* value, std::size_t n_values) {
@@ -127,7 +126,7 @@ FMU_API int fmi3SetFMUState(void* c, void* state) { return of(c).set_state(state
 FMU_API int fmi3FreeFMUState(void*, void** state) { return Component::free_state(state); }
 FMU_API int fmi3SerializedFMUStateSize(void*, void* state, std::size_t* size) {
     *size = Component::size_of(state);
-    return lm::ok;
+    return fmu::ok;
 }
 FMU_API int fmi3SerializeFMUState(void* c, void* state, std::uint8_t* bytes, std::size_t size) {
     return of(c).serialize(state, bytes, size);
@@ -154,7 +153,7 @@ FMU_API int fmi3GetOutputDerivatives(void* c, const Reference*, std::size_t n, c
 
 FMU_API int fmi3DoStep(void* c, double from, double interval, bool, bool* event, bool* terminate, bool* early,
                        double* last) {
-    const lm::Ended e = of(c).instance.step(from, interval);
+    const fmu::Ended e = of(c).instance.step(from, interval);
     *event = *terminate = *early = false;
     *last = of(c).instance.time();
     return of(c).ended(e);
@@ -162,18 +161,18 @@ FMU_API int fmi3DoStep(void* c, double from, double interval, bool, bool* event,
 
 // --- Model Exchange ---
 
-FMU_API int fmi3EvaluateDiscreteStates(void*) { return lm::ok; }
+FMU_API int fmi3EvaluateDiscreteStates(void*) { return fmu::ok; }
 FMU_API int fmi3UpdateDiscreteStates(void* c, bool* needed, bool* terminate, bool* nominals_changed,
                                      bool* states_changed, bool* next_defined, double* next) {
-    lm::Instance::Settled settled;
-    const lm::Ended e = of(c).instance.settle(settled);
+    fmu::Instance::Settled settled;
+    const fmu::Ended e = of(c).instance.settle(settled);
     *needed = *terminate = *nominals_changed = false;
     *states_changed = settled.states_changed;
     *next_defined = settled.has_next;
     *next = settled.next;
     return of(c).ended(e);
 }
-FMU_API int fmi3EnterContinuousTimeMode(void*) { return lm::ok; }
+FMU_API int fmi3EnterContinuousTimeMode(void*) { return fmu::ok; }
 FMU_API int fmi3CompletedIntegratorStep(void* c, bool, bool* enter_event_mode, bool* terminate) {
     *enter_event_mode = *terminate = false;
     return of(c).ended(of(c).instance.accept(*enter_event_mode));
@@ -196,9 +195,11 @@ FMU_API int fmi3GetNominalsOfContinuousStates(void* c, double* out, std::size_t 
 }
 FMU_API int fmi3GetNumberOfEventIndicators(void* c, std::size_t* n) {
     *n = of(c).instance.indicator_count();
-    return lm::ok;
+    return fmu::ok;
 }
 FMU_API int fmi3GetNumberOfContinuousStates(void* c, std::size_t* n) {
     *n = of(c).instance.state_count();
-    return lm::ok;
+    return fmu::ok;
 }
+
+}  // namespace lostmotion::fmi3

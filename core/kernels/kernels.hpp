@@ -1,5 +1,5 @@
-// What solves trains takes minutes to compile: each kernel in a file of its own, once for all that is built with the
-// same options.
+// What solves drives and trains takes minutes to compile: each kernel in a file of its own, once for all that is built
+// with the same options.
 #pragma once
 
 #include "lostmotion/simulation/hybrid.hpp"
@@ -21,6 +21,10 @@ namespace lostmotion {
     TEMPLATE class SimulationOf<model::TrainSystem<D>>;                                                                \
     TEMPLATE class TrainSimulationIn<D>;
 
+// Drives step by step; their runs are compiled where they are called.
+#define LOSTMOTION_DRIVE_KERNEL(TEMPLATE) TEMPLATE class SimulationOf<SwitchedDrive>;
+
+LOSTMOTION_DRIVE_KERNEL(extern template)
 LOSTMOTION_TRAIN_KERNEL(extern template, model::Narrow)
 LOSTMOTION_TRAIN_KERNEL(extern template, model::Middle)
 LOSTMOTION_TRAIN_KERNEL(extern template, model::Wide)

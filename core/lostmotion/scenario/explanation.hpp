@@ -72,9 +72,9 @@ inline Explanation of_train(const Scenario& s, double time) {
 // The scenario has passed its check; time is not negative.
 inline Explanation explain(const Scenario& s, double time) {
     if constexpr (holds(Kernel::drive))
-        if (s.form == Scenario::of_drive) return explanation::of_drive(s, time);
+        if (s.is_of_drive()) return explanation::of_drive(s, time);
     if constexpr (holds_trains)
-        if (s.form == Scenario::of_train) return explanation::of_train(s, time);
+        if (!s.is_of_drive()) return explanation::of_train(s, time);
     return {};
 }
 

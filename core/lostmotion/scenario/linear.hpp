@@ -78,12 +78,12 @@ inline Status directional_derivative(ScenarioSimulation& s, const double* states
     std::vector<double> dx(s.names().states.size()), du(s.solver_inputs());
     if (states != nullptr) std::copy_n(states, dx.size(), dx.begin());
     for (std::size_t k = 0; k < s.free_inputs() && inputs != nullptr; ++k) du[s.solver_input(k)] = inputs[k];
-    if (s.drive() != nullptr)
-        direction::of_drive(*s.drive(), dx.data(), du.data(), rates, variables);
-    else
-        s.train()->with([&](auto& in) {
+    s.with([&]<class S>(S& in) {
+        if constexpr (std::is_same_v<S, Simulation>)
+            direction::of_drive(in, dx.data(), du.data(), rates, variables);
+        else
             direction::of_train(*s.train(), in.point(), s.names().states, dx.data(), du.data(), rates, variables);
-        });
+    });
     if (variables == nullptr) return status;
     std::fill(variables + s.variables().first_shown(), variables + s.variables().size(), 0.0);
     std::vector<double> values(s.variables().size());

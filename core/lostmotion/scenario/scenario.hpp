@@ -22,6 +22,8 @@ struct Scenario {
     bool references_given = false;  // step by step, in the place of those of the controllers; not in descriptions
     double duration = 1.0, sample_interval = 1e-3;  // [s]
 
+    // Known beforehand in a build for one form alone, once it has passed `check_build`.
+    bool is_of_drive() const { return holds(Kernel::drive) && (!holds_trains || form == of_drive); }
     std::size_t samples() const { return static_cast<std::size_t>(duration / sample_interval * (1.0 + 1e-12)) + 1; }
 };
 
@@ -75,7 +77,7 @@ struct FreeInput {
 inline std::vector<FreeInput> free_inputs(const Scenario& s) {
     std::vector<std::string> names{"command", "load_torque"};
     std::vector<std::size_t> commands{0};
-    if (s.form == Scenario::of_train) {
+    if (!s.is_of_drive()) {
         const model::Assembly a(s.train);
         names = model::input_names(a);
         commands.clear();
@@ -108,7 +110,7 @@ inline std::string check(const Scenario& s) {
                                      std::to_string(wanted);
     };
     std::size_t motors = 1, shafts = 2, states = n_states, inputs = n_inputs, gears = 1;
-    if (s.form == Scenario::of_train) {
+    if (!s.is_of_drive()) {
         const TrainRun run(s.train);
         if (!run.error().empty()) return run.error();
         motors = s.train.motors.size();
@@ -130,12 +132,12 @@ inline std::string check(const Scenario& s) {
         if (turned[m]) return "two controllers turn the same motor";
         turned[m] = true;
         for (const model::LinearController& c : s.train.controllers)
-            if (s.form == Scenario::of_train && c.motor == axis.motor) return "two controllers turn the same motor";
-        const Motor& law = s.form == Scenario::of_train ? s.train.motors[m].law : s.drive.motor;
+            if (!s.is_of_drive() && c.motor == axis.motor) return "two controllers turn the same motor";
+        const Motor& law = !s.is_of_drive() ? s.train.motors[m].law : s.drive.motor;
         if (axis.law.field_orientation && law.kind != Motor::torque_source)
             return "a motor under field-oriented control must be a torque source";
     }
-    if (s.form == Scenario::of_train) {
+    if (!s.is_of_drive()) {
         const TrainRun run(s.train);
         if (std::string error = check_control(run.assembly(), s.control); !error.empty()) return error;
         return check_start(run.assembly(), s.start);

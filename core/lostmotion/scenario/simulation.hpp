@@ -56,10 +56,11 @@ class ScenarioSimulation {
  public:
     // The scenario has passed its check. It begins at its start.
     ScenarioSimulation(const Scenario& scenario, double step) : control_(scenario.control), variables_(scenario) {
-        if (scenario.form == Scenario::of_drive)
-            drive_ = std::make_unique<Simulation>(scenario.drive, step, control_);
-        else
+        if (scenario.is_of_drive()) {
+            if constexpr (holds(Kernel::drive)) drive_ = std::make_unique<Simulation>(scenario.drive, step, control_);
+        } else if constexpr (holds_trains) {
             train_ = std::make_unique<TrainSimulation>(scenario.train, step, control_);
+        }
         laws_ = control_.laws();
         name_all(scenario);
         reset(scenario.start, scenario.hysteresis_capacities);
@@ -83,38 +84,44 @@ class ScenarioSimulation {
     // use(simulation) with that of its kernel.
     template <class Use>
     decltype(auto) with(Use&& use) {
-        if (drive_) return use(*drive_);
-        return train_->with(use);
+        if constexpr (holds(Kernel::drive))
+            if (!holds_trains || drive_) return use(*drive_);
+        if constexpr (holds_trains) return train_->with(use);
     }
     template <class Use>
     decltype(auto) with(Use&& use) const {
-        if (drive_) return use(std::as_const(*drive_));
-        return std::as_const(*train_).with(use);
+        if constexpr (holds(Kernel::drive))
+            if (!holds_trains || drive_) return use(std::as_const(*drive_));
+        if constexpr (holds_trains) return std::as_const(*train_).with(use);
     }
     TrainSimulation* train() { return train_.get(); }
-    Simulation* drive() { return drive_.get(); }
 
     double time() const {
         return with([](const auto& s) { return s.time(); });
     }
     // Why a status is what it is, in words; empty if all is well.
     std::string text(Status status) const {
-        if (drive_) return status_text(status, drive_->time(), drive_->stopped_at());
-        return train_->with([&](const auto& s) {
-            return train_status_text(train_->assembly(), status, s.time(), s.stopped_at(), s.too_many_guards());
+        return with([&]<class S>(const S& s) {
+            if constexpr (std::is_same_v<S, Simulation>)
+                return status_text(status, s.time(), s.stopped_at());
+            else
+                return train_status_text(train_->assembly(), status, s.time(), s.stopped_at(), s.too_many_guards());
         });
     }
 
     // To t = 0, with the contacts still to be found. Returns what is wrong with the start, or nothing.
     std::string reset(std::span<const double> states, std::span<const double> capacities) {
-        if (drive_) {
-            Simulation::Snapshot start;
-            std::copy(states.begin(), states.end(), start.x.begin());
-            start.memory = {capacities[0], 0.0};
-            drive_->restore(start);
-            return "";
-        }
-        return train_->reset(train_start(states, capacities));
+        return with([&]<class S>(S& s) -> std::string {
+            if constexpr (std::is_same_v<S, Simulation>) {
+                Simulation::Snapshot start;
+                std::copy(states.begin(), states.end(), start.x.begin());
+                start.memory = {capacities[0], 0.0};
+                s.restore(start);
+                return "";
+            } else {
+                return train_->reset(train_start(states, capacities));
+            }
+        });
     }
     TrainStart train_start(std::span<const double> states, std::span<const double> capacities) const {
         return lostmotion::train_start(train_->assembly(), states, capacities);
@@ -127,8 +134,12 @@ class ScenarioSimulation {
             end_[free_[k]] = end[k];
         }
         set_references(begin, end, interval);
-        if (drive_) return drive_->advance(interval, begin_[0], end_[0], begin_[1], end_[1]);
-        return train_->advance(interval, begin_, end_);
+        return with([&]<class S>(S& s) {
+            InputsOf<typename S::D> first{}, last{};
+            std::copy(begin_.begin(), begin_.end(), first.begin());
+            std::copy(end_.begin(), end_.end(), last.begin());
+            return s.advance(interval, first, last);
+        });
     }
     // What acts at t = 0, for what is read before the first step.
     void hold(std::span<const double> inputs) {
@@ -197,13 +208,12 @@ class ScenarioSimulation {
     Status read(double* out) {
         const Status status = with([](auto& s) { return s.find_regime(); });
         if (status != Status::done) return status;
-        if (drive_) {
-            const Reading reading = drive_->reading();
-            std::copy(reading.value.begin(), reading.value.end(), out);
-        } else {
-            const std::vector<double> values = train_->with([](auto& s) { return s.values(); });
-            std::copy(values.begin(), values.end(), out);
-        }
+        with([&]<class S>(S& s) {
+            if constexpr (std::is_same_v<S, Simulation>)
+                std::ranges::copy(s.reading().value, out);
+            else
+                std::ranges::copy(s.values(), out);
+        });
         if (!laws_.empty()) with([&](const auto& in) { read_controllers(in.snapshot(), out); });
         variables_.derive(out, 1, 0);
         return status;
@@ -281,13 +291,12 @@ class ScenarioSimulation {
         }
         for (std::size_t a = 0; a < control_.axes.size() && scenario.references_given; ++a)
             name_reference(scenario, control_.axes[a]);
-        begin_.resize(scenario.form == Scenario::of_drive
-                          ? std::size_t{n_inputs}
-                          : static_cast<std::size_t>(train_->assembly().layout().inputs));
+        begin_.resize(scenario.is_of_drive() ? std::size_t{n_inputs}
+                                             : static_cast<std::size_t>(train_->assembly().layout().inputs));
         end_ = begin_;
         for (const ControlledAxis& axis : control_.axes) {
             const auto m = static_cast<std::size_t>(axis.motor);
-            const std::string motor = scenario.form == Scenario::of_drive ? "motor" : scenario.train.motors[m].name;
+            const std::string motor = scenario.is_of_drive() ? "motor" : scenario.train.motors[m].name;
             torques_.push_back(static_cast<std::size_t>(variables_.place(motor + "_torque")));
         }
         identity_ = 0xcbf29ce484222325u;
@@ -297,7 +306,7 @@ class ScenarioSimulation {
 
     void name_reference(const Scenario& scenario, const ControlledAxis& axis) {
         const auto m = static_cast<std::size_t>(axis.motor);
-        const std::string of = scenario.form == Scenario::of_drive ? "" : scenario.train.motors[m].name + "_";
+        const std::string of = scenario.is_of_drive() ? "" : scenario.train.motors[m].name + "_";
         const control::Axis::Mode mode = axis.law.mode;
         names_.references.push_back({of + "reference",
                                      mode == control::Axis::position_mode ? "rad"

@@ -20,14 +20,14 @@ class Variables {
  public:
     // The scenario has passed its check.
     explicit Variables(const Scenario& s) {
-        if (s.form == Scenario::of_drive)
+        if (s.is_of_drive())
             add_drive(s.drive);
         else
             add_train(s.train);
         for (std::size_t a = 0; a < s.control.axes.size(); ++a) {
             const control::Axis& law = s.control.axes[a].law;
             const auto motor = static_cast<std::size_t>(s.control.axes[a].motor);
-            const std::string prefix = s.form == Scenario::of_drive ? "" : s.train.motors[motor].name + "_";
+            const std::string prefix = s.is_of_drive() ? "" : s.train.motors[motor].name + "_";
             const auto add = [&](int signal, const control::AxisSignalName& named) {
                 shown_.push_back({static_cast<int>(a), signal});
                 all_.push_back({prefix + named.name, named.unit, named.meaning});

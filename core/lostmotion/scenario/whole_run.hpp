@@ -120,8 +120,7 @@ inline void add_signals(const Scenario& s, const Variables& variables, const std
     for (std::size_t a = 0; a < s.control.axes.size(); ++a) {
         const ControlledAxis& axis = s.control.axes[a];
         if (!axis.law.field_orientation) continue;
-        const std::string motor =
-            s.form == Scenario::of_drive ? "motor" : s.train.motors[static_cast<std::size_t>(axis.motor)].name;
+        const std::string motor = s.is_of_drive() ? "motor" : s.train.motors[static_cast<std::size_t>(axis.motor)].name;
         const int place = variables.place(motor + "_torque");
         const std::size_t first = control::n_axis_signals;
         const double *i_d = recorded(a, first + control::direct_current),
@@ -141,9 +140,9 @@ WholeRun run(const Scenario& s, const WholeRunOptions& options, OfDrive&& solve_
     out.values.assign(variables.size() * out.samples, 0.0);
     std::vector<double> control;
     if constexpr (holds(Kernel::drive))
-        if (s.form == Scenario::of_drive) of_drive(s, options, control, out, solve_drive);
+        if (s.is_of_drive()) of_drive(s, options, control, out, solve_drive);
     if constexpr (holds_trains)
-        if (s.form == Scenario::of_train) of_train(s, options, control, out, solve_train);
+        if (!s.is_of_drive()) of_train(s, options, control, out, solve_train);
     if (s.control.present()) add_signals(s, variables, control, out);
     for (std::size_t k = 0; k < out.samples; ++k) variables.derive(out.values.data(), out.samples, k);
     return out;

@@ -103,7 +103,8 @@ def export_fmu(
         scenario = without_controllers(scenario)
     if references:
         _check_references(scenario)
-    binaries = _libraries(LIBRARIES if libraries is None else Path(libraries), PLATFORMS[fmi])
+    kernel = "drive" if isinstance(scenario, Scenario) else scenario.core().kernel()
+    binaries = _libraries(LIBRARIES if libraries is None else Path(libraries), PLATFORMS[fmi], kernel)
     parameters = tuple(
         p for p in parameters_of(scenario, numbers_of).parameters if not _of_signals(scenario, p.key, references)
     )
@@ -139,13 +140,15 @@ def without_controllers(scenario: Scenario | TrainScenario) -> Scenario | TrainS
     return scenario.replace(controllers={}, command={**scenario.command, **commands})
 
 
-def _libraries(directory: Any, places: Mapping[str, str]) -> dict[str, bytes]:
-    """The libraries that there are, by their places in an FMU."""
+def _libraries(directory: Any, places: Mapping[str, str], kernel: str) -> dict[str, bytes]:
+    """The libraries that there are, by their places in an FMU: with its kernel alone, or as installed from source with all."""
     found = {}
     for platform, place in places.items():
-        file = directory / platform / place.rpartition("/")[2]
-        if file.is_file():
-            found[place] = file.read_bytes()
+        extension = place.rpartition(".")[2]
+        for name in ("all", kernel):
+            file = directory / platform / f"{name}.{extension}"
+            if file.is_file():
+                found[place] = file.read_bytes()
     if not found:
         raise InputError(
             f"{directory}: has no library of an FMU; build them by `make fmu`, or install a wheel that has them"
