@@ -56,6 +56,27 @@ def test_a_gearbox_with_backlash_is_found_again(tmp_path: Path) -> None:
         assert result.values[name] == pytest.approx(value, rel=2e-3), name
 
 
+def test_a_torque_ripple_is_found_by_a_slow_run(tmp_path: Path) -> None:
+    directory = tmp_path / "campaign"
+    run = CliRunner().invoke(app, ["rig", NAME, "--logs", str(directory), "--ripple", "2 0.004 N*m"])
+    assert run.exit_code == 0, run.output
+    assert (directory / "logs" / "ripple.csv").exists()
+    result = lm.identify(directory / "identify.toml")
+    for name, truth in {"ripple_torque": 0.004, "ripple_phase": 0.0}.items():
+        interval = result.intervals[name]
+        assert interval.high - interval.low < 0.1 * (truth or 1.0)
+        assert result.values[name] == pytest.approx(truth, rel=0.02, abs=0.02)
+
+
+@pytest.mark.parametrize("text", ["0.02 N*m", "2", "2 0.02 N", "2 -1 N*m", "x 1 N*m"])
+def test_a_torque_ripple_that_is_none_is_refused(text: str, tmp_path: Path) -> None:
+    run = CliRunner().invoke(app, ["rig", NAME, "--logs", str(tmp_path / "campaign"), "--ripple", text])
+    assert run.exit_code != 0
+    assert isinstance(run.exception, lm.InputError)
+    assert str(run.exception).startswith("--ripple: ")
+    assert not (tmp_path / "campaign" / "logs").exists()
+
+
 def test_the_rig_is_locked_driven_and_driven_back(gearbox: lm.Gearbox) -> None:
     plans = {plan.name: plan for plan in experiments(gearbox)}
     assert [name for name, plan in plans.items() if plan.header["locked"]] == ["locked-ramp.csv"]

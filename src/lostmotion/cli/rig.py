@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..errors import InputError
 from .arguments import complete_gearbox
 from .targets import try_directory, writing
 from .terminal import busy, progress
 
 if TYPE_CHECKING:
+    from ..model.angle_torques import TorqueHarmonic
     from ..test_rig.measurement import RigReport
 
 
@@ -39,6 +41,14 @@ def rig(
             help="Write logs of the rig's experiments and the file that identifies the gearbox from them, instead of the page.",
         ),
     ] = None,
+    ripple: Annotated[
+        str | None,
+        typer.Option(
+            "--ripple",
+            metavar="'ORDER TORQUE'",
+            help='With --logs: torque ripple of the input shaft, so many periods in one turn, e.g. --ripple "2 0.02 N*m".',
+        ),
+    ] = None,
 ) -> None:
     """Measure a gearbox on the virtual test rig and compare with its data sheet.
 
@@ -47,13 +57,15 @@ def rig(
     \b
     lostmotion rig schaeffler-rt1-h-20-100
     lostmotion rig my-gearbox.toml -o sheet --set loss_factor=1.3
-    lostmotion rig my-gearbox.toml --logs campaign
+    lostmotion rig my-gearbox.toml --logs campaign --ripple "2 0.02 N*m"
     """
     from ..data_sheets.gearbox_sheet import GearboxSheet
     from ..data_sheets.records import find
     from ..errors import need
     from ..simulation.scenario_files import gearbox_from_record
 
+    if ripple is not None and logs is None:
+        raise InputError("--ripple: is for the logs of a campaign; give --logs DIR, too")
     try_directory(output if logs is None else logs)
     if logs is None:
         need("jinja2", "The page of the rig", "report")
@@ -64,8 +76,10 @@ def rig(
     if logs is not None:
         from ..identification.campaign import write_campaign
 
+        title = f"{sheet.title or sheet.name}: logs of the virtual rig"
+        torque = None if ripple is None else _ripple(ripple)
         with busy("Running the rig"):
-            file = write_campaign(logs, part, title=f"{sheet.title or sheet.name}: logs of the virtual rig")
+            file = write_campaign(logs, part, title=title, ripple=torque)
         print(f"The logs are in {logs / 'logs'}; lostmotion identify {file} finds the gearbox in them")
         return
     from ..test_rig.measurement import WORK, measure
@@ -83,6 +97,18 @@ def rig(
     for note in notes:
         print(f"  note: {note}")
     print(f"The data sheet is at {page}")
+
+
+def _ripple(text: str) -> TorqueHarmonic:
+    from ..model.angle_torques import TorqueHarmonic
+
+    order, _, torque = text.strip().partition(" ")
+    if not order.isdigit() or not torque.strip():
+        raise InputError(f'--ripple: "{text}" must be the periods in one turn and a torque, such as "2 0.02 N*m"')
+    try:
+        return TorqueHarmonic.model_validate({"shaft": "motor", "order": int(order), "amplitude": torque.strip()})
+    except InputError as error:
+        raise InputError(f'--ripple: "{text}": {error}') from None
 
 
 def _print_comparisons(report: RigReport) -> None:

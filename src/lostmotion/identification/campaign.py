@@ -13,6 +13,7 @@ from ..atomic_writer import write_whole
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
+from ..model.angle_torques import TorqueHarmonic
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.losses import LossMap
@@ -32,13 +33,15 @@ OFF = 1.25  # by which start values are off, so that the logs have to bring them
 ENCODERS = {"motor_angle": 2 * math.pi / 2**16, "output_angle": 2 * math.pi / 2**22}  # steps [rad]
 TORQUE_NOISE = 2e-3  # of the rated output torque
 LOAD_INERTIA = 2.0  # of the load machine, of that of the gearbox at the output
+SLOW = 20.0  # times the coefficient of the brake at which the rated torque gives the rated speed, for the ripple
+PHASE_OFF = 0.5  # [rad] by which the start value of the ripple's phase is off
 
 
-def experiments(gearbox: Gearbox) -> list[Log]:
+def experiments(gearbox: Gearbox, ripple: TorqueHarmonic | None = None) -> list[Log]:
     """Locked ramp, runs without load, back-driving, runs against a brake: time, header and inputs of each.
 
     Torques go up to the rated one, speeds to about the rated one; the header says whether the output is locked, and the
-    coefficient of the brake [N·m·s/rad].
+    coefficient of the brake [N·m·s/rad]. With a torque ripple, it also turns slowly under a constant torque.
     """
     torque, speed = gearbox.rated_output_torque, gearbox.rated_input_speed
     motor = torque / gearbox.ratio
@@ -56,6 +59,7 @@ def experiments(gearbox: Gearbox) -> list[Log]:
     rise = np.where(
         short < RISE, 0.5 - 0.5 * np.cos(math.pi * short / RISE), 1.0
     )  # a jump would leave the drive ringing
+    slow = [plan("ripple", short, 0.0, SLOW * brake, rise * 0.5 * motor, still)] if ripple is not None else []
     return [
         plan("locked-ramp", time, 1.0, 0.0, 1.2 * motor * _triangle(time / PERIOD), np.zeros(len(time))),
         plan("no-load", short, 0.0, 0.0, rise * 0.5 * motor * np.cos(swing * short), still),
@@ -63,6 +67,7 @@ def experiments(gearbox: Gearbox) -> list[Log]:
         plan("back-driving", short, 0.0, 0.0, still, rise * 0.6 * torque * np.cos(swing * short)),
         plan("braked", short, 0.0, brake, rise * 0.9 * motor * np.sin(2 * math.pi * short), still),
         plan("braked-slow", short, 0.0, 4.0 * brake, rise * motor * np.sin(math.pi * short), still),
+        *slow,
     ]
 
 
@@ -78,7 +83,7 @@ def _rotor(gearbox: Gearbox) -> float:
     return gearbox.inertia
 
 
-def rig_scenario(gearbox: Gearbox, title: str = "") -> TrainScenario:
+def rig_scenario(gearbox: Gearbox, title: str = "", ripple: TorqueHarmonic | None = None) -> TrainScenario:
     """The rig: a motor as a source of torque, the gearbox, and a load machine that may be locked or brake."""
     gear = Gear.of(gearbox, input="motor", output="output").model_dump()
     inertia = LOAD_INERTIA * gearbox.inertia * gearbox.ratio**2
@@ -95,6 +100,8 @@ def rig_scenario(gearbox: Gearbox, title: str = "") -> TrainScenario:
         "gears": {"gearbox": gear | {"mesh_damping": mesh_damping(gearbox)}},
         "simulation": {"duration": PERIOD, "sample_interval": INTERVAL},
     }
+    if ripple is not None:
+        tables["angle_torques"] = {"ripple": ripple}
     return TrainScenario(title=title, **tables)
 
 
@@ -107,7 +114,7 @@ def mesh_damping(gearbox: Gearbox) -> float:
     return 2.0 * DAMPING * math.sqrt(slopes[0] * motor * load / (motor + load))
 
 
-def parameters(gearbox: Gearbox) -> tuple[dict[str, float], dict[str, Any]]:
+def parameters(gearbox: Gearbox, ripple: TorqueHarmonic | None = None) -> tuple[dict[str, float], dict[str, Any]]:
     """What the campaign is to find: values by name, SI, and the formulas of the scenario by dotted key."""
     values = {"inertia": gearbox.inertia}
     formulas: dict[str, Any] = {"gears.gearbox.inertia": "inertia"}
@@ -142,12 +149,16 @@ def parameters(gearbox: Gearbox) -> tuple[dict[str, float], dict[str, Any]]:
     else:
         values["efficiency"] = losses.efficiency
         formulas["gears.gearbox.losses.efficiency"] = "efficiency"
+    if ripple is not None:
+        values |= {"ripple_torque": ripple.amplitude, "ripple_phase": ripple.phase}
+        formulas["angle_torques.ripple.amplitude"] = "ripple_torque"
+        formulas["angle_torques.ripple.phase"] = "ripple_phase"
     return values, formulas
 
 
-def identification(gearbox: Gearbox, title: str = "") -> dict[str, Any]:
+def identification(gearbox: Gearbox, title: str = "", ripple: TorqueHarmonic | None = None) -> dict[str, Any]:
     """The identification file of the campaign, as tables."""
-    values, formulas = parameters(gearbox)
+    values, formulas = parameters(gearbox, ripple)
     locked = 100.0 * gearbox.rated_output_torque
     noise = deviations(gearbox)
     return {
@@ -183,6 +194,8 @@ def _encoder(name: str, noise: dict[str, float]) -> dict[str, float]:
 
 
 def _free(name: str, value: float) -> dict[str, Any]:
+    if name == "ripple_phase":
+        return {"start": value + PHASE_OFF, "min": value - math.pi, "max": value + math.pi}
     if name == "efficiency":
         return {"start": 1.0 - OFF * (1.0 - value), "min": 0.01, "max": 1.0}
     return {"start": OFF * value, "min": 0.1 * value, "max": 10.0 * value, "logarithmic": True}
@@ -200,6 +213,7 @@ def write_campaign(
     gearbox: Gearbox,
     *,
     title: str = "",
+    ripple: TorqueHarmonic | None = None,
     seed: Count = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Path:
@@ -213,6 +227,9 @@ def write_campaign(
         Whose values the logs are of.
     title
         Of the files.
+    ripple
+        A torque on the shaft ``motor`` or ``output`` of the rig over its angle, which data sheets do not give; with it there is a
+        slow run under a constant torque, and its amplitude and phase are to be found, too.
     seed
         Of the noise.
     progress
@@ -226,19 +243,21 @@ def write_campaign(
     Raises
     ------
     InputError
-        The gearbox has no inertia.
+        The gearbox has no inertia, or the ripple is on another shaft.
     """
+    if ripple is not None and ripple.shaft not in ("motor", "output"):
+        raise InputError(f'ripple: shaft is "{ripple.shaft}"; the shafts of the rig are "motor" and "output"')
     directory = Path(directory)
-    scenario = rig_scenario(gearbox, title)
-    tables = identification(gearbox, title)
+    scenario = rig_scenario(gearbox, title, ripple)
+    tables = identification(gearbox, title, ripple)
     (directory / "logs").mkdir(parents=True, exist_ok=True)
     _write(directory / "rig.toml", scenario_text(scenario, title))
     note = "Logs of the virtual rig: start values are 25 % off, and found again as well as such sensors allow."
     _write(directory / "identify.toml", toml_text(tables, note))
     rig = Rig(Identification(**tables), directory)
     noise = deviations(gearbox) | {name: 0.5 * step for name, step in ENCODERS.items()}
-    for k, plan in enumerate(experiments(gearbox)):
-        log = virtual_log(rig, plan, parameters(gearbox)[0], noise=noise, seed=seed + k)
+    for k, plan in enumerate(experiments(gearbox, ripple)):
+        log = virtual_log(rig, plan, parameters(gearbox, ripple)[0], noise=noise, seed=seed + k)
         _write(directory / "logs" / plan.name, _csv(log))
         if progress is not None:
             progress(plan.name)
