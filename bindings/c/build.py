@@ -39,7 +39,7 @@ FMU_SOURCES = [
     *(HERE.parent / "fmu" / f"{name}.cpp" for name in ("fmi2", "fmi3")),
 ]
 # Each FMU and each platform adds to its size: no functions but those of FMI, no tables for exceptions.
-FMU_FLAGS = (*FLAGS, "-DLM_API=", "-ffunction-sections", "-fdata-sections", "-fno-asynchronous-unwind-tables")
+FMU_FLAGS = (*FLAGS, "-DLM_API=", "-ffunction-sections", "-fdata-sections", "-fno-unwind-tables")
 # Of a live page, beside the kernel of its drive: nothing else.
 PAGE_SOURCES = [s for s in INTERFACE if s.stem in ("run", "explanation", "scenario", "freestanding")]
 # With the oldest C library that the libraries for Linux need, and the extension of their names.
@@ -159,8 +159,13 @@ def fmu_library(to: Path, platform: str, kernel: str, optimisation: str = "-O2")
         compiled(FMU_SOURCES, arguments, "-Oz", directory, flags),
     ]
     unfinished = library.with_suffix(".unfinished")
-    whole = {"linux": ["-Wl,-z,defs", "-Wl,--gc-sections"], "darwin": ["-Wl,-dead_strip"]}
-    zig("cc", *arguments, "-shared", "-s", *whole.get(platform.partition("-")[2], []), *made, "-o", unfinished)
+    # A missing symbol ends the linking, not the loading; nothing that is not called, and no names but those of FMI.
+    link = {
+        "linux": ["-s", "-Wl,-z,defs", "-Wl,--gc-sections"],
+        "windows": ["-s"],
+        "darwin": ["-Wl,-dead_strip", "-Wl,-x"],
+    }[platform.partition("-")[2]]
+    zig("cc", *arguments, "-shared", *link, *made, "-o", unfinished)
     unfinished.replace(library)
     for spare in library.parent.glob("*.lib"):  # the linker for Windows writes an import library beside it
         spare.unlink()
