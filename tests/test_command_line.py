@@ -397,3 +397,12 @@ def test_a_run_of_a_million_samples_is_drawn_in_seconds() -> None:
             assert len(line.get_xdata()) <= plots.MAX_POINTS + 10
     drawn = figure.axes[4].lines[0].get_ydata()
     assert np.max(drawn) == pytest.approx(1e3 * float(result["twist"].max()), rel=1e-15)
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no /proc")
+def test_a_directory_that_takes_no_files_is_told() -> None:
+    done = CliRunner().invoke(app, ["run", "paper-2dof-nl-small", "-o", "/proc/drive.csv"])
+    assert isinstance(done.exception, lm.InputError)
+    assert str(done.exception) == (
+        "/proc/drive.csv: cannot be written: its directory takes no new files; name another one"
+    )

@@ -32,13 +32,20 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
         mode = 0o666 & ~_umask()
         temporary.chmod(mode)
         temporary.replace(path)
-    except FileNotFoundError:
-        raise InputError(f"{path}: its directory does not exist; make it first") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise unwritable(path, error) from None
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
+
+
+def unwritable(path: Path, error: OSError) -> InputError:
+    """Why a file cannot be written."""
+    if isinstance(error, FileNotFoundError) and path.parent.is_dir():  # as of a file system that makes its files itself
+        return InputError(f"{path}: cannot be written: its directory takes no new files; name another one")
+    if isinstance(error, FileNotFoundError):
+        return InputError(f"{path}: its directory does not exist; make it first")
+    return InputError(f"{path}: cannot be written: {error.strerror or error}")
 
 
 def write_bytes(path: Path, content: bytes) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from ..atomic_writer import unwritable
 from ..errors import InputError
 
 
@@ -24,10 +25,8 @@ def try_file(path: Path) -> None:
     try:
         with tempfile.TemporaryFile(dir=path.parent):
             pass
-    except FileNotFoundError:
-        raise InputError(f"{path}: its directory does not exist; make it first") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+        raise unwritable(path, error) from None
 
 
 def try_directory(path: Path) -> None:
