@@ -100,7 +100,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "identify": (lm.identify, {"source": "none.toml", "threads": 1, "profiles": False, "progress": dangle}),
     "load_identification": (lm.load_identification, {"path": "none.toml"}),
     "read_log": (lm.read_log, {"path": "none.csv", "time": ""}),
-    "write_campaign": (lm.write_campaign, {"directory": "none", "gearbox": SCENARIO.gearbox, "title": "", "seed": 1, "progress": dangle}),
+    "write_campaign": (lm.write_campaign, {"directory": "none", "gearbox": SCENARIO.gearbox, "title": "", "ripple": None, "seed": 1, "progress": dangle}),
     "design_experiment": (lm.design_experiment, {"result": 5, "plans": [], "deviation": None}),
     "commission": (lm.commission, {"scenario": SCENARIO, "motor": None, "window": None, "progress": dangle}),
     "tune": (lm.tune, {"scenario": SCENARIO, "rule": "identical_damping", "damping": 0.7, "phase_margin": 1.0, "goal": "bandwidth", "sensitivity_peak": 1.7, "motor": None}),
