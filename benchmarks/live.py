@@ -14,6 +14,7 @@ from report import Report
 
 import lostmotion as lm
 from lostmotion.live_page.page import write_page
+from lostmotion.portable.description import kernel_of
 
 ROOT = Path(__file__).parent.parent
 SCENARIOS = {
@@ -66,8 +67,7 @@ def section(report: Report) -> None:
             page, numbers = Path(directory, f"{name}.html"), Path(directory, f"{name}.bin")
             write_page(page, scenario)
             numbers.write_bytes(lm.description(scenario, parameters=False).astype("<f8").tobytes())
-            kernel = "drive" if isinstance(scenario, lm.Scenario) else scenario.core().kernel()
-            core = ROOT / "build" / "page-core" / kernel / "core.wasm"
+            core = ROOT / "build" / "page-core" / kernel_of(scenario) / "core.wasm"
             pairs = [(native(library, numbers), portable(core, numbers)) for _ in range(ROUNDS)]
             here, there = (min(times) for times in zip(*pairs, strict=True))
             size = f"{page.stat().st_size / 1e3:.0f}"

@@ -11,8 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import lostmotion as lm
-
 MISSING = "the compiler is missing: .venv/bin/pip install --group portable"
 pytest.importorskip("ziglang", reason=MISSING)
 wasmtime: Any = pytest.importorskip("wasmtime", reason=MISSING)
@@ -36,11 +34,6 @@ def compiled(kernel: str) -> Path:
     """The core of live pages for drives in the short form, or for trains of a kernel."""
     path: Path = builder().page_core(kernel)
     return path
-
-
-def kernel_of(scenario: lm.Scenario | lm.TrainScenario) -> str:
-    """That a scenario takes."""
-    return "drive" if isinstance(scenario, lm.Scenario) else scenario.core().kernel()
 
 
 class PortableCore:

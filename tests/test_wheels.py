@@ -10,13 +10,14 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Collection
+from itertools import product
 from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
 
 import lostmotion as lm
-from conftest import CONTROLLED, ROOT
+from conftest import CONTROLLED, ROOT, follows_target
 
 DIST = Path(os.environ.get("LOSTMOTION_WHEELS", ROOT / "dist"))
 WHEELS = {p.name.split("-", 2)[2].removesuffix(".whl"): p for p in sorted(DIST.glob("lostmotion-*.whl"))}
@@ -46,19 +47,13 @@ def test_a_wheel_holds_all_that_a_user_needs(tag: str) -> None:
     modules = {m.group(1) for n in names if (m := re.fullmatch(rf"lostmotion/_core_(\w+?)(?:{suffix})", n))}
     assert modules == BUILDS[processor(tag)]
     assert any(re.fullmatch(rf"lostmotion/_instruction_set(?:{suffix})", n) for n in names)
-    libraries: dict[str, set[str]] = {
-        n.split("/")[2]: set() for n in names if n.startswith("lostmotion/fmu_libraries/")
-    }
-    for platform, kernels in libraries.items():
-        kernels |= {Path(n).stem for n in names if n.startswith(f"lostmotion/fmu_libraries/{platform}/")}
-    assert libraries == {key: {"drive", "narrow", "middle", "wide"} for key in FMU_PLATFORMS}
+    libraries = {(p.parent.name, p.stem) for p in map(Path, names) if p.parts[1] == "fmu_libraries"}
+    assert libraries == set(product(FMU_PLATFORMS, ("drive", "narrow", "middle", "wide")))
     assert {"lostmotion/live_page/page.html", "lostmotion/live_page/wide.wasm.gz"} <= set(names)
     assert {f"lostmotion/scenarios/{name}.toml" for name in lm.shipped_scenarios()} <= set(names)
 
 
-TARGETS = {
-    path.stem for path in CONTROLLED if any(getattr(c.reference, "target", None) for c in lm.load(path).axes().values())
-}
+TARGETS = {path.stem for path in CONTROLLED if follows_target(lm.load(path))}
 """Scenarios whose references follow a target: what they feed the core is numpy's, which is not equal on all processors."""
 
 

@@ -41,11 +41,11 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
 
 def unwritable(path: Path, error: OSError) -> InputError:
     """Why a file cannot be written."""
-    if isinstance(error, FileNotFoundError) and path.parent.is_dir():  # as of a file system that makes its files itself
+    if not isinstance(error, FileNotFoundError):
+        return InputError(f"{path}: cannot be written: {error.strerror or error}")
+    if path.parent.is_dir():  # of a file system that makes its files itself
         return InputError(f"{path}: cannot be written: its directory takes no new files; name another one")
-    if isinstance(error, FileNotFoundError):
-        return InputError(f"{path}: its directory does not exist; make it first")
-    return InputError(f"{path}: cannot be written: {error.strerror or error}")
+    return InputError(f"{path}: its directory does not exist; make it first")
 
 
 def write_bytes(path: Path, content: bytes) -> None:

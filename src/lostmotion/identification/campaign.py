@@ -256,8 +256,9 @@ def write_campaign(
     _write(directory / "identify.toml", toml_text(tables, note))
     rig = Rig(Identification(**tables), directory)
     noise = deviations(gearbox) | {name: 0.5 * step for name, step in ENCODERS.items()}
+    values, _ = parameters(gearbox, ripple)
     for k, plan in enumerate(experiments(gearbox, ripple)):
-        log = virtual_log(rig, plan, parameters(gearbox, ripple)[0], noise=noise, seed=seed + k)
+        log = virtual_log(rig, plan, values, noise=noise, seed=seed + k)
         _write(directory / "logs" / plan.name, _csv(log))
         if progress is not None:
             progress(plan.name)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..atomic_writer import write_bytes
 from ..errors import InputError
+from ..portable.description import kernel_of
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from .description import describe
@@ -20,8 +21,7 @@ CORES = Path(__file__).parent
 
 def core_of(scenario: Scenario | TrainScenario) -> Path:
     """The core with the kernel that a scenario takes, so that a page holds no other."""
-    kernel = "drive" if isinstance(scenario, Scenario) else scenario.core().kernel()
-    return CORES / f"{kernel}.wasm.gz"
+    return CORES / f"{kernel_of(scenario)}.wasm.gz"
 
 
 def page(scenario: Scenario | TrainScenario, name: str = "drive") -> str:

@@ -17,6 +17,11 @@ from ..simulation.train_scenario import TrainScenario
 from .parameters import Parameter, parameters_of
 
 
+def kernel_of(scenario: Scenario | TrainScenario) -> str:
+    """The kernel of the core that a scenario takes: ``"drive"``, or the narrowest that holds its train."""
+    return "drive" if isinstance(scenario, Scenario) else scenario.core().kernel()
+
+
 @checked
 def description(scenario: Scenario | TrainScenario, *, parameters: bool = True) -> np.ndarray:
     """A scenario as the numbers that `lm_scenario_read` of the C interface takes.

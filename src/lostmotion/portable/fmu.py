@@ -26,7 +26,7 @@ from ..simulation.train_scenario import TrainScenario
 from ..simulation.train_variables import axis_variables, train_variables
 from ..simulation.variables import VARIABLES
 from . import fmi2, fmi3
-from .description import numbers_of
+from .description import kernel_of, numbers_of
 from .fmu_model import Declared, Model, page
 from .parameters import Parameter, parameters_of
 
@@ -103,8 +103,8 @@ def export_fmu(
         scenario = without_controllers(scenario)
     if references:
         _check_references(scenario)
-    kernel = "drive" if isinstance(scenario, Scenario) else scenario.core().kernel()
-    binaries = _libraries(LIBRARIES if libraries is None else Path(libraries), PLATFORMS[fmi], kernel)
+    directory = LIBRARIES if libraries is None else Path(libraries)
+    binaries = _libraries(directory, PLATFORMS[fmi], kernel_of(scenario))
     parameters = tuple(
         p for p in parameters_of(scenario, numbers_of).parameters if not _of_signals(scenario, p.key, references)
     )
@@ -145,10 +145,9 @@ def _libraries(directory: Any, places: Mapping[str, str], kernel: str) -> dict[s
     found = {}
     for platform, place in places.items():
         extension = place.rpartition(".")[2]
-        for name in ("all", kernel):
-            file = directory / platform / f"{name}.{extension}"
-            if file.is_file():
-                found[place] = file.read_bytes()
+        files_of = (directory / platform / f"{name}.{extension}" for name in (kernel, "all"))
+        if (library := next((file for file in files_of if file.is_file()), None)) is not None:
+            found[place] = library.read_bytes()
     if not found:
         raise InputError(
             f"{directory}: has no library of an FMU; build them by `make fmu`, or install a wheel that has them"

@@ -75,7 +75,7 @@ class ClosedLoop:
         self.plant, self.window = plant, window
         self.simulation = _UnderSine(plant, source, amplitude, window.frequency, law)
         self.core = self.simulation._core
-        self.constants: dict[str, Any] = {name: plant.signals[name].mean for name in self.simulation.inputs}
+        self.constants = {name: plant.signals[name].mean for name in self.simulation.inputs}
         self.begin = 0  # tick at which the window begins
         self._running = list(running_slots(self.simulation._control))
         self.windows = self.jumps = 0
