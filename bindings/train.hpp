@@ -5,6 +5,7 @@
 
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -15,8 +16,25 @@
 #include "lostmotion/analysis/steady_regime.hpp"
 #include "lostmotion/analysis/train_batch.hpp"
 #include "lostmotion/model/train_description.hpp"
+#include "lostmotion/scenario/fields.hpp"
 
 namespace lostmotion::binding {
+
+// Fields of an element, by name.
+class NamedFields {
+ public:
+    using Range = lostmotion::Range;
+
+    explicit NamedFields(const nb::dict& values) : values_(values) {}
+    void number(const char* name, double& v, Range = Range::any) { v = nb::cast<double>(values_[name]); }
+    template <class Curve>
+    void curve(const char* name, Curve& v) {
+        v = nb::cast<Curve>(values_[name]);
+    }
+
+ private:
+    const nb::dict& values_;
+};
 
 // As Python describes a train.
 class TrainDescription : public model::TrainDescription {
@@ -46,6 +64,20 @@ class TrainDescription : public model::TrainDescription {
                   const model::PeriodicCurve* transmission_error) {
         const Gearbox law = make_drive(parameters, false, curve, map).gearbox;
         model::TrainDescription::add_gear(name, input, output, law, efficiencies, mesh_damping, transmission_error);
+    }
+
+    void add(const std::string& table, const std::string& name, const std::string& shaft, const nb::dict& fields) {
+        bool known = false;
+        model::Train::each_kind(train, [&](const char* own, const char*, const auto& elements) {
+            if (table != own) return;
+            known = true;
+            typename std::remove_cvref_t<decltype(elements)>::value_type element;
+            element.name = name;
+            NamedFields named(fields);
+            element.describe(named);
+            model::TrainDescription::add(std::move(element), shaft);
+        });
+        if (!known) throw nb::value_error(("there is no table '" + table + "'").c_str());
     }
 
     // signals: kind and shaft, which only an angle and a speed have.
@@ -252,7 +284,6 @@ inline void bind_train(nb::module_& m) {
              "torsion_curve"_a.none(), "loss_map"_a.none(), "efficiencies"_a.none(), "mesh_damping"_a,
              "transmission_error"_a.none())
         .def("set_housing", &TrainDescription::set_housing, "gear"_a, "shaft"_a)
-        .def("add_brake", &TrainDescription::add_brake, "name"_a, "shaft"_a, "torque"_a, "breakaway_torque"_a)
         .def("add_clutch", add_coupling(Coupling::clutch), "name"_a, "input"_a, "output"_a, "torque"_a,
              "breakaway_torque"_a)
         .def("add_safety_clutch", add_coupling(Coupling::safety_clutch), "name"_a, "input"_a, "output"_a, "torque"_a,
@@ -263,7 +294,10 @@ inline void bind_train(nb::module_& m) {
                 t.add_coupling(name, input, output, 0.0, 0.0, Coupling::freewheel);
             },
             "name"_a, "input"_a, "output"_a)
-        .def("add_angle_torque", &TrainDescription::add_angle_torque, "name"_a, "shaft"_a, "torque"_a)
+        .def("add", &TrainDescription::add, "table"_a, "name"_a, "shaft"_a, "fields"_a,
+             nb::sig("def add(self, table: str, name: str, shaft: str, fields: collections.abc.Mapping[str, "
+                     "typing.Any]) -> None"),
+             "What acts on one shaft: the table of its kind, and its fields in SI units.")
         .def("add_controller", &TrainDescription::add_controller, "motor"_a, "signals"_a, "compared"_a, "states"_a,
              "A"_a, "B"_a, "C"_a, "D"_a, "back_calculation"_a, "limit"_a)
         .def("check", &TrainDescription::check)

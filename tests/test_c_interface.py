@@ -105,6 +105,15 @@ class Train:
             assert isinstance(t, TorqueCurve)
             curve = PeriodicCurve(t.period, doubles(t.angles), doubles(t.torques), len(t.angles))
             self.add("lm_add_angle_torque", name, t.shaft, c.byref(curve))
+        for name, s in train.springs.items():
+            breaks, slopes = s.stiffness.pieces()
+            self.add(
+                "lm_add_spring",
+                name,
+                s.shaft,
+                c.byref(Curve(doubles(breaks), doubles(slopes), len(breaks))),
+                s.rest_angle,
+            )
 
     def parameters(self, part: Any, table: str) -> tuple[Any, int]:
         given = numbers(part, table)
@@ -226,6 +235,7 @@ def test_clutches_freewheels_and_torques_over_an_angle_have_the_bits_of_python(l
         },
         freewheels={"freewheel": {"input": "b", "output": "c"}},
         angle_torques={"cogging": {"kind": "curve", "shaft": "d", "angles": [0, 1.5, 4], "torques": [0, 1.2, -1.2]}},
+        springs={"stops": {"shaft": "d", "stiffness": {"kind": "curve", "backlash": 0.2, "slopes": [9.0]}}},
         command={"clutch": {"mean": 1.0}},
         simulation={"duration": 1.0, "sample_interval": 1e-3},
     )

@@ -444,6 +444,8 @@ STIFF = {"input": "a", "output": "b", "ratio": 2.0}
 STRIBECK = {"friction_torque": 0.1, "breakaway_torque": 0.2, "stribeck_speed": 1.0, "friction_error": 0.002}
 FAN = {"kind": "quadratic", "coefficient": 1e-5, "max_speed": 300.0, "error": 0.005}
 GAP = {"kind": "curve", "backlash": 0.1, "slopes": [100.0]}
+PIVOT = {"kind": "linear", "stiffness": 5.0}
+STOPS = {"kind": "curve", "backlash": 0.4, "slopes": [20.0, 80.0], "breaks": [0.05]}
 ERROR = {"kind": "sine", "amplitude": 1e-3, "order": 5, "error": 1e-5}
 ELEMENTS = {
     "brake": two_shafts(
@@ -462,6 +464,8 @@ ELEMENTS = {
         gears={"g": STIFF},
         angle_torques={"cog": {"kind": "sine", "shaft": "a", "amplitude": 0.02, "order": 12, "error": 0.001}},
     ),
+    "spring": two_shafts(gears={"g": SOFT}, springs={"pivot": {"shaft": "b", "stiffness": PIVOT, "rest_angle": 0.3}}),
+    "end stops": two_shafts(gears={"g": SOFT}, springs={"stops": {"shaft": "b", "stiffness": STOPS}}),
     "transmission error": two_shafts(gears={"g": SOFT | {"mesh_damping": 0.01, "transmission_error": ERROR}}),
     "housing": two_shafts(
         gears={
@@ -523,6 +527,54 @@ def test_a_pendulum_swings_with_its_period() -> None:
     expected = small * np.cos(math.sqrt(9.80665 / 0.3) * result["time"].values)
     phase = math.sqrt(9.80665 / 0.3) * 3.0  # by a small^2/16th of which it lags at the end
     assert float(abs(result["arm_angle"] - expected).max()) < 1.5 * small * phase * small**2 / 16.0
+
+
+@pytest.mark.parametrize(
+    ("elements", "where"),
+    [
+        (
+            {"angle_torques": {"cog": {"kind": "sine", "shaft": "a", "amplitude": 1.0, "error": 1e-9}}},
+            "angle_torques.cog:",
+        ),
+        (
+            {"gears": {"g": SOFT | {"transmission_error": ERROR | {"error": 1e-12}}}},
+            "gears.g: with its transmission error",
+        ),
+        ({"shafts": {"b": {"inertia": 2e-3, "drag": FAN | {"error": 1e-12}}}}, "shafts.b: with its drag"),
+    ],
+)
+def test_errors_that_ask_for_too_many_lines_are_refused(elements: dict[str, Any], where: str) -> None:
+    with pytest.raises(lm.InputError, match=rf"key {where} would take \d+ straight lines; at most 30000 are possible"):
+        two_shafts(**({"gears": {"g": SOFT}} | elements)).train()
+
+
+def test_a_loss_map_too_fine_to_count_is_refused() -> None:
+    n = 140
+    fine = {"kind": "map", "speeds": [float(k) for k in range(n)], "loads": [k - 0.5 * n for k in range(n)]}
+    losses = fine | {"values": [[0.1] * n] * n}
+    rated = {"rated_input_speed": 100.0, "rated_output_torque": 10.0}
+    with pytest.raises(lm.InputError, match=r"key gears.g: has a loss map of some \d+ triangles; at most 30000 are"):
+        two_shafts(gears={"g": SOFT | rated | {"losses": losses}}).train()
+
+
+def test_a_spring_balances_an_arm() -> None:
+    # An arm that gravity would turn at m g r = 6 N m, held level by a spring of 10 N m/rad that is wound up by 0.6 rad:
+    # there it stands, and swings about it with sqrt(k/J).
+    mgr, k, J, small = 6.0, 10.0, 0.2, 1e-3
+    scenario = lm.TrainScenario(
+        shafts={"arm": {"inertia": J}},
+        gravity={"weight": {"shaft": "arm", "mass": mgr / 9.80665, "radius": 1.0, "angle": math.pi / 2, "error": 1e-7}},
+        springs={
+            "balance": {"shaft": "arm", "stiffness": {"kind": "linear", "stiffness": k}, "rest_angle": mgr / k},
+        },
+        initial={"angles": {"arm": small}},
+        simulation={"duration": 2.0, "sample_interval": 1e-3},
+    )
+    result = lm.simulate(scenario)
+    expected = small * np.cos(math.sqrt(k / J) * result["time"].values)
+    # What the cosine of gravity leaves: m g r phi^2/2 and the chords, over J, for the two seconds.
+    assert float(abs(result["arm_angle"] - expected).max()) < (mgr * small**2 / 2 + 1e-7) / J * 2.0**2 / 2
+    assert "balance: spring" in lm.energy_of(result)
 
 
 def test_friction_that_jams_ends_in_one_line() -> None:

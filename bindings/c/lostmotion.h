@@ -199,6 +199,9 @@ LM_API int lm_add_safety_clutch(lm_train* train, const char* name, const char* i
                                 double breakaway_torque);
 LM_API int lm_add_freewheel(lm_train* train, const char* name, const char* input, const char* output);
 LM_API int lm_add_angle_torque(lm_train* train, const char* name, const char* shaft, const lm_periodic_curve* torque);
+/* A spring to the frame: torque over the angle [N m], against it, from rest_angle [rad] on. */
+LM_API int lm_add_spring(lm_train* train, const char* name, const char* shaft, const lm_curve* curve,
+                         double rest_angle);
 
 /* Whether the train can be run. */
 LM_API int lm_train_check(lm_train* train);

@@ -24,9 +24,10 @@ std::string name_error(const lm_train& train, const char* name) {
         return false;
     };
     const auto& t = train.description.train;
-    if (taken(t.shafts) || taken(t.motors) || taken(t.gears) || taken(t.brakes) || taken(t.couplings) ||
-        taken(t.angle_torques))
-        return "the name '" + text(name) + "' is taken; use another one";
+    bool used = taken(t.shafts) || taken(t.motors) || taken(t.gears) || taken(t.couplings);
+    lm::model::Train::each_kind(
+        t, [&](const char*, const char*, const auto& elements) { used = used || taken(elements); });
+    if (used) return "the name '" + text(name) + "' is taken; use another one";
     return {};
 }
 
@@ -175,7 +176,7 @@ int lm_set_housing(lm_train* train, const char* gear, const char* shaft) {
 int lm_add_brake(lm_train* train, const char* name, const char* shaft, double torque, double breakaway_torque) {
     return train->attempt([&] {
         std::string wrong = name_error(*train, name);
-        if (wrong.empty()) train->description.add_brake(name, text(shaft), torque, breakaway_torque);
+        if (wrong.empty()) train->description.add(lm::model::Brake{name, 0, torque, breakaway_torque}, text(shaft));
         return wrong;
     });
 }
@@ -207,7 +208,18 @@ int lm_add_angle_torque(lm_train* train, const char* name, const char* shaft, co
         lm::model::PeriodicCurve curve;
         if (wrong.empty() && torque == nullptr) wrong = "angle torque '" + text(name) + "' has no curve";
         if (wrong.empty()) wrong = read(*torque, "angle torque '" + text(name) + "'", curve);
-        if (wrong.empty()) train->description.add_angle_torque(name, text(shaft), curve);
+        if (wrong.empty()) train->description.add(lm::model::AngleTorque{name, 0, curve}, text(shaft));
+        return wrong;
+    });
+}
+
+int lm_add_spring(lm_train* train, const char* name, const char* shaft, const lm_curve* curve, double rest_angle) {
+    return train->attempt([&] {
+        std::string wrong = name_error(*train, name);
+        lm::model::Spring spring{name, 0, {}, rest_angle};
+        if (wrong.empty() && curve == nullptr) wrong = "spring '" + text(name) + "' has no curve";
+        if (wrong.empty()) wrong = read(*curve, "spring '" + text(name) + "'", spring.curve);
+        if (wrong.empty()) train->description.add(std::move(spring), text(shaft));
         return wrong;
     });
 }

@@ -76,7 +76,7 @@ inline std::vector<double> least_constraint(const Assembly& a, const Instant& no
             }
         for (std::size_t b = 0; b < t.brakes.size(); ++b)
             if (t.brakes[b].shaft == static_cast<int>(s)) {
-                const double more = t.brakes[b].torque * std::clamp(input(p.brakes[b].input), 0.0, 1.0);
+                const double more = t.brakes[b].torque * std::clamp(input(p.acting[b]->command), 0.0, 1.0);
                 sliding += more;
                 holding += more;
             }

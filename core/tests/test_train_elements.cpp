@@ -240,7 +240,7 @@ TEST_CASE("a holding brake stops a shaft, holds its load and lets it go") {
     TrainRun run(t);
     run.speed(0) = 6.0;
     run.inputs[run.load(0)] = {{5.0}};
-    run.inputs[run.assembly.places().brakes[0].input] = {
+    run.inputs[run.assembly.places().acting[0]->command] = {
         {0.0}, {.value = 1.0, .from = 0.5}, {.value = 0.2, .from = 2.0}};
     REQUIRE(run.begin());
     REQUIRE(run.run(2.5));
@@ -248,6 +248,23 @@ TEST_CASE("a holding brake stops a shaft, holds its load and lets it go") {
     REQUIRE(run.events.size() == 1);
     CHECK(run.events[0].time == doctest::Approx(0.5 + 4.5 / 8.0));
     CHECK(run.speed(0) == doctest::Approx(-0.5 * (5.0 - 3.0) / 2.0));
+}
+
+TEST_CASE("a shaft flies to and fro between two elastic end stops") {
+    const double J = 2.0, k = 800.0, gap = 0.3, rest = 0.1, v = 1.5;
+    Train t;
+    t.shafts = {shaft(J)};
+    t.springs = {{"stops", 0, TorsionCurve({gap}, {0.0, k}), rest}};
+    TrainRun run(t);
+    run.speed(0) = v;
+    REQUIRE(run.begin());
+    const double flight = 2.0 * gap / v, contact = pi / std::sqrt(k / J), first = (gap + rest) / v;
+    REQUIRE(run.run(first + 2.5 * flight + 3.0 * contact));
+    REQUIRE(run.events.size() == 6);
+    for (int n = 0; n < 6; ++n)
+        CHECK(run.events[static_cast<std::size_t>(n)].time ==
+              doctest::Approx(first + n / 2 * (flight + contact) + n % 2 * contact).epsilon(1e-12));
+    CHECK(run.speed(0) == doctest::Approx(-v).epsilon(1e-12));
 }
 
 TEST_CASE("damped flanks part while they would pull, and fly through the gap") {

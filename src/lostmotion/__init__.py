@@ -89,6 +89,7 @@ if TYPE_CHECKING:
     from .model.shaft import Shaft as Shaft
     from .model.signals import CommandSignal as CommandSignal
     from .model.signals import TorqueSignal as TorqueSignal
+    from .model.springs import Spring as Spring
     from .model.synchronous_motor import PhaseValues as PhaseValues
     from .model.synchronous_motor import Winding as Winding
     from .model.torsion import Hysteresis as Hysteresis
@@ -213,6 +214,7 @@ _HOMES = {
     "model.motor": ("Motor", "MotorLimits", "ShaftMotor"),
     "model.self_locking": ("Overrunning", "SelfLocking", "overrunning", "self_locking"),
     "model.shaft": ("DragCurve", "FrictionCurve", "QuadraticDrag", "Shaft"),
+    "model.springs": ("Spring",),
     "model.signals": ("CommandSignal", "TorqueSignal"),
     "model.synchronous_motor": ("PhaseValues", "Winding"),
     "model.torsion": ("Hysteresis", "LinearStiffness", "Rigid", "TorsionCurve"),

@@ -72,9 +72,9 @@ class Breakaway {
         double sum = 0.0;
         for (std::size_t m = 0; m < train_.motors.size(); ++m)
             if (train_.motors[m].shaft == shaft && static_cast<int>(m) != left_out_) sum += torque_at_rest(m);
-        for (std::size_t k = 0; k < train_.angle_torques.size(); ++k)
-            if (train_.angle_torques[k].shaft == shaft)
-                sum += model::evaluate(assembly_.layout(), assembly_.angle_torque(static_cast<int>(k), key_), now_);
+        for (const auto& e : assembly_.places().acting)
+            if (e->shaft == shaft && e->acts_at_rest())
+                sum += model::evaluate(assembly_.layout(), e->torque(assembly_.site(shaft), key_), now_);
         const int load = assembly_.places().shafts[static_cast<std::size_t>(shaft)].load;
         return load == model::nowhere ? sum : sum - input(load);
     }

@@ -1,7 +1,7 @@
 // The linear regime of a train in steady motion: every dry contact slips the way its shaft turns, clutches are closed,
 // brakes open, rigid gears hold. Its eigenvalues say whether such a motion lasts.
 //
-// Torques over angle and transmission errors are left out: they change within a turn.
+// Torques over angle, springs and transmission errors are left out: they change within a turn.
 #pragma once
 
 #include <cmath>
@@ -47,10 +47,8 @@ inline model::Key key_of(const model::Assembly& a, const SteadyMotion& motion) {
     const auto set = [&key](int branch, int at) {
         if (branch != nowhere) key.branch[static_cast<std::size_t>(branch)] = static_cast<std::int16_t>(at);
     };
-    for (std::size_t s = 0; s < t.shafts.size(); ++s) {
+    for (std::size_t s = 0; s < t.shafts.size(); ++s)
         set(p.shafts[s].friction_piece, t.shafts[s].friction.piece(motion.speed[s]));
-        set(p.shafts[s].drag_piece, t.shafts[s].drag.locate(motion.speed[s]));
-    }
     for (std::size_t g = 0; g < t.gears.size(); ++g) {
         const Gear& gear = t.gears[g];
         if (!gear.rigid()) set(p.gears[g].piece, piece_at(gear.law.curve, motion.torque[g]));
@@ -59,13 +57,15 @@ inline model::Key key_of(const model::Assembly& a, const SteadyMotion& motion) {
         const double mu = sign(w) * motion.torque[g] / gear.rated_torque();
         set(p.gears[g].cell, gear.loss_cell(mu, std::fabs(w) / gear.law.rated_input_speed));
     }
-    for (const BrakePlace& b : p.brakes) set(b.branch, -1);
+    for (const auto& e : p.acting) set(e->branch, e->locate_steady(motion.speed[static_cast<std::size_t>(e->shaft)]));
     return key;
 }
 
 // The train must have passed the check.
 inline SteadyRegime steady_regime(model::Train train, const SteadyMotion& motion) {
-    train.angle_torques.clear();
+    model::Train::each_kind(train, [](const char*, const char*, auto& elements) {
+        std::erase_if(elements, [](const auto& e) { return model::on_shaft(e)->over_angle(); });
+    });
     for (model::Gear& g : train.gears) g.transmission_error = {};
     const model::Assembly a(std::move(train));
     const model::Regime r = a.build(key_of(a, motion));

@@ -62,7 +62,7 @@ class VariedTrain {
         }
         const model::Layout &a = base().layout(), &b = n.train->assembly().layout();
         if (a.coupled != b.coupled || a.angles != b.angles || a.memory != b.memory || a.inputs != b.inputs ||
-            a.contacts != b.contacts || a.branches != b.branches || !same_pieces(n.train->assembly().train())) {
+            a.contacts != b.contacts || a.branches != b.branches || !same_pieces(n.train->assembly())) {
             error_ = "beside the value of " + name + " the train has other states, contacts or pieces of laws";
             return;
         }
@@ -73,12 +73,11 @@ class VariedTrain {
         beside_.push_back({parameter, n.weight, n.train, other_ratios});
     }
 
-    // The curves of torques over angle: how many pieces they have follows from the error that is allowed.
-    bool same_pieces(const model::Train& other) const {
-        const model::Train& own = base().train();
-        for (std::size_t k = 0; k < own.angle_torques.size(); ++k)
-            if (own.angle_torques[k].torque.pieces() != other.angle_torques[k].torque.pieces()) return false;
-        return true;
+    // Of curves: how many they have follows from the error that is allowed.
+    bool same_pieces(const model::Assembly& other) const {
+        const model::ShaftElements &own = base().places().acting, &others = other.places().acting;
+        return std::equal(own.begin(), own.end(), others.begin(), others.end(),
+                          [](const auto& a, const auto& b) { return a->pieces() == b->pieces(); });
     }
 
     const TrainRun& base_;

@@ -27,10 +27,10 @@ inline std::vector<CapacityShare> shaft_capacity(const Assembly& a, int shaft, d
     for (const ShaftMotor& m : train.motors)
         if (m.shaft == shaft && m.law.friction_torque > 0.0)
             shares.push_back({m.name, m.law.friction_torque, m.law.friction_torque});
-    for (std::size_t b = 0; b < train.brakes.size(); ++b)
-        if (const Brake& brake = train.brakes[b]; brake.shaft == shaft) {
-            const double T = brake.capacity(now.input[0][a.places().brakes[b].input], w == 0.0);
-            shares.push_back({brake.name, T, T});
+    for (const auto& e : a.places().acting)
+        if (e->is_dry() && e->shaft == shaft) {
+            const double T = e->friction(a.places().instant_of(*e, now), w == 0.0);
+            shares.push_back({e->name, T, T});
         }
     for (std::size_t g = 0; g < train.gears.size() && T_2 != nullptr; ++g)
         if (const Gear& gear = train.gears[g]; gear.input == shaft && gear.has_dry_losses())

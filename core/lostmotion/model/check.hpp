@@ -58,10 +58,13 @@ class TrainCheck {
             return {};
         };
         for (std::string error :
-             {one("motor", train_.motors), two("gear", train_.gears), housings(), one("brake", train_.brakes),
-              two("coupling", train_.couplings), one("angle torque", train_.angle_torques)})
+             {one("motor", train_.motors), two("gear", train_.gears), housings(), two("coupling", train_.couplings)})
             if (!error.empty()) return error;
-        return {};
+        std::string error;
+        Train::each_kind(train_, [&](const char*, const char* kind, const auto& elements) {
+            if (error.empty()) error = one(kind, elements);
+        });
+        return error;
     }
 
     std::string housings() const {
@@ -121,9 +124,26 @@ class TrainCheck {
                 return name + " has backlash with both mesh damping and hysteresis; take one of them";
             if (g.transmission_error.present() && (g.rigid() || g.law.has_hysteresis()))
                 return name + " has a transmission error; it needs a stiffness, without hysteresis";
+            if (std::string error = too_fine(name + " with its transmission error", g.transmission_error.pieces());
+                !error.empty())
+                return error;
+            if (g.law.losses == Gearbox::loss_map)
+                if (const std::size_t cells = 2 * g.law.map.speeds().size() * g.law.map.loads().size();
+                    cells > static_cast<std::size_t>(max_pieces))
+                    return name + " has a loss map of some " + std::to_string(cells) + " triangles; at most " +
+                           std::to_string(max_pieces) + " are possible: leave out speeds or loads";
         }
+        std::string error;
+        Train::each_kind(train_, [&](const char*, const char* kind, const auto& elements) {
+            for (std::size_t k = 0; k < elements.size() && error.empty(); ++k)
+                error = too_fine(named(kind, elements[k].name, k), on_shaft(elements[k])->pieces());
+        });
+        if (!error.empty()) return error;
         for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
             const DryFriction& f = train_.shafts[s].friction;
+            const int drag = 2 * train_.shafts[s].drag.outermost_piece() + 1;
+            for (const auto& [what, pieces] : {std::pair{" with its friction", f.pieces()}, {" with its drag", drag}})
+                if (std::string fine = too_fine(shaft(static_cast<int>(s)) + what, pieces); !fine.empty()) return fine;
             if (f.speeds.size() != f.torques.size() || (!f.speeds.empty() && f.speeds[0] != 0.0))
                 return shaft(static_cast<int>(s)) + " has a friction curve that does not begin at speed 0";
             for (std::size_t k = 1; k < f.speeds.size(); ++k)
@@ -176,7 +196,8 @@ class TrainCheck {
         for (const Coupling& c : train_.couplings) join(c.input, c.output);
         std::vector<bool> acted_on(part.size());
         for (const ShaftMotor& m : train_.motors) acted_on[static_cast<std::size_t>(part[m.shaft])] = true;
-        for (const AngleTorque& t : train_.angle_torques) acted_on[static_cast<std::size_t>(part[t.shaft])] = true;
+        for (const auto& e : shaft_elements(train_))
+            if (e->drives()) acted_on[static_cast<std::size_t>(part[static_cast<std::size_t>(e->shaft)])] = true;
         for (std::size_t s = 0; s < part.size(); ++s)
             if (train_.shafts[s].loaded) acted_on[static_cast<std::size_t>(part[s])] = true;
         for (std::size_t s = 0; s < part.size(); ++s)
@@ -197,6 +218,11 @@ class TrainCheck {
             if (std::string error = too_many(what, static_cast<std::size_t>(count.first), count.second); !error.empty())
                 return error;
         return {};
+    }
+    static std::string too_fine(const std::string& what, int pieces) {
+        if (pieces <= max_pieces) return {};
+        return what + " would take " + std::to_string(pieces) + " straight lines; at most " +
+               std::to_string(max_pieces) + " are possible: allow a larger error";
     }
     static std::string too_many(const char* what, std::size_t n, int most) {
         if (n <= static_cast<std::size_t>(most)) return {};

@@ -53,9 +53,8 @@ inline std::vector<PeriodicAngle> periodic_angles(const Assembly& a) {
     for (std::size_t s = 0; s < train.shafts.size(); ++s) {
         PeriodicAngle angle{static_cast<int>(s), a.places().shafts[s].angle, {}};
         if (angle.state == nowhere) continue;
-        for (std::size_t k = 0; k < train.angle_torques.size(); ++k)
-            if (train.angle_torques[k].shaft == angle.shaft)
-                angle.turns.push_back({a.places().angle_torques[k].turn, train.angle_torques[k].torque.period()});
+        for (const auto& e : a.places().acting)
+            if (e->turn != nowhere && e->shaft == angle.shaft) angle.turns.push_back({e->turn, e->period()});
         for (std::size_t g = 0; g < train.gears.size(); ++g) {
             const Gear& gear = train.gears[g];
             if (!gear.transmission_error.present()) continue;
@@ -65,9 +64,12 @@ inline std::vector<PeriodicAngle> periodic_angles(const Assembly& a) {
         }
         std::vector<double> periods;
         for (const PeriodicAngle::Turn& t : angle.turns) periods.push_back(t.period);
-        // A controller knows the angle itself, however often the shaft has turned.
+        // A controller or a spring knows the angle itself, however often the shaft has turned.
         const bool known = std::any_of(train.controllers.begin(), train.controllers.end(),
-                                       [&](const LinearController& c) { return c.takes_angle(angle.shaft); });
+                                       [&](const LinearController& c) { return c.takes_angle(angle.shaft); }) ||
+                           std::any_of(a.places().acting.begin(), a.places().acting.end(), [&](const auto& e) {
+                               return e->shaft == angle.shaft && e->over_angle() && e->turn == nowhere;
+                           });
         if (!known) angle.period = common_period(periods);
         angles.push_back(std::move(angle));
     }

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "places.hpp"
-#include "regime.hpp"
 
 namespace lostmotion::model {
 
@@ -77,16 +76,7 @@ class ElementForms {
         const Gear& g = train_.gears[gear];
         return g.loss_terms(layout().one, places_.shafts[g.input].speed, T_2);
     }
-    Row angle_torque(int k, const Key& key) const {
-        const PeriodicCurve& curve = train_.angle_torques[k].torque;
-        const AngleTorquePlace& p = places_.angle_torques[k];
-        const int piece = key.branch[p.piece];
-        Row torque = terms_.one(curve.at_zero(piece)) +
-                     terms_.state(places_.shafts[train_.angle_torques[k].shaft].angle, curve.slope(piece)) -
-                     terms_.memory(p.turn, curve.slope(piece));
-        if (p.remainder != nowhere) torque += terms_.input(p.remainder);
-        return torque;
-    }
+    Site site(int shaft) const { return {terms_, places_.shafts[shaft]}; }
     // Viscous friction of a gear on a housing that turns, between that and its input shaft; 0 of others, whose shaft
     // has it.
     Row housing_friction(int gear, const Regime& r) const {
@@ -100,14 +90,7 @@ class ElementForms {
         r.ties.each_share(shaft, [&](int k, double share) { f.c[places_.shafts[k].speed] = share; });
         return f;
     }
-    // Torque against the motion of a shaft.
-    Row drag_torque(int shaft, const Key& key) const {
-        const ShaftPlace& p = places_.shafts[shaft];
-        const TorsionCurve& drag = train_.shafts[shaft].drag;
-        const int piece = p.drag_piece == nowhere ? 0 : key.branch[p.drag_piece];
-        return terms_.state(p.speed, drag.slope(piece)) + terms_.one(drag.offset(piece));
-    }
-    // Dry friction of a shaft that slips, without brakes and gears.
+    // Dry friction of a shaft that slips, without what acts on it and gears.
     Row sliding_friction(int shaft, const Key& key) const {
         const ShaftPlace& p = places_.shafts[shaft];
         const DryFriction& friction = train_.shafts[shaft].friction;
@@ -118,9 +101,8 @@ class ElementForms {
     // What a shaft holds at rest, without gears.
     Row held_friction(int shaft, const Key& key) const {
         Row F = terms_.one(places_.shafts[shaft].motor_friction + train_.shafts[shaft].friction.holding());
-        for (std::size_t b = 0; b < train_.brakes.size(); ++b)
-            if (const Brake& brake = train_.brakes[b]; brake.shaft == shaft)
-                F += commanded(places_.brakes[b].input, places_.brakes[b].branch, brake.holding(), key);
+        for (const auto& e : places_.acting)
+            if (e->is_dry() && e->shaft == shaft) F += e->friction(site(shaft), key, true);
         return F;
     }
     // What a clutch takes while it slips, or holds at rest; of a freewheel, what it passes on backward.
@@ -128,14 +110,12 @@ class ElementForms {
         const Coupling& c = train_.couplings[k];
         const CouplingPlace& p = places_.couplings[k];
         const double torque = at_rest ? c.holding() : c.torque;
-        if (c.kind == Coupling::clutch) return commanded(p.input, p.branch, torque, key);
+        if (c.kind == Coupling::clutch) return commanded(terms_, torque, p.input, key.branch[p.branch]);
         return c.kind == Coupling::safety_clutch ? terms_.one(torque) : Row{};
     }
-    // What an engaged brake takes of a shaft that slips.
-    Row brake_torque(int k, const Key& key) const {
-        const BrakePlace& p = places_.brakes[k];
-        return static_cast<double>(mode(key, places_.shafts[train_.brakes[k].shaft].contact)) *
-               commanded(p.input, p.branch, train_.brakes[k].torque, key);
+    // What a dry element takes of a shaft that slips.
+    Row dry_torque(const ShaftElement& e, const Key& key) const {
+        return static_cast<double>(mode(key, places_.shafts[e.shaft].contact)) * e.friction(site(e.shaft), key, false);
     }
     // Is the rate of the twist kept at zero?
     bool twist_rests(int gear, const Regime& r) const {
@@ -143,11 +123,6 @@ class ElementForms {
         if (g.rigid()) return true;
         if (r.ties.at_rest[g.input] && r.ties.at_rest[g.output] && g.housing == nowhere) return true;
         return !g.transmission_error.present() && kept_at_rest(twist_place(g, gear), r.ties);
-    }
-    // Capacity of a brake or clutch: linear in its input, 0 below 0 and 1 above 1.
-    Row commanded(int input, int branch, double torque, const Key& key) const {
-        const int b = key.branch[branch];
-        return b < 0 ? Row{} : b > 0 ? terms_.one(torque) : terms_.input(input, torque);
     }
 
     // What a controller takes.

@@ -1,8 +1,8 @@
 // Equations of a regime: torques, accelerations and rates from the forms of the elements.
 //
-// The torques of a shaft are added up in one order: motors, gears and couplings that turn it; viscous friction; the
-// load; its dry contact; gears and couplings that it turns; gears whose housing it is. Losses act on the contact of the
-// input shaft, whose capacity is the sum over all that is dry there: one speed, one sign.
+// The torques of a shaft are added up in one order: motors, gears and couplings that turn it; viscous friction; what
+// acts on it; the load; its dry contact; gears and couplings that it turns; gears whose housing it is. Losses act on
+// the contact of the input shaft, whose capacity is the sum over all that is dry there: one speed, one sign.
 #pragma once
 
 #include "element_forms.hpp"
@@ -138,8 +138,8 @@ inline Row Equations::shaft_friction(int shaft, const Key& key, const Regime& r,
         F = static_cast<double>(mode(key, p.contact)) * forms_.held_friction(shaft, key);
     } else {
         F = forms_.sliding_friction(shaft, key);
-        for (std::size_t b = 0; b < train_.brakes.size(); ++b)
-            if (train_.brakes[b].shaft == shaft) F += forms_.brake_torque(static_cast<int>(b), key);
+        for (const auto& e : places_.acting)
+            if (e->is_dry() && e->shaft == shaft) F += forms_.dry_torque(*e, key);
     }
     for (std::size_t g = 0; g < train_.gears.size(); ++g)
         if (train_.gears[g].input == shaft && train_.gears[g].has_dry_losses()) F += loss[g];
@@ -155,10 +155,10 @@ inline Row Equations::acceleration(int shaft, const Key& key, const Regime& r) c
         if (train_.gears[g].output == shaft) sum += r.output_torque[g];
     for (std::size_t k = 0; k < train_.couplings.size(); ++k)
         if (train_.couplings[k].output == shaft) sum += r.contact_torque[places_.couplings[k].contact];
-    for (std::size_t k = 0; k < train_.angle_torques.size(); ++k)
-        if (train_.angle_torques[k].shaft == shaft) sum += forms_.angle_torque(static_cast<int>(k), key);
     sum -= p.viscous_friction * forms_.shaft_speed(shaft, r);
-    if (train_.shafts[shaft].has_drag() && !r.ties.at_rest[shaft]) sum -= forms_.drag_torque(shaft, key);
+    for (const auto& e : places_.acting)
+        if (!e->is_dry() && e->shaft == shaft && (e->acts_at_rest() || !r.ties.at_rest[shaft]))
+            sum += e->torque(forms_.site(shaft), key);
     if (p.load != nowhere) sum -= terms_.input(p.load);
     if (p.contact != nowhere) sum -= r.contact_torque[p.contact];
     for (std::size_t g = 0; g < train_.gears.size(); ++g)

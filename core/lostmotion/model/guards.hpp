@@ -41,7 +41,6 @@ class RegimeGuards {
     void add_speed_pieces(int shaft);
     void add_input_limits();
     void add_output_limits();
-    void add_angle_pieces(int branch, int turn, const Row& angle, const PeriodicCurve& curve);
 
     Guard& add(const Row& form, Guard::Kind kind, int contact, int branch, int neighbour) {
         regime_.guards.push_back(Guard{form, kind, contact, branch, neighbour});
@@ -70,13 +69,11 @@ inline void RegimeGuards::add_all() {
     for (std::size_t g = 0; g < train_.gears.size(); ++g) {
         const GearPlace& p = places_.gears[g];
         if (p.error_piece != nowhere && turns(train_.gears[g].input, train_.gears[g].housing))
-            add_angle_pieces(p.error_piece, p.error_turn, forms_.error_angle(static_cast<int>(g)),
-                             train_.gears[g].transmission_error);
+            add_piece_guards(terms_, forms_.error_angle(static_cast<int>(g)), train_.gears[g].transmission_error,
+                             p.error_turn, p.error_piece, regime_.key, regime_.guards);
     }
-    for (std::size_t k = 0; k < train_.angle_torques.size(); ++k)
-        if (const AngleTorque& t = train_.angle_torques[k]; turns(t.shaft, nowhere))
-            add_angle_pieces(places_.angle_torques[k].piece, places_.angle_torques[k].turn,
-                             terms_.state(places_.shafts[t.shaft].angle), t.torque);
+    for (const auto& e : places_.acting)
+        e->add_guards(forms_.site(e->shaft), regime_.key, turns(e->shaft, nowhere), regime_.guards);
 }
 
 // Is a contact that "slips" kept at rest while its shafts turn, as in a loop of gears? Its speed is rounding.
@@ -282,31 +279,20 @@ inline void RegimeGuards::add_speed_pieces(int shaft) {
             add(terms_.one(law.friction.speeds[k + 1]) - s * w, Guard::edge, p.contact, p.friction_piece, k + 1);
         if (k > 0) add(s * w - terms_.one(law.friction.speeds[k]), Guard::edge, p.contact, p.friction_piece, k - 1);
     }
-    if (p.drag_piece != nowhere) {
-        const int k = regime_.key.branch[p.drag_piece], last = law.drag.outermost_piece();
-        if (k < last) add(terms_.one(law.drag.upper(k)) - w, Guard::edge, nowhere, p.drag_piece, k + 1);
-        if (k > -last) add(w - terms_.one(law.drag.lower(k)), Guard::edge, nowhere, p.drag_piece, k - 1);
-    }
 }
 
 inline void RegimeGuards::add_input_limits() {
-    const auto limits = [&](int input, int branch, double low, double high, int contact) {
-        const int at = regime_.key.branch[branch];
-        const Row u = terms_.input(input);
-        if (at <= 0) add(terms_.one(at == 0 ? high : low) - u, Guard::input_limit, contact, branch, at + 1);
-        if (at >= 0) add(u - terms_.one(at == 0 ? low : high), Guard::input_limit, contact, branch, at - 1);
+    const auto limits = [&](int input, double low, double high, int contact, int branch) {
+        add_limit_guards(terms_, terms_.input(input), low, high, regime_.key,
+                         {.kind = Guard::input_limit, .contact = contact, .branch = branch}, regime_.guards);
     };
     for (std::size_t m = 0; m < train_.motors.size(); ++m)
-        if (places_.motors[m].branch != nowhere) {
+        if (const MotorPlace& p = places_.motors[m]; p.branch != nowhere) {
             const double most = train_.motors[m].command_limit();
-            limits(places_.motors[m].command, places_.motors[m].branch, -most, most,
-                   places_.shafts[train_.motors[m].shaft].contact);
+            limits(p.command, -most, most, places_.shafts[train_.motors[m].shaft].contact, p.branch);
         }
-    for (std::size_t b = 0; b < train_.brakes.size(); ++b)
-        limits(places_.brakes[b].input, places_.brakes[b].branch, 0.0, 1.0,
-               places_.shafts[train_.brakes[b].shaft].contact);
     for (const CouplingPlace& c : places_.couplings)
-        if (c.branch != nowhere) limits(c.input, c.branch, 0.0, 1.0, c.contact);
+        if (c.branch != nowhere) limits(c.input, 0.0, 1.0, c.contact, c.branch);
 }
 
 // Where the output of a controller reaches its limit, or comes back from it.
@@ -314,26 +300,10 @@ inline void RegimeGuards::add_output_limits() {
     for (std::size_t k = 0; k < train_.controllers.size(); ++k) {
         const int branch = places_.controllers[k].branch;
         if (branch == nowhere) continue;
-        const int at = regime_.key.branch[branch];
         const double most = train_.controllers[k].limit;
-        const Row v = forms_.controller_output(static_cast<int>(k));
-        if (at <= 0) add(terms_.one(at == 0 ? most : -most) - v, Guard::edge, nowhere, branch, at + 1);
-        if (at >= 0) add(v - terms_.one(at == 0 ? -most : most), Guard::edge, nowhere, branch, at - 1);
+        add_limit_guards(terms_, forms_.controller_output(static_cast<int>(k)), -most, most, regime_.key,
+                         {.kind = Guard::edge, .branch = branch}, regime_.guards);
     }
-}
-
-// Where an angle leaves its piece. The last and the first piece are neighbours: then the angle at which the
-// present turn began, which is remembered, moves by a period.
-inline void RegimeGuards::add_angle_pieces(int branch, int turn, const Row& angle, const PeriodicCurve& curve) {
-    const int k = regime_.key.branch[branch], last = curve.pieces() - 1;
-    const Row within = angle - terms_.memory(turn);
-    const auto edge = [&](const Row& form, int neighbour, double shift) {
-        Guard& g = add(form, Guard::edge, nowhere, branch, neighbour);
-        g.memory = shift == 0.0 ? nowhere : turn;
-        g.shift = shift;
-    };
-    edge(terms_.one(curve.upper(k)) - within, k == last ? 0 : k + 1, k == last ? curve.period() : 0.0);
-    edge(within - terms_.one(curve.lower(k)), k == 0 ? last : k - 1, k == 0 ? -curve.period() : 0.0);
 }
 
 }  // namespace lostmotion::model

@@ -67,10 +67,8 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
     for (std::size_t k = 0; k < train().couplings.size(); ++k)
         if (const int locked = places().contacts[places().couplings[k].contact].locked; locked != nowhere)
             event.coupling[k] = now.memory[locked];
-    for (std::size_t k = 0; k < train().angle_torques.size(); ++k) {
-        const AngleTorque& t = train().angle_torques[k];
-        now.memory[places().angle_torques[k].turn] = t.torque.turn(now.x[places().shafts[t.shaft].angle]);
-    }
+    for (const auto& e : places().acting)
+        if (e->turn != nowhere) now.memory[e->turn] = e->turn_at(now.x[places().shafts[e->shaft].angle]);
     return find(cache, now, event, key);
 }
 
@@ -380,8 +378,8 @@ bool SwitchedTrain<Sizes>::holds_more(const ContactPlace& c) const {
         return train().couplings[element].holding() > train().couplings[element].torque;
     const DryFriction& friction = train().shafts[element].friction;
     return friction.holding() > friction.at_zero(0) ||
-           std::any_of(train().brakes.begin(), train().brakes.end(),
-                       [&](const Brake& b) { return b.shaft == c.element && b.holding() > b.torque; });
+           std::any_of(places().acting.begin(), places().acting.end(),
+                       [&](const auto& e) { return e->shaft == c.element && e->holds_more(); });
 }
 
 // Where a contact holds more than it takes while it slips, both rest and slip may be consistent: it does not break away

@@ -34,27 +34,23 @@ double SwitchedTrain<Sizes>::output_of(const Now& now, int controller) const {
 template <class Sizes>
 template <class Now>
 void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
-    const auto side = [&](int input, double low, double high) {
-        const double u = now.input[0][input];
-        return static_cast<std::int16_t>(u > high ? +1 : u < low ? -1 : 0);
-    };
     const auto set = [&trial](int branch, int value) {
         if (branch != nowhere) trial.branch[branch] = static_cast<std::int16_t>(value);
     };
     for (std::size_t m = 0; m < train().motors.size(); ++m) {
-        const double most_command = train().motors[m].command_limit();
-        if (places().motors[m].branch != nowhere)
-            set(places().motors[m].branch, side(places().motors[m].command, -most_command, most_command));
+        const double most = train().motors[m].command_limit();
+        if (const MotorPlace& p = places().motors[m]; p.branch != nowhere)
+            set(p.branch, side_of(now.input[0][p.command], -most, most));
     }
-    for (const BrakePlace& b : places().brakes) set(b.branch, side(b.input, 0.0, 1.0));
     for (const CouplingPlace& c : places().couplings)
-        if (c.branch != nowhere) set(c.branch, side(c.input, 0.0, 1.0));
+        if (c.branch != nowhere) set(c.branch, side_of(now.input[0][c.input], 0.0, 1.0));
+    for (const auto& e : places().acting)
+        if (e->branch != nowhere) set(e->branch, e->locate(places().instant_of(*e, now)));
     for (std::size_t s = 0; s < train().shafts.size(); ++s) {
         const ShaftPlace& p = places().shafts[s];
         const double w = now.x[p.speed];
         if (p.friction_piece != nowhere && trial.modes[p.contact] != 0)
             set(p.friction_piece, train().shafts[s].friction.piece(w));
-        set(p.drag_piece, train().shafts[s].drag.locate(w));
     }
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const Gear& gear = train().gears[g];
@@ -73,16 +69,11 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
         const double pressed = gear.law.curve.torque(d) + gear.mesh_damping * rate;
         set(p.parted, piece != 0 && piece * pressed < 0.0 ? 1 : 0);
     }
-    for (std::size_t k = 0; k < train().angle_torques.size(); ++k) {
-        const AngleTorquePlace& p = places().angle_torques[k];
-        const double phi = now.x[places().shafts[train().angle_torques[k].shaft].angle];
-        set(p.piece, train().angle_torques[k].torque.piece(phi - now.memory[p.turn]));
-    }
     for (std::size_t k = 0; k < train().controllers.size(); ++k) {
         const int branch = places().controllers[k].branch;
         if (branch == nowhere) continue;
-        const double v = output_of(now, static_cast<int>(k)), limit = train().controllers[k].limit;
-        set(branch, v > limit ? +1 : v < -limit ? -1 : 0);
+        const double limit = train().controllers[k].limit;
+        set(branch, side_of(output_of(now, static_cast<int>(k)), -limit, limit));
     }
 }
 
@@ -159,16 +150,14 @@ void SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
                     needed -= coupling[n];
                 if (train().couplings[n].input == out) needed += coupling[n];
             }
-            for (std::size_t k = 0; k < train().angle_torques.size(); ++k) {
-                const AngleTorque& t = train().angle_torques[k];
-                if (t.shaft != out) continue;
-                needed -= t.torque(now.x[p.angle]);
-                if (const int rest = places().angle_torques[k].remainder; rest != nowhere) needed -= now.input[0][rest];
-            }
             double T_f = p.motor_friction + train().shafts[out].friction.holding();
-            for (std::size_t b = 0; b < train().brakes.size(); ++b)
-                if (train().brakes[b].shaft == out)
-                    T_f += train().brakes[b].holding() * std::clamp(now.input[0][places().brakes[b].input], 0.0, 1.0);
+            for (const auto& e : places().acting) {
+                if (e->shaft != out) continue;
+                const ShaftInstant here = places().instant_of(*e, now);
+                if (e->is_dry()) T_f += e->friction(here, true);
+                if (e->acts_at_rest()) needed -= e->torque(here);
+                if (e->remainder != nowhere) needed -= now.input[0][e->remainder];
+            }
             low = std::max(low, needed - T_f);
             high = std::min(high, needed + T_f);
         }

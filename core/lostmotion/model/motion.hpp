@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "../elements/row.hpp"
 #include "../kernel/flow.hpp"
-#include "row.hpp"
 
 namespace lostmotion::model {
 

@@ -58,7 +58,7 @@ inline std::vector<std::string> input_names(const Assembly& a) {
     };
     for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].command, t.motors[k].name + "_command");
     for (std::size_t k = 0; k < t.shafts.size(); ++k) set(p.shafts[k].load, t.shafts[k].name + "_load_torque");
-    for (std::size_t k = 0; k < t.brakes.size(); ++k) set(p.brakes[k].input, t.brakes[k].name + "_command");
+    for (const auto& e : p.acting) set(e->command, e->name + "_command");
     for (std::size_t k = 0; k < t.couplings.size(); ++k) set(p.couplings[k].input, t.couplings[k].name + "_command");
     for (std::size_t k = 0; k < t.controllers.size(); ++k) {
         set(p.controllers[k].reference, t.controllers[k].name + "_reference");
@@ -87,10 +87,8 @@ inline std::vector<std::string> branch_names(const Assembly& a) {
     };
     for (std::size_t k = 0; k < t.motors.size(); ++k)
         set(p.motors[k].branch, t.motors[k].name + ": limit of the command");
-    for (std::size_t k = 0; k < t.shafts.size(); ++k) {
+    for (std::size_t k = 0; k < t.shafts.size(); ++k)
         set(p.shafts[k].friction_piece, t.shafts[k].name + ": piece of the friction curve");
-        set(p.shafts[k].drag_piece, t.shafts[k].name + ": piece of the drag");
-    }
     for (std::size_t k = 0; k < t.gears.size(); ++k) {
         const std::string& name = t.gears[k].name;
         set(p.gears[k].piece, name + ": piece of the torsion curve");
@@ -100,12 +98,10 @@ inline std::vector<std::string> branch_names(const Assembly& a) {
         set(p.gears[k].error_piece, name + ": piece of the transmission error");
         set(p.gears[k].error_corner, name + ": rest on a corner of the transmission error");
     }
-    for (std::size_t k = 0; k < t.brakes.size(); ++k)
-        set(p.brakes[k].branch, t.brakes[k].name + ": limit of the command");
     for (std::size_t k = 0; k < t.couplings.size(); ++k)
         set(p.couplings[k].branch, t.couplings[k].name + ": limit of the command");
-    for (std::size_t k = 0; k < t.angle_torques.size(); ++k)
-        set(p.angle_torques[k].piece, t.angle_torques[k].name + ": piece of the torque over angle");
+    for (const auto& e : p.acting)
+        if (e->branch != nowhere) set(e->branch, e->name + ": " + e->piecewise_law());
     for (std::size_t k = 0; k < t.controllers.size(); ++k)
         set(p.controllers[k].branch, t.controllers[k].name + ": limit of the controller");
     return names;

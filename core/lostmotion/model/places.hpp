@@ -1,14 +1,12 @@
 // What belongs to each element of a train in its equations: states, contacts, memory, inputs, branches.
 //
 // Coupled states: [motor torques][shaft speeds][twists][angles that a torque or a controller depends on][states of
-// controllers]. Angles: one for each part of
-// the train that hangs together, that of its last shaft.
+// controllers]. Angles: one for each part of the train that hangs together, that of its last shaft.
 #pragma once
 
 #include <algorithm>
 #include <vector>
 
-#include "row.hpp"
 #include "ties.hpp"
 #include "train.hpp"
 
@@ -28,13 +26,6 @@ struct MotorPlace {
     int branch = nowhere;
     int controller = nowhere;  // its number
 };
-struct ShaftPlace {
-    int speed = nowhere, angle = nowhere;  // states; the angle only if a torque depends on it
-    int contact = nowhere, load = nowhere;
-    int friction_piece = nowhere, drag_piece = nowhere;  // branches
-    double inertia = 0.0, viscous_friction = 0.0;        // with the rotors and gears on it
-    double motor_friction = 0.0;                         // [N m], of the bearings of the motors on it
-};
 struct GearPlace {
     int twist = nowhere, contact = nowhere;
     int hysteresis = nowhere;                                                                           // memory
@@ -42,15 +33,8 @@ struct GearPlace {
     int error_corner = nowhere;  // branch: +1, -1: the input shaft rests on the upper, the lower end of that piece
     int error_turn = nowhere;    // memory
 };
-struct BrakePlace {
-    int input = nowhere, branch = nowhere;
-};
 struct CouplingPlace {
     int contact = nowhere, input = nowhere, branch = nowhere;
-};
-struct AngleTorquePlace {
-    int piece = nowhere, turn = nowhere;  // branch, memory
-    int remainder = nowhere;              // input: what the chords leave of a sine
 };
 
 struct ControllerPlace {
@@ -64,15 +48,21 @@ struct Places {
     std::vector<MotorPlace> motors;
     std::vector<ShaftPlace> shafts;
     std::vector<GearPlace> gears;
-    std::vector<BrakePlace> brakes;
     std::vector<CouplingPlace> couplings;
-    std::vector<AngleTorquePlace> angle_torques;
     std::vector<ControllerPlace> controllers;
+    ShaftElements acting;
     std::vector<ContactPlace> contacts;
     std::vector<int> last_shaft;  // of each part of the train, whose angle is kept
 
     // with_remainders: what piecewise-linear laws leave of smooth ones enters as further inputs.
     explicit Places(const Train& train, bool with_remainders = false);
+
+    template <class Now>
+    ShaftInstant instant_of(const ShaftElement& e, const Now& now) const {
+        const ShaftPlace& p = shafts[e.shaft];
+        return {now.x[p.speed], p.angle == nowhere ? 0.0 : now.x[p.angle],
+                e.command == nowhere ? 0.0 : now.input[0][e.command], e.turn == nowhere ? 0.0 : now.memory[e.turn]};
+    }
 
  private:
     // The narrowest kernel. A train that fits into it has a place for the torque of each motor and the twist of each
@@ -89,10 +79,9 @@ inline Places::Places(const Train& train, bool with_remainders)
     : motors(train.motors.size()),
       shafts(train.shafts.size()),
       gears(train.gears.size()),
-      brakes(train.brakes.size()),
       couplings(train.couplings.size()),
-      angle_torques(train.angle_torques.size()),
-      controllers(train.controllers.size()) {
+      controllers(train.controllers.size()),
+      acting(shaft_elements(train)) {
     for (std::size_t k = 0; k < controllers.size(); ++k)
         motors[train.controllers[k].motor].controller = static_cast<int>(k);
     for (std::size_t s = 0; s < shafts.size(); ++s) {
@@ -110,15 +99,16 @@ inline Places::Places(const Train& train, bool with_remainders)
     place_states(train);
     place_contacts(train);
     place_inputs(train);
-    for (std::size_t k = 0; with_remainders && k < angle_torques.size(); ++k)
-        if (train.angle_torques[k].torque.of_sine()) angle_torques[k].remainder = layout.inputs++;
+    for (const auto& e : acting)
+        if (with_remainders && e->is_smooth()) e->remainder = layout.inputs++;
     place_memory_and_branches(train);
     layout.arrange();
 }
 
 inline void Places::place_states(const Train& train) {
     std::vector<bool> by_angle(shafts.size());
-    for (const AngleTorque& t : train.angle_torques) by_angle[t.shaft] = true;
+    for (const auto& e : acting)
+        if (e->over_angle()) by_angle[e->shaft] = true;
     for (const Gear& g : train.gears)
         if (g.transmission_error.present()) {
             by_angle[g.input] = true;
@@ -166,8 +156,8 @@ inline void Places::place_states(const Train& train) {
 inline void Places::place_contacts(const Train& train) {
     const auto dry = [&](std::size_t s) {
         if (shafts[s].motor_friction > 0.0 || train.shafts[s].friction.present()) return true;
-        const auto on = [s](const auto& e) { return e.shaft == static_cast<int>(s); };
-        return std::any_of(train.brakes.begin(), train.brakes.end(), on) ||
+        const auto on = [s](const auto& e) { return e->is_dry() && e->shaft == static_cast<int>(s); };
+        return std::any_of(acting.begin(), acting.end(), on) ||
                std::any_of(train.gears.begin(), train.gears.end(),
                            [s](const Gear& g) { return g.input == static_cast<int>(s) && g.has_dry_losses(); });
     };
@@ -197,7 +187,8 @@ inline void Places::place_inputs(const Train& train) {
         if (m.controller == nowhere) m.command = layout.inputs++;
     for (std::size_t s = 0; s < shafts.size(); ++s)
         if (train.shafts[s].loaded) shafts[s].load = layout.inputs++;
-    for (BrakePlace& b : brakes) b.input = layout.inputs++;
+    for (const auto& e : acting)
+        if (e->has_command()) e->command = layout.inputs++;
     for (std::size_t k = 0; k < couplings.size(); ++k)
         if (train.couplings[k].commanded()) couplings[k].input = layout.inputs++;
     for (std::size_t k = 0; k < controllers.size(); ++k) {
@@ -219,10 +210,8 @@ inline void Places::place_memory_and_branches(const Train& train) {
     int& next = layout.branches;
     for (std::size_t m = 0; m < motors.size(); ++m)
         if (train.motors[m].limited() && motors[m].controller == nowhere) motors[m].branch = next++;
-    for (std::size_t s = 0; s < shafts.size(); ++s) {
+    for (std::size_t s = 0; s < shafts.size(); ++s)
         if (train.shafts[s].friction.pieces() > 1) shafts[s].friction_piece = next++;
-        if (train.shafts[s].drag.outermost_piece() > 0) shafts[s].drag_piece = next++;
-    }
     for (std::size_t k = 0; k < gears.size(); ++k) {
         const Gear& g = train.gears[k];
         if (!g.rigid()) gears[k].piece = next++;
@@ -237,12 +226,11 @@ inline void Places::place_memory_and_branches(const Train& train) {
             gears[k].error_turn = layout.memory++;
         }
     }
-    for (BrakePlace& b : brakes) b.branch = next++;
     for (CouplingPlace& c : couplings)
         if (c.input != nowhere) c.branch = next++;
-    for (AngleTorquePlace& t : angle_torques) {
-        t.piece = next++;
-        t.turn = layout.memory++;
+    for (const auto& e : acting) {
+        if (e->piecewise_law() != nullptr) e->branch = next++;
+        if (e->period() > 0.0) e->turn = layout.memory++;
     }
     for (std::size_t k = 0; k < controllers.size(); ++k)
         if (train.controllers[k].limited()) controllers[k].branch = next++;

@@ -15,9 +15,7 @@ struct PowerFlow {
         loss,    // turned into heat
         output,  // to the load
     } kind;
-    enum Element { motor, shaft, gear, brake, coupling, angle_torque } element;
-    int index;         // of the element
-    const char* what;  // "motor", "viscous friction", ...
+    std::string name;  // of the element, and what it is: "drum: viscous friction"
     Power<Row> power;
 };
 
@@ -38,77 +36,47 @@ inline std::vector<PowerFlow> power_flows(const Assembly& a, const Regime& r) {
     const auto speed = [&](int s) { return terms.state(places.shafts[s].speed); };
     const auto index = [](std::size_t k) { return static_cast<int>(k); };
     std::vector<PowerFlow> flows;
+    const auto add = [&](PowerFlow::Kind kind, const std::string& element, const char* what, const Power<Row>& power) {
+        flows.push_back({kind, element + ": " + what, power});
+    };
     for (std::size_t m = 0; m < train.motors.size(); ++m)
-        flows.push_back({PowerFlow::source,
-                         PowerFlow::motor,
-                         index(m),
-                         "motor",
-                         {r.motor_torque[m], speed(train.motors[m].shaft)}});
-    for (std::size_t k = 0; k < train.angle_torques.size(); ++k)
-        flows.push_back({PowerFlow::source,
-                         PowerFlow::angle_torque,
-                         index(k),
-                         "torque over angle",
-                         {a.angle_torque(index(k), r.key), speed(train.angle_torques[k].shaft)}});
+        add(PowerFlow::source, train.motors[m].name, "motor", {r.motor_torque[m], speed(train.motors[m].shaft)});
+    for (const auto& e : places.acting)
+        if (e->source() != nullptr)
+            add(PowerFlow::source, e->name, e->source(), {e->torque(a.site(e->shaft), r.key), speed(e->shaft)});
     for (std::size_t s = 0; s < train.shafts.size(); ++s) {
         const ShaftPlace& p = places.shafts[s];
+        const std::string& name = train.shafts[s].name;
         const Row w = speed(index(s));
-        flows.push_back(
-            {PowerFlow::loss, PowerFlow::shaft, index(s), "viscous friction", viscous_power(p.viscous_friction, w)});
-        if (train.shafts[s].has_drag())
-            flows.push_back({PowerFlow::loss, PowerFlow::shaft, index(s), "drag", {a.drag_torque(index(s), r.key), w}});
-        if (p.load != nowhere)
-            flows.push_back({PowerFlow::output, PowerFlow::shaft, index(s), "load", {terms.input(p.load), w}});
+        const auto lossy = [s](const auto& e) { return e->loss() != nullptr && e->shaft == static_cast<int>(s); };
+        add(PowerFlow::loss, name, "viscous friction", viscous_power(p.viscous_friction, w));
+        for (const auto& e : places.acting)
+            if (lossy(e) && !e->is_dry())
+                add(PowerFlow::loss, e->name, e->loss(), {-e->torque(a.site(index(s)), r.key), w});
+        if (p.load != nowhere) add(PowerFlow::output, name, "load", {terms.input(p.load), w});
         if (p.contact == nowhere || r.key.modes[p.contact] == 0) continue;
-        flows.push_back(
-            {PowerFlow::loss, PowerFlow::shaft, index(s), "dry friction", {a.sliding_friction(index(s), r.key), w}});
-        for (std::size_t b = 0; b < train.brakes.size(); ++b)
-            if (train.brakes[b].shaft == index(s))
-                flows.push_back(
-                    {PowerFlow::loss, PowerFlow::brake, index(b), "brake", {a.brake_torque(index(b), r.key), w}});
+        add(PowerFlow::loss, name, "dry friction", {a.sliding_friction(index(s), r.key), w});
+        for (const auto& e : places.acting)
+            if (lossy(e) && e->is_dry()) add(PowerFlow::loss, e->name, e->loss(), {a.dry_torque(*e, r.key), w});
     }
     for (std::size_t g = 0; g < train.gears.size(); ++g) {
         const Gear& gear = train.gears[g];
         Row relative = speed(gear.input);  // to the housing
         if (gear.housing != nowhere) relative -= speed(gear.housing);
-        flows.push_back({PowerFlow::loss, PowerFlow::gear, index(g), "mesh",
-                         mesh_power(r.input_torque[g], r.output_torque[g], a.per_input(index(g), r.key), relative)});
+        add(PowerFlow::loss, gear.name, "mesh",
+            mesh_power(r.input_torque[g], r.output_torque[g], a.per_input(index(g), r.key), relative));
         if (gear.housing != nowhere && gear.law.viscous_friction > 0.0)
-            flows.push_back({PowerFlow::loss,
-                             PowerFlow::gear,
-                             index(g),
-                             "viscous friction",
-                             {a.housing_friction(index(g), r), relative}});
+            add(PowerFlow::loss, gear.name, "viscous friction", {a.housing_friction(index(g), r), relative});
         if (gear.rigid() || a.twist_rests(index(g), r)) continue;
         // All of the output torque that is not the spring's.
-        const Row rate = a.twist_rate(index(g), r.key);
-        flows.push_back({PowerFlow::loss,
-                         PowerFlow::gear,
-                         index(g),
-                         "hysteresis and damping",
-                         {r.output_torque[g] - a.spring_torque(index(g), r.key), rate}});
+        add(PowerFlow::loss, gear.name, "hysteresis and damping",
+            {r.output_torque[g] - a.spring_torque(index(g), r.key), a.twist_rate(index(g), r.key)});
     }
     for (std::size_t k = 0; k < train.couplings.size(); ++k)
-        flows.push_back({PowerFlow::loss,
-                         PowerFlow::coupling,
-                         index(k),
-                         "coupling",
-                         {r.contact_torque[places.couplings[k].contact],
-                          speed(train.couplings[k].input) - speed(train.couplings[k].output)}});
+        add(PowerFlow::loss, train.couplings[k].name, "coupling",
+            {r.contact_torque[places.couplings[k].contact],
+             speed(train.couplings[k].input) - speed(train.couplings[k].output)});
     return flows;
-}
-
-// A name that no other flow of the train has: of the element, and of what it is.
-inline std::string flow_name(const Assembly& a, const PowerFlow& f) {
-    const Train& t = a.train();
-    const auto k = static_cast<std::size_t>(f.index);
-    const std::string& element = f.element == PowerFlow::motor      ? t.motors[k].name
-                                 : f.element == PowerFlow::shaft    ? t.shafts[k].name
-                                 : f.element == PowerFlow::gear     ? t.gears[k].name
-                                 : f.element == PowerFlow::brake    ? t.brakes[k].name
-                                 : f.element == PowerFlow::coupling ? t.couplings[k].name
-                                                                    : t.angle_torques[k].name;
-    return element + ": " + f.what;
 }
 
 // Of all flows that there can be: those of a regime in which every contact slips.
@@ -116,7 +84,7 @@ inline std::vector<std::string> flow_names(const Assembly& a) {
     Key key;
     key.modes.fill(1);
     std::vector<std::string> names;
-    for (const PowerFlow& f : power_flows(a, a.build(key))) names.push_back(flow_name(a, f));
+    for (const PowerFlow& f : power_flows(a, a.build(key))) names.push_back(f.name);
     return names;
 }
 

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "../elements/contact_place.hpp"
+#include "../elements/regime.hpp"
 #include "../kernel/elimination.hpp"
-#include "contact_place.hpp"
-#include "regime.hpp"
 
 namespace lostmotion::model {
 

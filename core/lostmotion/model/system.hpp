@@ -64,24 +64,28 @@ class TrainSystem {
     void stop(X& x, AtRest& at_rest) const {
         search_.stop(x, at_rest);
     }
-    // Inputs that depend on the state: what the chords of a torque over angle leave of its sine.
+    // Inputs that depend on the state: what straight lines leave of smooth laws.
     void set_remainders(const Key& key, const State& x, const typename D::Memory& memory, InputsOf<D>& u,
                         InputsOf<D>* rate = nullptr) const {
-        each_remainder([&](const AngleTorque& law, const AngleTorquePlace& p, const ShaftPlace& shaft) {
-            const Remainder rest(law.torque, x[shaft.angle], x[shaft.speed], memory[p.turn], key.branch[p.piece]);
-            u[p.remainder] = rest.value;
-            if (rate != nullptr) (*rate)[p.remainder] = rest.rate;
-        });
+        for (const auto& e : assembly_.places().acting) {
+            if (e->remainder == nowhere) continue;
+            const ShaftPlace& p = assembly_.places().shafts[static_cast<std::size_t>(e->shaft)];
+            const auto rest = e->remainder_at({x[p.speed], x[p.angle], 0.0, memory[e->turn]}, key.branch[e->branch]);
+            u[e->remainder] = rest.value;
+            if (rate != nullptr) (*rate)[e->remainder] = rest.rate;
+        }
     }
     // The same for the search of the next regime, where no piece is known yet: the law is continuous.
     void set_remainders(InstantOf<D>& now) const {
-        each_remainder([&](const AngleTorque& law, const AngleTorquePlace& p, const ShaftPlace& shaft) {
-            const double phi = now.x[shaft.angle], turn = law.torque.turn(phi);
-            const Remainder rest(law.torque, phi, now.x[shaft.speed], turn, law.torque.piece(phi - turn));
-            now.input[0][p.remainder] = rest.value;
-            now.input[1][p.remainder] = rest.rate;
-            now.input_magnitudes[p.remainder] = std::fabs(law.torque.smooth(phi));
-        });
+        for (const auto& e : assembly_.places().acting) {
+            if (e->remainder == nowhere) continue;
+            ShaftInstant here = assembly_.places().instant_of(*e, now);
+            here.turn = e->turn_at(here.angle);
+            const auto rest = e->remainder_at(here, e->locate(here));
+            now.input[0][e->remainder] = rest.value;
+            now.input[1][e->remainder] = rest.rate;
+            now.input_magnitudes[e->remainder] = rest.magnitude;
+        }
     }
     int n_twists() const { return n_twists_; }
     int twist_state(int t) const { return twists_[static_cast<std::size_t>(t)]; }
@@ -107,23 +111,6 @@ class TrainSystem {
     }
 
  private:
-    struct Remainder {
-        double value, rate;
-
-        Remainder(const PeriodicCurve& curve, double phi, double speed, double turn, int piece)
-            : value(curve.smooth(phi) - curve.at_zero(piece) - curve.slope(piece) * (phi - turn)),
-              rate((curve.smooth_slope(phi) - curve.slope(piece)) * speed) {}
-    };
-    template <class Use>
-    void each_remainder(Use&& use) const {
-        const Places& places = assembly_.places();
-        for (std::size_t k = 0; k < places.angle_torques.size(); ++k) {
-            const AngleTorque& law = assembly_.train().angle_torques[k];
-            if (places.angle_torques[k].remainder != nowhere)
-                use(law, places.angle_torques[k], places.shafts[static_cast<std::size_t>(law.shaft)]);
-        }
-    }
-
     const Assembly& assembly_;
     SwitchedTrain<D> search_;
     std::array<int, D::coupled> twists_{};

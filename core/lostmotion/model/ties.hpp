@@ -9,8 +9,8 @@
 #include <cmath>
 #include <vector>
 
-#include "contact_place.hpp"
-#include "regime.hpp"
+#include "../elements/contact_place.hpp"
+#include "../elements/regime.hpp"
 
 namespace lostmotion::model {
 

@@ -1,10 +1,13 @@
 // A drive train: shafts, and what joins, turns, loads and holds them. Parameters only.
 #pragma once
 
+#include <memory>
 #include <vector>
 
-#include "../parts/angle_torque.hpp"
-#include "../parts/brake.hpp"
+#include "../elements/angle_torque.hpp"
+#include "../elements/brake.hpp"
+#include "../elements/drag.hpp"
+#include "../elements/spring.hpp"
 #include "../parts/coupling.hpp"
 #include "../parts/gear.hpp"
 #include "../parts/linear_controller.hpp"
@@ -17,10 +20,33 @@ struct Train {
     std::vector<Shaft> shafts;
     std::vector<ShaftMotor> motors;
     std::vector<Gear> gears;
-    std::vector<Brake> brakes;
     std::vector<Coupling> couplings;
-    std::vector<AngleTorque> angle_torques;
     std::vector<LinearController> controllers;
+    // What acts on one shaft.
+    std::vector<Brake> brakes;
+    std::vector<AngleTorque> angle_torques;
+    std::vector<Spring> springs;
+
+    // Calls use(table, one of them, elements) for each kind of what acts on one shaft, in the order of the equations.
+    template <class Self, class Use>
+    static void each_kind(Self& train, Use&& use) {
+        use("brakes", "brake", train.brakes);
+        use("angle_torques", "angle torque", train.angle_torques);
+        use("springs", "spring", train.springs);
+    }
 };
+
+using ShaftElements = std::vector<std::unique_ptr<ShaftElement>>;
+
+inline ShaftElements shaft_elements(const Train& train) {
+    ShaftElements all;
+    Train::each_kind(train, [&](const char*, const char*, const auto& elements) {
+        for (const auto& e : elements) all.push_back(on_shaft(e));
+    });
+    for (std::size_t s = 0; s < train.shafts.size(); ++s)
+        if (const Shaft& shaft = train.shafts[s]; shaft.has_drag())
+            all.push_back(std::make_unique<DragOnShaft>(shaft.name, static_cast<int>(s), shaft.drag));
+    return all;
+}
 
 }  // namespace lostmotion::model

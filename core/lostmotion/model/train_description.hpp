@@ -3,7 +3,9 @@
 
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "train.hpp"
 
@@ -36,17 +38,19 @@ class TrainDescription {
         for (Gear& g : train.gears)
             if (g.name == gear) g.housing = place_of(shaft);
     }
-    void add_brake(const std::string& name, const std::string& shaft, double torque, double breakaway_torque) {
-        train.brakes.push_back({name, place_of(shaft), torque, breakaway_torque});
-    }
     void add_coupling(const std::string& name, const std::string& input, const std::string& output, double torque,
                       double breakaway_torque, Coupling::Kind kind) {
         train.couplings.push_back({name, kind, place_of(input), place_of(output), torque, breakaway_torque});
     }
-    void add_angle_torque(const std::string& name, const std::string& shaft, const PeriodicCurve& torque) {
-        train.angle_torques.push_back({name, place_of(shaft), torque});
+    // What acts on one shaft.
+    template <class Element>
+    void add(Element element, const std::string& shaft) {
+        element.shaft = place_of(shaft);
+        Train::each_kind(train, [&](const char*, const char*, auto& elements) {
+            if constexpr (std::is_same_v<std::vector<Element>&, decltype(elements)>)
+                elements.push_back(std::move(element));
+        });
     }
-
     void add_controller(LinearController c, const std::string& motor) {
         c.motor = -1;
         for (std::size_t k = 0; k < train.motors.size(); ++k)

@@ -79,6 +79,7 @@ class FieldPath {
 class FieldWriter {
  public:
     static constexpr bool reads = false;
+    using Range = lostmotion::Range;
 
     std::vector<double> numbers;
 
@@ -117,11 +118,16 @@ class FieldWriter {
     void part(const char*, Use&& use) {
         use();
     }
+    template <class Curve>
+    void curve(const char*, Curve& v) {
+        describe(*this, v);
+    }
 };
 
 class FieldReader {
  public:
     static constexpr bool reads = true;
+    using Range = lostmotion::Range;
 
     explicit FieldReader(std::span<const double> numbers) : numbers_(numbers) {}
 
@@ -199,6 +205,10 @@ class FieldReader {
     void part(const char* name, Use&& use) {
         const FieldPath::Step here(path_, name);
         use();
+    }
+    template <class Curve>
+    void curve(const char* name, Curve& v) {
+        part(name, [&] { describe(*this, v); });
     }
 
  private:

@@ -8,7 +8,7 @@
 
 namespace lostmotion {
 
-inline constexpr long max_pieces = 30000;  // of a law: they are counted in 16 bits
+using model::max_pieces;
 
 inline bool rising(const std::vector<double>& v) {
     for (std::size_t k = 1; k < v.size(); ++k)
@@ -211,14 +211,6 @@ void describe(F& f, Gear& g) {
 }
 
 template <class F>
-void describe(F& f, Brake& b) {
-    f.text("name", b.name);
-    f.integer("shaft", b.shaft, 0, max_number);
-    f.number("torque", b.torque, Range::not_negative);
-    f.number("breakaway_torque", b.breakaway_torque, Range::not_negative);
-}
-
-template <class F>
 void describe(F& f, Coupling& c) {
     f.text("name", c.name);
     f.choice("kind", c.kind, 3);
@@ -226,13 +218,6 @@ void describe(F& f, Coupling& c) {
     f.integer("output", c.output, 0, max_number);
     f.number("torque", c.torque, Range::not_negative);
     f.number("breakaway_torque", c.breakaway_torque, Range::not_negative);
-}
-
-template <class F>
-void describe(F& f, AngleTorque& t) {
-    f.text("name", t.name);
-    f.integer("shaft", t.shaft, 0, max_number);
-    f.part("torque", [&] { describe(f, t.torque); });
 }
 
 template <class F>
@@ -261,10 +246,15 @@ void describe(F& f, Train& t) {
     f.each("shafts", t.shafts, element);
     f.each("motors", t.motors, element);
     f.each("gears", t.gears, element);
-    f.each("brakes", t.brakes, element);
     f.each("couplings", t.couplings, element);
-    f.each("angle_torques", t.angle_torques, element);
     f.each("controllers", t.controllers, element);
+    Train::each_kind(t, [&](const char* table, const char*, auto& elements) {
+        f.each(table, elements, [&](auto& e) {
+            f.text("name", e.name);
+            f.integer("shaft", e.shaft, 0, max_number);
+            e.describe(f);
+        });
+    });
 }
 
 }  // namespace model

@@ -42,7 +42,7 @@ class TrainMeter {
 
     // Its row, which it keeps from regime to regime.
     int place(const model::PowerFlow& f) {
-        const std::string name = model::flow_name(assembly_, f);
+        const std::string& name = f.name;
         for (std::size_t k = 0; k < names_.size(); ++k)
             if (names_[k] == name) return static_cast<int>(k);
         names_.push_back(name);

@@ -109,6 +109,9 @@ def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, po
     for t in (*scenario.gravity.values(), *scenario.angle_torques.values()):
         n, curve = ratios[t.shaft], t.core()
         other -= n * np.array([curve(phi) for phi in (n * s.angle).tolist()])
+    for spring in scenario.springs.values():
+        n, spring_curve = ratios[spring.shaft], spring.stiffness.core()
+        other += n * np.array([spring_curve.torque(phi - spring.rest_angle) for phi in (n * s.angle).tolist()])
     r = inertia * s.acceleration + viscous * s.speed + dry * np.sign(s.speed) + other
     return np.asarray(r[s.blocks].mean(axis=1))
 

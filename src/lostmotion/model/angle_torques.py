@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -65,6 +65,10 @@ class TorqueHarmonic(Harmonic):
     def core(self) -> _core.PeriodicCurve:
         return self._core_curve(self.amplitude, self.error)
 
+    def core_fields(self) -> dict[str, Any]:
+        """What the core takes, in SI units."""
+        return {"torque": self.core()}
+
 
 class TorqueCurve(AngleCurve):
     """A torque on the shaft over its angle: straight lines through points over one period."""
@@ -80,6 +84,10 @@ class TorqueCurve(AngleCurve):
 
     def core(self) -> _core.PeriodicCurve:
         return _core.PeriodicCurve(self.period, list(self.angles), list(self.torques))
+
+    def core_fields(self) -> dict[str, Any]:
+        """What the core takes, in SI units."""
+        return {"torque": self.core()}
 
 
 class ErrorHarmonic(Harmonic):
@@ -127,6 +135,10 @@ class Gravity(Part):
         return _core.PeriodicCurve.sine(
             -amplitude, 1, self.angle, SHARE * amplitude if self.error is None else self.error
         )
+
+    def core_fields(self) -> dict[str, Any]:
+        """What the core takes, in SI units."""
+        return {"torque": self.core()}
 
 
 AngleTorque = Annotated[TorqueHarmonic | TorqueCurve, Field(discriminator="kind")]

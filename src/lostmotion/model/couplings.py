@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
 
@@ -59,6 +59,10 @@ class Brake(Commanded):
 
     shaft: str
     """that it holds"""
+
+    def core_fields(self) -> dict[str, Any]:
+        """What the core takes, in SI units."""
+        return {"torque": self.torque, "breakaway_torque": self.holding()}
 
 
 class Clutch(Commanded):

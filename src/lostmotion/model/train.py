@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Self, TypeVar
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -21,12 +21,16 @@ from .losses import LossMap, MeshEfficiency, WormMesh
 from .motor import ShaftMotor
 from .parameters import MotorLaw, numbers
 from .shaft import Shaft
+from .springs import Spring
 from .torsion import Rigid
 
 V = TypeVar("V")
 
 Elements = Annotated[dict[str, V], AfterValidator(Named)]
 """by name, in the order of the equations"""
+
+# What acts on one shaft: tables, and what the core calls them (core/lostmotion/model/train.hpp).
+ON_SHAFTS = {"brakes": "brakes", "gravity": "angle_torques", "angle_torques": "angle_torques", "springs": "springs"}
 
 # What the core calls an element (core/lostmotion/model/check.hpp), and the tables that it may stand in.
 TABLES = {
@@ -36,6 +40,7 @@ TABLES = {
     "brake": ("brakes",),
     "coupling": ("clutches", "freewheels"),
     "angle torque": ("gravity", "angle_torques"),
+    "spring": ("springs",),
 }
 
 
@@ -49,6 +54,7 @@ class TrainElements(Part):
     freewheels: Elements[Freewheel] = Field(default_factory=nothing)
     gravity: Elements[Gravity] = Field(default_factory=nothing)
     angle_torques: Elements[AngleTorque] = Field(default_factory=nothing)
+    springs: Elements[Spring] = Field(default_factory=nothing)
 
     def commanded(self) -> list[str]:
         """Names of what has a command: motors, brakes and friction clutches."""
@@ -110,7 +116,7 @@ class DriveTrain(TrainElements):
         problem = self.core(loaded).check()
         if not problem:
             return
-        found = re.fullmatch("(shaft|motor|gear|brake|coupling|angle torque) '([^']*)' (.*)", problem)
+        found = re.fullmatch(f"({'|'.join(TABLES)}) '([^']*)' (.*)", problem)
         if found is None:
             raise InputError(problem)
         kind, name, text = found.groups()
@@ -129,16 +135,14 @@ class DriveTrain(TrainElements):
             train.add_motor(name, m.shaft, numbers(m.as_dc(), "motor") | dict(changes), torque_source, limit)
         for name, g in self.gears.items():
             add_gear(train, name, g)
-        for name, b in self.brakes.items():
-            train.add_brake(name, b.shaft, b.torque, b.holding())
         for name, c in self.clutches.items():
             add = train.add_clutch if c.kind == "friction" else train.add_safety_clutch
             add(name, c.input, c.output, c.torque, c.holding())
         for name, f in self.freewheels.items():
             train.add_freewheel(name, f.input, f.output)
-        turning: dict[str, Any] = {**self.gravity, **self.angle_torques}
-        for name, t in turning.items():
-            train.add_angle_torque(name, t.shaft, t.core())
+        for table, kind in ON_SHAFTS.items():
+            for name, element in getattr(self, table).items():
+                train.add(kind, name, element.shaft, element.core_fields())
         return train
 
 

@@ -11,6 +11,8 @@
 
 namespace lostmotion::model {
 
+inline constexpr long max_pieces = 30000;  // of a law: they are counted in 16 bits
+
 // Which regime: the mode of each contact (slips forward +1, backward -1, stuck 0) and the branch of each piecewise law.
 struct Key {
     std::array<std::int8_t, max_contacts> modes{};
@@ -41,7 +43,7 @@ struct Guard {
         turning,      // the torque that drives a contact at its limit turns back
         outside,      // the extended data of a law end
     };
-    Row form;
+    Row form{};
     Kind kind = outside;
     int contact = -1;         // for speed and capacity; the contact that a law belongs to, if any
     int branch = -1;          // for edges and limits: the law

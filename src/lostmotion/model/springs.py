@@ -1,0 +1,29 @@
+"""Springs between a shaft and the frame: counterbalances, flexure pivots, cables that are wound up, end stops."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from ..inputs.part import Part
+from ..inputs.quantities import Angle
+from .torsion import LinearStiffness, TorsionCurve
+
+
+class Spring(Part):
+    """A spring between a shaft and the frame: the torque ``-P(phi - rest_angle)`` on the shaft.
+
+    With `backlash`, a torsion curve leaves the shaft free between two elastic end stops.
+    """
+
+    shaft: str
+    """on which it acts"""
+    stiffness: Annotated[TorsionCurve | LinearStiffness, Field(discriminator="kind")]
+    """P over the angle from the rest angle on"""
+    rest_angle: Angle = 0.0
+    """of the shaft, where the spring has no torque"""
+
+    def core_fields(self) -> dict[str, Any]:
+        """What the core takes, in SI units."""
+        return {"curve": self.stiffness.core(), "rest_angle": self.rest_angle}
