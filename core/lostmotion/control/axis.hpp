@@ -250,7 +250,7 @@ class Axis {
     }
     // The next one, from where the last one has been followed up to.
     void set_course(const WindingCourse& next, double* slot) const {
-        const auto [electrical, heat] = energy(next.begin, slot);
+        const auto [electrical, heat] = energy(next.begin, course(slot), slot);
         slot[energy_] = electrical;
         slot[energy_ + 1] = heat;
         std::memcpy(slot + course_, &next, sizeof next);
@@ -265,16 +265,11 @@ class Axis {
         const DirectQuadrature i = course(slot).current(time);
         return field_orientation->winding.torque(i.d, i.q);
     }
-    double winding_signal(int s, double time, const double* slot) const {
+    std::array<double, n_winding_signals> winding_signals(double time, const double* slot) const {
         const WindingCourse c = course(slot);
-        switch (s) {
-            case direct_current: return c.current(time).d;
-            case quadrature_current: return c.current(time).q;
-            case direct_voltage: return c.voltage(time).d;
-            case quadrature_voltage: return c.voltage(time).q;
-            case electrical_energy: return energy(time, slot).electrical;
-            default: return energy(time, slot).heat;
-        }
+        const DirectQuadrature i = c.current(time), u = c.voltage(time);
+        const auto [electrical, heat] = energy(time, c, slot);
+        return {i.d, i.q, u.d, u.q, electrical, heat};
     }
 
  private:
@@ -343,8 +338,7 @@ class Axis {
         return {commutates_by_encoder ? slot[speed_angle] : y.rotor_angle, slot[measured_speed], y.rotor_angle,
                 course(slot).current(y.time)};
     }
-    WindingCourse::Energy energy(double time, const double* slot) const {
-        const WindingCourse c = course(slot);
+    WindingCourse::Energy energy(double time, const WindingCourse& c, const double* slot) const {
         const auto [electrical, heat] = c.energy(field_orientation->winding, c.begin, time);
         return {slot[energy_] + electrical, slot[energy_ + 1] + heat};
     }

@@ -13,6 +13,8 @@
 #include <array>
 #include <cmath>
 
+#include "../kernel/vec.hpp"
+
 namespace lostmotion {
 
 struct SynchronousWinding {
@@ -46,6 +48,13 @@ struct PowerSeries {
         for (int k = n - 1; k >= 0; --k) sum = sum * s + c[k];
         return sum;
     }
+    // At eight places, each as above.
+    Pack<8> operator()(const Pack<8>& s) const {
+        Pack<8> sum{};
+        for (int k = n - 1; k >= 0; --k)
+            for (int p = 0; p < Pack<8>::parts; ++p) sum.part[p] = sum.part[p] * s.part[p] + c[k];
+        return sum;
+    }
 };
 
 // A speed [rad/s], by its values at both ends of a stretch and its mean.
@@ -59,12 +68,26 @@ struct Ramp {
     double value = 0.0, slope = 0.0;  // at the beginning, per second
 };
 
+// Of s^n over the stretch: its integral, and that of s^n (s - 1/2).
+template <int n>
+struct SeriesShares {
+    std::array<double, static_cast<std::size_t>(n)> mean{}, moment{};
+
+    constexpr SeriesShares() {
+        for (int k = 0; k < n; ++k) {
+            mean[k] = 1.0 / (k + 1);
+            moment[k] = k / (2.0 * (k + 1) * (k + 2));
+        }
+    }
+};
+
 // Currents, voltages and speed from `begin` to `end` [s]. Numbers only, so that a controller can remember it.
 struct WindingCourse {
     static constexpr int terms = 16;
     // Of the fastest change times the length, at most: the terms left out are then below 1/16! of the whole.
     static constexpr double reach = 0.5;
     using Series = PowerSeries<terms>;
+    static constexpr SeriesShares<terms> shares{};
 
     double begin = 0.0, end = 0.0;
     PowerSeries<3> speed;
@@ -88,40 +111,56 @@ struct WindingCourse {
         return c;
     }
 
-    // Currents and voltages from what they are at the beginning.
-    void solve(const SynchronousWinding& w) {
-        const double h = length(), p = w.pole_pairs, ratio = w.inductance_q / w.inductance_d;
-        const double damping_d = w.resistance / w.inductance_d, damping_q = w.resistance / w.inductance_q;
-        std::array<double, 3> turn;
-        for (std::size_t k = 0; k < 3; ++k) turn[k] = h * p * speed.c[k];
-        for (int n = 0; n + 1 < terms; ++n) {
+    // So many terms that those left out are below rounding, where the fastest change times the length is `change`.
+    static int terms_for(double change) {
+        int n = 3;
+        for (double left = change * change / 6.0; n < terms && left > 1e-17; ++n) left *= change * shares.mean[n];
+        return n;
+    }
+
+    // Currents and voltages from what they are at the beginning, by the first `used` terms.
+    void solve(const SynchronousWinding& w, int used = terms) {
+        const double h = length(), ratio = w.inductance_q / w.inductance_d;
+        const double rise_d = h / w.inductance_d, rise_q = h / w.inductance_q;
+        const double damping_d = rise_d * w.resistance, damping_q = rise_q * w.resistance;
+        std::array<double, 3> turn, of_d, of_q, of_flux;  // the speed, and what it makes of i_d, i_q and psi
+        for (std::size_t k = 0; k < 3; ++k) {
+            turn[k] = h * w.pole_pairs * speed.c[k];
+            of_d[k] = turn[k] / ratio;
+            of_q[k] = turn[k] * ratio;
+            of_flux[k] = turn[k] * w.flux_linkage / w.inductance_q;
+        }
+        for (Series* s : {&i_d, &i_q, &u_d, &u_q}) std::fill(s->c.begin() + used, s->c.end(), 0.0);
+        const auto extend = [&](int n, int reach) {
             // The speed times each of the series, of s^n.
-            double by_d = n < 3 ? turn[n] * w.flux_linkage / w.inductance_q : 0.0, by_q = 0.0, of_u_d = 0.0,
-                   of_u_q = 0.0;
-            for (int k = 0; k < 3 && k <= n; ++k) {
-                by_d += turn[k] * i_d.c[n - k] / ratio;
-                by_q += turn[k] * i_q.c[n - k] * ratio;
+            double by_d = n < 3 ? of_flux[n] : 0.0, by_q = 0.0, of_u_d = 0.0, of_u_q = 0.0;
+            for (int k = reach; k >= 0; --k) {  // what was found last comes in last
+                by_d += of_d[k] * i_d.c[n - k];
+                by_q += of_q[k] * i_q.c[n - k];
                 of_u_d += turn[k] * u_d.c[n - k];
                 of_u_q += turn[k] * u_q.c[n - k];
             }
-            const double next = 1.0 / (n + 1);
-            i_d.c[n + 1] = next * (h * (u_d.c[n] / w.inductance_d - damping_d * i_d.c[n]) + by_q);
-            i_q.c[n + 1] = next * (h * (u_q.c[n] / w.inductance_q - damping_q * i_q.c[n]) - by_d);
+            const double next = shares.mean[n];
+            i_d.c[n + 1] = next * ((rise_d * u_d.c[n] - damping_d * i_d.c[n]) + by_q);
+            i_q.c[n + 1] = next * ((rise_q * u_q.c[n] - damping_q * i_q.c[n]) - by_d);
             u_d.c[n + 1] = next * of_u_q;
             u_q.c[n + 1] = -next * of_u_d;
-        }
+        };
+        extend(0, 0);
+        extend(1, 1);
+        for (int n = 2; n + 1 < used; ++n) extend(n, 2);
     }
 
     // The ramp with the impulse of the torque over the stretch, and with its moment: of an inertia both give the same
     // speed and the same angle at the end.
-    Ramp torque(const SynchronousWinding& w) const {
+    Ramp torque(const SynchronousWinding& w, int used = terms) const {
         double mean = 0.0, moment = 0.0;
-        for (int n = 0; n < terms; ++n) {
+        for (int n = 0; n < used; ++n) {
             double m = w.flux_linkage * i_q.c[n];
             if (w.saliency() != 0.0)
                 for (int k = 0; k <= n; ++k) m += w.saliency() * i_d.c[k] * i_q.c[n - k];
-            mean += m / (n + 1);
-            moment += m * n / (2.0 * (n + 1) * (n + 2));
+            mean += m * shares.mean[n];
+            moment += m * shares.moment[n];
         }
         const double scale = 1.5 * w.pole_pairs, rise = 12.0 * moment;
         return {scale * (mean - 0.5 * rise), length() > 0.0 ? scale * rise / length() : 0.0};
@@ -138,13 +177,13 @@ struct WindingCourse {
             weight{0.36268378337836198297, 0.31370664587788728734, 0.22238103445337447054, 0.10122853629037625915};
         Energy out;
         const double middle = 0.5 * (share(from) + share(to)), half = 0.5 * (share(to) - share(from));
-        for (std::size_t k = 0; k < 4; ++k)
-            for (const double side : {-1.0, 1.0}) {
-                const double s = middle + side * half * place[k];
-                const double d = i_d(s), q = i_q(s);
-                out.electrical += weight[k] * (u_d(s) * d + u_q(s) * q);
-                out.heat += weight[k] * (d * d + q * q);
-            }
+        Pack<8> s;
+        for (int k = 0; k < 8; ++k) s.set(k, middle + (k % 2 == 0 ? -half : half) * place[k / 2]);
+        const Pack<8> d = i_d(s), q = i_q(s), power = u_d(s) * d + u_q(s) * q, squares = d * d + q * q;
+        for (int k = 0; k < 8; ++k) {
+            out.electrical += weight[k / 2] * power[k];
+            out.heat += weight[k / 2] * squares[k];
+        }
         const double scale = 1.5 * 0.5 * (to - from);
         return {scale * out.electrical, scale * w.resistance * out.heat};
     }

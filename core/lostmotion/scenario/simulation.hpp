@@ -342,13 +342,17 @@ class ScenarioSimulation {
     template <class Snapshot>
     void read_controllers(const Snapshot& now, double* out) const {
         std::vector<const double*> slots{now.control.slots.data()};
-        for (const control::Axis& law : laws_) slots.push_back(slots.back() + law.slots());
+        std::vector<std::array<double, control::n_winding_signals>> windings;
+        for (const control::Axis& law : laws_) {
+            windings.push_back(winding_signals_of(law, now.time, slots.back()));
+            slots.push_back(slots.back() + law.slots());
+        }
         double* to = out + variables_.first_shown();
         for (const Variables::Shown& shown : variables_.shown()) {
             const auto a = static_cast<std::size_t>(shown.axis);
             *to++ = shown.signal < control::n_axis_signals
                         ? laws_[a].signal(shown.signal, slots[a])
-                        : laws_[a].winding_signal(shown.signal - control::n_axis_signals, now.time, slots[a]);
+                        : windings[a][static_cast<std::size_t>(shown.signal - control::n_axis_signals)];
         }
         for (std::size_t a = 0; a < laws_.size(); ++a)
             if (laws_[a].field_orientation) out[torques_[a]] = laws_[a].winding_torque(now.time, slots[a]);

@@ -82,6 +82,12 @@ struct ControlCourse {
     std::vector<double> slots;  // of all axes, one after the other
 };
 
+// Of an axis, 0 without a winding.
+inline std::array<double, control::n_winding_signals> winding_signals_of(const control::Axis& a, double time,
+                                                                         const double* slot) {
+    return a.field_orientation ? a.winding_signals(time, slot) : std::array<double, control::n_winding_signals>{};
+}
+
 // The signals of the axes at the instants of a record: out[(axis * signals + signal) * count + k] at k * interval.
 class ControlRecord {
  public:
@@ -95,20 +101,18 @@ class ControlRecord {
             const double* slot = course.slots.data();
             double* to = out_ + next_;
             for (const control::Axis& a : loop.axes) {
-                for (int s = 0; s < signals_; ++s, to += count_) *to = signal(a, s, slot);
+                for (int s = 0; s < control::n_axis_signals; ++s, to += count_) *to = a.signal(s, slot);
+                if (signals_ > control::n_axis_signals)
+                    for (const double v : winding_signals_of(a, static_cast<double>(next_) * interval_, slot)) {
+                        *to = v;
+                        to += count_;
+                    }
                 slot += a.slots();
             }
         }
     }
 
  private:
-    double signal(const control::Axis& a, int s, const double* slot) const {
-        if (s < control::n_axis_signals) return a.signal(s, slot);
-        return a.field_orientation
-                   ? a.winding_signal(s - control::n_axis_signals, static_cast<double>(next_) * interval_, slot)
-                   : 0.0;
-    }
-
     double interval_;
     std::size_t count_;
     int signals_;

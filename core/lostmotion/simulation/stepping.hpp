@@ -62,8 +62,7 @@ class SimulationOf {
         const double* slot = now_.control.slots.data();
         for (const control::Axis& a : laws_) {
             for (int s = 0; s < control::n_axis_signals; ++s) out.push_back(a.signal(s, slot));
-            for (int s = 0; s < control::n_winding_signals; ++s)
-                out.push_back(a.field_orientation ? a.winding_signal(s, now_.time, slot) : 0.0);
+            for (const double v : winding_signals_of(a, now_.time, slot)) out.push_back(v);
             slot += a.slots();
         }
         return out;

@@ -38,7 +38,7 @@ class WindingCoupling {
         : solver_(solver), tick_(tick) {
         int first = 0;
         for (std::size_t k = 0; k < axes.size(); ++k) {
-            if (axes[k].field_orientation) motors_.push_back({&axes[k], &places[k], first, {}});
+            if (axes[k].field_orientation) motors_.push_back({&axes[k], &places[k], first});
             first += axes[k].slots();
         }
         if (present()) probe_ = solver.twin();
@@ -75,7 +75,8 @@ class WindingCoupling {
         const control::Axis* axis;
         const AxisPlace<D>* place;
         int first;  // slot
-        WindingCourse next;
+        WindingCourse next{};
+        int terms = WindingCourse::terms;  // of the series of `next`
 
         const SynchronousWinding& winding() const { return axis->field_orientation->winding; }
         double* slots(std::span<double> all) const { return all.data() + first; }
@@ -94,7 +95,7 @@ class WindingCoupling {
         return evaluate<D>(form, solver.state(), solver.memory(), InputsOf<D>{});
     }
     static void set_torque(Solver& solver, const Motor& m) {
-        const Ramp torque = m.next.torque(m.winding());
+        const Ramp torque = m.next.torque(m.winding(), m.terms);
         solver.set_ramp(m.place->input, torque.value / m.axis->rated_torque, torque.slope / m.axis->rated_torque);
     }
     // Currents, voltages and speed of this instant.
@@ -123,6 +124,7 @@ class WindingCoupling {
         const double now = solver_.time(), h = end - now;
         for (Motor& m : motors_) {
             m.next.end = end;
+            m.terms = WindingCourse::terms_for(h * m.winding().fastest(m.next.speed.c[0]));
             const WindingCourse last = m.course(slots);
             const double rise =
                 last.length() > 0.0 ? h * (last.speed.c[1] + 2.0 * last.speed.c[2]) / last.length() : 0.0;
@@ -132,7 +134,7 @@ class WindingCoupling {
         for (int pass = 0; pass < most_passes; ++pass) {
             probe_->follow(solver_);
             for (Motor& m : motors_) {
-                m.next.solve(m.winding());
+                m.next.solve(m.winding(), m.terms);
                 set_torque(*probe_, m);
             }
             Nobody nobody;
