@@ -104,7 +104,19 @@ LABELS: dict[str, tuple[str, str, float | str]] = {
     "speed.torque_limit": ("torque limit", "N*m", 10.0),
     "current.time_constant": ("current loop time constant", "s", 10.0),
 }
-TABLES = ("motor", "motors", "gearbox", "gears", "load", "shafts", "brakes", "clutches", "controller", "controllers")
+TABLES = (
+    "motor",
+    "motors",
+    "gearbox",
+    "gears",
+    "load",
+    "shafts",
+    "brakes",
+    "clutches",
+    "springs",
+    "controller",
+    "controllers",
+)
 
 
 def of_parameters(
