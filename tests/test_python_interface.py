@@ -9,6 +9,7 @@ import timeit
 import matplotlib as mpl
 import numpy as np
 import pytest
+from pydantic import BaseModel
 
 import lostmotion as lm
 from conftest import ROOT, SCENARIOS
@@ -111,6 +112,24 @@ def test_notebooks_show_every_value_with_its_unit(path) -> None:
 
 
 # --- plots ---
+
+
+def test_the_schema_describes_fields_by_their_docstrings() -> None:
+    class Own(lm.Brake):
+        torque: float
+        colour: str = ""
+        """as it is painted"""
+
+    def described(part: type[BaseModel], field: str) -> str | None:
+        return part.model_json_schema()["properties"][field].get("description")
+
+    assert str(described(lm.Brake, "shaft")) == "that it holds"
+    assert str(described(lm.Brake, "torque")).startswith("capacity while it slips")  # of its base
+    assert described(Own, "colour") == "as it is painted"
+    assert described(Own, "torque") is None  # annotated anew, without one
+    assert described(Own, "engagement_delay") == "from a step up of the command until it acts"
+    brakes = lm.TrainScenario.model_json_schema()["$defs"]["Brake"]["properties"]
+    assert brakes["shaft"]["description"] == "that it holds"
 
 
 def test_a_result_draws_the_figures_of_the_command_line() -> None:
