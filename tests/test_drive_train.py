@@ -706,3 +706,13 @@ def test_a_safety_clutch_has_no_delays() -> None:
             },
             clutches={"c": clutch},
         )
+
+
+@pytest.mark.parametrize("stiffness", [1e40, 1e60, 1e100, 1e200, 1e300])
+def test_a_stiffness_without_measure_ends_in_one_line(stiffness: float) -> None:
+    spring = {"kind": "linear", "stiffness": stiffness}
+    to_frame = two_shafts(gears={"g": STIFF}, springs={"s": {"shaft": "b", "stiffness": spring}})
+    between = two_shafts(gears={"g": SOFT | {"stiffness": spring}})
+    for scenario in (to_frame, between):
+        with pytest.raises(lm.SolverError, match="left the range that can be computed at t = 0"):
+            lm.simulate(scenario)

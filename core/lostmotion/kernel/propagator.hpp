@@ -69,6 +69,7 @@ class Propagator {
     static constexpr int max_levels = 40;
     static constexpr int usual_levels = 12;
     static constexpr double unbounded = 1e200;  // exponential_bound from here on is no longer computed
+    static constexpr double max_norm = 1e18;    // |A| [1/s] of which time can be resolved
     static constexpr double base_norm = 0.25;   // |A| h of the base interval, in scaled units
 
     // rotations: its unit is a length of which some power-of-two multiple or fraction is the base interval.
@@ -79,14 +80,17 @@ class Propagator {
         n_pairs_ = static_cast<int>(rotations.basis().size() / 2);
         const double fastest = rotations.fastest();
         double norm = fastest;  // of A in scaled units, or the highest input frequency [1/s]
+        resolved_ = true;
         for (int r = 0; r < D::coupled; ++r) {
             double sum = 0.0;
             for (int c = 0; c < D::coupled; ++c) sum += std::fabs(rates.rate(r, c)) * scale[c] / scale[r];
             norm = std::fmax(norm, sum);
+            resolved_ = resolved_ && sum < max_norm;  // nor is it if that is no number
         }
         for (int j = 0; j < D::angles; ++j)
             norm = std::fmax(
                 norm, std::fabs(rates.angle_coefficient[j]) * scale[rates.angle_speed[j]] / scale[D::coupled + j]);
+        if (!resolved_) norm = fastest;
         base_ = rotations.unit();
         exponent_ = 0;
         for (; norm * base_ > base_norm; base_ *= 0.5) --exponent_;
@@ -118,6 +122,8 @@ class Propagator {
     const Response* responses(int k) const { return responses_.data() + k * n_pairs_; }
     const PhaseRotation* rotations(int k) const { return rotations_of_level_[k]; }
 
+    // Whether the regime is slow enough to be followed in time.
+    bool resolved() const { return resolved_; }
     double length(int k) const { return base_ * power_of_two[k]; }
     double per_first() const { return per_first_; }  // 1 / length(1), rounded
     // Steps stay below a sixth of the fastest input period: the doubling formula of a sine loses accuracy beyond it.
@@ -308,10 +314,11 @@ class Propagator {
     double base_ = 0.0;  // length of level 0 [s]
     double per_first_ = 0.0;
     double long_stretch_ = 0.0;  // [s]
-    int exponent_ = 0;           // of two: base / unit
-    int longest_ = 0;            // level
-    int bounded_ = max_levels;   // the highest level whose exponential_bound is bounded, as far as they are computed
-    int n_pairs_ = 0;            // of functions of the inputs
+    bool resolved_ = true;
+    int exponent_ = 0;          // of two: base / unit
+    int longest_ = 0;           // level
+    int bounded_ = max_levels;  // the highest level whose exponential_bound is bounded, as far as they are computed
+    int n_pairs_ = 0;           // of functions of the inputs
     PhaseRotations* rotations_ = nullptr;
     int levels_ = 0;
     std::vector<Step> steps_;          // one a level, kept when others are computed

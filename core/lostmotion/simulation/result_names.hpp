@@ -86,8 +86,10 @@ inline std::string status_text(Status status, double time, const std::string& co
             return "no combination of sticking and slipping contacts is consistent " + at +
                    ": the friction jams. Give the gearbox a compliance, or lower its losses.";
         case Status::outside:
-            return "the state left the range that the loss map can be extended to " + at +
-                   " (1000 times its data). The drive is unstable, or its data or inputs have a wrong unit.";
+            return "the state left the range that can be computed " + at +
+                   ": 1000 times the data of a loss map, or what numbers resolve. The drive is unstable, or its data "
+                   "or "
+                   "inputs, such as a stiffness, have a wrong unit.";
         case Status::zeno:
             return "switching instants of the contact '" + contact + "' accumulate " + at +
                    ": infinitely many in finite time. The model ends here.";

@@ -19,6 +19,7 @@ inline auto ExactSolver<System>::run_regime(const Segment<System>& segment, doub
     -> Status {
     Entry& e = segment.entry;
     Propagator& p = e.propagator;
+    if (!p.resolved()) return Status::outside;
     typename GuardTable::Values constant;
     e.guards.constants(segment.memory, constant);
     Cursor *cursor = begin_, *end = there_;
