@@ -111,9 +111,6 @@ def test_notebooks_show_every_value_with_its_unit(path) -> None:
     assert page.count("<table>") == page.count("</table>") > 5
 
 
-# --- plots ---
-
-
 def test_the_schema_describes_fields_by_their_docstrings() -> None:
     class Own(lm.Brake):
         torque: float
@@ -130,6 +127,9 @@ def test_the_schema_describes_fields_by_their_docstrings() -> None:
     assert described(Own, "engagement_delay") == "from a step up of the command until it acts"
     brakes = lm.TrainScenario.model_json_schema()["$defs"]["Brake"]["properties"]
     assert brakes["shaft"]["description"] == "that it holds"
+
+
+# --- plots ---
 
 
 def test_a_result_draws_the_figures_of_the_command_line() -> None:

@@ -53,7 +53,18 @@ class AngleCurve(Part):
             )
 
 
-class TorqueHarmonic(Harmonic):
+class PeriodicTorque:
+    """What is a torque on a shaft over its angle."""
+
+    def core(self) -> _core.PeriodicCurve:
+        raise NotImplementedError
+
+    def core_fields(self) -> dict[str, Any]:
+        """What the core takes, in SI units."""
+        return {"torque": self.core()}
+
+
+class TorqueHarmonic(PeriodicTorque, Harmonic):
     """A torque on the shaft ``amplitude * sin(order * phi + phase)``, by straight lines: cogging, ripple, unbalance."""
 
     shaft: str
@@ -65,12 +76,8 @@ class TorqueHarmonic(Harmonic):
     def core(self) -> _core.PeriodicCurve:
         return self._core_curve(self.amplitude, self.error)
 
-    def core_fields(self) -> dict[str, Any]:
-        """What the core takes, in SI units."""
-        return {"torque": self.core()}
 
-
-class TorqueCurve(AngleCurve):
+class TorqueCurve(PeriodicTorque, AngleCurve):
     """A torque on the shaft over its angle: straight lines through points over one period."""
 
     shaft: str
@@ -84,10 +91,6 @@ class TorqueCurve(AngleCurve):
 
     def core(self) -> _core.PeriodicCurve:
         return _core.PeriodicCurve(self.period, list(self.angles), list(self.torques))
-
-    def core_fields(self) -> dict[str, Any]:
-        """What the core takes, in SI units."""
-        return {"torque": self.core()}
 
 
 class ErrorHarmonic(Harmonic):
@@ -117,7 +120,7 @@ class ErrorCurve(AngleCurve):
         return _core.PeriodicCurve(self.period, list(self.angles), list(self.errors))
 
 
-class Gravity(Part):
+class Gravity(PeriodicTorque, Part):
     """A mass off the axis of a horizontal shaft: the torque ``-m g r sin(phi + angle)``, by straight lines."""
 
     shaft: str
@@ -135,10 +138,6 @@ class Gravity(Part):
         return _core.PeriodicCurve.sine(
             -amplitude, 1, self.angle, SHARE * amplitude if self.error is None else self.error
         )
-
-    def core_fields(self) -> dict[str, Any]:
-        """What the core takes, in SI units."""
-        return {"torque": self.core()}
 
 
 AngleTorque = Annotated[TorqueHarmonic | TorqueCurve, Field(discriminator="kind")]
