@@ -1,0 +1,302 @@
+"""The laws of the elements of a drive train: both solvers on each, closed forms, what commands and errors may be."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from test_drive_train import train
+
+
+def two_shafts(**tables: Any) -> lm.TrainScenario:
+    """Two shafts, a torque source on the first, and these tables."""
+    base: dict[str, Any] = {
+        "shafts": {"a": {"inertia": 1e-3}, "b": {"inertia": 2e-3, "torque": 0.0}},
+        "motors": {"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 1e-4}},
+        "command": {"m": {"mean": 0.3, "amplitude": 1.0, "frequency": 2.0}},
+        "simulation": {"duration": 0.6, "sample_interval": 1e-3},
+    }
+    return lm.TrainScenario(**base | {name: {**base.get(name, {}), **table} for name, table in tables.items()})
+
+
+SOFT = {"input": "a", "output": "b", "ratio": 2.0, "stiffness": {"kind": "linear", "stiffness": 50.0}}
+STIFF = {"input": "a", "output": "b", "ratio": 2.0}
+STRIBECK = {"friction_torque": 0.1, "breakaway_torque": 0.2, "stribeck_speed": 1.0, "friction_error": 0.002}
+FAN = {"kind": "quadratic", "coefficient": 1e-5, "max_speed": 300.0, "error": 0.005}
+GAP = {"kind": "curve", "backlash": 0.1, "slopes": [100.0]}
+PIVOT = {"kind": "linear", "stiffness": 5.0}
+STOPS = {"kind": "curve", "backlash": 0.4, "slopes": [20.0, 80.0], "breaks": [0.05]}
+ERROR = {"kind": "sine", "amplitude": 1e-3, "order": 5, "error": 1e-5}
+ELEMENTS = {
+    "brake": two_shafts(
+        gears={"g": SOFT},
+        brakes={"k": {"shaft": "b", "torque": 3.0}},
+        command={"k": {"steps": [{"height": 1.0, "time": 0.2}, {"height": -1.0, "time": 0.4}]}},
+    ),
+    "clutch": two_shafts(
+        clutches={"c": {"input": "a", "output": "b", "torque": 0.6}},
+        command={"c": {"ramps": [{"rise": 1.0, "duration": 0.3, "begin": 0.1}]}},
+    ),
+    "safety clutch": two_shafts(clutches={"c": {"kind": "safety", "input": "a", "output": "b", "torque": 0.6}}),
+    "freewheel": two_shafts(freewheels={"f": {"input": "a", "output": "b"}}),
+    "gravity": two_shafts(gears={"g": SOFT}, gravity={"arm": {"shaft": "b", "mass": 0.5, "radius": 0.2}}),
+    "cogging": two_shafts(
+        gears={"g": STIFF},
+        angle_torques={"cog": {"kind": "sine", "shaft": "a", "amplitude": 0.02, "order": 12, "error": 0.001}},
+    ),
+    "spring": two_shafts(gears={"g": SOFT}, springs={"pivot": {"shaft": "b", "stiffness": PIVOT, "rest_angle": 0.3}}),
+    "end stops": two_shafts(gears={"g": SOFT}, springs={"stops": {"shaft": "b", "stiffness": STOPS}}),
+    "transmission error": two_shafts(gears={"g": SOFT | {"mesh_damping": 0.01, "transmission_error": ERROR}}),
+    "housing": two_shafts(
+        gears={
+            "g": SOFT | {"housing": "h", "stiffness": GAP, "mesh_damping": 0.01},
+            "support": SOFT | {"input": "h", "output": "b", "ratio": 1.5},
+        },
+        shafts={"h": {"inertia": 4e-3, "friction_torque": 0.02}},
+    ),
+    "planetary gear": two_shafts(
+        gears={"g": STIFF | {"ratio": 4.0, "housing": "ring"}},
+        shafts={"ring": {"inertia": 4e-3, "friction_torque": 0.1}},
+    ),
+    "friction over speed": two_shafts(gears={"g": SOFT}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, **STRIBECK}}),
+    "drag": two_shafts(gears={"g": STIFF}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, "drag": FAN}}),
+    "damped play": two_shafts(gears={"g": SOFT | {"stiffness": GAP, "mesh_damping": 0.2}}),
+    "torque limit": two_shafts(
+        gears={"g": STIFF},
+        motors={"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 1e-4, "torque_limit": 0.5}},
+    ),
+    "worm and brake": train(),
+}
+
+
+def chords(scenario: lm.TrainScenario) -> float:
+    """By how much chords in place of sines move a speed [rad/s] at most: their error over the smallest inertia."""
+    smooth: dict[str, Any] = {**scenario.gravity, **scenario.angle_torques}
+    if not smooth:
+        return 0.0
+    error = sum(element.error or 1e-3 * 9.80665 * element.mass * element.radius for element in smooth.values())
+    return error * scenario.simulation.duration / min(shaft.inertia for shaft in scenario.shafts.values())
+
+
+@pytest.mark.parametrize("scenario", ELEMENTS.values(), ids=ELEMENTS)
+def test_both_solvers_agree_on_every_element(scenario: lm.TrainScenario) -> None:
+    """The adaptive solver takes sines as they are, the exact one by chords."""
+    exact = lm.simulate(scenario)
+    coarse, fine = (
+        lm.simulate(scenario, solver="dormand-prince", relative_tolerance=tolerance) for tolerance in (1e-8, 1e-10)
+    )
+    for name in exact:
+        if str(name).endswith(("_speed", "_angle", "_twist")):
+            size = float(abs(exact[name]).max()) or 1.0
+            open_by = float(abs(coarse[name] - fine[name]).max()) / size  # what the tolerance leaves open
+            sines = chords(scenario) * (1.0 if str(name).endswith("_speed") else scenario.simulation.duration)
+            assert float(abs(exact[name] - fine[name]).max()) <= (2.0 * open_by + 1e-9) * size + sines, name
+    ledger = lm.energy_of(exact)
+    assert abs(ledger["residual"]) <= 1e-9 * ledger["turned_over"]
+
+
+def test_a_pendulum_swings_with_its_period() -> None:
+    small = 0.02  # rad; the period of a pendulum is longer by small^2/16
+    scenario = lm.TrainScenario(
+        shafts={"arm": {"inertia": 2.0 * 0.3**2}},
+        gravity={"mass": {"shaft": "arm", "mass": 2.0, "radius": 0.3, "error": 1e-7}},
+        initial={"angles": {"arm": small}},
+        simulation={"duration": 3.0, "sample_interval": 1e-3},
+    )
+    result = lm.simulate(scenario)
+    expected = small * np.cos(math.sqrt(9.80665 / 0.3) * result["time"].values)
+    phase = math.sqrt(9.80665 / 0.3) * 3.0  # by a small^2/16th of which it lags at the end
+    assert float(abs(result["arm_angle"] - expected).max()) < 1.5 * small * phase * small**2 / 16.0
+
+
+@pytest.mark.parametrize(
+    ("elements", "where"),
+    [
+        (
+            {"angle_torques": {"cog": {"kind": "sine", "shaft": "a", "amplitude": 1.0, "error": 1e-9}}},
+            "angle_torques.cog:",
+        ),
+        (
+            {"gears": {"g": SOFT | {"transmission_error": ERROR | {"error": 1e-12}}}},
+            "gears.g: with its transmission error",
+        ),
+        ({"shafts": {"b": {"inertia": 2e-3, "drag": FAN | {"error": 1e-12}}}}, "shafts.b: with its drag"),
+    ],
+)
+def test_errors_that_ask_for_too_many_lines_are_refused(elements: dict[str, Any], where: str) -> None:
+    with pytest.raises(lm.InputError, match=rf"key {where} would take \d+ straight lines; at most 30000 are possible"):
+        two_shafts(**({"gears": {"g": SOFT}} | elements)).train()
+
+
+def test_a_loss_map_too_fine_to_count_is_refused() -> None:
+    n = 140
+    fine = {"kind": "map", "speeds": [float(k) for k in range(n)], "loads": [k - 0.5 * n for k in range(n)]}
+    losses = fine | {"values": [[0.1] * n] * n}
+    rated = {"rated_input_speed": 100.0, "rated_output_torque": 10.0}
+    with pytest.raises(lm.InputError, match=r"key gears.g: has a loss map of some \d+ triangles; at most 30000 are"):
+        two_shafts(gears={"g": SOFT | rated | {"losses": losses}}).train()
+
+
+def test_a_spring_balances_an_arm() -> None:
+    # An arm that gravity would turn at m g r = 6 N m, held level by a spring of 10 N m/rad that is wound up by 0.6 rad:
+    # there it stands, and swings about it with sqrt(k/J).
+    mgr, k, J, small = 6.0, 10.0, 0.2, 1e-3
+    scenario = lm.TrainScenario(
+        shafts={"arm": {"inertia": J}},
+        gravity={"weight": {"shaft": "arm", "mass": mgr / 9.80665, "radius": 1.0, "angle": math.pi / 2, "error": 1e-7}},
+        springs={
+            "balance": {"shaft": "arm", "stiffness": {"kind": "linear", "stiffness": k}, "rest_angle": mgr / k},
+        },
+        initial={"angles": {"arm": small}},
+        simulation={"duration": 2.0, "sample_interval": 1e-3},
+    )
+    result = lm.simulate(scenario)
+    expected = small * np.cos(math.sqrt(k / J) * result["time"].values)
+    # What the cosine of gravity leaves: m g r phi^2/2 and the chords, over J, for the two seconds.
+    assert float(abs(result["arm_angle"] - expected).max()) < (mgr * small**2 / 2 + 1e-7) / J * 2.0**2 / 2
+    assert "balance: spring" in lm.energy_of(result)
+
+
+def test_friction_that_jams_ends_in_one_line() -> None:
+    worm = {"losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.5, "backdrive_efficiency": -0.2}}
+    scenario = lm.TrainScenario(
+        shafts={"worm": {"inertia": 1e-4}, "drum": {"inertia": 2.0, "torque": 20.0}},
+        gears={"g": {"input": "worm", "output": "drum", "ratio": 50.0, **worm}},
+        initial={"speeds": {"worm": -100.0, "drum": -2.0}},
+        simulation={"duration": 0.1, "sample_interval": 1e-3},
+    )
+    with pytest.raises(lm.SolverError, match="the friction jams"):
+        lm.simulate(scenario)
+
+
+def test_a_self_locking_worm_holds_lowers_smoothly_or_chatters() -> None:
+    """Efficiencies of its drawing: eta_b = tan(g - r)/tan g with g = 4 deg, tan r = 0.084; i = 50, load 20 N m."""
+    tan_g = math.tan(math.radians(4.0))
+    eta_b = (tan_g - 0.084) / (1.0 + 0.084 * tan_g) / tan_g
+    smooth = lm.simulate(lm.load("worm-lowering", {"shafts.drum.inertia": 0.5}))
+    held = smooth.sel(time=slice(0.0, 0.099))
+    assert float(abs(held["drum_speed"]).max()) < 1e-12  # the motor is off
+    # What the motor has left turns the worm against 1e-3 N m s/rad of oil.
+    speed = (0.15 - 0.01 - 20.0 * abs(eta_b) / 50.0) / 1e-3
+    assert float(smooth["worm_speed"].sel(time=1.19, method="nearest")) == pytest.approx(-speed, rel=1e-5)
+    assert not np.any(smooth["worm_contact"].sel(time=slice(0.11, 1.19)) == 0)
+    # The paradox of rigid friction, |eta_b| J_2 > J_1 i^2, is chatter of the compliant mesh: the worm locks while the motor pushes.
+    assert abs(eta_b) * 2.0 > 1e-4 * 50.0**2 > abs(eta_b) * 0.5
+    chatter = lm.simulate(lm.load("worm-lowering"))
+    locked = chatter["worm_contact"].sel(time=slice(0.11, 1.19)).values == 0
+    assert np.count_nonzero(np.diff(locked.astype(int)) == 1) >= 2
+
+
+def test_a_bias_above_half_the_torque_of_the_ring_keeps_the_backlash_closed() -> None:
+    biased = lm.simulate(lm.load("two-motors-one-ring"))
+    settled = biased.sel(time=slice(1.0, None))  # the flanks have met
+    gap = 0.5 * 4.0 * math.pi / 10800.0
+    assert np.all(settled["first_gear_twist"] > gap)
+    assert np.all(settled["second_gear_twist"] < -gap)
+    changes = {f"command.{name}_motor.mean": 0.0 for name in ("first", "second")}
+    loose = lm.simulate(lm.load("two-motors-one-ring", changes)).sel(time=slice(1.0, None))
+    for name in ("first", "second"):
+        assert float(loose[f"{name}_gear_twist"].min()) < -gap
+        assert float(loose[f"{name}_gear_twist"].max()) > gap
+
+
+def braked(command: Any, **delays: float) -> lm.TrainScenario:
+    """A flywheel of 2 kg·m² at 10 rad/s and a brake of 4 N·m."""
+    return lm.TrainScenario(
+        shafts={"wheel": {"inertia": 2.0, "torque": 0.0}},
+        brakes={"b": {"shaft": "wheel", "torque": 4.0, **delays}},
+        command={"b": command},
+        initial={"speeds": {"wheel": 10.0}},
+        simulation={"duration": 2.0, "sample_interval": 0.001},
+    )
+
+
+def test_a_brake_acts_after_its_delays() -> None:
+    command = {"steps": [{"height": 1, "time": 0.5}, {"height": -1, "time": 1.0}]}
+    speed = lm.simulate(braked(command, engagement_delay=0.03, release_delay=0.1)).wheel_speed
+    # 2 rad/s^2 from 0.53 s to 1.1 s
+    assert float(speed.sel(time=0.53, method="nearest")) == 10.0
+    assert float(speed[-1]) == pytest.approx(10.0 - 2.0 * (1.1 - 0.53), abs=1e-12)
+    assert float(speed.sel(time=0.8, method="nearest")) == pytest.approx(10.0 - 2.0 * 0.27, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("command", "delays", "message"),
+    [
+        (
+            {"ramps": [{"rise": 1, "duration": 0.1}]},
+            {"engagement_delay": 0.03},
+            "key command.b: is not made of steps; with an engagement or release delay, give mean and steps alone",
+        ),
+        (
+            {"steps": [{"height": 1, "time": 0.5}, {"height": -1, "time": 0.51}]},
+            {"engagement_delay": 0.03},
+            "key command.b: steps at 0.5 s and at 0.51 s, which after the delays would act in reverse order; leave more time "
+            "between them",
+        ),
+    ],
+)
+def test_a_command_that_delays_cannot_shift_is_refused(command: Any, delays: dict[str, float], message: str) -> None:
+    with pytest.raises(lm.InputError) as refused:
+        braked(command, **delays)
+    assert message in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("command", "reached"),
+    [
+        (8.0, "8"),
+        ({"steps": [{"height": 1}, {"height": 1, "time": 0.5}]}, "2"),
+        ({"mean": 0.2, "ramps": [{"rise": 1, "duration": 0.1}]}, "1.2"),
+        ({"mean": 0.5, "amplitude": 0.6, "frequency": 1}, "1.1"),
+        ({"samples": {"times": [0, 0.1, 0.2], "values": [0, 1.5, 0]}}, "1.5"),
+    ],
+)
+def test_a_brake_is_commanded_up_to_its_full_torque(command: Any, reached: str) -> None:
+    """Such as a torque of 8 N·m in the place of a share."""
+    with pytest.raises(lm.InputError) as refused:
+        braked(command)
+    message = f"key command.b: may reach {reached}; it is a share, and 1 is the full torque, 4 N*m"
+    assert message in str(refused.value)
+
+
+def test_a_brake_may_swing_from_open_to_full_torque() -> None:
+    tenths = {"steps": [{"height": 0.1, "time": 0.1 * k} for k in range(10)]}  # their sum is 1 up to rounding
+    for command in ({"mean": 0.5, "amplitude": 0.5, "frequency": 1}, tenths):
+        assert float(lm.simulate(braked(command)).wheel_speed[-1]) < 10.0
+    simulation = lm.Simulation(braked(1.0))
+    with pytest.raises(lm.InputError, match=r"b_command 2\.0 is a share, and 1 is the full torque"):
+        simulation.advance(0.1, b_command=2.0)
+    simulation.advance(0.1, b_command=(1.0, 0.0))
+
+
+def test_a_safety_clutch_has_no_delays() -> None:
+    clutch = {"kind": "safety", "input": "a", "output": "b", "torque": 1.0, "release_delay": 0.1}
+    with pytest.raises(lm.InputError, match="is a safety clutch, which has no command; remove engagement_delay"):
+        lm.DriveTrain(
+            shafts={"a": {"inertia": 1.0}, "b": {"inertia": 1.0}},
+            motors={
+                "m": {
+                    "shaft": "a",
+                    "kind": "torque_source",
+                    "rotor_inertia": 0.1,
+                    "rated_speed": 100.0,
+                    "rated_torque": 1.0,
+                }
+            },
+            clutches={"c": clutch},
+        )
+
+
+@pytest.mark.parametrize("stiffness", [1e40, 1e60, 1e100, 1e200, 1e300])
+def test_a_stiffness_without_measure_ends_in_one_line(stiffness: float) -> None:
+    spring = {"kind": "linear", "stiffness": stiffness}
+    to_frame = two_shafts(gears={"g": STIFF}, springs={"s": {"shaft": "b", "stiffness": spring}})
+    between = two_shafts(gears={"g": SOFT | {"stiffness": spring}})
+    for scenario in (to_frame, between):
+        with pytest.raises(lm.SolverError, match="left the range that can be computed at t = 0"):
+            lm.simulate(scenario)
