@@ -13,7 +13,7 @@ import numpy as np
 from ..atomic_writer import write_whole
 from ..errors import InputError, need
 from ..inputs.arguments import checked
-from .results import labelled, variables_of
+from .results import labelled, recorded_variables
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import packed_again, switchings_of
 
@@ -58,7 +58,7 @@ def save(dataset: xarray.Dataset, path: str | Path) -> None:
     InputError
         No result, unknown ending, or the file cannot be written; nothing half-written remains.
     """
-    if "time" not in dataset.coords or not any(v.name in dataset for v in variables_of(dataset.attrs)):
+    if "time" not in dataset.coords or not any(v.name in dataset for v in recorded_variables(dataset.attrs)):
         raise InputError("this dataset is no result over time; give one of simulate, periodic_motion or open_result")
     path = check_output(path)
     writers = {".nc": _write_netcdf, ".csv": _write_csv, ".parquet": _write_parquet}
@@ -145,18 +145,19 @@ def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Datase
             f"{path}: holds {len(time)} of the {written} samples that its header announces; it is cut off or changed; run the scenario again"
         )
     switchings = {SWITCHINGS: packed_again(meta[SWITCHINGS], meta["attributes"])} if SWITCHINGS in meta else {}
-    return labelled(time, columns, meta["attributes"] | switchings)
+    attributes = meta["attributes"] | switchings
+    return labelled(time, columns, attributes, recorded_variables(attributes))
 
 
 def _columns(dataset: xarray.Dataset) -> dict[str, Any]:
     return {"time": dataset["time"].values} | {
-        v.name: dataset[v.name].values for v in variables_of(dataset.attrs) if v.name in dataset
+        v.name: dataset[v.name].values for v in recorded_variables(dataset.attrs) if v.name in dataset
     }
 
 
 def _write_csv(dataset: xarray.Dataset, path: Path) -> None:
     columns = _columns(dataset)
-    units = {v.name: v.unit for v in variables_of(dataset.attrs)} | {"time": "s"}
+    units = {v.name: v.unit for v in recorded_variables(dataset.attrs)} | {"time": "s"}
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(f"# lostmotion {_header(dataset)}\n")
         file.write(",".join(f"{name} [{units[name]}]" for name in columns) + "\n")

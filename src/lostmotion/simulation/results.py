@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
@@ -45,6 +45,8 @@ class RawResult:
     values: dict[str, np.ndarray]
     """of the result variables"""
     attrs: dict[str, Any]
+    variables: tuple[Variable, ...]
+    """those that the scenario may have, for units and meanings"""
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.time if name == "time" else self.values[name]
@@ -54,7 +56,7 @@ class RawResult:
 
     def dataset(self) -> xarray.Dataset:
         """The labelled dataset."""
-        return labelled(self.time, self.values, self.attrs)
+        return labelled(self.time, self.values, self.attrs, self.variables)
 
 
 def raw_result(scenario: Scenario, result: Any, solver: str, *, ledger: bool) -> RawResult:
@@ -85,23 +87,25 @@ def raw_result(scenario: Scenario, result: Any, solver: str, *, ledger: bool) ->
         )
     if scenario.gearbox.note:
         attributes["note"] = scenario.gearbox.note
-    return RawResult(time, data, attributes)
+    return RawResult(time, data, attributes, variables_of(scenario))
 
 
-def labelled(time: Any, data: dict[str, Any], attributes: dict[str, Any]) -> xarray.Dataset:
+def labelled(
+    time: Any, data: dict[str, Any], attributes: dict[str, Any], variables: Iterable[Variable]
+) -> xarray.Dataset:
     """Samples of the result variables as a dataset, with units and meanings."""
     import xarray as xr
 
-    variables = {
+    shown = {
         v.name: ("time", data[v.name], {"units": v.unit, "long_name": v.meaning, "symbol": v.symbol})
-        for v in variables_of(attributes)
+        for v in variables
         if v.name in data
     }
     coordinates = xr.Coordinates(
         {"time": ("time", time, {"units": "s", "long_name": "time"})},
         indexes={"time": xr.indexes.PandasIndex(time, "time")},
     )
-    return xr.Dataset(variables, coords=coordinates, attrs=attributes)
+    return xr.Dataset(shown, coords=coordinates, attrs=attributes)
 
 
 def is_train_result(result: xarray.Dataset | RawResult) -> bool:
@@ -109,14 +113,20 @@ def is_train_result(result: xarray.Dataset | RawResult) -> bool:
     return is_train(json.loads(result.attrs.get("scenario", "{}")))
 
 
-def variables_of(attributes: Mapping[str, Any]) -> tuple[Variable, ...]:
-    """The variables that a result with these attributes may have: those of a drive, or of its train."""
-    tables = json.loads(attributes.get("scenario", "{}"))
-    if not is_train(tables):
-        controller = tables.get("controller")
-        return VARIABLES if controller is None else (*VARIABLES, *axis_variables({"": Controller(**controller)}))
-    scenario = TrainScenario(**tables)
+def variables_of(scenario: Scenario | TrainScenario) -> tuple[Variable, ...]:
+    """The variables that a result of this scenario may have."""
+    if isinstance(scenario, Scenario):
+        return (*VARIABLES, *axis_variables({"": controller for controller in scenario.axes().values()}))
     return (*train_variables(scenario.train(), scenario.core()), *axis_variables(scenario.axes()))
+
+
+def recorded_variables(attributes: Mapping[str, Any]) -> tuple[Variable, ...]:
+    """The variables that a result with these attributes may have."""
+    tables = json.loads(attributes.get("scenario", "{}"))
+    if is_train(tables):
+        return variables_of(TrainScenario(**tables))
+    controller = tables.get("controller")
+    return (*VARIABLES, *axis_variables({} if controller is None else {"": Controller(**controller)}))
 
 
 def add_derived(data: dict[str, Any], ratio: Any) -> None:

@@ -16,13 +16,12 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Number
 from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
-from .results import RawResult, raw_result
+from .results import RawResult, raw_result, variables_of
 from .scenario import Initial, LoadTable, Scenario, SimulationTable
 from .sensitivities import run_sensitivities
 from .train_parts import SIDE_BY_SIDE
 from .train_results import run_train
 from .train_scenario import TrainScenario
-from .train_variables import axis_variables, train_variables
 from .variables import STATES
 from .windings import ATTRIBUTE as ERROR_BOUND
 from .windings import coarser, error_bound, oriented, too_slow
@@ -141,11 +140,8 @@ def run(
     if not low <= tolerance <= high:
         raise InputError(f"relative_tolerance {tolerance:g} must lie between {low:g} and {high:g}")
     table = scenario.simulation
-    width = BYTES_PER_SAMPLE
-    if isinstance(scenario, TrainScenario):
-        axes = axis_variables(scenario.axes())
-        width = 16 * (len(train_variables(scenario.train(), scenario.core())) + len(axes))
-    check_memory(table.samples, width)
+    of_drive = isinstance(scenario, Scenario)
+    check_memory(table.samples, BYTES_PER_SAMPLE if of_drive else 16 * len(variables_of(scenario)))
     how = "exact" if exact else f"dormand-prince, relative tolerance {tolerance:g}"
     options: tuple[Any, ...] = (
         table.duration,

@@ -13,7 +13,7 @@ from .. import _core
 from ..control.axis import OPEN_LOOP, Bound
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
-from .results import RawResult, installed_version
+from .results import RawResult, installed_version, variables_of
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import CONTACTS_OF_TRAIN, packed
 from .train_parts import SIDE_BY_SIDE, control_of_part, joined_results, parts_of
@@ -42,7 +42,8 @@ def run_train(
     set_torques(scenario, data)
     add_derived_of_train(scenario.train(), data, time)
     attributes = _attributes(scenario, result, how, ledger=ledger)
-    return RawResult(time, data, attributes | {CONTACTS_OF_TRAIN: " ".join(core.contact_names())})
+    attributes |= {CONTACTS_OF_TRAIN: " ".join(core.contact_names())}
+    return RawResult(time, data, attributes, variables_of(scenario))
 
 
 def _core_result(
