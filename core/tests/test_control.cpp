@@ -102,7 +102,7 @@ TEST_CASE("exact and adaptive solver agree on five hundred random axes") {
 // The rotor at 60 rad/s, no current, a voltage of 5 V in q that stands still in the stator.
 TEST_CASE("the power series of a winding is the solution of its equations, by small steps of fourth order") {
     const SynchronousWinding w{3.0, 1.5, 4e-3, 7e-3, 0.08};
-    WindingCourse course = WindingCourse::at(0.0, {0.3, -0.8}, {1.0, 5.0}, 60.0);
+    WindingCourse course = WindingCourse::at(w, 0.0, {0.3, -0.8}, {1.0, 5.0}, 60.0);
     course.end = 4e-4;
     course.speed = parabola(60.0, 75.0, 69.0);
     course.solve(w);
@@ -138,7 +138,7 @@ TEST_CASE("the power series of a winding is the solution of its equations, by sm
     CHECK(i_q == doctest::Approx(x[1]).epsilon(1e-12));
     CHECK(u_d == doctest::Approx(x[2]).epsilon(1e-12));
     CHECK(u_q == doctest::Approx(x[3]).epsilon(1e-12));
-    const Ramp line = course.torque(w);
+    const Ramp line = course.torque;
     CHECK(line.value * course.end + line.slope * course.end * course.end / 2.0 ==
           doctest::Approx(impulse).epsilon(1e-6));
     CHECK(line.value * course.end * course.end / 2.0 + line.slope * std::pow(course.end, 3) / 3.0 ==

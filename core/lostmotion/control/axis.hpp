@@ -191,7 +191,7 @@ class Axis {
         }
         if (field_orientation) {
             field_orientation->start(y.rotor_angle, y.rotor_speed, slot);
-            set_course(WindingCourse::at(y.time, {}, {}, y.rotor_speed), slot);
+            set_course(WindingCourse::at(field_orientation->winding, y.time, {}, {}, y.rotor_speed), slot);
         }
     }
 
@@ -248,6 +248,7 @@ class Axis {
         std::memcpy(static_cast<void*>(&c), slot + course_, sizeof c);
         return c;
     }
+    double course_end(const double* slot) const { return slot[course_ + 1]; }
     // The next one, from where the last one has been followed up to.
     void set_course(const WindingCourse& next, double* slot) const {
         const auto [electrical, heat] = energy(next.begin, course(slot), slot);
@@ -258,8 +259,7 @@ class Axis {
     // What acts on the motor as a torque source, in a straight line.
     Ramp torque_command(double time, const double* slot) const {
         const WindingCourse c = course(slot);
-        const Ramp torque = c.torque(field_orientation->winding);
-        return {(torque.value + torque.slope * (time - c.begin)) / rated_torque, torque.slope / rated_torque};
+        return {(c.torque.value + c.torque.slope * (time - c.begin)) / rated_torque, c.torque.slope / rated_torque};
     }
     double winding_torque(double time, const double* slot) const {
         const DirectQuadrature i = course(slot).current(time);

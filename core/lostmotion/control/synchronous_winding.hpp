@@ -43,15 +43,16 @@ template <int n>
 struct PowerSeries {
     std::array<double, static_cast<std::size_t>(n)> c{};
 
-    double operator()(double s) const {
+    // Of its first `used` terms.
+    double operator()(double s, int used = n) const {
         double sum = 0.0;
-        for (int k = n - 1; k >= 0; --k) sum = sum * s + c[k];
+        for (int k = used - 1; k >= 0; --k) sum = sum * s + c[k];
         return sum;
     }
     // At eight places, each as above.
-    Pack<8> operator()(const Pack<8>& s) const {
+    Pack<8> operator()(const Pack<8>& s, int used) const {
         Pack<8> sum{};
-        for (int k = n - 1; k >= 0; --k)
+        for (int k = used - 1; k >= 0; --k)
             for (int p = 0; p < Pack<8>::parts; ++p) sum.part[p] = sum.part[p] * s.part[p] + c[k];
         return sum;
     }
@@ -90,19 +91,25 @@ struct WindingCourse {
     static constexpr SeriesShares<terms> shares{};
 
     double begin = 0.0, end = 0.0;
+    double count = 1.0;  // of the terms of the series below; all others are 0
+    Ramp torque{};       // of the motor, with the impulse and the moment of the true one
     PowerSeries<3> speed;
+    double bend_change = 0.0;  // of its last coefficient since the course before, beside what the torque has made of it
     Series i_d, i_q, u_d, u_q;
 
     double length() const { return end - begin; }
+    int used() const { return static_cast<int>(count); }
     // At a time, as a share of the stretch.
     double share(double time) const { return length() > 0.0 ? (time - begin) / length() : 0.0; }
-    DirectQuadrature current(double time) const { return {i_d(share(time)), i_q(share(time))}; }
-    DirectQuadrature voltage(double time) const { return {u_d(share(time)), u_q(share(time))}; }
+    DirectQuadrature current(double time) const { return {i_d(share(time), used()), i_q(share(time), used())}; }
+    DirectQuadrature voltage(double time) const { return {u_d(share(time), used()), u_q(share(time), used())}; }
 
     // An instant, without any length.
-    static WindingCourse at(double time, DirectQuadrature current, DirectQuadrature voltage, double speed) {
+    static WindingCourse at(const SynchronousWinding& w, double time, DirectQuadrature current,
+                            DirectQuadrature voltage, double speed) {
         WindingCourse c;
         c.begin = c.end = time;
+        c.torque.value = w.torque(current.d, current.q);
         c.i_d.c[0] = current.d;
         c.i_q.c[0] = current.q;
         c.u_d.c[0] = voltage.d;
@@ -111,16 +118,19 @@ struct WindingCourse {
         return c;
     }
 
-    // So many terms that those left out are below rounding, where the fastest change times the length is `change`.
-    static int terms_for(double change) {
+    // So many terms that those left out are below `left_out`, where the fastest change times the length is `change`.
+    static int terms_for(double change, double left_out) {
         int n = 3;
-        for (double left = change * change / 6.0; n < terms && left > 1e-17; ++n) left *= change * shares.mean[n];
+        for (double left = change * change / 6.0; n < terms && left > left_out; ++n) left *= change * shares.mean[n];
         return n;
     }
 
-    // Currents and voltages from what they are at the beginning, by the first `used` terms.
-    void solve(const SynchronousWinding& w, int used = terms) {
+    // Currents and voltages from what they are at the beginning, and the torque that they make; to rounding, or to a
+    // share of the whole that may be left out.
+    void solve(const SynchronousWinding& w, double left_out = 1e-17) {
         const double h = length(), ratio = w.inductance_q / w.inductance_d;
+        const int used = terms_for(h * w.fastest(speed.c[0]), left_out);
+        count = used;
         const double rise_d = h / w.inductance_d, rise_q = h / w.inductance_q;
         const double damping_d = rise_d * w.resistance, damping_q = rise_q * w.resistance;
         std::array<double, 3> turn, of_d, of_q, of_flux;  // the speed, and what it makes of i_d, i_q and psi
@@ -149,21 +159,7 @@ struct WindingCourse {
         extend(0, 0);
         extend(1, 1);
         for (int n = 2; n + 1 < used; ++n) extend(n, 2);
-    }
-
-    // The ramp with the impulse of the torque over the stretch, and with its moment: of an inertia both give the same
-    // speed and the same angle at the end.
-    Ramp torque(const SynchronousWinding& w, int used = terms) const {
-        double mean = 0.0, moment = 0.0;
-        for (int n = 0; n < used; ++n) {
-            double m = w.flux_linkage * i_q.c[n];
-            if (w.saliency() != 0.0)
-                for (int k = 0; k <= n; ++k) m += w.saliency() * i_d.c[k] * i_q.c[n - k];
-            mean += m * shares.mean[n];
-            moment += m * shares.moment[n];
-        }
-        const double scale = 1.5 * w.pole_pairs, rise = 12.0 * moment;
-        return {scale * (mean - 0.5 * rise), length() > 0.0 ? scale * rise / length() : 0.0};
+        torque = torque_ramp(w);
     }
 
     // What the winding takes from the inverter between two times, and what of it becomes heat [J]. By Gauss's formula
@@ -176,16 +172,34 @@ struct WindingCourse {
                                                      0.79666647741362673959, 0.96028985649753623168},
             weight{0.36268378337836198297, 0.31370664587788728734, 0.22238103445337447054, 0.10122853629037625915};
         Energy out;
+        if (from == to) return out;
         const double middle = 0.5 * (share(from) + share(to)), half = 0.5 * (share(to) - share(from));
         Pack<8> s;
         for (int k = 0; k < 8; ++k) s.set(k, middle + (k % 2 == 0 ? -half : half) * place[k / 2]);
-        const Pack<8> d = i_d(s), q = i_q(s), power = u_d(s) * d + u_q(s) * q, squares = d * d + q * q;
+        const Pack<8> d = i_d(s, used()), q = i_q(s, used()), power = u_d(s, used()) * d + u_q(s, used()) * q,
+                      squares = d * d + q * q;
         for (int k = 0; k < 8; ++k) {
             out.electrical += weight[k / 2] * power[k];
             out.heat += weight[k / 2] * squares[k];
         }
         const double scale = 1.5 * 0.5 * (to - from);
         return {scale * out.electrical, scale * w.resistance * out.heat};
+    }
+
+ private:
+    // The ramp with the impulse of the torque over the stretch, and with its moment: of an inertia both give the same
+    // speed and the same angle at the end.
+    Ramp torque_ramp(const SynchronousWinding& w) const {
+        double mean = 0.0, moment = 0.0;
+        for (int n = 0; n < used(); ++n) {
+            double m = w.flux_linkage * i_q.c[n];
+            if (w.saliency() != 0.0)
+                for (int k = 0; k <= n; ++k) m += w.saliency() * i_d.c[k] * i_q.c[n - k];
+            mean += m * shares.mean[n];
+            moment += m * shares.moment[n];
+        }
+        const double scale = 1.5 * w.pole_pairs, rise = 12.0 * moment;
+        return {scale * (mean - 0.5 * rise), length() > 0.0 ? scale * rise / length() : 0.0};
     }
 };
 

@@ -116,6 +116,7 @@ class AdaptiveSolver {
     const State& state() const { return now_.x; }
     const Memory& memory() const { return now_.memory; }
     const Regime& regime() { return cache_.regime(key_); }
+    const LinearRatesOf<D>& linear_rates() { return cache_.entry(key_).rates; }
     const std::vector<InputBasis>& basis() const { return basis_; }
     Contact stopped_at() const { return stopped_at_; }
     long steps() const { return steps_; }

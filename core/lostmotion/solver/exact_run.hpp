@@ -76,6 +76,7 @@ class ExactSolver {
     const Memory& memory() const { return now_.memory; }
     const Key& key() const { return key_; }
     const Regime& regime() { return cache_.regime(key_); }
+    const LinearRatesOf<D>& linear_rates() { return cache_.entry(key_).rates; }
     const Regime& regime(const Key& key) { return cache_.regime(key); }
     Cache& cache() { return cache_; }
     const std::vector<InputBasis>& basis() const { return rotations_.basis(); }
