@@ -116,7 +116,7 @@ def is_train_result(result: xarray.Dataset | RawResult) -> bool:
 def variables_of(scenario: Scenario | TrainScenario) -> tuple[Variable, ...]:
     """The variables that a result of this scenario may have."""
     if isinstance(scenario, Scenario):
-        return (*VARIABLES, *axis_variables({"": controller for controller in scenario.axes().values()}))
+        return _variables_of_drive(scenario.controller)
     return (*train_variables(scenario.train(), scenario.core()), *axis_variables(scenario.axes()))
 
 
@@ -126,7 +126,11 @@ def recorded_variables(attributes: Mapping[str, Any]) -> tuple[Variable, ...]:
     if is_train(tables):
         return variables_of(TrainScenario(**tables))
     controller = tables.get("controller")
-    return (*VARIABLES, *axis_variables({} if controller is None else {"": Controller(**controller)}))
+    return _variables_of_drive(None if controller is None else Controller(**controller))
+
+
+def _variables_of_drive(controller: Controller | None) -> tuple[Variable, ...]:
+    return VARIABLES if controller is None else (*VARIABLES, *axis_variables({"": controller}))
 
 
 def add_derived(data: dict[str, Any], ratio: Any) -> None:
