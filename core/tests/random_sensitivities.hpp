@@ -198,7 +198,7 @@ inline void differences_of_run(const RandomCase& c, const Knob& knob, double dur
                                std::vector<double>& best, std::vector<double>& doubt) {
     const double p = knob.get(c);
     std::vector<double> last;
-    for (int e = 10; e <= 12; e += 2) {
+    for (int e = 8; e <= 10; ++e) {
         const double h = std::ldexp(std::fabs(p), -e);
         std::vector<double> d, rounded;
         for (const auto& [offset, weight] :
@@ -265,14 +265,14 @@ inline void compare_sensitivities(const RandomCase& c, const std::vector<Knob>& 
             size = std::fmax(size, 1e-4 * std::fmax(value_size, 1e-6) / std::fabs(chosen[p].get(c)));
             for (std::size_t n = 0; n < exact.samples; ++n) {
                 if (!std::isfinite(d[n])) continue;  // has ended
-                if (!(own_doubt[n] <= near * size)) {
+                if (!(own_doubt[n] <= 0.25 * near * size)) {
                     ++tally.undecided;
                     continue;
                 }
                 ++tally.compared;
                 const double gap = std::fabs(d[n] - own[n]) / std::fmax(size, 1e-300);
                 tally.worst = std::fmax(tally.worst, size > 0.0 ? gap : 0.0);
-                if (size == 0.0 || gap <= 2.0 * near) continue;
+                if (size == 0.0 || gap <= near) continue;
                 ++tally.wrong;
                 if (tell != nullptr && n % 4 == 0)
                     std::printf("  %s: d %s / d %s at %g: %.10g, by differences %.10g (doubt %.1g, scale %.3g)\n", tell,

@@ -7,8 +7,8 @@ TEST_SUITE_BEGIN("sensitivity");
 
 namespace lostmotion::model {
 
-// Differences of a run are rounded to some 1e-12 of its values over the step; where two steps agree to 1e-8, so must
-// they with the derivative.
+// Differences of a run are rounded to some 1e-12 of its values over the step; where two steps agree to 2.5e-9, they
+// must with the derivative to 1e-8.
 SensitivityTally compare_random(unsigned seed, int trains, bool closed_loop) {
     SensitivityTally tally;
     for (int n = 0; n < trains; ++n) {

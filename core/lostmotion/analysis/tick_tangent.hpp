@@ -2,7 +2,7 @@
 //
 // What a tick makes of their numbers s, of what they measure y and of their own parameters is a smooth function but for
 // limits and rounding to whole increments. Its derivative is found by differences along ds/dp, dy/dp and the parameter
-// at once: of the values beside, those that no limit parts from the present one. What an encoder of finite resolution
+// apart: of the values beside, those that no limit parts from the present one. What an encoder of finite resolution
 // reads does not depend on anything but at single instants: its derivative is 0.
 #pragma once
 
@@ -33,10 +33,11 @@ inline bool difference_beside_limits(const std::array<double, 5>& f, double h, d
     return std::fmin(std::fabs(left), std::fabs(right)) <= 1e-2 * course + noise;
 }
 
-// Whether three values at equal distances lie in a straight line, as far as rounding lets one see.
-inline bool alike_beside(double left, double here, double right) {
+// Whether three values at equal distances lie in a straight line, as far as rounding lets one see, or bend by a share
+// of their difference.
+inline bool alike_beside(double left, double here, double right, double bend) {
     const double size = std::fmax(std::fabs(left), std::fmax(std::fabs(here), std::fabs(right)));
-    return std::fabs(right - 2.0 * here + left) <= 1e-4 * std::fabs(right - left) + 2e-13 * size;
+    return std::fabs(right - 2.0 * here + left) <= bend * std::fabs(right - left) + 2e-13 * size;
 }
 
 class TickTangent {
@@ -86,7 +87,8 @@ class TickTangent {
 
  private:
     static constexpr int n_measured = 7;
-    static constexpr double shrink = 0x1p-6;  // of a step that only the motion takes, so that few limits lie within
+    // Steps of the motion, in those of the parameter, and by how much a law may bend over them.
+    static constexpr std::array<std::pair<double, double>, 3> lengths{{{0x1p6, 0.0}, {1.0, 0.0}, {0x1p-3, 1e-4}}};
     struct Command {
         int input;
         double value = 0.0;
@@ -181,12 +183,16 @@ class TickTangent {
         values_.resize(static_cast<std::size_t>(5 * count));
         for (int p = 0; p < parameters_; ++p) {
             const std::vector<Beside>& all = beside_[static_cast<std::size_t>(p)];
-            if (std::any_of(all.begin(), all.end(), [](const Beside& b) { return !b.laws.empty(); }))
-                vary_law(a, p, first, count, law, slots, act, noise);
-            else if (moves(p, first, count))
-                vary_motion(p, first, count, law, slots, act, noise);
+            const bool of_law = std::any_of(all.begin(), all.end(), [](const Beside& b) { return !b.laws.empty(); });
+            const bool of_motion = moves(p, first, count);
+            by_law_.assign(static_cast<std::size_t>(count), 0.0);
+            if (of_law) vary_law(a, p, count, law, slots, act, noise);
+            if (of_motion) vary_motion(p, first, count, law, slots, act, noise);
+            if (of_law || of_motion)
+                for (int k = 0; k < count; ++k) derivative(p, first + k) += by_law_[static_cast<std::size_t>(k)];
         }
     }
+    double& derivative(int p, int slot) { return slots_[static_cast<std::size_t>(slot * parameters_ + p)]; }
     // Whether anything that an axis remembers or measures changes with a parameter.
     bool moves(int p, int first, int count) const {
         for (int k = 0; k < count; ++k)
@@ -195,64 +201,74 @@ class TickTangent {
             if (measured_derivative_[static_cast<std::size_t>(k * parameters_ + p)] != 0.0) return true;
         return false;
     }
-    // What `act` makes of the numbers at another value of a parameter: values_[5 k + to].
+    // What `act` makes of numbers and measurements: values_[5 k + to].
     template <class Act>
-    void put(int to, int p, double offset, int first, int count, const control::Axis& law, const double* slots,
-             const Act& act) {
-        for (int k = 0; k < count; ++k)
-            at_[static_cast<std::size_t>(k)] =
-                slots[k] + offset * slots_[static_cast<std::size_t>((first + k) * parameters_ + p)];
-        act(law, measured(p, offset), at_.data());
+    void put(int to, int count, const control::Axis& law, const control::Sampled& y, const Act& act) {
+        act(law, y, at_.data());
         for (int k = 0; k < count; ++k)
             values_[static_cast<std::size_t>(5 * k + to)] = at_[static_cast<std::size_t>(k)];
     }
-    void take(int p, int first, int count, double h, double noise) {
-        for (int k = 0; k < count; ++k) {
-            const double* f = &values_[static_cast<std::size_t>(5 * k)];
-            double& out = slots_[static_cast<std::size_t>((first + k) * parameters_ + p)];
-            if (!difference_beside_limits({f[0], f[1], now_[static_cast<std::size_t>(k)], f[3], f[4]}, h, noise, out))
-                error_ = "a limit of a controller that it only touches";
-        }
+    // The derivative of a number by what was put.
+    double taken(int k, double h, double noise) {
+        const double* f = &values_[static_cast<std::size_t>(5 * k)];
+        double out = 0.0;
+        if (!difference_beside_limits({f[0], f[1], now_[static_cast<std::size_t>(k)], f[3], f[4]}, h, noise, out))
+            error_ = "a limit of a controller that it only touches";
+        return out;
     }
-    // Where the law itself depends on the parameter.
+    // As far as the law itself depends on the parameter. Where it does not, exactly 0.
     template <class Act>
-    void vary_law(std::size_t a, int p, int first, int count, const control::Axis& law, const double* slots,
-                  const Act& act, double noise) {
+    void vary_law(std::size_t a, int p, int count, const control::Axis& law, const double* slots, const Act& act,
+                  double noise) {
         const std::vector<Beside>& all = beside_[static_cast<std::size_t>(p)];
         const bool central = all.size() == 4 && all[0].offset < 0.0 && all[3].offset > 0.0;
-        for (std::size_t j = 0; j < all.size(); ++j)
-            put(static_cast<int>(j) + (central && j > 1 ? 1 : 0), p, all[j].offset, first, count,
-                all[j].laws.empty() ? law : all[j].laws[a], slots, act);
-        if (central) return take(p, first, count, all[2].offset, noise);
+        for (std::size_t j = 0; j < all.size(); ++j) {
+            std::copy_n(slots, count, at_.begin());
+            put(static_cast<int>(j) + (central && j > 1 ? 1 : 0), count, all[j].laws.empty() ? law : all[j].laws[a],
+                measured_, act);
+        }
         for (int k = 0; k < count; ++k) {
-            double& out = slots_[static_cast<std::size_t>((first + k) * parameters_ + p)];
-            out = 0.0;
+            double& out = by_law_[static_cast<std::size_t>(k)];
+            if (central) {
+                out = taken(k, all[2].offset, noise);
+                continue;
+            }
             for (std::size_t j = 0; j < all.size(); ++j)
                 out +=
                     all[j].weight * (values_[static_cast<std::size_t>(5 * k) + j] - now_[static_cast<std::size_t>(k)]);
         }
     }
-    // Where only the motion does: two values beside, and two more if a limit parts them.
+    // As far as the motion does. Most laws are straight but for limits: then a long step, with little rounding, gives
+    // the derivative; otherwise a short one, within which few limits lie, with two more values beside if one does.
     template <class Act>
     void vary_motion(int p, int first, int count, const control::Axis& law, const double* slots, const Act& act,
                      double noise) {
-        double h = std::numeric_limits<double>::infinity();
-        for (const Beside& b : beside_[static_cast<std::size_t>(p)]) h = std::fmin(h, shrink * std::fabs(b.offset));
-        put(1, p, -h, first, count, law, slots, act);
-        put(3, p, h, first, count, law, slots, act);
-        bool smooth = true;
-        for (int k = 0; k < count && smooth; ++k) {
-            const double *f = &values_[static_cast<std::size_t>(5 * k)], here = now_[static_cast<std::size_t>(k)];
-            smooth = alike_beside(f[1], here, f[3]);
-        }
+        double offset = std::numeric_limits<double>::infinity(), h = offset;
+        for (const Beside& b : beside_[static_cast<std::size_t>(p)]) offset = std::fmin(offset, std::fabs(b.offset));
+        const auto put_at = [&](int to, double step) {
+            for (int k = 0; k < count; ++k)
+                at_[static_cast<std::size_t>(k)] = slots[k] + step * derivative(p, first + k);
+            put(to, count, law, measured(p, step), act);
+        };
+        const auto alike = [&](double step, double bend) {
+            put_at(1, -step);
+            put_at(3, step);
+            for (int k = 0; k < count; ++k) {
+                const double* f = &values_[static_cast<std::size_t>(5 * k)];
+                if (!alike_beside(f[1], now_[static_cast<std::size_t>(k)], f[3], bend)) return false;
+            }
+            return true;
+        };
+        bool smooth = false;
+        for (const auto& [factor, bend] : lengths)
+            if (!smooth) smooth = alike(h = factor * offset, bend);
         if (!smooth) {
-            put(0, p, -2.0 * h, first, count, law, slots, act);
-            put(4, p, 2.0 * h, first, count, law, slots, act);
-            return take(p, first, count, h, noise);
+            put_at(0, -2.0 * h);
+            put_at(4, 2.0 * h);
         }
         for (int k = 0; k < count; ++k) {
             const double* f = &values_[static_cast<std::size_t>(5 * k)];
-            slots_[static_cast<std::size_t>((first + k) * parameters_ + p)] = (f[3] - f[1]) / (2.0 * h);
+            derivative(p, first + k) = smooth ? (f[3] - f[1]) / (2.0 * h) : taken(k, h, noise);
         }
     }
 
@@ -264,7 +280,7 @@ class TickTangent {
     std::vector<Command> commands_;
     std::vector<double> slots_;  // derivatives of the numbers of all axes
     control::Sampled measured_;
-    std::vector<double> measured_derivative_, now_, at_, values_;
+    std::vector<double> measured_derivative_, now_, at_, values_, by_law_;
     std::string error_;
 };
 
