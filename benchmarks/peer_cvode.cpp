@@ -116,6 +116,8 @@ class Cvode {
     // What only synchronous motors under field orientation ask of a solver: none here has them.
     std::unique_ptr<Cvode> twin() const { throw std::logic_error("no second solver"); }
     void follow(const Cvode&) {}
+    std::size_t switchings() const { return 0; }
+    const auto& linear_rates() { return task_.cache.entry(key_).rates; }
     ~Cvode() {
         CVodeFree(&memory_);
         SUNLinSolFree(solver_);
