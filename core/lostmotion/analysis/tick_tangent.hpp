@@ -1,9 +1,9 @@
 // How what sampled controllers remember and command depends on parameters.
 //
 // What a tick makes of their numbers s, of what they measure y and of their own parameters is a smooth function but for
-// limits and rounding to whole increments. Its derivative is found by differences along ds/dp, dy/dp and the parameter
-// apart: of the values beside, those that no limit parts from the present one. What an encoder of finite resolution
-// reads does not depend on anything but at single instants: its derivative is 0.
+// limits and rounding to whole increments. Its derivative is found by differences, of the parameter alone and of the
+// motion, along ds/dp and dy/dp: of the values beside, those that no limit parts from the present one. What an encoder
+// of finite resolution reads does not depend on anything but at single instants: its derivative is 0.
 #pragma once
 
 #include <string>

@@ -87,9 +87,8 @@ inline std::string status_text(Status status, double time, const std::string& co
                    ": the friction jams. Give the gearbox a compliance, or lower its losses.";
         case Status::outside:
             return "the state left the range that can be computed " + at +
-                   ": 1000 times the data of a loss map, or what numbers resolve. The drive is unstable, or its data "
-                   "or "
-                   "inputs, such as a stiffness, have a wrong unit.";
+                   ": 1000 times the data of a loss map, or what numbers resolve. "
+                   "The drive is unstable, or its data or inputs, such as a stiffness, have a wrong unit.";
         case Status::zeno:
             return "switching instants of the contact '" + contact + "' accumulate " + at +
                    ": infinitely many in finite time. The model ends here.";
