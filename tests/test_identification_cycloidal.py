@@ -38,6 +38,12 @@ def baseline() -> lm.IdentificationResult:
     return lm.identify(EXAMPLE / "baseline.toml")
 
 
+@pytest.fixture(scope="module")
+def split() -> lm.IdentificationResult:
+    """Of the shipped file and logs of the split pin wheel."""
+    return lm.identify(EXAMPLE / "split-pinwheel.toml")
+
+
 def test_the_extract_has_what_the_author_measured(procedure: ModuleType) -> None:
     """Means over 50 and 100 ms change play and compliance by less than 5 and 1 % of what all samples give."""
     for file, (play, compliance) in (("baseline.toml", BASELINE[:2]), ("split-pinwheel.toml", SPLIT)):
@@ -65,6 +71,33 @@ def test_play_compliance_and_friction_are_those_of_the_thesis(
     play, compliance = procedure.play_and_compliance(procedure.tests_of(baseline, simulated=True))
     friction = procedure.coulomb_friction(baseline.scenario)
     assert (play, compliance, friction) == pytest.approx(BASELINE, rel=0.1)
+
+
+def test_play_and_compliance_of_the_split_pin_wheel_are_those_of_the_thesis(
+    split: lm.IdentificationResult, procedure: ModuleType
+) -> None:
+    assert split.chosen == 1
+    found = procedure.play_and_compliance(procedure.tests_of(split, simulated=True))
+    assert found == pytest.approx(SPLIT, rel=0.1)
+
+
+def test_the_split_pin_wheel_comes_as_near_to_the_held_out_log_as_the_other_logs_do(
+    split: lm.IdentificationResult, procedure: ModuleType
+) -> None:
+    """In the large ramps: the identified drive against the mean of the ramps at the two other angles."""
+    *others, measured = sorted(
+        zip(split.logs, *(procedure.tests_of(split, simulated=s) for s in (False, True)), strict=True),
+        key=lambda of: "split-5" in of[0].name,
+    )
+    ramps = [ramp[2] for ramp in procedure.ramps(measured[1], large=True)]
+    length = min(*(ramp.size for ramp in ramps), *(procedure.mean_position(o[1], large=True).size for o in others))
+    mean = np.mean([procedure.mean_position(o[1], large=True)[:length] for o in others], axis=0)
+    floor = np.sqrt(np.mean([np.var(ramp[:length] - mean) for ramp in ramps]))
+    large = measured[1][4] >= procedure.LARGE
+    left = np.sqrt(np.mean((measured[1][3] - measured[2][3])[large] ** 2))
+    assert left < 1.05 * floor
+    _, rmse = split.error(held_out=True)
+    assert np.degrees(rmse) < 0.32
 
 
 def test_only_the_sum_of_two_frictions_shows_while_the_output_is_locked(baseline: lm.IdentificationResult) -> None:

@@ -23,7 +23,7 @@ def play_and_compliance(tests: list[np.ndarray]) -> tuple[float, float]:
     over time, then the tests. The play is the distance between the positions at zero torque, on the way up and on the way down;
     the compliance is the mean slope of both ways beyond the play.
     """
-    small, large = (_mean([_mean(_ramps(test, big)) for test in tests]) for big in (False, True))
+    small, large = (_mean([_mean(ramps(test, large=big)) for test in tests]) for big in (False, True))
     up, down = _loading(small)
     low, high = small[2, up][0], small[2, down][0]
     up, down = _loading(large)
@@ -33,7 +33,13 @@ def play_and_compliance(tests: list[np.ndarray]) -> tuple[float, float]:
     return float(high - low), float(np.mean(slopes))
 
 
-def _ramps(test: np.ndarray, large: bool) -> list[np.ndarray]:
+def mean_position(test: np.ndarray, *, large: bool) -> np.ndarray:
+    """Position [deg] over time, the mean of the ramps of a test, about its own mean."""
+    return _mean(ramps(test, large=large))[2]
+
+
+def ramps(test: np.ndarray, *, large: bool) -> list[np.ndarray]:
+    """(command, torque, position) of each ramp of a test, resampled."""
     found = []
     for number in np.unique(test[4]):
         if (number >= LARGE) == large:
