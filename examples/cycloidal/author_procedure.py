@@ -35,7 +35,8 @@ def play_and_compliance(tests: list[np.ndarray]) -> tuple[float, float]:
 
 def mean_position(test: np.ndarray, *, large: bool) -> np.ndarray:
     """Position [deg] over time, the mean of the ramps of a test, about its own mean."""
-    return _mean(ramps(test, large=large))[2]
+    position: np.ndarray = _mean(ramps(test, large=large))[2]
+    return position
 
 
 def ramps(test: np.ndarray, *, large: bool) -> list[np.ndarray]:
