@@ -85,16 +85,15 @@ def test_the_split_pin_wheel_comes_as_near_to_the_held_out_log_as_the_other_logs
     split: lm.IdentificationResult, procedure: ModuleType
 ) -> None:
     """In the large ramps: the identified drive against the mean of the ramps at the two other angles."""
-    *others, measured = sorted(
-        zip(split.logs, *(procedure.tests_of(split, simulated=s) for s in (False, True)), strict=True),
-        key=lambda of: "split-5" in of[0].name,
-    )
-    ramps = [ramp[2] for ramp in procedure.ramps(measured[1], large=True)]
-    length = min(*(ramp.size for ramp in ramps), *(procedure.mean_position(o[1], large=True).size for o in others))
-    mean = np.mean([procedure.mean_position(o[1], large=True)[:length] for o in others], axis=0)
+    measured, simulated = (procedure.tests_of(split, simulated=s) for s in (False, True))
+    held_out = next(k for k, log in enumerate(split.logs) if "split-5" in log.name)
+    others = [procedure.mean_ramp(test, large=True)[2] for k, test in enumerate(measured) if k != held_out]
+    ramps = [ramp[2] for ramp in procedure.ramps(measured[held_out], large=True)]
+    length = min(curve.size for curve in others + ramps)
+    mean = np.mean([curve[:length] for curve in others], axis=0)
     floor = np.sqrt(np.mean([np.var(ramp[:length] - mean) for ramp in ramps]))
-    large = measured[1][4] >= procedure.LARGE
-    left = np.sqrt(np.mean((measured[1][3] - measured[2][3])[large] ** 2))
+    large = measured[held_out][4] >= procedure.LARGE
+    left = np.sqrt(np.mean((measured[held_out][3] - simulated[held_out][3])[large] ** 2))
     assert left < 1.05 * floor
     _, rmse = split.error(held_out=True)
     assert np.degrees(rmse) < 0.32

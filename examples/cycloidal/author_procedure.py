@@ -23,7 +23,7 @@ def play_and_compliance(tests: list[np.ndarray]) -> tuple[float, float]:
     over time, then the tests. The play is the distance between the positions at zero torque, on the way up and on the way down;
     the compliance is the mean slope of both ways beyond the play.
     """
-    small, large = (_mean([_mean(ramps(test, large=big)) for test in tests]) for big in (False, True))
+    small, large = (_mean([mean_ramp(test, large=big) for test in tests]) for big in (False, True))
     up, down = _loading(small)
     low, high = small[2, up][0], small[2, down][0]
     up, down = _loading(large)
@@ -33,10 +33,9 @@ def play_and_compliance(tests: list[np.ndarray]) -> tuple[float, float]:
     return float(high - low), float(np.mean(slopes))
 
 
-def mean_position(test: np.ndarray, *, large: bool) -> np.ndarray:
-    """Position [deg] over time, the mean of the ramps of a test, about its own mean."""
-    position: np.ndarray = _mean(ramps(test, large=large))[2]
-    return position
+def mean_ramp(test: np.ndarray, *, large: bool) -> np.ndarray:
+    """(command, torque, position) over time, the mean of the ramps of a test; the position about its own mean."""
+    return _mean(ramps(test, large=large))
 
 
 def ramps(test: np.ndarray, *, large: bool) -> list[np.ndarray]:
