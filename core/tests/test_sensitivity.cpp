@@ -9,14 +9,16 @@ namespace lostmotion::model {
 
 // Differences of a run are rounded to some 1e-12 of its values over the step; where two steps agree to 2.5e-9, they
 // must with the derivative to 1e-8.
+void compare_one(unsigned seed, bool closed_loop, SensitivityTally& tally) {
+    CAPTURE(seed);
+    RandomTrains random(seed);
+    const RandomCase c = random_case(random, 5, 0.3, closed_loop);
+    compare_sensitivities(c, some_knobs(random, c, 1), 0.3, tally, 1e-8, "differs");
+}
+
 SensitivityTally compare_random(unsigned seed, int trains, bool closed_loop) {
     SensitivityTally tally;
-    for (int n = 0; n < trains; ++n) {
-        CAPTURE(n);
-        RandomTrains random(seed + static_cast<unsigned>(n));
-        const RandomCase c = random_case(random, 5, 0.3, closed_loop);
-        compare_sensitivities(c, some_knobs(random, c, 1), 0.3, tally, 1e-8, "differs");
-    }
+    for (int n = 0; n < trains; ++n) compare_one(seed + static_cast<unsigned>(n), closed_loop, tally);
     return tally;
 }
 
@@ -30,6 +32,20 @@ TEST_CASE("derivatives of 300 random trains are those of differences of their ru
     CHECK(open.ended + closed.ended < 10);
     CHECK(open.compared > 10000);
     CHECK(closed.compared > 5000);
+}
+
+// Gears between shafts that stand. In the first group the friction of the shaft that a gear turns bounds its torque; in
+// the second a contact reaches its limit at the switching, where the torques are those of its slipping.
+TEST_CASE("derivatives of torques that rest leaves open") {
+    SensitivityTally tally;
+    for (const unsigned seed : {20183u, 20291u, 20489u, 22152u, 22549u, 22554u, 23471u})
+        compare_one(seed, false, tally);
+    compare_one(60938, true, tally);
+    for (const unsigned seed : {20324u, 20379u, 20392u}) compare_one(seed, false, tally);
+    CHECK(tally.failed_runs == 0);
+    CHECK(tally.wrong == 0);
+    CHECK(tally.ended == 0);
+    CHECK(tally.compared > 4000);
 }
 
 // x' = -a x + u from rest: dx/da and dx/du are known, also where exp(-a h) is lost in 1.

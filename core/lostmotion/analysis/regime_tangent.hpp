@@ -27,6 +27,12 @@ inline std::optional<model::Row> channel_form(const model::Assembly& a, const mo
     }
 }
 
+// The forms of a locked torque, in the order of RegimeTangent::locked.
+inline constexpr std::size_t n_locked_forms = 4;
+inline std::array<const model::Row*, n_locked_forms> locked_forms(const model::LockedTorque<model::Row>& l) {
+    return {&l.low, &l.high, &l.needs, &l.friction};
+}
+
 // A regime as composed in the train and in those beside it.
 struct RegimeTangent {
     model::Regime regime;
@@ -34,6 +40,8 @@ struct RegimeTangent {
     Varied guard;           // guards x terms
     Varied output_torque;   // gears x terms
     Varied contact_torque;  // contacts x terms
+    Varied locked;          // forms of locked torques x terms, see locked_forms
+    Varied needs_torque;    // locked torques x contacts
     std::vector<std::optional<model::Row>> channel;
     Varied channel_varied;  // channels x terms
     Varied shift;           // guards x 1: of the memory beyond an edge, see Guard
@@ -89,6 +97,8 @@ class RegimeTangents {
         t->guard = room(r.guards.size());
         t->output_torque = room(r.output_torque.size());
         t->contact_torque = room(r.contact_torque.size());
+        t->locked = room(r.locked.size() * n_locked_forms);
+        t->needs_torque = Varied(static_cast<int>(r.locked.size()), layout().contacts, parameters);
         t->channel_varied = room(channels_.size());
         t->shift = Varied(static_cast<int>(r.guards.size()), 1, parameters);
         for (const TrainChannel& c : channels_) t->channel.push_back(channel_form(trains_.base(), r, c));
@@ -102,7 +112,8 @@ class RegimeTangents {
             for (int k = 0; k < layout().terms; ++k)
                 to.at(static_cast<int>(row), k)[b.parameter] += b.weight * (f.c[k] - from.c[k]);
         };
-        t.alike = t.alike && r.guards.size() == at.guards.size() && r.solvable == at.solvable;
+        t.alike = t.alike && r.guards.size() == at.guards.size() && r.solvable == at.solvable &&
+                  r.locked.size() == at.locked.size();
         for (std::size_t k = 0; k < r.rate.size(); ++k) note(t.rate, k, r.rate[k], at.rate[k]);
         for (std::size_t g = 0; g < r.guards.size() && t.alike; ++g) {
             const model::Guard &one = r.guards[g], &other = at.guards[g];
@@ -115,6 +126,13 @@ class RegimeTangents {
             note(t.output_torque, k, r.output_torque[k], at.output_torque[k]);
         for (std::size_t k = 0; k < r.contact_torque.size(); ++k)
             note(t.contact_torque, k, r.contact_torque[k], at.contact_torque[k]);
+        for (std::size_t k = 0; k < r.locked.size() && t.alike; ++k) {
+            const auto own = locked_forms(r.locked[k]), other = locked_forms(at.locked[k]);
+            for (std::size_t f = 0; f < n_locked_forms; ++f) note(t.locked, k * n_locked_forms + f, *own[f], *other[f]);
+            for (int c = 0; c < layout().contacts; ++c)
+                t.needs_torque.at(static_cast<int>(k), c)[b.parameter] +=
+                    b.weight * (at.locked[k].needs_torque[c] - r.locked[k].needs_torque[c]);
+        }
         for (std::size_t c = 0; c < channels_.size(); ++c)
             if (t.channel[c]) note(t.channel_varied, c, *t.channel[c], *channel_form(b.assembly(), at, channels_[c]));
     }

@@ -9,6 +9,13 @@
 
 namespace lostmotion {
 
+// A form, and its row among those that change with parameters.
+struct VariedForm {
+    const model::Row& form;
+    const Varied& varied;
+    int row;
+};
+
 // Of the values that w stands for: a form, and its derivatives.
 class FormTangent {
  public:
@@ -89,27 +96,43 @@ class ResetTangent {
         const int row = trains_.base().layout().first_memory + g.memory;
         add_scaled(to + row * parameters_, 1.0, before.shift.at(static_cast<int>(guard), 0), parameters_);
     }
-    // A locked torque that keeps the value of a form.
-    void kept(int row, const model::Row& was, const Varied& forms, int at, const double* w, const double* derivative,
-              double* to) const {
-        form_.add_own(forms, at, w, 1.0, to + row * parameters_);
-        form_.add_inputs(was, derivative, 1.0, to + row * parameters_);
+    // A locked torque that a regime gives: of what is set anew beside it, `to` has the derivatives already.
+    void given(const VariedForm& torque, const double* w, const double* derivative, int memory, double* to) const {
+        std::vector<double> sum(static_cast<std::size_t>(parameters_));
+        add_now(torque, w, derivative, 1.0, to, sum.data());
+        std::copy(sum.begin(), sum.end(), to + (trains_.base().layout().first_memory + memory) * parameters_);
     }
-    // One that has used up a margin: of what is set anew beside it, `to` has the derivatives already.
-    void at_limit(int row, const model::Row& limit, const Varied& forms, int at, const double* w,
-                  const double* derivative, double* to) const {
+    // A locked torque, number k of a regime, at a bound: of what is set anew beside it, `to` has the derivatives
+    // already. torques: those of other stuck contacts, and their derivatives.
+    void at_bound(const RegimeTangent& after, std::size_t k, model::Bound bound, const double* w,
+                  const double* derivative, const double* torques, const double* torque_derivatives, double* to) const {
         const model::Layout& n = trains_.base().layout();
-        const double own = limit.c[static_cast<std::size_t>(row)];
-        double* out = to + row * parameters_;
-        std::fill_n(out, parameters_, 0.0);
-        form_.add_own(forms, at, w, -1.0 / own, out);
-        form_.add_inputs(limit, derivative, -1.0 / own, out);
-        for (int k = 0; k < n.first_input; ++k)
-            if (k != row && limit.c[static_cast<std::size_t>(k)] != 0.0)
-                add_scaled(out, -limit.c[static_cast<std::size_t>(k)] / own, to + k * parameters_, parameters_);
+        const model::LockedTorque<model::Row>& l = after.regime.locked[k];
+        std::vector<double> sum(static_cast<std::size_t>(parameters_));
+        const auto forms = locked_forms(l);
+        const bool with_torques = l.each_form(bound, [&](const model::Row& form, double factor) {
+            const auto number = static_cast<std::size_t>(std::find(forms.begin(), forms.end(), &form) - forms.begin());
+            add_now({form, after.locked, static_cast<int>(k * n_locked_forms + number)}, w, derivative, factor, to,
+                    sum.data());
+        });
+        if (with_torques)
+            for (int c = 0; c < n.contacts; ++c) {
+                add_scaled(sum.data(), torques[c], after.needs_torque.at(static_cast<int>(k), c), parameters_);
+                add_scaled(sum.data(), l.needs_torque[static_cast<std::size_t>(c)],
+                           torque_derivatives + c * parameters_, parameters_);
+            }
+        std::copy(sum.begin(), sum.end(), to + (n.first_memory + l.memory) * parameters_);
     }
 
  private:
+    void add_now(const VariedForm& f, const double* w, const double* derivative, double factor, const double* to,
+                 double* sum) const {
+        form_.add_own(f.varied, f.row, w, factor, sum);
+        form_.add_inputs(f.form, derivative, factor, sum);
+        for (int j = 0; j < trains_.base().layout().first_input; ++j)
+            if (const double c = f.form.c[static_cast<std::size_t>(j)]; c != 0.0)
+                add_scaled(sum, factor * c, to + j * parameters_, parameters_);
+    }
     static model::Ties tie(const model::Assembly& a, const std::int8_t* modes) {
         return model::tie(a.places().contacts, static_cast<int>(a.train().shafts.size()), modes);
     }

@@ -46,6 +46,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
           resets_(trains, form_, inputs.parameters()),
           system_(trains.base()),
           laws_(system_),
+          locked_(system_),
           ticks_(inputs.parameters(), variations, control),
           output_(output),
           n_(trains.base().layout()),
@@ -95,7 +96,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
         const ResetOf<System> r{w, old, next, x, memory, before, after};
         auto jump = JacobianOf<D>::identity();
         const ResetRatesOf<D> rates = laws_.reset(r, jump);
-        if (!rates.exact) end(w, "a torque at rest that comes to lie where contacts let it");
+        if (!rates.exact) end(w, torque_at_rest);
         set_anew_.assign(derivative_.size(), 0.0);
         reset(r, old_tangent, left_w_.data(), left_.data(), set_anew_.data());
         apply(jump, rates, r, left_.data(), shift_.data(), set_anew_.data());
@@ -113,6 +114,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
 
  private:
     using ComponentsRow = ComponentsOf<D>;
+    static constexpr const char* torque_at_rest = "a torque at rest that comes to lie where contacts let it";
 
     double* row(int k) { return derivative_.data() + k * parameters_; }
     void read(std::size_t sample) {
@@ -201,18 +203,54 @@ class TrainSensitivity final : public TrainWatcher<D> {
                 output_.ends_by = "a contact at rest that a parameter sets in motion at the start: " +
                                   model::contact_name(trains_.base(), c);
             }
-        const auto& contacts = trains_.base().places().contacts;
-        for (std::size_t c = contacts.size(); c-- > 0;) {
-            const int locked = contacts[c].locked;
-            if (locked == model::nowhere || !r.ties.redundant[c]) continue;
-            const double now = memory[static_cast<std::size_t>(locked)],
-                         given = start_memory_[static_cast<std::size_t>(locked)];
-            if (std::fabs(now - given) <= rounding * std::fabs(given)) continue;
-            const int limit = laws_.limit_of(c, *regime_, state(), memory, inputs()[0]);
-            if (limit >= 0)
-                resets_.at_limit(n_.first_memory + locked, r.guards[static_cast<std::size_t>(limit)].form,
-                                 tangent_->guard, limit, w_.data(), derivative_.data(), derivative_.data());
+        hold_at_start(memory);
+    }
+
+    // Torques that rest leaves open are given with the start, where contacts can hold them; those of gears whose
+    // contacts slip or are determined begin without hysteresis.
+    void hold_at_start(const Memory& memory) {
+        const model::Assembly& a = trains_.base();
+        const model::Regime& r = tangent_->regime;
+        if (r.locked.empty()) return;
+        std::array<double, model::max_contacts> torques{};
+        std::vector<double> derivatives(model::max_contacts * static_cast<std::size_t>(parameters_));
+        for (std::size_t c = 0; c < a.places().contacts.size(); ++c) {
+            const model::ContactPlace& contact = a.places().contacts[c];
+            double* to = derivatives.data() + c * static_cast<std::size_t>(parameters_);
+            if (contact.locked != model::nowhere) {
+                torques[c] = start_memory_[static_cast<std::size_t>(contact.locked)];
+                std::copy_n(row(n_.first_memory + contact.locked), parameters_, to);
+            } else if (contact.kind == model::ContactPlace::gear) {
+                const model::Row P = a.spring_torque(contact.element, r.key);
+                torques[c] = form_.value(P, w_.data());
+                form_.add_motion(P, derivative_.data(), 1.0, to);
+                for (const VariedTrain::Beside& b : trains_.beside())
+                    to[b.parameter] +=
+                        b.weight *
+                        (form_.value(b.assembly().spring_torque(contact.element, r.key), w_.data()) - torques[c]);
+            }
         }
+        if (const auto hold = locked_.find(*regime_, torques, state(), memory, inputs()[0])) {
+            set_held(*hold, torques.data(), derivatives.data(), derivative_.data());
+        } else if (!ended()) {
+            output_.ends_at = 0.0;
+            output_.ends_by = torque_at_rest;
+        }
+    }
+    // torques: those before, by contact, and their derivatives.
+    void set_held(const typename LockedTorques<D>::Hold& hold, const double* torques, const double* derivatives,
+                  double* to) {
+        const RegimeTangent& rest = *tangent_;
+        const RegimeTangent& in = hold.at_limit ? regimes_(hold.at_limit->key, hold.at_limit->rows) : rest;
+        const auto set_row = [&](int memory) { return to + (n_.first_memory + memory) * parameters_; };
+        for (const auto& l : in.regime.locked)
+            std::copy_n(derivatives + l.contact * parameters_, parameters_, set_row(l.memory));
+        for (std::size_t k = 0; k < in.regime.locked.size(); ++k)
+            if (hold.bounds[k] != model::Bound::none)
+                resets_.at_bound(in, k, hold.bounds[k], w_.data(), derivative_.data(), torques, derivatives, to);
+        locked_.each_given(hold, *regime_, [&](const auto& l) {
+            resets_.given(torque_of(l.contact, in), w_.data(), derivative_.data(), l.memory, to);
+        });
     }
 
     // By how much the instant shifts at which a guard falls through zero. False if it only touches it.
@@ -252,22 +290,33 @@ class TrainSensitivity final : public TrainWatcher<D> {
         if (w.guard >= 0) resets_.turn(old, static_cast<std::size_t>(w.guard), to);
         enter(r.after);
         set_states(w.x, w.memory);
-        for (std::size_t c = a.places().contacts.size(); c-- > 0;) {
-            const model::ContactPlace& contact = a.places().contacts[c];
-            if (contact.locked == model::nowhere || !tangent_->regime.ties.redundant[c]) continue;
-            const int row = n_.first_memory + contact.locked;
-            const auto at = laws_.locked_at(c, r);
-            if (at.was != nullptr) {
-                const bool gear = contact.kind == model::ContactPlace::gear;
-                const int index = gear ? contact.element : static_cast<int>(c);
-                const auto& was = gear ? old.regime.output_torque : old.regime.contact_torque;
-                resets_.kept(row, was[static_cast<std::size_t>(index)], gear ? old.output_torque : old.contact_torque,
-                             index, left_w, left, to);
-            } else if (at.limit >= 0) {
-                resets_.at_limit(row, tangent_->regime.guards[static_cast<std::size_t>(at.limit)].form, tangent_->guard,
-                                 at.limit, w_.data(), derivative_.data(), to);
-            }
+        hold(r, old, left_w, left, to);
+    }
+    // Torques that rest leaves open after a switching.
+    void hold(const ResetOf<System>& r, const RegimeTangent& old, const double* left_w, const double* left,
+              double* to) {
+        if (tangent_->regime.locked.empty()) return;
+        const auto hold = locked_.find(r);
+        if (!hold) return;
+        const auto& contacts = trains_.base().places().contacts;
+        std::array<double, model::max_contacts> torques{};
+        std::vector<double> derivatives(contacts.size() * static_cast<std::size_t>(parameters_));
+        for (std::size_t c = 0; c < contacts.size(); ++c) {
+            if (contacts[c].kind == model::ContactPlace::shaft) continue;
+            const VariedForm was = torque_of(static_cast<int>(c), old);
+            double* own = derivatives.data() + c * static_cast<std::size_t>(parameters_);
+            torques[c] = form_.value(was.form, left_w);
+            form_.add_own(was.varied, was.row, left_w, 1.0, own);
+            form_.add_inputs(was.form, left, 1.0, own);
         }
+        set_held(*hold, torques.data(), derivatives.data(), to);
+    }
+    // What a contact of a gear or of a coupling takes.
+    VariedForm torque_of(int contact, const RegimeTangent& t) const {
+        const model::ContactPlace& c = trains_.base().places().contacts[static_cast<std::size_t>(contact)];
+        if (c.kind == model::ContactPlace::gear)
+            return {t.regime.output_torque[static_cast<std::size_t>(c.element)], t.output_torque, c.element};
+        return {t.regime.contact_torque[static_cast<std::size_t>(contact)], t.contact_torque, contact};
     }
 
     void apply(const JacobianOf<D>& jump, const ResetRatesOf<D>& rates, const ResetOf<System>& r, const double* left,
@@ -318,6 +367,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
     ResetTangent resets_;
     const System system_;
     const ComponentLaws<System> laws_;
+    const LockedTorques<D> locked_;
     TickTangent ticks_;
     SensitivityOutput& output_;
     const model::Layout& n_;

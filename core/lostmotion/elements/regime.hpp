@@ -85,6 +85,32 @@ struct Driver {
     Form torque{}, rate{};
 };
 
+// Which bound a locked torque has come to: of its own contact, or of the friction of the shaft that it turns.
+enum class Bound : std::uint8_t { none, low, high, friction_below, friction_above };
+
+// A torque that rest leaves open, and the forms that bound it: its own contact holds it from `low` to `high`; where the
+// shaft that it turns is held by friction, it also lies within `friction` of what that shaft `needs`.
+template <class Form>
+struct LockedTorque {
+    int contact = -1, memory = -1;  // where it acts, and where it is remembered
+    bool has_low = false, has_high = false, on_held_shaft = false;
+    Form low{}, high{}, needs{}, friction{};
+    // What the shaft needs beside `needs`: shares of T_2 of gears and of the torques of couplings that are stuck as
+    // well, by contact.
+    std::array<double, max_contacts> needs_torque{};
+
+    // The bound that is a sum of forms: calls use(form, factor) for each, and says whether other torques count as well.
+    template <class Use>
+    bool each_form(Bound bound, Use&& use) const {
+        if (bound == Bound::low) use(low, 1.0);
+        if (bound == Bound::high) use(high, 1.0);
+        if (bound != Bound::friction_below && bound != Bound::friction_above) return false;
+        use(needs, 1.0);
+        use(friction, bound == Bound::friction_below ? -1.0 : 1.0);
+        return true;
+    }
+};
+
 struct Regime {
     Key key;
     std::vector<Row> rate;  // of each state
@@ -97,6 +123,7 @@ struct Regime {
     std::array<bool, max_contacts> at_rest{};  // contacts whose speeds this regime keeps at zero
     Ties ties;
     std::vector<Driver<Row>> drivers;
+    std::vector<LockedTorque<Row>> locked;  // in the order in which they are held: from the load to the motors
     // The only driver, if it is one input, and which way this has to go on.
     int driving_input = -1;  // -1: none, or more than that
     double driving_way = 0.0;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "../solver/components.hpp"
+#include "locked_torques.hpp"
 #include "system.hpp"
 
 namespace lostmotion::model {
@@ -134,9 +135,10 @@ class ComponentLaws<model::TrainSystem<D>> {
     using State = StateOf<D>;
     using Memory = typename D::Memory;
     using Components = ComponentsOf<D>;
+    using Locked = model::LockedTorque<LinearFormOf<D>>;
 
     explicit ComponentLaws(const System& system)
-        : assembly_(system.assembly()), angles_(model::periodic_angles(assembly_)) {
+        : assembly_(system.assembly()), angles_(model::periodic_angles(assembly_)), locked_(system) {
         neutral_.fill(true);
         const model::Layout& n = assembly_.layout();
         std::fill_n(neutral_.begin(), n.coupled, false);
@@ -214,37 +216,10 @@ class ComponentLaws<model::TrainSystem<D>> {
                 assembly_.train().gears[g].law.hysteresis_capacity_slope(r.x[p.twist]);
         }
         ResetRatesOf<D> rates;
-        const model::Ties after = ties(r.switching.after.modes);
-        for (std::size_t c = contacts().size(); c-- > 0;)  // as they are held: from the load to the motors
-            if (contacts()[c].locked != model::nowhere) lock(c, after.redundant[c], r, jump, rates);
+        for (const model::ContactPlace& c : contacts())
+            if (c.locked != model::nowhere) jump.row[D::states + c.locked] = {};
+        hold(r, jump, rates);
         return rates;
-    }
-
-    // Of a torque that the motion does not determine, after a switching: the form before it that it keeps the value of,
-    // or the guard of the regime after, a margin that it has used up; or neither.
-    struct Locked {
-        const LinearFormOf<D>* was = nullptr;
-        int limit = -1;
-    };
-    Locked locked_at(std::size_t c, const ResetOf<System>& r) const {
-        const model::ContactPlace& contact = contacts()[c];
-        const auto& was = contact.kind == model::ContactPlace::gear ? r.before.output_torque[contact.element]
-                                                                    : r.before.contact_torque[c];
-        const double size = magnitude_of(was, r.x, r.memory, r.input[0]);
-        const double before = evaluate<D>(was, r.x, r.memory, r.input[0]);
-        if (std::fabs(before - r.switching.memory[contact.locked]) <= rounding * size) return {&was, -1};
-        return {nullptr, limit_of(c, r.after, r.switching.x, r.switching.memory, r.input_after[0])};
-    }
-    // The margin of a contact that the locked torque has used up, a guard of this regime; -1: none.
-    int limit_of(std::size_t c, const typename System::Regime& after, const State& x, const Memory& m,
-                 const InputsOf<D>& u) const {
-        for (int g = 0; g < after.n_guards; ++g) {
-            const auto& guard = after.guards[g];
-            if (guard.kind != model::Guard::capacity) continue;
-            if (guard.form.c[D::first_memory + contacts()[c].locked] == 0.0) continue;
-            if (std::fabs(evaluate<D>(guard.form, x, m, u)) <= rounding * magnitude_of(guard.form, x, m, u)) return g;
-        }
-        return -1;
     }
 
  private:
@@ -259,28 +234,48 @@ class ComponentLaws<model::TrainSystem<D>> {
         magnitude_[memory] = magnitude;
     }
 
-    // A torque that the motion does not determine stays as it was, or comes to lie at the limit of a contact.
-    void lock(std::size_t c, bool used, const ResetOf<System>& r, JacobianOf<D>& jump, ResetRatesOf<D>& rates) const {
-        const int k = D::states + contacts()[c].locked;
-        Components& row = jump.row[k];
-        row = {};
-        if (!used) return;
-        const Locked at = locked_at(c, r);
-        if (at.was != nullptr) {
-            row = gradient<D>(*at.was);
-            rates.by_time[k] = input_part<D>(*at.was, r.input[1]);
-            return;
+    // How the torques that rest leaves open depend on what was before.
+    void hold(const ResetOf<System>& r, JacobianOf<D>& jump, ResetRatesOf<D>& rates) const {
+        const auto hold = locked_.find(r);
+        rates.exact = hold.has_value();
+        if (!hold) return;
+        Components row;
+        double by_time;
+        const auto add_before = [&](int contact, double share) {
+            const LinearFormOf<D>& was = locked_.torque(r.before, contact);
+            const Components g = gradient<D>(was);
+            for (int i = 0; i < component_count<D>; ++i) row[i] += share * g[i];
+            by_time += share * input_part<D>(was, r.input[1]);
+        };
+        const auto add_now = [&](const LinearFormOf<D>& form, double factor) {
+            const Components g = gradient<D>(form);
+            by_time += factor * input_part<D>(form, r.input_after[1]);
+            for (int j = 0; j < component_count<D>; ++j) {
+                if (g[j] == 0.0) continue;
+                for (int i = 0; i < component_count<D>; ++i) row[i] += factor * g[j] * jump.row[j][i];
+                by_time += factor * g[j] * rates.by_time[j];
+            }
+        };
+        const auto set = [&](const Locked& l, auto&& add) {
+            row = {};
+            by_time = 0.0;
+            add();
+            jump.row[D::states + l.memory] = row;
+            rates.by_time[D::states + l.memory] = by_time;
+        };
+        const typename System::Regime& in = hold->at_limit ? *hold->at_limit : r.after;
+        for (const Locked& l : in.locked) set(l, [&] { add_before(l.contact, 1.0); });
+        for (std::size_t k = 0; k < in.locked.size(); ++k) {
+            const Locked& l = in.locked[k];
+            if (hold->bounds[k] == model::Bound::none) continue;
+            set(l, [&] {
+                if (!l.each_form(hold->bounds[k], add_now)) return;
+                for (std::size_t c = 0; c < contacts().size(); ++c)
+                    if (l.needs_torque[c] != 0.0) add_before(static_cast<int>(c), l.needs_torque[c]);
+            });
         }
-        rates.exact = rates.exact && at.limit >= 0;
-        if (at.limit < 0) return;
-        const LinearFormOf<D>& limit = r.after.guards[at.limit].form;
-        const Components g = gradient<D>(limit);
-        rates.by_time[k] = -input_part<D>(limit, r.input_after[1]) / g[k];
-        for (int j = 0; j < component_count<D>; ++j) {
-            if (j == k || g[j] == 0.0) continue;
-            for (int i = 0; i < component_count<D>; ++i) row[i] -= g[j] / g[k] * jump.row[j][i];
-            rates.by_time[k] -= g[j] / g[k] * rates.by_time[j];
-        }
+        locked_.each_given(*hold, r.after,
+                           [&](const Locked& l) { set(l, [&] { add_now(locked_.torque(in, l.contact), 1.0); }); });
     }
     static double magnitude_of(const LinearFormOf<D>& f, const State& x, const Memory& m, const InputsOf<D>& u) {
         return lostmotion::magnitude<D>(f, x, m, u);
@@ -288,6 +283,7 @@ class ComponentLaws<model::TrainSystem<D>> {
 
     const model::Assembly& assembly_;
     const std::vector<model::PeriodicAngle> angles_;
+    const LockedTorques<D> locked_;
     std::array<bool, static_cast<std::size_t>(component_count<D>)> neutral_;
     Memory magnitude_{};
 };

@@ -5,6 +5,10 @@
 // the contact of the input shaft, whose capacity is the sum over all that is dry there: one speed, one sign.
 #pragma once
 
+#include <algorithm>
+#include <utility>
+#include <vector>
+
 #include "element_forms.hpp"
 #include "statics.hpp"
 
@@ -29,7 +33,9 @@ class Equations {
     void compose_gear(int gear, const Key& key, Regime& r, std::vector<Row>& loss) const;
     void compose_coupling(int coupling, const Key& key, Regime& r) const;
     Row shaft_friction(int shaft, const Key& key, const Regime& r, const std::vector<Row>& loss) const;
-    Row acceleration(int shaft, const Key& key, const Regime& r) const;
+    Row net_torque(int shaft, const Key& key, const Regime& r) const;
+    LockedTorque<Row> locked_torque(int contact, const Key& key, const Regime& r) const;
+    void add_held_shaft(int shaft, const Key& key, const Regime& r, LockedTorque<Row>& locked) const;
 
     int mode(const Key& key, int contact) const { return key.modes[contact]; }
     // What a stuck contact takes: found from its rest, or, where the motion does not determine it, as it was.
@@ -59,7 +65,10 @@ inline void Equations::compose(const Key& key, Regime& r, std::vector<Row>& acce
         if (c != nowhere) r.contact_torque[c] = shaft_friction(static_cast<int>(s), key, r, loss);
     }
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
-        acceleration[s] = this->acceleration(static_cast<int>(s), key, r);
+        acceleration[s] = net_torque(static_cast<int>(s), key, r) / places_.shafts[s].inertia;
+    r.locked.clear();
+    for (std::size_t c = places_.contacts.size(); c-- > 0;)
+        if (r.ties.redundant[c]) r.locked.push_back(locked_torque(static_cast<int>(c), key, r));
     // From here on the torque at the input includes the losses.
     for (std::size_t g = 0; g < gears; ++g) r.input_torque[g] += loss[g];
 }
@@ -146,7 +155,7 @@ inline Row Equations::shaft_friction(int shaft, const Key& key, const Regime& r,
     return F;
 }
 
-inline Row Equations::acceleration(int shaft, const Key& key, const Regime& r) const {
+inline Row Equations::net_torque(int shaft, const Key& key, const Regime& r) const {
     const ShaftPlace& p = places_.shafts[shaft];
     Row sum;
     for (std::size_t m = 0; m < train_.motors.size(); ++m)
@@ -173,7 +182,53 @@ inline Row Equations::acceleration(int shaft, const Key& key, const Regime& r) c
         if (gear.input == shaft) sum -= forms_.housing_friction(static_cast<int>(g), r);
         if (gear.housing == shaft) sum += forms_.housing_friction(static_cast<int>(g), r);
     }
-    return sum / p.inertia;
+    return sum;
+}
+
+// What bounds a torque that rest leaves open. The shaft that it turns bounds it by its plain friction alone: losses
+// there depend on the torque itself.
+inline LockedTorque<Row> Equations::locked_torque(int contact, const Key& key, const Regime& r) const {
+    const ContactPlace& c = places_.contacts[contact];
+    LockedTorque<Row> locked;
+    locked.contact = contact;
+    locked.memory = c.locked;
+    const auto between = [&locked](const Row& low, const Row& high) {
+        locked.has_low = locked.has_high = true;
+        locked.low = low;
+        locked.high = high;
+    };
+    if (c.kind == ContactPlace::gear) {
+        const Row P = forms_.spring_torque(c.element, key);
+        if (!c.bilateral) {
+            const Row h = terms_.memory(places_.gears[c.element].hysteresis);
+            between(P - h, P + h);
+        }
+    } else if (c.one_way) {
+        locked.has_low = true;
+    } else {
+        const Row most = forms_.coupling_capacity(c.element, key, true);
+        between(-most, most);
+    }
+    const int on = places_.shafts[c.b].contact;
+    const bool lossy = std::any_of(train_.gears.begin(), train_.gears.end(),
+                                   [&](const Gear& g) { return g.input == c.b && g.has_dry_losses(); });
+    if (on != nowhere && mode(key, on) == 0 && !lossy) add_held_shaft(c.b, key, r, locked);
+    return locked;
+}
+
+// All that turns a shaft at rest but its friction and this torque.
+inline void Equations::add_held_shaft(int shaft, const Key& key, const Regime& r, LockedTorque<Row>& locked) const {
+    locked.on_held_shaft = true;
+    locked.friction = forms_.held_friction(shaft, key);
+    locked.needs = -net_torque(shaft, key, r);
+    locked.needs.c[layout_.first_memory + locked.memory] = 0.0;
+    for (int c = 0; c < layout_.contacts; ++c) {
+        const double share = std::exchange(locked.needs.c[layout_.terms + c], 0.0);
+        const ContactPlace& other = places_.contacts[c];
+        if (share == 0.0 || other.kind == ContactPlace::shaft) continue;
+        locked.needs_torque[c] = share;
+        if (other.kind == ContactPlace::gear) locked.needs -= share * forms_.spring_torque(other.element, key);
+    }
 }
 
 inline void Equations::set_rates(const Key& key, const std::vector<Row>& acceleration, Regime& r) const {

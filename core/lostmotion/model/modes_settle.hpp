@@ -5,19 +5,6 @@
 
 namespace lostmotion::model {
 
-template <class Sizes>
-template <class Now>
-double SwitchedTrain<Sizes>::motor_torque(const Now& now, int motor) const {
-    const ShaftMotor& m = train().motors[motor];
-    if (m.law.kind == Motor::dc) return now.x[places().motors[motor].torque];
-    if (const int k = places().motors[motor].controller; k != nowhere) {
-        const double limit = train().controllers[k].limit;
-        return m.law.rated_torque * std::clamp(output_of(now, k), -limit, limit);
-    }
-    return std::clamp(m.law.rated_torque * now.input[0][places().motors[motor].command], -m.torque_limit,
-                      m.torque_limit);
-}
-
 // Of a controller, before its limit.
 template <class Sizes>
 template <class Now>
@@ -94,80 +81,21 @@ void SwitchedTrain<Sizes>::locate_losses(const Now& now, const std::array<double
     }
 }
 
-// Torques that the motion does not determine stay where they were, or at the nearest values that their own contacts
-// and the plain friction of the shafts behind them can hold, from the load to the motors. Whether all can hold them,
+// Torques that the motion does not determine are held, from the load to the motors. Whether all contacts can hold them,
 // the guards tell.
 template <class Sizes>
-template <class Now>
-void SwitchedTrain<Sizes>::hold(Now& now, const Event& event, const Key& modes,
-                                std::array<double, max_contacts>& T_2) const {
-    if (!some_redundant_) return;
-    const std::vector<ContactPlace>& all = places().contacts;
-    const Ties ties = tie(all, static_cast<int>(train().shafts.size()), modes.modes.data());
-    std::array<double, max_contacts> coupling = event.coupling;
-    for (std::size_t k = all.size(); k-- > 0;) {
-        if (!ties.redundant[k]) continue;
-        const ContactPlace& c = all[k];
-        const bool is_gear = c.kind == ContactPlace::gear;
-        double low = -std::numeric_limits<double>::infinity(), high = -low;
-        if (is_gear && !c.bilateral) {
-            const GearPlace& p = places().gears[c.element];
-            const double P = train().gears[c.element].law.curve.torque(now.x[p.twist]), h = now.memory[p.hysteresis];
-            low = P - h;
-            high = P + h;
-        } else if (!is_gear && c.one_way) {
-            low = 0.0;
-        } else if (!is_gear) {
-            const Coupling& law = train().couplings[c.element];
-            const int input = places().couplings[c.element].input;
-            high = law.commanded() ? law.holding() * std::clamp(now.input[0][input], 0.0, 1.0) : law.holding();
-            low = -high;
-        }
-        double& torque = is_gear ? T_2[c.element] : coupling[c.element];
-        const double own_low = low, own_high = high;
-        const int out = c.b, contact = places().shafts[out].contact;
-        const bool lossy = std::any_of(train().gears.begin(), train().gears.end(),
-                                       [&](const Gear& g) { return g.input == out && g.has_dry_losses(); });
-        if (contact != nowhere && modes.modes[contact] == 0 && !lossy) {
-            const ShaftPlace& p = places().shafts[out];
-            double needed = p.load == nowhere ? 0.0 : now.input[0][p.load];
-            for (std::size_t m = 0; m < train().motors.size(); ++m)
-                if (train().motors[m].shaft == out) needed -= motor_torque(now, static_cast<int>(m));
-            for (std::size_t g = 0; g < train().gears.size(); ++g) {
-                const Gear& gear = train().gears[g];
-                if (gear.output == out && !(is_gear && static_cast<int>(g) == c.element)) needed -= T_2[g];
-                double T_1 = T_2[g] / (gear.law.ratio * gear.law.efficiency);
-                if (const int piece = places().gears[g].error_piece; piece != nowhere)
-                    T_1 -= gear.transmission_error.slope(modes.branch[piece]) * T_2[g] / gear.law.efficiency;
-                if (gear.input == out) needed += T_1;
-                if (gear.housing == out) needed += T_2[g] - T_1;
-                if (gear.housing != nowhere && (gear.input == out || gear.housing == out))
-                    needed += (gear.input == out ? 1.0 : -1.0) * gear.law.viscous_friction *
-                              (now.x[places().shafts[gear.input].speed] - now.x[places().shafts[gear.housing].speed]);
-            }
-            for (std::size_t n = 0; n < train().couplings.size(); ++n) {
-                if (train().couplings[n].output == out && (is_gear || static_cast<int>(n) != c.element))
-                    needed -= coupling[n];
-                if (train().couplings[n].input == out) needed += coupling[n];
-            }
-            double T_f = p.motor_friction + train().shafts[out].friction.holding();
-            for (const auto& e : places().acting) {
-                if (e->shaft != out) continue;
-                const ShaftInstant here = places().instant_of(*e, now);
-                if (e->is_dry()) T_f += e->friction(here, true);
-                if (e->acts_at_rest()) needed -= e->torque(here);
-                if (e->remainder != nowhere) needed -= now.input[0][e->remainder];
-            }
-            low = std::max(low, needed - T_f);
-            high = std::min(high, needed + T_f);
-        }
-        if (low > high) {
-            low = own_low;
-            high = own_high;
-        }
-        torque = std::clamp(torque, low, high);
-        now.memory[c.locked] = torque;
+template <class R, class Now>
+void SwitchedTrain<Sizes>::hold(const R& r, Now& now, const Event& event) const {
+    if (r.locked.empty()) return;
+    std::array<double, max_contacts> torques{};
+    for (int c = 0; c < contacts(); ++c) {
+        const ContactPlace& p = places().contacts[c];
+        if (p.kind != ContactPlace::shaft)
+            torques[c] = p.kind == ContactPlace::gear ? event.gear[p.element] : event.coupling[p.element];
     }
+    for (const auto& l : r.locked) now.memory[l.memory] = torques[l.contact];
+    for (const auto& l : r.locked)
+        now.memory[l.memory] = held_torque(l, torques, [&](const auto& form) { return evaluate(n_, form, now); }).value;
 }
 
 // Is this combination of modes consistent? Pieces and cells are found by a walk that begins at what the torques were.
@@ -189,7 +117,7 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
             train().gears[g].law.curve.torque(now.x[p.twist]) + (slip == 2 ? 0.0 : slip * now.memory[p.hysteresis]);
     }
     locate_losses(now, T_2, trial);
-    hold(now, event, trial, T_2);
+    if (some_redundant_) hold(cache.regime(trial), now, event);
     Trial result = walk(cache, now, event, trial, key);
     if (result.found == Found::inconsistent && settle_on_corner(cache, now, event, trial, key))
         result.found = Found::yes;

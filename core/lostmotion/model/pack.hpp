@@ -69,6 +69,7 @@ struct PackedRegime {
     std::array<bool, D::coupled> resting{}, following{};  // speeds kept at zero, and those that follow others
     bool solvable = true, in_data = true;
     std::vector<Driver<PackedForm<D>>> drivers;
+    std::vector<LockedTorque<PackedForm<D>>> locked;
     int driving_input = -1;
     double driving_way = 0.0;
     bool complete = true;  // false: it has more guards than there is room for
@@ -98,6 +99,9 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
     out.driving_input = r.driving_input;
     out.driving_way = r.driving_way;
     for (const Driver<Row>& d : r.drivers) out.drivers.push_back({d.contact, pack<D>(d.torque, n), pack<D>(d.rate, n)});
+    for (const LockedTorque<Row>& l : r.locked)
+        out.locked.push_back({l.contact, l.memory, l.has_low, l.has_high, l.on_held_shaft, pack<D>(l.low, n),
+                              pack<D>(l.high, n), pack<D>(l.needs, n), pack<D>(l.friction, n), l.needs_torque});
     out.in_data = r.in_data;
     return out;
 }

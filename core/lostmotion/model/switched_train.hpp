@@ -22,6 +22,7 @@
 
 #include "../solver/status.hpp"
 #include "assembly.hpp"
+#include "held_torque.hpp"
 #include "motion.hpp"
 #include "scales.hpp"
 
@@ -79,6 +80,18 @@ class SwitchedTrain {
     // Sets the speeds of contacts at rest to what they are, to the last bit, and marks those that this implies.
     template <class X, class AtRest>
     void stop(X& x, AtRest& at_rest) const;
+
+    // The key in these modes, at the instant and the torques of another regime.
+    template <class R, class Now>
+    Key branches_at(const R& other, const Key& modes, const Now& now) const {
+        Key key;
+        key.modes = modes.modes;
+        std::array<double, max_contacts> T_2{};
+        for (std::size_t g = 0; g < train().gears.size(); ++g) T_2[g] = evaluate(n_, other.output_torque[g], now);
+        locate(now, key);
+        locate_losses(now, T_2, key);
+        return key;
+    }
 
     double few = 27.0;        // up to so many combinations are tried one after the other; more are pivoted
     mutable long trials = 0;  // combinations tried so far
@@ -177,10 +190,8 @@ class SwitchedTrain {
     void locate(const Now& now, Key& trial) const;
     template <class Now>
     void locate_losses(const Now& now, const std::array<double, max_contacts>& T_2, Key& trial) const;
-    template <class Now>
-    void hold(Now& now, const Event& event, const Key& modes, std::array<double, max_contacts>& T_2) const;
-    template <class Now>
-    double motor_torque(const Now& now, int motor) const;
+    template <class R, class Now>
+    void hold(const R& r, Now& now, const Event& event) const;
     template <class Now>
     double output_of(const Now& now, int controller) const;
 

@@ -47,6 +47,10 @@ class TrainSystem {
         if (!r.complete) overflowed_ = true;
         return r;
     }
+    // In these modes, at the instant and the torques of another regime.
+    Regime build_at(const Regime& other, const Key& modes, const InstantOf<D>& now) const {
+        return build(search_.branches_at(other, modes, now));
+    }
     template <class Cache>
     Found start(Cache& cache, InstantOf<D>& now, Key& key) const {
         const Found found = search_.start(cache, now, key);
