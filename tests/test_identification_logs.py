@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -139,14 +140,16 @@ def test_messages_of_an_mcap_file_are_channels_at_the_times_of_one_topic(tmp_pat
     assert log.header == {"mass": 0.5, "unit": "left"}
     assert any("servo/goal" in note for note in log.notes)
     assert read_log(path, time="/servo/goal").time == pytest.approx(TIME[::4], abs=1e-9)
-    with pytest.raises(lm.InputError, match="has no topic servo/stat in JSON"):
+    with pytest.raises(lm.InputError, match="has no topic servo/stat; its topics are servo/state, servo/goal"):
         read_log(path, time="servo/stat")
 
 
-def test_an_mcap_file_that_is_not_in_json_is_refused_in_one_line(tmp_path: Path) -> None:
+def test_an_mcap_file_that_is_neither_in_json_nor_of_ros_is_refused_in_one_line(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
-    as_mcap(path, "cdr")
-    with pytest.raises(lm.InputError, match=r"has no topic in JSON \(cdr\); record with") as refused:
+    as_mcap(path, "protobuf")
+    with pytest.raises(
+        lm.InputError, match=r"has no topic in JSON or of ROS \(protobuf\); record in one of these"
+    ) as refused:
         read_log(path)
     assert "\n" not in str(refused.value)
     as_mcap(path)
@@ -155,6 +158,133 @@ def test_an_mcap_file_that_is_not_in_json_is_refused_in_one_line(tmp_path: Path)
         with pytest.raises(lm.InputError, match="is not an MCAP file that mcap reads") as refused:
             read_log(path)
         assert "\n" not in str(refused.value)
+
+
+JOINT = "std_msgs/Header header\nfloat64[] position\nbool enabled\nstring name\nuint8[] image\n"
+HEADER = "=" * 80 + "\nMSG: std_msgs/Header\n"
+ROS1 = JOINT + HEADER + "uint32 seq\ntime stamp\nstring frame_id\n"
+ROS2 = (
+    JOINT
+    + HEADER
+    + "builtin_interfaces/Time stamp\nstring frame_id\n"
+    + "=" * 80
+    + "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+)
+JITTER = np.arange(len(TIME)) * 7919 % 4001 * 1000  # ns by which a message is published after its stamp
+
+
+def ros1_message(stamp: int, position: float) -> bytes:
+    """Little endian, without padding, as its wire format says."""
+    text = struct.pack("<III", 1, *divmod(stamp, 10**9)) + struct.pack("<I", 4) + b"base"
+    text += struct.pack("<Idd?", 2, position, -position, True) + struct.pack("<I", 5) + b"servo"
+    return text + struct.pack("<I", 200) + bytes(200)
+
+
+def ros2_message(stamp: int, position: float) -> bytes:
+    """Plain CDR, little endian: numbers at multiples of their size, words with an end."""
+    text = struct.pack("<iI", *divmod(stamp, 10**9)) + struct.pack("<I", 5) + b"base\0" + bytes(3)
+    text += struct.pack("<I", 2) + bytes(-(len(text) + 4) % 8) + struct.pack("<dd?", position, -position, True)
+    text += bytes(-len(text) % 4) + struct.pack("<I", 6) + b"servo\0"
+    text += bytes(-len(text) % 4) + struct.pack("<I", 200) + bytes(200)
+    return b"\0\1\0\0" + text
+
+
+def as_ros_mcap(path: Path, ros: int) -> None:
+    mcap = pytest.importorskip("mcap.writer")
+    begin = 1_700_000_000_000_000_000
+    encoding, definition, name = [
+        ("ros1", ROS1, "servo_msgs/Joint"),
+        ("cdr", ROS2, "servo_msgs/msg/Joint"),
+    ][ros - 1]
+    message = [ros1_message, ros2_message][ros - 1]
+    with path.open("wb") as stream:
+        writer = mcap.Writer(stream)
+        writer.start()
+        schema = writer.register_schema(name, f"ros{ros}msg", definition.encode())
+        state = writer.register_channel("/servo/state", encoding, schema)
+        for t, x, late in zip(TIME, ANGLE, JITTER, strict=True):
+            at = begin + round(1e9 * t)
+            writer.add_message(state, at + int(late), message(at, x), at + int(late))
+        writer.finish()
+
+
+def as_bag(path: Path) -> Path:
+    """A bag of ROS 1, or the directory of one of ROS 2."""
+    rosbags = pytest.importorskip("rosbags")
+    assert rosbags
+    from rosbags import rosbag1, rosbag2
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    ros1 = path.suffix == ".bag"
+    begin = 1_700_000_000_000_000_000
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(ROS1 if ros1 else ROS2, "servo_msgs/msg/Joint"))
+    message = ros1_message if ros1 else ros2_message
+    with rosbag1.Writer(path) if ros1 else rosbag2.Writer(path, version=9) as writer:
+        state = writer.add_connection("/servo/state", "servo_msgs/msg/Joint", typestore=store)
+        for t, x, late in zip(TIME, ANGLE, JITTER, strict=True):
+            at = begin + round(1e9 * t)
+            writer.write(state, at + int(late), message(at, x))
+    return path if ros1 else next(path.glob("*.db3"))
+
+
+@pytest.mark.parametrize("kind", ["ROS 1 in MCAP", "ROS 2 in MCAP", "bag of ROS 1", "bag of ROS 2"])
+def test_messages_of_ros_are_channels(tmp_path: Path, kind: str) -> None:
+    pytest.importorskip("rosbags")
+    if "MCAP" in kind:
+        path = tmp_path / "log.mcap"
+        as_ros_mcap(path, int(kind[4]))
+    else:
+        path = as_bag(tmp_path / ("log.bag" if kind.endswith("1") else "log"))
+    log = read_log(path)
+    assert {
+        "servo/state.position[0]",
+        "servo/state.position[1]",
+        "servo/state.enabled",
+        "servo/state.header.stamp.sec",
+    } <= set(log.channels)
+    assert log.values("servo/state.position[1]").tolist() == (-ANGLE).tolist()
+    assert log.time == pytest.approx(TIME + 1e-9 * (JITTER - JITTER[0]), abs=1e-9)
+    assert read_log(path, time="/servo/state.header.stamp").time == pytest.approx(TIME, abs=1e-9)
+    assert any("lists of more than 100 numbers are left out: servo/state.image" in note for note in log.notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"), [("log.bag", b"something else"), ("log.db3", b"something else"), ("log.bag", b"")]
+)
+def test_a_file_that_is_no_bag_is_refused_in_one_line(tmp_path: Path, name: str, content: bytes) -> None:
+    pytest.importorskip("rosbags")
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(lm.InputError, match="is not a bag that rosbags reads") as refused:
+        read_log(path)
+    assert "\n" not in str(refused.value)
+
+
+def test_damaged_messages_of_ros_are_refused_in_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    mcap = pytest.importorskip("mcap.writer")
+    path = tmp_path / "log.mcap"
+    for definition, data, said in (
+        (ROS2, ros2_message(0, 1.0)[:40], "topic servo/state: a message cannot be read"),
+        ("float64[ position", b"", "topic servo/state: the definition of servo_msgs/msg/Joint cannot be read"),
+    ):
+        with path.open("wb") as stream:
+            writer = mcap.Writer(stream)
+            writer.start()
+            schema = writer.register_schema("servo_msgs/msg/Joint", "ros2msg", definition.encode())
+            writer.add_message(writer.register_channel("/servo/state", "cdr", schema), 0, data, 0)
+            writer.finish()
+        with pytest.raises(lm.InputError, match=said) as refused:
+            read_log(path)
+        assert "\n" not in str(refused.value)
+
+
+def test_stamps_that_messages_do_not_carry_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    as_mcap(path)
+    with pytest.raises(lm.InputError, match=r"message 1 has no header.stamp .* give logs.time = 'servo/goal'"):
+        read_log(path, time="/servo/goal.header.stamp")
 
 
 def test_a_pattern_that_names_no_file_is_refused(tmp_path: Path) -> None:

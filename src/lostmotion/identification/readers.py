@@ -11,7 +11,7 @@ from ..inputs.validation import did_you_mean
 from .binary_logs import read_mat_log, read_mdf_log, read_parquet_log, read_tdms_log
 from .csv_log import read_csv_log
 from .logs import Log
-from .mcap_log import read_mcap_log
+from .robot_logs import read_mcap_log, read_ros_bag
 from .servo_json import read_servo_json
 
 TABLES: dict[str, Callable[..., Log]] = {
@@ -23,18 +23,21 @@ TABLES: dict[str, Callable[..., Log]] = {
     ".mf4": read_mdf_log,
     ".tdms": read_tdms_log,
     ".mcap": read_mcap_log,
+    ".bag": read_ros_bag,
+    ".db3": read_ros_bag,
 }
 ENDINGS = (".json", *TABLES)
 
 
 @checked
 def read_log(path: str | Path, *, time: str = "") -> Log:
-    """Read a log: CSV, MATLAB, Parquet, MDF 4, TDMS, MCAP, or JSON of a servo recorder, by the ending of its name.
+    """Read a log: CSV, MATLAB, Parquet, MDF 4, TDMS, MCAP, bag of ROS, or JSON of a servo recorder, by the ending of its name.
 
     Parameters
     ----------
     time
-        Name of the channel of the time, where it is not found by itself; of an MCAP file the topic.
+        Name of the channel of the time, where it is not found by itself; of an MCAP file or a bag the topic,
+        or ``TOPIC.header.stamp``.
 
     Raises
     ------
