@@ -73,6 +73,10 @@ int main(int argc, char** argv) {
     const SwitchedDrive drive(paper.drive);
     time_run("the paper's drive", n_coupled,
              Run<SwitchedDrive>{drive, paper.signals, {}, paper.drive.balanced_scale(), 2.0});
-    for (const TimedTrain& t : trains)
-        in_kernel(t, [&](const auto& in) { time_run(t.name.c_str(), in.assembly.layout().coupled, run_of(in, t)); });
+    const auto time_train = [](const TimedTrain& t, const std::string& name, const auto& in) {
+        time_run(name.c_str(), in.assembly.layout().coupled, run_of(in, t));
+    };
+    for (const TimedTrain& t : trains) in_kernel(t, [&](const auto& in) { time_train(t, t.name, in); });
+    // What the width of a kernel costs, apart from how stiff a train is.
+    time_train(trains[0], "the same in the kernel of 8 states", TrainIn<model::Middle>(trains[0]));
 }

@@ -53,7 +53,7 @@ class Cursor {
     const State& x() const { return x_; }
     const InputState<D>& input() const { return input_; }
     [[gnu::always_inline]] const State& rate() const {
-        if (!rate_known_) rate_ = propagator_->rates()(x_, *constant_, input_.values());
+        if (!rate_known_) propagator_->rates()(coupled(x_), *constant_, input_).store(rate_.data());
         rate_known_ = true;
         return rate_;
     }
@@ -163,7 +163,7 @@ class Cursor {
     // At a state that the inputs belong to.
     [[gnu::always_inline]] void arrive(const Lanes& x) {
         x.store(x_.data());
-        propagator_->rates()(x.coupled, *constant_, input_.values()).store(rate_.data());
+        propagator_->rates()(x.coupled, *constant_, input_).store(rate_.data());
         rate_known_ = true;
     }
     [[gnu::always_inline]] void arrive(const Lanes& x, const Lanes& rate) {
@@ -173,7 +173,7 @@ class Cursor {
     }
     // Whether anything but the state itself acts on the coupled states.
     bool driven() const {
-        const Coupled drive = load(*constant_) + propagator_->rates().forced(input_.values());
+        const Coupled drive = load(*constant_) + propagator_->rates().forced(input_);
         for (int k = 0; k < D::coupled; ++k)
             if (drive[k] != 0.0) return true;
         return false;

@@ -166,7 +166,8 @@ double evaluate_rate(const LinearFormOf<D>& f, const StateOf<D>& rate, const Inp
     return sum;
 }
 
-// Up to N forms as columns, so that all are evaluated at once. None may depend on an angle.
+// Up to N forms, as many side by side as a vector holds, so that all of them are evaluated at once. None may depend on
+// an angle.
 template <class D, int N>
 class FormTable {
  public:
@@ -177,11 +178,13 @@ class FormTable {
     using Inputs = InputsOf<D>;
     using Memory = typename D::Memory;
 
-    FormTable() { column_[D::one].fill(1.0); }  // forms that are not there are 1
+    FormTable() {
+        for (int row = 0; row < N; ++row) place(row, D::one) = 1.0;  // forms that are not there are 1
+    }
 
     void set(int row, const LinearForm& f) {
         for (int j = D::coupled; j < D::states; ++j) assert(f.c[j] == 0.0);
-        for (int k = 0; k < D::terms; ++k) column_[k][row] = f.c[k];
+        for (int k = 0; k < D::terms; ++k) place(row, k) = f.c[k];
         rows_ = std::max(rows_, (row + vec_width) / vec_width * vec_width);
         for (int i = 0; i < D::inputs; ++i) {
             driven_ = driven_ || f.c[D::first_input + i] != 0.0;
@@ -190,10 +193,10 @@ class FormTable {
         for (int k = 0; k < D::memory; ++k) depends_on_.see_memory(k, f.c[D::first_memory + k]);
     }
     int rows() const { return rows_; }  // rounded up to whole vectors
-    double coefficient(int row, int term) const { return column_[term][row]; }
+    double coefficient(int row, int term) const { return block_[row / vec_width][term][row % vec_width]; }
     LinearForm form(int row) const {
         LinearForm f;
-        for (int k = 0; k < D::terms; ++k) f.c[k] = column_[k][row];
+        for (int k = 0; k < D::terms; ++k) f.c[k] = coefficient(row, k);
         return f;
     }
 
@@ -208,14 +211,19 @@ class FormTable {
     [[gnu::always_inline]] void evaluate(const Values& constant, const State& x, const Inputs& u, Values& out) const {
         for (int g = 0; g < rows_; g += vec_width) store(load(&constant[g]) + terms(g, x, u), &out[g]);
     }
-    // The same with inputs that are asked for their values or rates where the forms depend on them.
+    // Values and time derivatives at once; the inputs are asked for theirs where the forms depend on them.
     template <class Input>
-    void evaluate(const Values& constant, const State& x, const Input& input, Values& out) const {
-        evaluate(constant, x, driven_ ? input.values() : Inputs{}, out);
-    }
-    template <class Input>
-    void rates(const State& rate, const Input& input, Values& out) const {
-        rates(rate, driven_ ? input.rates() : Inputs{}, out);
+    [[gnu::always_inline]] void evaluate(const Values& constant, const State& x, const State& rate, const Input& input,
+                                         Values& value, Values& slope) const {
+        Inputs u{}, u_rate{};
+        if (driven_) {
+            input.values(depends_on_.inputs, u);
+            input.rates(depends_on_.inputs, u_rate);
+        }
+        for (int g = 0; g < rows_; g += vec_width) {
+            store(load(&constant[g]) + terms(g, x, u), &value[g]);
+            store(terms(g, rate, u_rate), &slope[g]);
+        }
     }
     // Sums of the magnitudes of the terms, from magnitudes of what the forms depend on.
     void magnitudes(const Memory& m, const State& x, const Inputs& u, Values& out) const {
@@ -239,7 +247,7 @@ class FormTable {
     template <class V = Vec>
     V at(int term, int g) const {
         V v;
-        __builtin_memcpy(&v, &column_[term][g], sizeof v);
+        __builtin_memcpy(&v, &block_[g / vec_width][term][g % vec_width], sizeof v);
         return v;
     }
     template <bool magnitudes = false, class V = Vec>
@@ -258,7 +266,10 @@ class FormTable {
         return absolute(at<V>(D::one, g)) + kept + terms<true, V>(g, x, u);
     }
 
-    alignas(64) std::array<std::array<double, N>, D::terms> column_{};
+    double& place(int row, int term) { return block_[row / vec_width][term][row % vec_width]; }
+
+    // Term by term the coefficients of the forms of one vector, vector by vector: what is used lies together.
+    alignas(64) std::array<std::array<std::array<double, vec_width>, D::terms>, N / vec_width> block_{};
     int rows_ = 0;
     bool driven_ = false;
     [[no_unique_address]] DependsOn<D> depends_on_;

@@ -263,17 +263,37 @@ class InputState {
     const InputBasis& basis(int q) const { return basis_[q]; }
     const double* weights() const { return weights_; }
 
-    [[gnu::always_inline]] Inputs values() const {
-        return sum(linear_, [this](int q) { return weights_[q]; });
+    Inputs values() const {
+        Inputs out{};
+        values(n_inputs, out);
+        return out;
     }
-    [[gnu::always_inline]] Inputs rates() const {
-        return sum(slope_, [this](int q) { return basis_[q].omega * weights_[q + 1]; });
+    // Of the first n alone.
+    [[gnu::always_inline]] void values(int n, Inputs& out) const {
+        sum(n, linear_, [this](int q) { return weights_[q]; }, out);
+    }
+    [[gnu::always_inline]] void rates(int n, Inputs& out) const {
+        sum(n, slope_, [this](int q) { return basis_[q].omega * weights_[q + 1]; }, out);
+    }
+    // The first three derivatives of one.
+    [[gnu::always_inline]] std::array<double, 3> derivatives(int i) const {
+        double first = slope_[i], second = 0.0, third = 0.0;
+        for (int q = i == 0 ? 0 : sines_end_[i - 1]; q < sines_end_[i]; q += 2) {
+            const double omega = basis_[q].omega, turned_twice = -omega * omega, odd = omega * weights_[q + 1];
+            first += odd;
+            second += weights_[q] * turned_twice;
+            third += odd * turned_twice;
+        }
+        return {first, second, third};
     }
 
     // Sums of the magnitudes of the parts: what the rounding of the values is relative to.
     Inputs magnitudes() const {
-        return sum(lostmotion::magnitudes(linear_),
-                   [this](int q) { return std::fabs(weights_[q]) + std::fabs(weights_[q + 1]); });
+        Inputs out{};
+        sum(
+            n_inputs, lostmotion::magnitudes(linear_),
+            [this](int q) { return std::fabs(weights_[q]) + std::fabs(weights_[q + 1]); }, out);
+        return out;
     }
     const Inputs& slope() const { return slope_; }
     // The piecewise-linear parts alone.
@@ -345,7 +365,7 @@ class InputState {
     // Moves on by h, for once; sines and cosines of small angles from their series.
     void rotate(double h) {
         time_ += h;
-        for (int i = 0; i < n_inputs; ++i) linear_[i] += slope_[i] * h;
+        add_slopes(*this, h);
         for (int q = 0; q < sines_end_[n_inputs - 1]; q += 2) {
             const double a = basis_[q].omega * h, a2 = a * a;
             const auto [sine, cosine] =
@@ -362,7 +382,7 @@ class InputState {
         time_ = from.time_ + h;
         breakpoint_ = from.breakpoint_;
         slope_ = from.slope_;
-        for (int i = 0; i < n_inputs; ++i) linear_[i] = from.linear_[i] + slope_[i] * h;
+        add_slopes(from, h);
         for (int q = 0; q < size_; q += 2) (*rotations++ * pair_of(from, q)).store(weights_ + q);
     }
 
@@ -371,16 +391,25 @@ class InputState {
         if (size_ > static_cast<int>(few_.size())) many_.resize(static_cast<std::size_t>(size_));
         weights_ = many_.empty() ? few_.data() : many_.data();
     }
+    // The linear parts h after `from`, in the vectors in which they are copied: a processor waits long for a vector of
+    // what has just been written number by number.
+    [[gnu::always_inline]] void add_slopes(const InputState& from, double h) {
+        constexpr int width = vec_width < n_inputs ? vec_width : n_inputs, whole = n_inputs / width * width;
+        const auto add = [&]<int n>(std::integral_constant<int, n>, int i) __attribute__((always_inline)) {
+            (Pack<n>::load(&from.linear_[i]) + h * Pack<n>::load(&slope_[i])).store(&linear_[i]);
+        };
+        for (int i = 0; i < whole; i += width) add(std::integral_constant<int, width>{}, i);
+        if constexpr (whole < n_inputs) add(std::integral_constant<int, n_inputs - whole>{}, whole);
+    }
     static Pack<2> pair_of(const InputState& s, int q) { return Pack<2>::load(s.weights_ + q); }
-    // For each input, what it begins with and the terms of its sines.
+    // For each of the first n inputs, what it begins with and the terms of its sines. Number by number, and nothing is
+    // copied: see add_slopes().
     template <class Term>
-    [[gnu::always_inline]] Inputs sum(const Inputs& begin, Term&& term) const {
+    [[gnu::always_inline]] void sum([[maybe_unused]] int n, const Inputs& begin, Term&& term, Inputs& out) const {
         if constexpr (n_inputs > 2) {  // of many inputs few have a sine
-            Inputs out = begin;
-            for (int q = 0; q < sines_end_[n_inputs - 1]; q += 2) out[basis_[q].input] += term(q);
-            return out;
+            for (int i = 0; i < n; ++i) out[i] = begin[i];
+            for (int q = 0; q < sines_end_[n - 1]; q += 2) out[basis_[q].input] += term(q);
         } else {
-            Inputs out;
             int q = 0;
             const auto add = [&](std::size_t i) __attribute__((always_inline)) {
                 double sum = begin[i];
@@ -389,7 +418,6 @@ class InputState {
             };
             [&]<std::size_t... i>(std::index_sequence<i...>)
                 __attribute__((always_inline)) { (add(i), ...); }(std::make_index_sequence<n_inputs>{});
-            return out;
         }
     }
 

@@ -126,13 +126,21 @@ struct LinearRatesOf {
         for (int i = 1; i < depends_on.inputs; ++i) sum = sum + u[i] * load(input_column[i]);
         return sum;
     }
+    // From inputs that are asked for their values.
+    template <class Input>
+    [[gnu::always_inline]] Coupled forced(const Input& input) const {
+        Inputs u{};
+        input.values(depends_on.inputs, u);
+        return forced(u);
+    }
     // The rates of the angles.
     [[gnu::always_inline]] std::array<double, D::angles> angle_rate(const Coupled& x) const {
         std::array<double, D::angles> out;
         for (int j = 0; j < D::angles; ++j) out[j] = angle_coefficient[j] * x[angle_speed[j]];
         return out;
     }
-    [[gnu::always_inline]] Lanes operator()(const Coupled& x, const Column& constant, const Inputs& u) const {
+    template <class Input>
+    [[gnu::always_inline]] Lanes operator()(const Coupled& x, const Column& constant, const Input& u) const {
         return {(rate * x + forced(u)) + load(constant), angle_rate(x)};
     }
     [[gnu::always_inline]] State operator()(const State& x, const Column& constant, const Inputs& u) const {

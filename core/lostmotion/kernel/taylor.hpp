@@ -119,14 +119,26 @@ struct IntegralOf {
 
     // By how much the state changes that had this rate.
     [[gnu::always_inline]] Lanes operator*(const Lanes& rate) const {
-        Lanes out{coupled * rate.coupled, {}};
-        for (int j = 0; j < D::angles; ++j)
-            out.angle[j] = (load(angle[j]) * rate.coupled).sum() + length * rate.angle[j];
+        Lanes out{coupled * rate.coupled, angle_changes(rate.coupled)};
+        for (int j = 0; j < D::angles; ++j) out.angle[j] += length * rate.angle[j];
         return out;
     }
     [[gnu::always_inline]] Lanes operator*(const ColumnOf<D>& rate) const {
-        Lanes out{coupled * rate, {}};
-        for (int j = 0; j < D::angles; ++j) out.angle[j] = (load(angle[j]) * load(rate)).sum();
+        return {coupled * rate, angle_changes(load(rate))};
+    }
+
+ private:
+    [[gnu::always_inline]] std::array<double, D::angles> angle_changes(const CoupledOf<D>& rate) const {
+        std::array<double, D::angles> out;
+        if constexpr (D::angles == 1) {
+            out[0] = (load(angle[0]) * rate).sum();
+        } else {  // at once
+            constexpr int last = D::angles - 1;
+            const auto of = [&](int j) __attribute__((always_inline)) { return load(angle[std::min(j, last)]) * rate; };
+            const Pack<4> change = sums(of(0), of(1), of(2), of(3));
+            static_assert(D::angles <= 4);
+            for (int j = 0; j < D::angles; ++j) out[j] = change[j];
+        }
         return out;
     }
 };
@@ -174,9 +186,11 @@ class Taylor {
     // Of the coupled states.
     [[gnu::always_inline]] Coupled fourth_derivative(const Coupled& rate, const InputState<D>& input) const {
         Coupled sum = cubed_ * rate;
-        const auto u = input.template jet<4>();
-        for (int i = 0; i < rates_->depends_on.inputs; ++i)
-            if (input.varies(i)) sum = sum + input_[i].bring(u[1][i], u[2][i], u[3][i]);
+        for (int i = 0; i < rates_->depends_on.inputs; ++i) {
+            if (!input.varies(i)) continue;
+            const auto [first, second, third] = input.derivatives(i);
+            sum = sum + input_[i].bring(first, second, third);
+        }
         return sum;
     }
 

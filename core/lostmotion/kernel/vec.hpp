@@ -6,6 +6,7 @@
 #endif
 
 #include <array>
+#include <bit>
 #include <type_traits>
 #include <utility>
 
@@ -152,8 +153,10 @@ template <int n>
 inline Vec min_of(Vec a, Vec b) { return a < b ? a : b; }
 template <class V>
 [[gnu::always_inline]] inline V absolute(V a) {
-    return a < -a ? -a : a;
+    typedef long long Bits __attribute__((vector_size(sizeof(V))));
+    return std::bit_cast<V>(std::bit_cast<Bits>(a) & 0x7fffffffffffffff);
 }
+inline double absolute(double a) { return a < -a ? -a : a; }
 template <int n>
 [[gnu::always_inline]] inline Pack<n> absolute(Pack<n> a) {
     for (auto& part : a.part) part = absolute(part);

@@ -102,8 +102,7 @@ auto ExactSolver<System>::leap(const Entry& e, double limit) -> bool {
 template <class System>
 inline auto ExactSolver<System>::evaluate(const Entry& e, const typename GuardTable::Values& constant, Cursor& at,
                                           Ends& out) -> void {
-    e.guards.evaluate(constant, at.x(), at.input(), out.value);
-    e.guards.rates(at.rate(), at.input(), out.slope);
+    e.guards.evaluate(constant, at.x(), at.rate(), at.input(), out.value, out.slope);
     if (!at.carries_rate()) return;
     for (int k = 0; k < e.n_twist_speeds; ++k) {
         const auto& s = e.twist_speeds[k];
@@ -134,10 +133,12 @@ inline auto ExactSolver<System>::enclose(int rows, const Ends& here, const Ends&
         store(low, &bounds_.lower[g]);
         store(error, &bounds_.error[g]);
         const unsigned clear = above(low, error);
-        // One that starts on zero or above and rises all through is certain, too.
-        const Vec rise = min_of(c1 - begin, min_of(c2 - c1, end - c2));
-        const unsigned rises = above(rise, slope_share * error) & ~above(Vec{}, begin);
-        doubtful |= Guards{all_bits & ~(clear | rises)} << g;
+        if (clear != all_bits) {
+            // One that starts on zero or above and rises all through is certain, too.
+            const Vec rise = min_of(c1 - begin, min_of(c2 - c1, end - c2));
+            const unsigned rises = above(rise, slope_share * error) & ~above(Vec{}, begin);
+            doubtful |= Guards{all_bits & ~(clear | rises)} << g;
+        }
         tight |= clear & ~above(low, 64.0 * error);
     }
     roomy_ = tight == 0;

@@ -103,7 +103,7 @@ inline auto ExactSolver<System>::first_return(const LinearForm& form, const Curs
 template <class System>
 inline auto ExactSolver<System>::find_zero(Entry& e, int g, const Memory& memory, const Cursor& cursor,
                                            bool starts_on_zero, double estimate, double h) -> double {
-    const LinearForm form = e.guards.form(g);
+    const LinearForm& form = e.regime.guards[g].form;
     const double base = e.propagator.length(0);
     double low = 0.0, high = h, s = estimate;
     if (starts_on_zero) {

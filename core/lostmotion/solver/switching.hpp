@@ -115,7 +115,7 @@ Status switch_regime(const System& system, Cache& cache, InputState<D>& input, d
             system.set_remainders(left);
             before = left.input[0];
         }
-    const Found found = system.next(cache, now, fired, key, before.value_or(now.input[0]));
+    const Found found = system.next(cache, now, fired, key, before ? *before : now.input[0]);
     if (found != Found::yes) return status_of(found);
     if (wanted) show_switching(system, cache, now, key, s, observer);
     return Status::done;
