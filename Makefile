@@ -85,7 +85,7 @@ $(LIVE)/page.html: page/node_modules/installed $(wildcard page/*.ts page/*.html 
 	cd page && npm run --silent build
 	cp build/page/index.html $@
 # The last of them to be written.
-$(LIVE)/wide.wasm.gz: $(SOURCES) $(wildcard bindings/c/*) page/src/core.ts | $(VENV)/portable
+$(LIVE)/wide.wasm.gz: $(SOURCES) $(wildcard bindings/c/*) page/src/core.ts | $(VENV)/portable page/node_modules/installed
 	$(BIN)/python bindings/c/build.py page $(LIVE)
 	touch $@
 page/node_modules/installed: page/package.json page/package-lock.json

@@ -22,11 +22,15 @@ import { format } from "./units";
 import { unpacked } from "./wasm";
 
 const LONG = 8; // ms of a run from which on the next one is worked out beside the page, which then goes on moving
+// Of the first run: where this share takes longer, it is shown alone until the whole is there.
+const [BEGINNING, SHORT] = [1 / 16, 3]; // ms
 
 class Page {
   private readonly changes: Changes;
   private d: Description;
   private run?: Run;
+  private long = false;
+  private warning = ""; // of the address, beside the first run
   private pinned?: Run;
   private waiting = false;
   private readonly player: Player;
@@ -79,8 +83,8 @@ class Page {
       name: original.name,
       title: original.title || original.name,
     });
-    this.attempt(() => this.use(this.core.run(this.d.core)));
-    if (unusable.length > 0) this.say(`The address holds what this drive does not know: ${unusable.join(", ")}`, true);
+    if (unusable.length > 0) this.warning = `The address holds what this drive does not know: ${unusable.join(", ")}`;
+    this.attempt(() => this.begin());
     addEventListener("resize", () => this.later());
     addEventListener("hashchange", () => this.follow());
     if (this.run) this.bar.start();
@@ -111,10 +115,26 @@ class Page {
   }
 
   private compute(): void {
-    if (!this.run || this.run.milliseconds < LONG) {
-      this.attempt(() => this.use(this.core.run(this.d.core)));
+    if (this.long) this.computeBeside();
+    else this.attempt(() => this.use(this.core.run(this.d.core)));
+  }
+
+  /** The first run. */
+  private begin(): void {
+    const { core } = this.d;
+    const samples = Math.max(1, Math.round((BEGINNING * core.duration) / core.interval));
+    const beginning = this.core.run({ ...core, duration: samples * core.interval });
+    if (beginning.milliseconds < SHORT) {
+      this.use(this.core.run(core));
       return;
     }
+    this.long = true;
+    this.take(beginning);
+    this.say(`the first ${format(beginning.time.at(-1)!, 3)} s; the rest is being solved`, false);
+    this.computeBeside();
+  }
+
+  private computeBeside(): void {
     this.beside.ask({ kind: "run", input: this.d.core }, (answer) => {
       if (answer.kind === "run") this.use(answer.run);
       if (answer.kind === "failure") this.say(answer.message, true);
@@ -132,29 +152,39 @@ class Page {
 
   /** The run of the drive as it is. */
   private use(run: Run): void {
-    if (!this.run) this.charts.build(this.d, run);
-    this.run = run;
+    this.long = run.milliseconds >= LONG;
+    this.take(run);
     const { milliseconds, switchings, time } = run;
     this.say(
-      `${format(time.at(-1)!, 3)} s, ${switchings} switchings, solved exactly in ${milliseconds.toFixed(1)} ms`,
-      false,
+      this.warning ||
+        `${format(time.at(-1)!, 3)} s, ${switchings} switchings, solved exactly in ${milliseconds.toFixed(1)} ms`,
+      this.warning !== "",
     );
-    this.paint();
+    this.warning = "";
     this.stand.use(this.d, run);
     this.margins.use(this.changes);
     this.response.use(this.d);
+    if (performance.getEntriesByName("whole-run").length === 0)
+      requestAnimationFrame(() => performance.mark("whole-run"));
+  }
+
+  /** What is shown from now on: a whole run, or its beginning. */
+  private take(run: Run): void {
+    if (!this.run) this.charts.build(this.d, run);
+    this.run = run;
+    this.paint();
   }
 
   private paint(): void {
     if (!this.run) return;
     this.drawing.use(this.d, this.run);
-    this.charts.draw(this.run, this.pinned);
+    this.charts.draw(this.d, this.run, this.pinned);
     this.strip.draw(this.d, this.run);
     this.loops.draw(this.d, this.run, this.pinned);
     this.maps.draw(this.d, this.run, this.pinned);
     this.energy.draw(this.run);
     this.response.draw();
-    this.player.use(this.run.time.at(-1)!);
+    this.player.use(this.d.core.duration);
     this.actions.show();
   }
 

@@ -22,25 +22,27 @@ export class Strip {
     const c = this.canvas.getContext("2d")!;
     c.setTransform(density, 0, 0, density, 0, 0);
     const style = getComputedStyle(this.root);
-    const colour = (name: string): string => style.getPropertyValue(`--${name}`).trim();
+    const [text, still, moving] = ["text", "stuck", "slips"].map((name) =>
+      style.getPropertyValue(`--${name}`).trim(),
+    ) as [string, string, string];
     c.font = `12px ${style.fontFamily}`;
     c.textBaseline = "middle";
     const shares: string[] = [];
     rows.forEach(({ label, variable }, row) => {
       const modes = run.values.get(variable)!;
       const [top, last] = [row * ROW + 2, modes.length - 1];
-      const x = (k: number): number => LEFT + (k / last) * (width - LEFT - RIGHT);
+      const x = (k: number): number => LEFT + ((k * d.core.interval) / d.core.duration) * (width - LEFT - RIGHT);
       let stuck = 0;
       for (let k = 0; k < last;) {
         let end = k + 1;
         while (end < last && modes[end] === modes[k]) ++end;
         if (modes[k] === 0) stuck += end - k;
-        segment(c, colour, modes[k]!, x(k), x(end) - x(k), top + TEXT);
+        segment(c, modes[k] === 0 ? still : moving, modes[k]!, x(k), x(end) - x(k), top + TEXT);
         k = end;
       }
       const share = `${label}: stuck ${((100 * stuck) / last).toFixed(0)} %`;
       shares.push(share);
-      c.fillStyle = colour("text");
+      c.fillStyle = text;
       c.fillText(share, LEFT, top + TEXT / 2);
     });
     this.canvas.setAttribute("aria-label", `Contacts over time. ${shares.join("; ")}.`);
@@ -50,13 +52,13 @@ export class Strip {
 /** Stuck: full; forward: the upper half; backward: the lower half. */
 function segment(
   c: CanvasRenderingContext2D,
-  colour: (name: string) => string,
+  colour: string,
   mode: number,
   x: number,
   width: number,
   top: number,
 ): void {
-  c.fillStyle = colour(mode === 0 ? "stuck" : "slips");
+  c.fillStyle = colour;
   const half = BAR / 2;
   c.fillRect(x, mode < 0 ? top + half : top, width + 0.3, mode === 0 ? BAR : half);
 }

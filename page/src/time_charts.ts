@@ -99,14 +99,14 @@ export class TimeCharts {
     });
   }
 
-  draw(run: Run, pinned?: Run): void {
+  draw(d: Description, run: Run, pinned?: Run): void {
     this.run = run;
     for (const panel of this.panels) {
       const lines = [...(pinned ? lined(panel.figure, pinned, true) : []), ...lined(panel.figure, run, false)];
       const { unit } = panel.figure;
       panel.shown = shown(unit, Math.max(...lines.map((l) => largest(l.y))));
       panel.plot.draw({
-        x: { label: "time", unit: "s", range: [0, run.time.at(-1)!] },
+        x: { label: "time", unit: "s", range: [0, d.core.duration] },
         y: { label: "", unit },
         lines,
       });

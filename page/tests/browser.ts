@@ -58,9 +58,9 @@ export function watch(page: Page): string[] {
   return seen;
 }
 
-/** Waits until the first charts are drawn. */
+/** Waits until the whole run is shown. */
 export async function ready(page: Page): Promise<void> {
-  await page.waitForFunction(() => performance.getEntriesByName("first-plot").length > 0);
+  await page.waitForFunction(() => performance.getEntriesByName("whole-run").length > 0);
 }
 
 /** The samples of the page's CSV file, by variable. */

@@ -245,6 +245,43 @@ async function frames(page: Page, count: number): Promise<number[]> {
   }, count);
 }
 
+test("of a long run the beginning is shown until the whole is there", async () => {
+  const page = await browser.newPage({ viewport: { width: 1280, height: 900 }, reducedMotion: "reduce" });
+  const seen = watch(page);
+  // What the page asks its worker waits until it is released.
+  await page.addInitScript(() => {
+    const held: (() => void)[] = [];
+    const post = Worker.prototype.postMessage;
+    Worker.prototype.postMessage = function (...message: [any]) {
+      held.push(() => post.apply(this, message));
+    };
+    (window as any).release = () => {
+      Worker.prototype.postMessage = post;
+      for (const go of held) go();
+    };
+  });
+  await page.goto(`file://${join(directory, "long.html")}`);
+  await page.waitForFunction(() => performance.getEntriesByName("first-plot").length > 0);
+  expect(await page.textContent("#summary")).toMatch(/^the first [\d.]+ s; the rest is being solved$/);
+  const drawn = (): Promise<number> =>
+    page.evaluate(async () => {
+      const canvas = document.querySelector<HTMLCanvasElement>("#strip canvas")!;
+      const { width, height } = canvas;
+      const copy = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true })!;
+      copy.drawImage(await createImageBitmap(canvas), 0, 0);
+      const { data } = copy.getImageData(width >> 1, 0, width >> 1, height);
+      return data.filter((v, k) => k % 4 === 3 && v > 0).length;
+    });
+  const before = await drawn();
+  await page.evaluate(() => (window as any).release());
+  await ready(page);
+  expect(await page.textContent("#summary")).toContain("30 s,");
+  expect(await drawn()).toBeGreaterThan(before);
+  expect((await table(page)).time!.at(-1)).toBeCloseTo(30, 9);
+  expect(seen).toEqual([]);
+  await page.close();
+});
+
 test("figures: size, time to the first plot, and frames while a slider moves (printed, not judged)", async () => {
   const kilobytes = statSync(join(directory, "drive.html")).size / 1e3;
   const { page } = await open("drive", { reducedMotion: "no-preference" });

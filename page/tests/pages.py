@@ -67,6 +67,8 @@ def responses(scenario: lm.Scenario) -> list[dict[str, float]]:
 def main(directory: Path) -> None:
     """For each page NAME.html and NAME.json."""
     directory.mkdir(parents=True, exist_ok=True)
+    # So long that its beginning is shown before the whole is there.
+    write_page(directory / "long.html", lm.load("joint-under-gravity", {"simulation.duration": 30.0}))
     for page, (name, changes) in PAGES.items():
         scenario = lm.load(name)
         write_page(directory / f"{page}.html", scenario)
