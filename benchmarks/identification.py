@@ -112,6 +112,8 @@ def by_cma(p: Problem, start: Point, goal: float) -> tuple[float, float, int]:
 
 def section(report: Report) -> None:
     task, directory = load_identification(SERVO / "identify.toml")
+    lowest, load, _, direction = task.ladder
+    task = task.model_copy(update={"ladder": (lowest, load, direction)})
     rig = Rig(task, directory)
     free = free_on(task, RUNG)
     start = Point({n: p.start for n, p in task.parameters.items()}, {})
