@@ -305,6 +305,10 @@ def changed(values: np.ndarray, place: Any, to: Any) -> np.ndarray:
 
 SCREENED: dict[str, tuple[Log, str]] = {
     "glitch": (log_of(position=changed(ANGLE, 50, 9.0)), "dropped 1 glitch of position, the first at 0.5 s"),
+    "many glitches": (
+        log_of(position=changed(ANGLE, slice(5, 195, 10), 9.0)),
+        "dropped 19 glitches of position, the first at 0.05 s",
+    ),
     "repeated time": (
         log_of(changed(TIME, 50, TIME[49])),
         "dropped 1 samples with the time stamp of the sample before",
@@ -396,6 +400,12 @@ FILES: dict[str, tuple[str, bytes | str, str]] = {
     "word in a column": ("h.csv", "time,x\n0,1\n1,fast\n", "'fast' in column x is no number"),
     "column twice": ("i.csv", "time,x,x\n0,1,1\n1,2,2\n", "twice"),
     "unit of the time": ("j.csv", "time [fortnight],x\n0,1\n1,2\n", "the unit 'fortnight' of the time"),
+    "decimal comma": (
+        "o.csv",
+        "time;x\n0,1;1\n1,2;2\n",
+        "line 2: '0,1' in column time is no number; write decimal points",
+    ),
+    "too long a cell": ("p.csv", "time,x\n0,1\n1," + "1" * 200_000, r"line 3: cannot be read \(field larger"),
     "not text": ("k.csv", b"\xff\xfe\x00\x01", "is not UTF-8"),
     "not MATLAB": ("l.mat", b"something else", "is not a MATLAB file"),
     "not Parquet": ("m.parquet", b"something else", "is not a Parquet file"),

@@ -61,9 +61,17 @@ def _print_summary(result: IdentificationResult) -> None:
         print(f"  {'*' if k == result.chosen else ' '} {rung.name}: mean absolute error {rung.train:.5g}{held_out}")
     for line in result.lines():
         print(line)
+    if result.left_out:
+        print(
+            f"Left out, since they cannot be used, are {len(result.left_out)} of {len(result.left_out) + len(result.logs)} logs:"
+        )
+        _print_some([f"  {name}: {why}" for name, why in result.left_out.items()])
     if result.notes:
         print(f"Notes on {len(result.notes)} logs:")
-        lines = [f"  {name}: {note}" for name, notes in result.notes.items() for note in notes]
-        print(*lines[:NOTES], sep="\n")
-        if len(lines) > NOTES:
-            print(f"  and {len(lines) - NOTES} more, all on the page")
+        _print_some([f"  {name}: {note}" for name, notes in result.notes.items() for note in notes])
+
+
+def _print_some(lines: list[str]) -> None:
+    print(*lines[:NOTES], sep="\n")
+    if len(lines) > NOTES:
+        print(f"  and {len(lines) - NOTES} more, all on the page")

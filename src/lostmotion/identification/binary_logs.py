@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError, need
 from ..inputs.validation import did_you_mean
-from .logs import Channel, Log
+from .logs import Channel, Log, as_number
 
 TIME_NAMES = ("time", "t", "timestamp", "times", "tm")
 
@@ -171,13 +171,3 @@ def _of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[str, 
         if other
         else log
     )
-
-
-def as_number(value: Any) -> Any:
-    """A text that is a number, as one; anything else as it is."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.item()
-    try:
-        return float(value) if isinstance(value, str) else value
-    except ValueError:
-        return value

@@ -49,7 +49,7 @@ def read_csv_log(path: Path, *, time: str = "") -> Log:
             f"{path}: has {max(0, len(lines) - 1)} rows of values; a log needs a heading and two rows at least"
         )
     separator = max(",;\t", key=lines[0][1].count)
-    rows = list(csv.reader((line for _, line in lines), delimiter=separator))
+    rows = [_cells(path, number, line, separator) for number, line in lines]
     heading = [cell.strip() for cell in rows[0]]
     if all(_number(cell) is not None for cell in heading):
         raise InputError(
@@ -70,6 +70,13 @@ def read_csv_log(path: Path, *, time: str = "") -> Log:
     values = table[:, place] * _seconds(path, units.get(names[place], ""))
     channels = {name: Channel(table[:, k], units.get(name, "")) for k, name in enumerate(names) if k != place and name}
     return Log(path.name, values, channels, header)
+
+
+def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=separator))
+    except csv.Error as error:
+        raise InputError(f"{path}, line {number}: cannot be read ({error}); the file may be damaged") from None
 
 
 def _seconds(path: Path, unit: str) -> float:
@@ -116,7 +123,10 @@ def _table(path: Path, names: list[str], rows: list[list[str]], numbers: list[in
         for j, cell in enumerate(row):
             value = _number(cell)
             if value is None and cell.strip():
-                raise InputError(f"{path}, line {number}: {cell.strip()!r} in column {names[j]} is no number")
+                remedy = "; write decimal points" if _number(cell.replace(",", ".")) is not None else ""
+                raise InputError(
+                    f"{path}, line {number}: {cell.strip()[:40]!r} in column {names[j]} is no number{remedy}"
+                )
             if value is not None:
                 out[k, j] = value
     return out

@@ -16,10 +16,11 @@ from ..simulation.train_scenario import TrainScenario
 from .engine import Engine
 from .errors_of_logs import LogError, total
 from .fit import Fit, Problem
+from .gather import gathered
 from .identifiability import Undetermined, at_bounds, undetermined
 from .intervals import Interval, bootstrap, profile
 from .ladder import RungResult, begun_with, chosen, climb, free_on, problem_of, start_point
-from .prepare import Prepared, prepared, read_all
+from .prepare import Prepared
 from .record import gear_sheet, scenario_text, sheet_text
 from .rig import Rig
 from .runs import run_log
@@ -46,6 +47,8 @@ class IdentificationResult:
     """parameters that have ended at a bound"""
     notes: dict[str, tuple[str, ...]]
     """by log: what was dropped of it, and what looks wrong"""
+    left_out: dict[str, str] = field(default_factory=dict, kw_only=True)
+    """by log that cannot be used: why"""
     scenario: TrainScenario
     """the rig with the values that were found, of the first log"""
     profiles: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
@@ -195,8 +198,10 @@ def identify_task(
 ) -> IdentificationResult:
     """As `identify`, of a task that has been read."""
     rig = Rig(task, directory)
-    logs = [prepared(task, log, rig.units) for log in read_all(task, directory)]
-    return identify_logs(rig, logs, threads=threads, profiles=profiles, notify=notify)
+    logs, left_out = gathered(rig, directory)
+    result = identify_logs(rig, logs, threads=threads, profiles=profiles, notify=notify)
+    result.left_out = left_out
+    return result
 
 
 def identify_logs(

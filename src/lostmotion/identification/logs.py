@@ -66,3 +66,13 @@ class Log:
     def interval(self) -> float:
         """Median time between two samples [s]."""
         return float(np.median(np.diff(self.time)))
+
+
+def as_number(value: Any) -> Any:
+    """A text that is a number, as one; anything else as it is."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.item()
+    try:
+        return float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value

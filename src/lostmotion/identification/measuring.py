@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
+from ..errors import InputError
 from .formulas import names_in, number
 from .prepare import Prepared
 from .task import Identification, MeasuredChannel
@@ -127,7 +128,14 @@ class Measuring:
 
 def numbers_of(m: MeasuredChannel, known: Mapping[str, Any]) -> dict[str, float]:
     """Scale, offset, delay and filter of a channel."""
-    return {key: number(getattr(m, key), known, key) for key in NUMBERS}
+    found = {key: number(getattr(m, key), known, key) for key in NUMBERS}
+    if found["scale"] == 0.0:
+        raise InputError(f"key measured with the channel {m.channel}: scale is 0; it must be another number")
+    if found["filter_time"] < 0.0:
+        raise InputError(
+            f"key measured with the channel {m.channel}: filter_time is {found['filter_time']:g} s; it must be at least 0"
+        )
+    return found
 
 
 def delays_that_name(task: Identification, names: Sequence[str]) -> bool:

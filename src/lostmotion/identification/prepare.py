@@ -124,8 +124,9 @@ def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepar
         if i.default is not None and i.channel not in log.channels
     }
     log = replace(log, channels={**log.channels, **absent})
+    acting = (*inputs.values(), *_switches(task, log))
     log = screened(
-        Log(log.name, log.time, log.channels, header, log.notes), measured.values(), inputs.values(), task.logs.stated
+        Log(log.name, log.time, log.channels, header, log.notes), measured.values(), acting, task.logs.stated
     )
     keep = log.time - log.time[0] >= task.logs.first
     if task.logs.last is not None:
@@ -136,11 +137,12 @@ def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepar
         )
     if not keep.all():
         log = log.only(keep, f"{np.sum(~keep)} samples before logs.first or after logs.last are left out")
-    facts = {key: value for key, value in header.items() if isinstance(value, int | float | str)}
-    for name, channel in log.channels.items():
-        key = "".join(c if c.isalnum() else "_" for c in name)
-        facts[f"first_{key}"] = float(channel.values[0])
-        facts[f"mean_{key}"] = float(np.mean(channel.values))
+    facts = _facts(log)
+    for name in (*task.parameters, *task.nuisance):
+        if name in facts:
+            log = log.noted(
+                f"{name} is known of the log, and a parameter of the task, which counts; rename one of them"
+            )
 
     def in_si(channel: str, unit: str, variable: str, where: str) -> np.ndarray:
         factor = channel_factor(unit, log.channels[channel].unit, units.get(variable, ""), f"{log.name}: {where}")
@@ -159,6 +161,22 @@ def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepar
         _weights(task, log, facts),
         first,
     )
+
+
+def _switches(task: Identification, log: Log) -> list[str]:
+    """Channels of a log that phases and weights name."""
+    formulas = (task.logs.weight, *(phase.when for phase in task.phases))
+    return [name for text in formulas for name in Formula(text).names if name in log.channels]
+
+
+def _facts(log: Log) -> dict[str, Any]:
+    """What formulas may name of a log."""
+    facts = {key: value for key, value in log.header.items() if isinstance(value, int | float | str)}
+    for name, channel in log.channels.items():
+        key = "".join(c if c.isalnum() else "_" for c in name)
+        facts[f"first_{key}"] = float(channel.values[0])
+        facts[f"mean_{key}"] = float(np.mean(channel.values))
+    return facts
 
 
 def _fact(text: Any, facts: Mapping[str, Any], log: Log, key: str) -> Any:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..inputs.validation import did_you_mean
 from .binary_logs import read_mat_log, read_mdf_log, read_parquet_log, read_tdms_log
 from .csv_log import read_csv_log
 from .logs import Log
@@ -47,13 +46,15 @@ def read_log(path: str | Path, *, time: str = "") -> Log:
         The library of the format is not installed.
     """
     path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path}: is a directory; name the logs in it")
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; check the name")
     ending = path.suffix.lower()
     if ending == ".json":
-        return read_servo_json(path)
+        return read_servo_json(path, time=time)
     if ending not in TABLES:
-        raise InputError(f"{path}: {did_you_mean(ending, ENDINGS, 'logs end in ' + ', '.join(ENDINGS))}")
+        raise InputError(f"{path}: is no log by its ending; logs end in {', '.join(ENDINGS)}")
     return TABLES[ending](path, time=time)
 
 
@@ -68,14 +69,22 @@ def find_logs(patterns: Sequence[str], directory: Path) -> list[Path]:
     found: list[Path] = []
     for pattern in patterns:
         path = directory / pattern
-        if path.is_dir():
-            named = sorted(p for p in path.iterdir() if p.suffix.lower() in ENDINGS)
-        elif any(c in pattern for c in "*?["):
+        if not path.is_dir() and any(c in pattern for c in "*?["):
             anchor = Path(path.anchor) if Path(pattern).is_absolute() else directory
-            named = sorted(anchor.glob(str(path.relative_to(anchor)) if anchor == Path(path.anchor) else pattern))
+            try:
+                matched = sorted(anchor.glob(str(path.relative_to(anchor)) if anchor == Path(path.anchor) else pattern))
+            except (ValueError, NotImplementedError) as error:
+                raise InputError(
+                    f"key logs.files: {pattern!r} is no pattern ({error}); write one such as logs/**/*.json"
+                ) from None
         else:
-            named = [path] if path.is_file() else []
+            matched = [path]
+        named = [p for m in matched for p in (_within(m) if m.is_dir() else [m] if m.is_file() else [])]
         if not named:
             raise InputError(f"key logs.files: {pattern!r} names no log in {directory.resolve()}; check the name")
         found += named
     return list(dict.fromkeys(found))
+
+
+def _within(directory: Path) -> list[Path]:
+    return sorted(p for p in directory.iterdir() if p.suffix.lower() in ENDINGS and p.is_file())

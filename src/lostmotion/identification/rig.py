@@ -17,7 +17,7 @@ from ..simulation.scenario_files import find_scenario, load
 from ..simulation.sensitivities import channels_of
 from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form
 from ..simulation.train_state import start_capacities
-from .formulas import Formula
+from .formulas import Formula, names_in
 from .prepare import Prepared
 from .shaft_angles import angle_terms
 from .task import Identification, Rung
@@ -104,6 +104,13 @@ class Rig:
                 raise InputError(
                     f"key measured.{name}.variable: {m.variable!r} is no variable of {task.scenario}; {meant}"
                 )
+            if isinstance(m.resolution, float) and m.resolution < 0.0:
+                raise InputError(f"key measured.{name}.resolution: {m.resolution:g} must be at least 0")
+        table, _, gear = task.record.partition(".")
+        if task.record and (table != "gear" or gear not in self.scenario.gears):
+            raise InputError(
+                f"key record: {task.record!r} must be gear.NAME with one of {', '.join(self.scenario.gears) or 'no gear'}"
+            )
         self._formulas: dict[tuple[int, int], dict[str, Any]] = {}
         self._keys: dict[tuple[str, int, int], list[str]] = {}
         self._set = {key: _read(value, f"set.{key}") for key, value in task.set.items()}
@@ -114,6 +121,21 @@ class Rig:
         for k, rung in enumerate(task.rungs()):
             own = {key: _read(v, f"ladder[{k}].set.{key}") for key, v in rung.set.items()}
             self._rungs.append({**(self._rungs[-1] if self._rungs else {}), **own})
+        self._refuse_idle()
+
+    def _refuse_idle(self) -> None:
+        """A parameter that is sought and enters nothing."""
+        task = self.task
+        entered = names_of([self._set, *self._phases, *self._rungs])
+        for channel in (*task.inputs.values(), *task.measured.values()):
+            numbers = (getattr(channel, key, None) for key in ("scale", "offset", "delay", "filter_time"))
+            entered |= frozenset().union(*(names_in(n) for n in numbers if n is not None))
+        sought = [("parameters", name) for rung in task.rungs() for name in rung.free]
+        for table, name in [*sought, *(("nuisance", name) for name in task.nuisance)]:
+            if name not in entered:
+                raise InputError(
+                    f"key {table}.{name}: enters no formula of set, phases, ladder, inputs or measured; name it there, or leave it out"
+                )
 
     def rungs(self) -> tuple[Rung, ...]:
         """Of the task."""

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, need
-from .binary_logs import as_number
-from .logs import Channel, Log
+from .logs import Channel, Log, as_number
 
 Course = tuple[np.ndarray, np.ndarray]  # times of the messages [ns] and values
 STAMP = ".header.stamp"

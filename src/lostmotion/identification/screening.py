@@ -13,6 +13,9 @@ GLITCH = 8.0  # times the usual change between samples (99th percentile), there 
 CLOCK = 0.3  # share of repeated time stamps from which on the clock is taken to be coarse
 PAUSE = 5.0  # times the usual interval between samples, that is noted as a pause
 LIMIT = 0.2  # share of samples at the largest value, from which on a channel is taken to saturate
+LONG = 60.0  # [s] between samples, beyond which times are taken to be in another unit
+LONGEST = 1e5  # [s] of a log
+HUGE = 1e30  # beyond which a value is none
 STALL = 0.1  # share of the samples in which no channel changes, from which on it is noted
 SLOW = 10.0  # samples for each change of a channel that otherwise changes, from which on it is called slow
 CONTRADICTION = 0.03  # share by which the mean of a channel may depart from what the header says
@@ -40,7 +43,7 @@ def screened(log: Log, measured: Iterable[str], inputs: Iterable[str], stated: d
         log.values(name)
     if len(log.time) < 10:
         raise InputError(f"{log.name}: has {len(log.time)} samples; 10 at least are needed, leave the file out")
-    log = _rising(log)
+    log = _in_seconds(_rising(log))
     log = _numbers(log, measured, inputs)
     for name in measured:
         log = _without_glitches(log, name)
@@ -93,6 +96,18 @@ def _rising(log: Log) -> Log:
     return log
 
 
+def _in_seconds(log: Log) -> Log:
+    """The log, with a note or an error where its times are hardly in seconds."""
+    if log.duration > LONGEST or log.interval > LONG:
+        raise InputError(
+            f"{log.name}: its times go from {log.time[0]:.6g} to {log.time[-1]:.6g} s in steps of {log.interval:.4g} s; "
+            f"times are read in s: give their unit, or split the file where the clock jumps"
+        )
+    if log.interval >= 1.0:
+        return log.noted(f"its samples are {log.interval:.4g} s apart; times are read in s")
+    return log
+
+
 def _spread(log: Log) -> Log:
     """Samples between two ticks of a coarse clock, at equal distances."""
     first = np.concatenate([[True], np.diff(log.time) > 0.0])
@@ -114,7 +129,7 @@ def _spread(log: Log) -> Log:
 def _numbers(log: Log, measured: list[str], inputs: list[str]) -> Log:
     """Without samples in which a channel that is needed is no number."""
     for name in dict.fromkeys((*inputs, *measured)):
-        bad = ~np.isfinite(log.values(name))
+        bad = ~(np.abs(log.values(name)) < HUGE)
         if bad.all():
             raise InputError(
                 f"{log.name}: channel {name} has no number in any sample; leave the file out, or name another channel"
@@ -132,13 +147,20 @@ def _without_glitches(log: Log, name: str) -> Log:
     """Without single samples that jump away and back."""
     x = log.values(name)
     step = np.diff(x)
-    usual = float(np.percentile(np.abs(step), 99.0))
-    if usual == 0.0:
-        return log
     there, back = step[:-1], step[1:]
     away = np.minimum(np.abs(there), np.abs(back))
+    returns = (np.sign(there) * np.sign(back) < 0.0) & (np.abs(there + back) < 0.5 * away)
+    # Steps there and back do not tell what is usual: a few glitches would hide each other.
+    calm = np.ones(len(step), dtype=bool)
+    calm[:-1] &= ~returns
+    calm[1:] &= ~returns
+    usual = float(np.percentile(np.abs(step[calm]), 99.0)) if calm.any() else 0.0
+    if usual == 0.0:
+        usual = float(np.percentile(np.abs(step), 99.0))
+    if usual == 0.0:
+        return log
     glitch = np.zeros(len(x), dtype=bool)
-    glitch[1:-1] = (there * back < 0.0) & (away > GLITCH * usual) & (np.abs(there + back) < 0.5 * away)
+    glitch[1:-1] = returns & (away > GLITCH * usual)
     if not glitch.any():
         return log
     k = int(np.argmax(glitch))
@@ -189,4 +211,6 @@ def _compared(log: Log, key: str, channel: str) -> Log:
     said, mean = log.header[key], float(np.nanmean(log.values(channel)))
     if not isinstance(said, int | float) or abs(mean - said) <= CONTRADICTION * max(abs(mean), abs(said)):
         return log
-    return log.noted(f"the header says {key} = {said:.6g}, the channel {channel} is {mean:.6g} on average")
+    return log.noted(
+        f"the header says {key} = {said:.6g}, the channel {channel} is {mean:.6g} on average; formulas that name {key} take the header"
+    )

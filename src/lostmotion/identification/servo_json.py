@@ -9,23 +9,31 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .logs import Channel, Log
+from .logs import Channel, Log, as_number
 
 
-def read_servo_json(path: Path) -> Log:
+def read_servo_json(path: Path, *, time: str = "") -> Log:
     """Of a file ``{"mass": 0.5, ..., "entries": [{"timestamp": 0.0, "position": 0.1, ...}, ...]}``; units are SI.
 
     Keys of the header with hyphens are read with underscores. Words and lists of the header are kept as they are.
+
+    Parameters
+    ----------
+    time
+        Key of the time in each entry; left out, ``timestamp``, or steps of ``dt`` of the header.
 
     Raises
     ------
     InputError
     """
+    clock = time or "timestamp"
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+    except RecursionError:
+        raise InputError(f"{path}: is not a log, its lists are too deep; leave the file out") from None
+    except ValueError as error:  # of the encoding, of JSON, or of a number of thousands of digits
         raise InputError(f"{path}: is not JSON ({error}); it may have been cut off, record or copy it again") from None
     if not isinstance(data, dict) or not isinstance(data.get("entries"), list):
         raise InputError(f"{path}: has no list entries; a servo log is an object with entries, one for each instant")
@@ -34,17 +42,29 @@ def read_servo_json(path: Path) -> Log:
         raise InputError(f"{path}: key entries: is empty; leave the file out")
     if not all(isinstance(entry, dict) for entry in entries):
         raise InputError(f"{path}: key entries: must be objects, each with a timestamp")
-    header = {key.replace("-", "_"): value for key, value in data.items() if key != "entries"}
+    header = {key.replace("-", "_"): as_number(value) for key, value in data.items() if key != "entries"}
     step = header.get("dt")
-    if "timestamp" not in entries[0] and isinstance(step, int | float) and step > 0:
-        time = step * np.arange(len(entries))
+    if clock in entries[0]:
+        times = _column(path, entries, clock)
+    elif not time and isinstance(step, int | float) and step > 0:
+        times = step * np.arange(len(entries))
     else:
-        time = _column(path, entries, "timestamp")
-    keys = [key for key in entries[0] if key != "timestamp" and not isinstance(entries[0][key], str | list | dict)]
+        raise InputError(
+            f"{path}: entries[0] lacks {clock}; add it to each entry, or the interval dt [s] to the header"
+        )
+    keys = [key for key in entries[0] if key != clock and any(_is_number(entry.get(key)) for entry in entries)]
     channels = {key: Channel(_column(path, entries, key)) for key in keys}
-    partial = sorted({key for entry in entries for key in entry} - set(keys) - {"timestamp"})
-    log = Log(path.name, time, channels, header)
-    return log.noted(f"channels that do not begin with a number are left out: {', '.join(partial)}") if partial else log
+    partial = sorted({key for entry in entries for key in entry} - set(keys) - {clock})
+    log = Log(path.name, times, channels, header)
+    return (
+        log.noted(f"channels without numbers, or that the first entry lacks, are left out: {', '.join(partial)}")
+        if partial
+        else log
+    )
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, bool | int | float)
 
 
 def _column(path: Path, entries: list[dict[str, Any]], key: str) -> np.ndarray:
@@ -56,7 +76,10 @@ def _column(path: Path, entries: list[dict[str, Any]], key: str) -> np.ndarray:
                 f"{path}: entries[{k}] lacks {key}, which entries[0] has; remove the entry, or add the value"
             )
         value = entry[key]
-        if value is not None and not isinstance(value, bool | int | float):
-            raise InputError(f"{path}: entries[{k}].{key}: {value!r} is no number")
-        out[k] = np.nan if value is None else float(value)
+        if value is not None and not _is_number(value):
+            raise InputError(f"{path}: entries[{k}].{key}: {value!r} is no number; put one there, or null")
+        try:
+            out[k] = np.nan if value is None else float(value)
+        except OverflowError:
+            out[k] = np.inf
     return out

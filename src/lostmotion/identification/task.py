@@ -16,7 +16,7 @@ from ..inputs.quantities import NotNegative, Number, Positive, Switch, Time, Who
 from ..inputs.toml_files import read_toml
 from ..inputs.validation import did_you_mean
 from ..model.train import Elements
-from .formulas import Formula
+from .formulas import CONSTANTS, FUNCTIONS, Formula
 from .parameters import FreeParameter
 
 FormulaText = str | float
@@ -154,7 +154,7 @@ class Identification(Part):
     """left out, one rung with all parameters"""
     fit: FitOptions = FitOptions()
     record: str = ""
-    """``gear.NAME``, ``motor.NAME`` or ``shaft.NAME`` of the rig, of which a record is written"""
+    """``gear.NAME`` of the rig, of which a data sheet is written"""
 
     @model_validator(mode="after")
     def _hangs_together(self) -> Self:
@@ -170,6 +170,22 @@ class Identification(Part):
                 if name not in known:
                     meant = did_you_mean(name, known, f"the parameters are {', '.join(known)}")
                     raise ValueError(f"has ladder[{k}] with {name!r}, which is no free parameter; {meant}")
+        for k, rung in enumerate(self.ladder):
+            free = {name for below in self.ladder[: k + 1] for name in below.free}
+            for name, tried in rung.multi_start.items():
+                p = self.parameters[name]
+                if name not in free:
+                    raise ValueError(f"has ladder[{k}].multi_start.{name}, which is not free there; add it to free")
+                if not tried:
+                    raise ValueError(f"has ladder[{k}].multi_start.{name} without values; give some, or leave it out")
+                for value in tried:
+                    if not p.min <= value <= p.max:
+                        raise ValueError(
+                            f"has ladder[{k}].multi_start.{name} with {value:g} outside of {p.min:g} to {p.max:g}; leave it out"
+                        )
+        for name in (*self.parameters, *self.nuisance):
+            if name in CONSTANTS or name in FUNCTIONS:
+                raise ValueError(f"has a parameter {name}, which formulas know as something else; give it another name")
         for name in self.nuisance:
             if name in self.parameters:
                 raise ValueError(f"has {name} as a parameter and as a nuisance; leave one of them out")

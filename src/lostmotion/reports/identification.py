@@ -72,6 +72,7 @@ def write_identification(directory: Path, name: str, result: IdentificationResul
         "starts": result.starts(),
         "header": header,
         "errors": errors,
+        "left_out": result.left_out,
         "notes": result.notes,
         "figures": figures,
         "source": result.source(),
@@ -169,7 +170,14 @@ def _overlays(result: IdentificationResult, log: str, held_out: bool, run: dict[
             Curve("measured", run["time"], run[f"measured {channel}"], MEASURED),
             Curve("computed", run["time"], run[channel], COMPUTED),
         )
-        panels.append(Panel(f"{Path(log).stem[-28:]}{' (held out)' if held_out else ''}", "time [s]", channel, curves))
+        panels.append(
+            Panel(
+                f"{str(Path(log).with_suffix(''))[-28:]}{' (held out)' if held_out else ''}",
+                "time [s]",
+                channel,
+                curves,
+            )
+        )
     return panels
 
 
