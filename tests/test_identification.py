@@ -92,6 +92,21 @@ def test_a_product_that_alone_is_determined_is_named(logs: Path) -> None:
         assert result.intervals[name].low <= TRUTH[name] <= result.intervals[name].high
 
 
+def test_what_the_values_rest_on_is_said(found: IdentificationResult) -> None:
+    """The losses c of the rung that is taken are alike in both directions. With direction d they are c (1 + d) T and c (1 - d) T, and a motor
+    whose torque, armature and friction are larger by s moves the load alike: 1 + c'(1 + d) = s (1 + c) and 1 - c'(1 - d) = s (1 - c),
+    so c' = s c and s = 1/(1 - c d).
+    """
+    assert found.rungs[found.chosen].name == "load-dependent friction"
+    (said,) = [u for u in found.undetermined if "direction" in u.changes]
+    share = found.values["load_friction"] * found.task.parameters["direction"].step
+    for name in ("armature", "coulomb_friction", "viscous_friction", "load_friction"):
+        assert said.changes[name] == pytest.approx(share, rel=0.1), name
+    assert said.changes["resistance"] == pytest.approx(-share, rel=0.1)
+    assert "rest on direction = 0" in said.text and f"armature {100 * share:+.0f} %" in said.text
+    assert "stall torque" in said.text and "torque_constant" not in said.text
+
+
 @pytest.mark.parametrize(
     ("second", "unit", "what"),
     [

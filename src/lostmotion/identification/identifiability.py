@@ -14,6 +14,7 @@ from .task import Identification
 
 LOOSE = 1.0  # relative change, of the values in a direction, that 95 % of equally good fits stay within: beyond, it is not determined
 PART = 0.25  # of the largest relative change in a direction, from which on a parameter has a part in it
+WORTH = 0.02  # relative change of a value, from which on it is named as resting on another
 ALIKE = 0.3  # by which relative changes of parameters of one scale may differ
 
 # What determines a parameter, by the key of the scenario that it enters.
@@ -74,6 +75,45 @@ def undetermined(task: Identification, fit: Fit, parameters: Mapping[str, FreePa
             Undetermined(changes, float(width * abs(vector[largest])), _sentence(task, changes, sizes, parameters))
         )
     return found
+
+
+def resting_on(
+    task: Identification, fit: Fit, parameters: Mapping[str, FreeParameter], normal: np.ndarray, name: str
+) -> list[Undetermined]:
+    """That the values rest on the value of a parameter that is not free, if the logs would not tell it to within its scale.
+
+    Parameters
+    ----------
+    parameters
+        Those that are free, and this one as the last.
+    normal
+        J'WJ of the scaled parameters.
+    """
+    names = list(parameters)
+    p, given = parameters[name], fit.point.values[name]
+    slopes = np.array([slope_of(q, fit.point.values[n]) for n, q in parameters.items()])
+    H = normal / np.outer(slopes, slopes)
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+    H = H * np.outer(scale, scale)
+    others = -np.linalg.lstsq(H[:-1, :-1], H[:-1, -1], rcond=1e-10)[0]
+    held = float(H[-1, -1] + H[-1, :-1] @ others)
+    width = 1.96 * scale[-1] / np.sqrt(held) if held > 1e-10 else np.inf
+    if width < p.step:
+        return []
+    to = given + p.step if given + p.step <= p.max else given - p.step
+    moves = dict(zip(names[:-1], others * scale[:-1] / scale[-1] * (to - given), strict=True))
+    shares = {
+        n: d / fit.point.values[n] for n, d in moves.items() if abs(fit.point.values[n]) > 0.1 * parameters[n].step
+    }
+    shares = {n: share for n, share in shares.items() if abs(share) >= WORTH}
+    if not shares:
+        return []
+    listed = ", ".join(f"{n} {100.0 * share:+.0f} %" for n, share in sorted(shares.items(), key=lambda x: -abs(x[1])))
+    text = (
+        f"the values rest on {name} = {p.shown(given)}, which these logs do not tell to within {p.shown(p.step)}: with {p.shown(to)} "
+        f"they would be {listed}; {_remedy(task, [name])}"
+    )
+    return [Undetermined({name: 1.0, **shares}, float(width / p.step), text)]
 
 
 def _sentence(

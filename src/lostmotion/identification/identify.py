@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +15,9 @@ from ..inputs.quantities import Count
 from ..simulation.train_scenario import TrainScenario
 from .engine import Engine
 from .errors_of_logs import LogError, total
-from .fit import Fit, Problem
+from .fit import Fit, Problem, linearised
 from .gather import gathered
-from .identifiability import Undetermined, at_bounds, undetermined
+from .identifiability import Undetermined, at_bounds, resting_on, undetermined
 from .intervals import Interval, bootstrap, profile
 from .ladder import RungResult, begun_with, chosen, climb, free_on, problem_of, start_point
 from .prepare import Prepared
@@ -228,7 +228,7 @@ def identify_logs(
         rungs,
         best,
         intervals,
-        undetermined(task, fit, free),
+        [*undetermined(task, fit, free), *_resting(problem, fit)],
         at_bounds(fit, free),
         {log.name: log.log.notes for log in logs if log.log.notes},
         rig.scenario_at(first, fit.point.of(first), best),
@@ -239,6 +239,22 @@ def identify_logs(
         rig,
         logs,
     )
+
+
+def _resting(problem: Problem, fit: Fit) -> list[Undetermined]:
+    """What the values rest on: parameters of higher rungs that the model of this one has, and that the logs would not tell."""
+    rig, rung = problem.engine.rig, problem.rung
+    above = free_on(rig.task, len(rig.rungs()) - 1)
+    found = []
+    for name, p in above.items():
+        phases = range(-1, len(rig.task.phases))
+        if name in problem.parameters or not any(rig.keys_of(name, rung, phase) for phase in phases):
+            continue
+        wider = replace(problem, parameters={**problem.parameters, name: p})
+        residuals = wider.engine.residuals(wider.logs, fit.point, rung)
+        normal = linearised(wider, fit.point, residuals, fit.deviations, fit.correlation).normal
+        found += resting_on(rig.task, fit, wider.parameters, normal, name)
+    return found
 
 
 def residual_table(result: IdentificationResult, variables: tuple[str, ...] = ()) -> dict[str, dict[str, np.ndarray]]:
