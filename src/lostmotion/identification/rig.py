@@ -23,7 +23,7 @@ from .shaft_angles import angle_terms
 from .task import Identification, Rung
 from .variants import Variants
 
-KEPT = 20000  # scenarios that are kept ready
+KEPT = 4000  # scenarios that are kept ready, a tenth of a megabyte each; few serve again once the search has moved on
 
 
 @dataclass(frozen=True)
