@@ -24,6 +24,7 @@ from lostmotion.identification.parameters import FreeParameter
 from lostmotion.identification.prepare import prepared, read_all
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
+from lostmotion.reports.identification import loss_curves
 
 
 @pytest.fixture(scope="module")
@@ -214,6 +215,15 @@ def test_mistakes_of_the_file_are_one_line(tmp_path: Path) -> None:
         with pytest.raises(lm.InputError, match=said) as refused:
             lm.identify(file)
         assert str(file) in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_the_page_shows_what_a_gear_loses_in_both_directions() -> None:
+    """Of an efficiency of 0.8 driving and 0.7 driven: 2/0.8 - 2 = 0.5 and 2 - 0.7*2 = 0.6 N*m are lost at 2 N*m."""
+    train = lm.load(SERVO / "servo.toml").gears["train"]
+    assert loss_curves(train) == ()  # 1 in both directions
+    losses = {"kind": "mesh_efficiency", "drive_efficiency": 0.8, "backdrive_efficiency": 0.7}
+    for curve in loss_curves(type(train)(**{**train.model_dump(), "losses": losses})):
+        np.testing.assert_allclose(np.interp([-2.0, 0.0, 2.0], 2 * curve.x, 2 * curve.y), [0.6, 0.0, 0.5], atol=1e-12)
 
 
 def test_the_example_reads(tmp_path: Path) -> None:

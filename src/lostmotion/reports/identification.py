@@ -10,6 +10,8 @@ import numpy as np
 
 from ..identification.identify import IdentificationResult, residual_table
 from ..identification.ladder import free_on
+from ..model.gear import Gear
+from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..units.conversion import si_factor
 from . import plots
 from .pages import embed, panels_csv, render_page, save_figure, table_csv, write_text
@@ -144,7 +146,8 @@ def _figures(result: IdentificationResult) -> list[tuple[str, str, str, list[Pan
             )
         )
     if laws := _laws(result, table):
-        found.append(("laws", "Friction and torsion", "Of the identified rig.", laws, min(2, len(laws))))
+        caption = "Of the identified rig. What it adds to a shaft's viscous friction, such as the back-e.m.f. of a motor, is in there."
+        found.append(("laws", "Friction, losses and torsion", caption, laws, min(2, len(laws))))
     return found
 
 
@@ -267,7 +270,9 @@ def _laws(result: IdentificationResult, table: dict[str, dict[str, np.ndarray]])
                     (Curve("dry and viscous", w, dry + shaft.viscous_friction * w, LINE),),
                 )
             )
-    for name in result.scenario.gears:
+    for name, gear in result.scenario.gears.items():
+        if curves := loss_curves(gear):
+            panels.append(Panel(f"losses of {name}", "output torque [N·m]", "lost at the output [N·m]", curves))
         if any(f"{name}_twist" in run for run in table.values()):
             runs = list(table.values())[:3]
             curves = tuple(
@@ -282,3 +287,26 @@ def _laws(result: IdentificationResult, table: dict[str, dict[str, np.ndarray]])
             )
             panels.append(Panel(f"torsion of {name}", "twist [mrad]", "output torque [N·m]", curves))
     return panels
+
+
+def loss_curves(gear: Gear) -> tuple[Curve, ...]:
+    """Torque that a gear loses over the torque at its output, positive where the input drives, at its least and its largest speed."""
+    losses = gear.losses
+    if isinstance(losses, MeshEfficiency | WormMesh):
+        losses = efficiency_map(*losses.efficiencies())
+    if not isinstance(losses, LossMap) or gear.rated_output_torque is None or gear.rated_input_speed is None:
+        return ()
+    speeds, loads, values = losses.whole()
+    torque = np.array(loads) * gear.rated_output_torque
+    table = np.array(values) * gear.rated_output_torque
+    if not np.any(table):
+        return ()
+    return tuple(
+        Curve(
+            f"{speeds[k] * gear.rated_input_speed:.3g} rad/s",
+            torque,
+            table[:, k],
+            {"color": _shade(n), "linewidth": 1.4},
+        )
+        for n, k in enumerate((0, len(speeds) - 1))
+    )
