@@ -27,6 +27,7 @@ class NamedFields {
 
     explicit NamedFields(const nb::dict& values) : values_(values) {}
     void number(const char* name, double& v, Range = Range::any) { v = nb::cast<double>(values_[name]); }
+    void flag(const char* name, bool& v) { v = nb::cast<bool>(values_[name]); }
     template <class Curve>
     void curve(const char* name, Curve& v) {
         v = nb::cast<Curve>(values_[name]);
@@ -71,11 +72,17 @@ class TrainDescription : public model::TrainDescription {
         model::Train::each_kind(train, [&](const char* own, const char*, const auto& elements) {
             if (table != own) return;
             known = true;
-            typename std::remove_cvref_t<decltype(elements)>::value_type element;
-            element.name = name;
-            NamedFields named(fields);
-            element.describe(named);
-            model::TrainDescription::add(std::move(element), shaft);
+            model::TrainDescription::add(made_for(elements, name, fields), shaft);
+        });
+        if (!known) throw nb::value_error(("there is no table '" + table + "'").c_str());
+    }
+    void add_coupling(const std::string& table, const std::string& name, const std::string& input,
+                      const std::string& output, const nb::dict& fields) {
+        bool known = false;
+        model::Train::each_coupling_kind(train, [&](const char* own, const char*, const auto& elements) {
+            if (table != own) return;
+            known = true;
+            model::TrainDescription::add(made_for(elements, name, fields), input, output);
         });
         if (!known) throw nb::value_error(("there is no table '" + table + "'").c_str());
     }
@@ -140,6 +147,14 @@ class TrainDescription : public model::TrainDescription {
     }
 
  private:
+    template <class Element>
+    static Element made_for(const std::vector<Element>&, const std::string& name, const nb::dict& fields) {
+        Element element;
+        element.name = name;
+        NamedFields named(fields);
+        element.describe(named);
+        return element;
+    }
     model::LinearController::Signal controller_signal(const ControllerSignal& s) const {
         using Signal = model::LinearController::Signal;
         const auto& [kind, shaft] = s;
@@ -243,7 +258,6 @@ inline nb::tuple run_train_batch(const std::vector<CaseOfTrain>& cases, double d
 }
 
 inline void bind_train(nb::module_& m) {
-    using model::Coupling;
     using model::PeriodicCurve;
 
     nb::class_<PeriodicCurve>(m, "PeriodicCurve")
@@ -269,11 +283,6 @@ inline void bind_train(nb::module_& m) {
         },
         "friction_torque"_a, "breakaway_torque"_a, "stribeck_speed"_a, "error"_a);
 
-    const auto add_coupling = [](Coupling::Kind kind) {
-        return [kind](TrainDescription& t, const std::string& name, const std::string& input, const std::string& output,
-                      double torque,
-                      double breakaway_torque) { t.add_coupling(name, input, output, torque, breakaway_torque, kind); };
-    };
     nb::class_<TrainDescription>(m, "Train")
         .def(nb::init<>())
         .def("add_shaft", &TrainDescription::add_shaft, "name"_a, "inertia"_a, "viscous_friction"_a, "friction"_a,
@@ -284,20 +293,14 @@ inline void bind_train(nb::module_& m) {
              "torsion_curve"_a.none(), "loss_map"_a.none(), "efficiencies"_a.none(), "mesh_damping"_a,
              "transmission_error"_a.none())
         .def("set_housing", &TrainDescription::set_housing, "gear"_a, "shaft"_a)
-        .def("add_clutch", add_coupling(Coupling::clutch), "name"_a, "input"_a, "output"_a, "torque"_a,
-             "breakaway_torque"_a)
-        .def("add_safety_clutch", add_coupling(Coupling::safety_clutch), "name"_a, "input"_a, "output"_a, "torque"_a,
-             "breakaway_torque"_a)
-        .def(
-            "add_freewheel",
-            [](TrainDescription& t, const std::string& name, const std::string& input, const std::string& output) {
-                t.add_coupling(name, input, output, 0.0, 0.0, Coupling::freewheel);
-            },
-            "name"_a, "input"_a, "output"_a)
         .def("add", &TrainDescription::add, "table"_a, "name"_a, "shaft"_a, "fields"_a,
              nb::sig("def add(self, table: str, name: str, shaft: str, fields: collections.abc.Mapping[str, "
                      "typing.Any]) -> None"),
              "What acts on one shaft: the table of its kind, and its fields in SI units.")
+        .def("add_coupling", &TrainDescription::add_coupling, "table"_a, "name"_a, "input"_a, "output"_a, "fields"_a,
+             nb::sig("def add_coupling(self, table: str, name: str, input: str, output: str, fields: "
+                     "collections.abc.Mapping[str, typing.Any]) -> None"),
+             "What joins two shafts and is no gear, in the same way.")
         .def("add_controller", &TrainDescription::add_controller, "motor"_a, "signals"_a, "compared"_a, "states"_a,
              "A"_a, "B"_a, "C"_a, "D"_a, "back_calculation"_a, "limit"_a)
         .def("check", &TrainDescription::check)

@@ -7,12 +7,12 @@
 #include <new>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "lostmotion/drive/parameters.hpp"
 
 namespace lm = lostmotion;
-using lm::model::Coupling;
 
 namespace {
 
@@ -24,9 +24,10 @@ std::string name_error(const lm_train& train, const char* name) {
         return false;
     };
     const auto& t = train.description.train;
-    bool used = taken(t.shafts) || taken(t.motors) || taken(t.gears) || taken(t.couplings);
-    lm::model::Train::each_kind(
-        t, [&](const char*, const char*, const auto& elements) { used = used || taken(elements); });
+    bool used = taken(t.shafts) || taken(t.motors) || taken(t.gears);
+    const auto any = [&](const char*, const char*, const auto& elements) { used = used || taken(elements); };
+    lm::model::Train::each_kind(t, any);
+    lm::model::Train::each_coupling_kind(t, any);
     if (used) return "the name '" + text(name) + "' is taken; use another one";
     return {};
 }
@@ -86,6 +87,17 @@ std::string read(const lm_parameter* parameters, std::size_t n, const std::strin
         p->in(to) = parameters[k].value;
     }
     return {};
+}
+
+template <class Element>
+int add_coupling(lm_train& train, Element element, const char* name, const char* input, const char* output) {
+    return train.attempt([&] {
+        std::string wrong = name_error(train, name);
+        if (!wrong.empty()) return wrong;
+        element.name = name;
+        train.description.add(std::move(element), text(input), text(output));
+        return wrong;
+    });
 }
 
 }  // namespace
@@ -181,25 +193,16 @@ int lm_add_brake(lm_train* train, const char* name, const char* shaft, double to
     });
 }
 
-static int add_coupling(lm_train* train, const char* name, const char* input, const char* output, double torque,
-                        double breakaway_torque, Coupling::Kind kind) {
-    return train->attempt([&] {
-        std::string wrong = name_error(*train, name);
-        if (wrong.empty())
-            train->description.add_coupling(name, text(input), text(output), torque, breakaway_torque, kind);
-        return wrong;
-    });
-}
 int lm_add_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
                   double breakaway_torque) {
-    return add_coupling(train, name, input, output, torque, breakaway_torque, Coupling::clutch);
+    return add_coupling(*train, lm::model::Clutch{"", 0, 0, torque, breakaway_torque}, name, input, output);
 }
 int lm_add_safety_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
                          double breakaway_torque) {
-    return add_coupling(train, name, input, output, torque, breakaway_torque, Coupling::safety_clutch);
+    return add_coupling(*train, lm::model::Clutch{"", 0, 0, torque, breakaway_torque, true}, name, input, output);
 }
 int lm_add_freewheel(lm_train* train, const char* name, const char* input, const char* output) {
-    return add_coupling(train, name, input, output, 0.0, 0.0, Coupling::freewheel);
+    return add_coupling(*train, lm::model::Freewheel{}, name, input, output);
 }
 
 int lm_add_angle_torque(lm_train* train, const char* name, const char* shaft, const lm_periodic_curve* torque) {

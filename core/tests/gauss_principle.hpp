@@ -82,17 +82,15 @@ inline std::vector<double> least_constraint(const Assembly& a, const Instant& no
             }
         if (holding > 0.0) contact(static_cast<int>(s), 1.0, -1, 0.0, sliding, holding);
     }
-    for (std::size_t k = 0; k < t.couplings.size(); ++k) {
-        const Coupling& c = t.couplings[k];
-        if (c.kind == Coupling::freewheel) {
-            if (w[c.input] != w[c.output]) continue;
-            contact(c.input, 1.0, c.output, -1.0, 0.0, infinite, true);
-            rows.back().low = 0.0;
-            continue;
-        }
-        const double T =
-            c.torque * (c.kind == Coupling::clutch ? std::clamp(input(p.couplings[k].input), 0.0, 1.0) : 1.0);
+    for (std::size_t k = 0; k < t.clutches.size(); ++k) {
+        const Clutch& c = t.clutches[k];
+        const double T = c.torque * (c.safety ? 1.0 : std::clamp(input(p.couplings[k]->command), 0.0, 1.0));
         contact(c.input, 1.0, c.output, -1.0, T, T);
+    }
+    for (const Freewheel& c : t.freewheels) {
+        if (w[c.input] != w[c.output]) continue;
+        contact(c.input, 1.0, c.output, -1.0, 0.0, infinite, true);
+        rows.back().low = 0.0;
     }
     std::vector<double> acceleration(n);
     for (std::size_t s = 0; s < n; ++s) acceleration[s] = torque[s] / J[s];

@@ -61,7 +61,7 @@ inline std::vector<Knob> knobs(const RandomCase& c) {
         add("voltage_limit" + number(m), [m](RandomCase& x) -> double& { return x.train.motors[m].law.voltage_limit; });
     }
     for (std::size_t g = 0; g < c.train.gears.size(); ++g) {
-        if (c.train.gears.size() + c.train.couplings.size() < c.train.shafts.size())
+        if (c.train.gears.size() + c.train.clutches.size() + c.train.freewheels.size() < c.train.shafts.size())
             add("ratio" + number(g), [g](RandomCase& x) -> double& { return x.train.gears[g].law.ratio; });
         add("mesh_damping" + number(g), [g](RandomCase& x) -> double& { return x.train.gears[g].mesh_damping; });
         if (c.train.gears[g].law.hysteresis_efficiency < 1.0)
@@ -92,8 +92,8 @@ inline std::vector<Knob> knobs(const RandomCase& c) {
                                [=](RandomCase& x, double v) { x.train.gears[g].law.curve = with(true, n, v); }});
         }
     }
-    for (std::size_t k = 0; k < c.train.couplings.size(); ++k)
-        add("coupling" + number(k), [k](RandomCase& x) -> double& { return x.train.couplings[k].torque; });
+    for (std::size_t k = 0; k < c.train.clutches.size(); ++k)
+        add("clutch" + number(k), [k](RandomCase& x) -> double& { return x.train.clutches[k].torque; });
     for (std::size_t k = 0; k < c.train.brakes.size(); ++k)
         add("brake" + number(k), [k](RandomCase& x) -> double& { return x.train.brakes[k].torque; });
     for (std::size_t a = 0; a < c.control.axes.size(); ++a) {

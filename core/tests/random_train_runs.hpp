@@ -20,7 +20,8 @@ inline Train named(Train t) {
     name(t.motors, "motor");
     name(t.gears, "gear");
     name(t.brakes, "brake");
-    name(t.couplings, "coupling");
+    name(t.clutches, "clutch");
+    name(t.freewheels, "freewheel");
     name(t.angle_torques, "angle_torque");
     if (t.shafts[0].name.empty()) name(t.shafts, "shaft");
     return t;
@@ -165,7 +166,7 @@ inline bool leaves_break_away_open(const Train& t) {
     return std::any_of(a.places().contacts.begin(), a.places().contacts.end(),
                        [](const ContactPlace& c) { return c.locked != nowhere; }) &&
            (std::any_of(t.brakes.begin(), t.brakes.end(), more) ||
-            std::any_of(t.couplings.begin(), t.couplings.end(), more) ||
+            std::any_of(t.clutches.begin(), t.clutches.end(), more) ||
             std::any_of(t.gears.begin(), t.gears.end(), [](const Gear& g) { return g.has_dry_losses(); }) ||
             std::any_of(t.shafts.begin(), t.shafts.end(),
                         [](const Shaft& s) { return s.friction.holding() > s.friction.at_zero(0); }));
@@ -302,9 +303,7 @@ struct LawTally {
 
 // Nothing of it tells forward from backward.
 inline bool is_symmetric(const Train& t) {
-    return t.angle_torques.empty() &&
-           std::none_of(t.couplings.begin(), t.couplings.end(),
-                        [](const Coupling& c) { return c.kind == Coupling::freewheel; }) &&
+    return t.angle_torques.empty() && t.freewheels.empty() &&
            std::none_of(t.gears.begin(), t.gears.end(), [](const Gear& g) { return g.transmission_error.present(); });
 }
 // What it turns into heat is nowhere negative: a constant efficiency gives energy where the load drives.

@@ -42,8 +42,8 @@ class RandomTrains {
         for (int s = 1; s < shafts; ++s) {
             const int to = pick(std::max(0, s - 2), s - 1);
             if (coin(0.2)) {
-                const auto kind = static_cast<Coupling::Kind>(pick(0, 2));
-                t.couplings.push_back({"coupling", kind, to, s, spread(0.2, 2.0)});
+                const auto kind = static_cast<CouplingKind>(pick(0, 2));
+                add_coupling(t, kind, to, s, spread(0.2, 2.0), 0.0);
             } else {
                 t.gears.push_back(gear(to, s, losses));
             }
@@ -88,9 +88,9 @@ class RandomTrains {
             const bool forward = coin(0.7);
             const int input = forward ? to : s, output = forward ? s : to;
             if (coin(0.2)) {
-                const auto kind = static_cast<Coupling::Kind>(pick(0, 2));
+                const auto kind = static_cast<CouplingKind>(pick(0, 2));
                 const double torque = spread(0.2, 2.0);
-                t.couplings.push_back({"coupling", kind, input, output, torque, coin(0.3) ? 1.3 * torque : 0.0});
+                add_coupling(t, kind, input, output, torque, coin(0.3) ? 1.3 * torque : 0.0);
                 turns[s] = turns[to];
             } else {
                 t.gears.push_back(any_gear(input, output));
@@ -245,6 +245,13 @@ class RandomTrains {
     }
 
  private:
+    enum CouplingKind { clutch, safety_clutch, freewheel };
+    static void add_coupling(Train& t, CouplingKind kind, int input, int output, double torque, double breakaway) {
+        if (kind == freewheel)
+            t.freewheels.push_back({"freewheel", input, output});
+        else
+            t.clutches.push_back({"clutch", input, output, torque, breakaway, kind == safety_clutch});
+    }
     // Losses and laws that act against the frame are taken out.
     void put_housings(Train& t) {
         if (!housings_ || t.shafts.size() < 3) return;

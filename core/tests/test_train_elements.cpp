@@ -190,10 +190,10 @@ TEST_CASE("a clutch brings two shafts to one speed and slips again when asked fo
     Train t;
     t.shafts = {shaft(1.0), shaft(3.0)};
     t.shafts[1].loaded = true;
-    t.couplings = {{"clutch", Coupling::clutch, 0, 1, 6.0}};
+    t.clutches = {{"clutch", 0, 1, 6.0}};
     TrainRun run(t);
     run.speed(0) = 8.0;
-    const int u = run.assembly.places().couplings[0].input;
+    const int u = run.assembly.places().couplings[0]->command;
     run.inputs[u] = {{0.0}, {.value = 0.5, .from = 1.0}};
     run.inputs[run.load(1)] = {{0.0}, {.slope = 2.0, .from = 4.0}};
     REQUIRE(run.begin());
@@ -214,7 +214,7 @@ TEST_CASE("a freewheel takes hold when its input catches up and lets go when it 
     Train t;
     t.shafts = {shaft(1.0), shaft(2.0)};
     t.motors = {torque_motor(0)};
-    t.couplings = {{"freewheel", Coupling::freewheel, 0, 1}};
+    t.freewheels = {{"freewheel", 0, 1}};
     TrainRun run(t);
     run.speed(1) = 4.0;
     run.inputs[run.command(0)] = {{2.0}, {.value = -3.0, .from = 5.0}};

@@ -101,7 +101,7 @@ TEST_CASE("the torque between two shafts at rest is a play of all that drives it
     t.shafts[0].friction.torque = 100.0;
     t.shafts[1].friction.torque = 1.0;
     t.shafts[1].loaded = true;
-    t.couplings = {{"clutch", Coupling::safety_clutch, 0, 1, 50.0}};
+    t.clutches = {{"clutch", 0, 1, 50.0, 0.0, true}};
     t.motors = {torque_motor(1), torque_motor(1)};
     t.motors[1].law.kind = Motor::dc;
     for (ShaftMotor& m : t.motors) m.law.rated_torque = 1.0;
@@ -148,7 +148,7 @@ TEST_CASE("a contact at its limit gives what it holds, since it does not slip") 
     t.shafts[0].friction.torque = 100.0;
     t.shafts[1].friction.torque = 1.0;
     t.shafts[1].friction.breakaway_torque = 1.5;
-    t.couplings = {{"clutch", Coupling::safety_clutch, 0, 1, 50.0}};
+    t.clutches = {{"clutch", 0, 1, 50.0, 0.0, true}};
     t.motors = {torque_motor(1)};
     t.motors[0].law.rated_torque = 1.0;
     const std::vector<Signal> inputs{{{{0.0, 0.0, 1.0}, {2.0, 2.0, -1.0}}, {}}};

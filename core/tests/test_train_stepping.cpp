@@ -256,10 +256,11 @@ TEST_CASE("the command that turns a motor: what is behind a clutch, a freewheel,
     // A safety clutch passes on no more than it can; a freewheel drives one way only.
     Train clutched = t;
     clutched.gears = {slow};
-    clutched.couplings = {{"clutch", Coupling::safety_clutch, 1, 2, 3.0}};
+    clutched.clutches = {{"clutch", 1, 2, 3.0, 0.0, true}};
     of = commands(clutched, {0.0, 6.0});
     CHECK(of[0].command_forward == doctest::Approx((3.0 + 1.25) / 1.6 + 0.5).epsilon(1e-14));
-    clutched.couplings[0].kind = Coupling::freewheel;
+    clutched.clutches.clear();
+    clutched.freewheels = {{"freewheel", 1, 2}};
     of = commands(clutched, {0.0, 6.0});
     CHECK(of[0].command_forward == doctest::Approx((8.0 + 1.25) / 1.6 + 0.5).epsilon(1e-14));
     of = commands(clutched, {0.0, 0.0});

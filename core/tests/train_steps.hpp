@@ -28,7 +28,7 @@ inline double plain_value(const Signal& s, double t) {
 
 class TrainSteps {
  public:
-    // inputs: motors, loads of loaded shafts, brakes, commanded couplings, in this order.
+    // inputs: motors, loads of loaded shafts, brakes, commanded clutches, in this order.
     TrainSteps(const Train& train, const std::vector<Signal>& inputs) : train_(train), inputs_(inputs) {
         const auto shafts = train.shafts.size();
         speed.assign(shafts, 0.0);
@@ -92,7 +92,7 @@ class TrainSteps {
     struct Capacity {
         double slipping = 0.0, holding = 0.0;
     };
-    enum What { of_shaft, of_gear, of_coupling };
+    enum What { of_shaft, of_gear, of_clutch, of_freewheel };
     struct Place {
         What what;
         int element;
@@ -107,6 +107,12 @@ class TrainSteps {
         return static_cast<std::size_t>(k);
     }
     const Gear& gear(int g) const { return train_.gears[at(g)]; }
+    static bool is_coupling(const Place& p) { return p.what == of_clutch || p.what == of_freewheel; }
+    std::pair<int, int> joined(const Place& p) const {
+        if (p.what == of_freewheel)
+            return {train_.freewheels[at(p.element)].input, train_.freewheels[at(p.element)].output};
+        return {train_.clutches[at(p.element)].input, train_.clutches[at(p.element)].output};
+    }
     int shafts() const { return static_cast<int>(train_.shafts.size()); }
     int gears() const { return static_cast<int>(train_.gears.size()); }
     int unknowns() const { return shafts() + static_cast<int>(places_.size()); }
@@ -130,7 +136,9 @@ class TrainSteps {
             gear_contact_[at(g)] = static_cast<int>(places_.size());
             places_.push_back({of_gear, g});
         }
-        for (std::size_t k = 0; k < train_.couplings.size(); ++k) places_.push_back({of_coupling, static_cast<int>(k)});
+        for (std::size_t k = 0; k < train_.clutches.size(); ++k) places_.push_back({of_clutch, static_cast<int>(k)});
+        for (std::size_t k = 0; k < train_.freewheels.size(); ++k)
+            places_.push_back({of_freewheel, static_cast<int>(k)});
         modes_.contact.assign(places_.size(), 0);
         modes_.overrun.assign(train_.gears.size(), 0);
         modes_.flanks.assign(train_.gears.size(), 0);
@@ -145,15 +153,15 @@ class TrainSteps {
         for (std::size_t s = 0; s < train_.shafts.size(); ++s)
             if (train_.shafts[s].loaded) load_[s] = take();
         brake_.assign(train_.shafts.size(), {});
-        coupling_.clear();
+        clutch_.clear();
         for (const Brake& b : train_.brakes) {
             const double engaged = std::clamp(take(), 0.0, 1.0);
             brake_[at(b.shaft)].slipping += b.torque * engaged;
             brake_[at(b.shaft)].holding += std::max(b.torque, b.breakaway_torque) * engaged;
         }
-        for (const Coupling& c : train_.couplings) {
-            const double engaged = c.kind == Coupling::clutch ? std::clamp(take(), 0.0, 1.0) : 1.0;
-            coupling_.push_back({c.torque * engaged, std::max(c.torque, c.breakaway_torque) * engaged});
+        for (const Clutch& c : train_.clutches) {
+            const double engaged = c.safety ? 1.0 : std::clamp(take(), 0.0, 1.0);
+            clutch_.push_back({c.torque * engaged, std::max(c.torque, c.breakaway_torque) * engaged});
         }
     }
 
@@ -305,10 +313,10 @@ class TrainSteps {
         }
         for (std::size_t k = 0; k < places_.size(); ++k) {
             if (places_[k].what == of_shaft && places_[k].element == s) row.add(torque_of(static_cast<int>(k)), -1.0);
-            if (places_[k].what != of_coupling) continue;
-            const Coupling& c = train_.couplings[at(places_[k].element)];
-            if (c.input == s) row.add(torque_of(static_cast<int>(k)), -1.0);
-            if (c.output == s) row.add(torque_of(static_cast<int>(k)), 1.0);
+            if (!is_coupling(places_[k])) continue;
+            const auto [input, output] = joined(places_[k]);
+            if (input == s) row.add(torque_of(static_cast<int>(k)), -1.0);
+            if (output == s) row.add(torque_of(static_cast<int>(k)), 1.0);
         }
         for (const AngleTorque& t : train_.angle_torques)
             if (t.shaft == s) row.one += t.torque(angle[at(s)] + 0.5 * h_ * speed[at(s)]);
@@ -339,8 +347,9 @@ class TrainSteps {
         const Place& p = places_[at(k)];
         if (p.what == of_shaft) return speed_of(p.element);
         if (p.what == of_gear) return twist_rate(p.element);
-        Linear f = speed_of(train_.couplings[at(p.element)].input);
-        f.c[at(train_.couplings[at(p.element)].output)] -= 1.0;
+        const auto [input, output] = joined(p);
+        Linear f = speed_of(input);
+        f.c[at(output)] -= 1.0;
         return f;
     }
     Linear contact_row(int k, const std::vector<Linear>& T_2) const {
@@ -354,9 +363,7 @@ class TrainSteps {
         }
         if (p.what == of_shaft) f = shaft_capacity(p.element, mode, false, T_2, nullptr);
         if (p.what == of_gear) f.one = capacity[at(p.element)];
-        if (p.what == of_coupling)
-            f.one =
-                train_.couplings[at(p.element)].kind == Coupling::freewheel ? 0.0 : coupling_[at(p.element)].slipping;
+        if (p.what == of_clutch) f.one = clutch_[at(p.element)].slipping;
         for (double& c : f.c) c *= mode;
         f.one *= mode;
         f.c[at(shafts() + k)] -= 1.0;
@@ -405,8 +412,8 @@ class TrainSteps {
                 if (gear(p.element).law.compliance == Gearbox::rigid) continue;
                 forward = backward = capacity[at(p.element)];
             } else {
-                const bool freewheel = train_.couplings[at(p.element)].kind == Coupling::freewheel;
-                forward = freewheel ? 1e300 : coupling_[at(p.element)].holding;
+                const bool freewheel = p.what == of_freewheel;
+                forward = freewheel ? 1e300 : clutch_[at(p.element)].holding;
                 backward = freewheel ? 0.0 : forward;
             }
             if (torque > forward + slack || -torque > backward + slack) return false;
@@ -415,8 +422,8 @@ class TrainSteps {
     }
 
     bool holds_more(const Place& p) const {
-        if (p.what == of_gear) return false;
-        if (p.what == of_coupling) return coupling_[at(p.element)].holding > coupling_[at(p.element)].slipping;
+        if (p.what == of_gear || p.what == of_freewheel) return false;
+        if (p.what == of_clutch) return clutch_[at(p.element)].holding > clutch_[at(p.element)].slipping;
         const DryFriction& law = train_.shafts[at(p.element)].friction;
         return brake_[at(p.element)].holding > brake_[at(p.element)].slipping ||
                law.breakaway_torque > law.sliding(0.0);
@@ -429,7 +436,7 @@ class TrainSteps {
         std::vector<std::vector<int>> all{{}};
         for (const Place& p : places_) {
             const bool rigid = p.what == of_gear && gear(p.element).law.compliance == Gearbox::rigid;
-            const bool one_way = p.what == of_coupling && train_.couplings[at(p.element)].kind == Coupling::freewheel;
+            const bool one_way = p.what == of_freewheel;
             std::vector<std::vector<int>> longer;
             for (const auto& m : all)
                 for (const int mode : {0, -1, 1}) {
@@ -500,7 +507,7 @@ class TrainSteps {
     std::vector<Place> places_;
     std::vector<int> shaft_contact_, gear_contact_, direction_;
     std::vector<double> command_, load_, z_, T_2_;
-    std::vector<Capacity> brake_, coupling_;
+    std::vector<Capacity> brake_, clutch_;
     Modes modes_, trial_;
     double h_ = 0.0;
 };

@@ -910,16 +910,13 @@ class Train:
 
     def set_housing(self, gear: str, shaft: str) -> None: ...
 
-    def add_clutch(self, name: str, input: str, output: str, torque: float, breakaway_torque: float) -> None: ...
-
-    def add_safety_clutch(self, name: str, input: str, output: str, torque: float, breakaway_torque: float) -> None: ...
-
-    def add_freewheel(self, name: str, input: str, output: str) -> None: ...
-
     def add(self, table: str, name: str, shaft: str, fields: Mapping[str, Any]) -> None:
         """
         What acts on one shaft: the table of its kind, and its fields in SI units.
         """
+
+    def add_coupling(self, table: str, name: str, input: str, output: str, fields: Mapping[str, Any]) -> None:
+        """What joins two shafts and is no gear, in the same way."""
 
     def add_controller(self, motor: str, signals: Sequence[tuple[str, str]], compared: tuple[str, str], states: Sequence[str], A: Sequence[Sequence[float]], B: Sequence[Sequence[float]], C: Sequence[float], D: Sequence[float], back_calculation: Sequence[float], limit: float) -> None: ...
 

@@ -54,11 +54,9 @@ class Breakaway {
             if (&gear == from || (gear.input != shaft && gear.output != shaft)) continue;
             needed += gear.input == shaft ? to_drive(static_cast<int>(g), s) : to_drive_back(static_cast<int>(g), s);
         }
-        for (std::size_t k = 0; k < train_.couplings.size(); ++k) {
-            const model::Coupling& c = train_.couplings[k];
-            if (&c != from && (c.input == shaft || c.output == shaft))
-                needed += to_carry(static_cast<int>(k), c.input == shaft, s);
-        }
+        for (const auto& c : assembly_.places().couplings)
+            if (c->is_dry() && c.get() != from && (c->input == shaft || c->output == shaft))
+                needed += to_carry(*c, c->input == shaft, s);
         return needed;
     }
     bool reaches_a_loop(int shaft) {
@@ -145,14 +143,13 @@ class Breakaway {
         return f_a == f_b ? b : a + (value - f_a) / (f_b - f_a) * (b - a);
     }
 
-    double to_carry(int k, bool from_input, int s) {
-        const model::Coupling& c = train_.couplings[static_cast<std::size_t>(k)];
+    double to_carry(const model::CouplingElement& c, bool from_input, int s) {
         const int other = from_input ? c.output : c.input;
         if (reaches_a_loop(other)) return 0.0;
-        const int place = assembly_.places().couplings[static_cast<std::size_t>(k)].input;
-        const double u = place == model::nowhere ? 0.0 : input(place), way = from_input ? 1.0 : -1.0;
+        const model::CouplingInstant now = assembly_.places().instant_of(c, now_);
+        const double way = from_input ? 1.0 : -1.0;
         const double torque = way * to_turn(other, s, &c);  // that it has to pass on
-        return way * std::clamp(torque, -c.capacity(-1, u, true), c.capacity(+1, u, true));
+        return way * std::clamp(torque, -c.capacity(-1, now, true), c.capacity(+1, now, true));
     }
 
     const model::Assembly& assembly_;

@@ -58,6 +58,9 @@ inline model::Key key_of(const model::Assembly& a, const SteadyMotion& motion) {
         set(p.gears[g].cell, gear.loss_cell(mu, std::fabs(w) / gear.law.rated_input_speed));
     }
     for (const auto& e : p.acting) set(e->branch, e->locate_steady(motion.speed[static_cast<std::size_t>(e->shaft)]));
+    for (const auto& c : p.couplings)
+        set(c->branch, c->locate_steady(motion.speed[static_cast<std::size_t>(c->input)] -
+                                        motion.speed[static_cast<std::size_t>(c->output)]));
     return key;
 }
 

@@ -27,7 +27,7 @@ std::vector<NamedComponent> train_components(const model::Assembly& a) {
     for (const model::ContactPlace& c : p.contacts)
         if (c.locked != model::nowhere)
             out.push_back(
-                {(c.kind == model::ContactPlace::gear ? t.gears[c.element].name : t.couplings[c.element].name) +
+                {(c.kind == model::ContactPlace::gear ? t.gears[c.element].name : p.couplings[c.element]->name) +
                      "_locked_torque",
                  D::states + c.locked, false});
     return out;

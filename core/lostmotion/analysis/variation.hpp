@@ -75,9 +75,12 @@ class VariedTrain {
 
     // Of curves: how many they have follows from the error that is allowed.
     bool same_pieces(const model::Assembly& other) const {
-        const model::ShaftElements &own = base().places().acting, &others = other.places().acting;
-        return std::equal(own.begin(), own.end(), others.begin(), others.end(),
-                          [](const auto& a, const auto& b) { return a->pieces() == b->pieces(); });
+        const auto same = [](const auto& own, const auto& others) {
+            return std::equal(own.begin(), own.end(), others.begin(), others.end(),
+                              [](const auto& a, const auto& b) { return a->pieces() == b->pieces(); });
+        };
+        return same(base().places().acting, other.places().acting) &&
+               same(base().places().couplings, other.places().couplings);
     }
 
     const TrainRun& base_;

@@ -61,10 +61,9 @@ inline std::vector<CapacityShare> contact_capacity(const Assembly& a, int contac
             c.bilateral ? std::numeric_limits<double>::infinity() : now.memory[a.places().gears[k].hysteresis];
         return {{a.train().gears[k].name, h, h}};
     }
-    const Coupling& law = a.train().couplings[k];
-    const int input = a.places().couplings[k].input;
-    const double u = input == nowhere ? 0.0 : now.input[0][input];
-    return {{law.name, law.capacity(+1, u, r.at_rest[contact]), law.capacity(-1, u, r.at_rest[contact])}};
+    const CouplingElement& law = *a.places().couplings[k];
+    const CouplingInstant here = a.places().instant_of(law, now);
+    return {{law.name, law.capacity(+1, here, r.at_rest[contact]), law.capacity(-1, here, r.at_rest[contact])}};
 }
 
 }  // namespace lostmotion::model

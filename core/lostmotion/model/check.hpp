@@ -36,7 +36,8 @@ class TrainCheck {
     std::string shafts_exist() const {
         if (train_.shafts.empty()) return "the train has no shaft";
         if (std::string error = too_many("shafts", train_.shafts.size(), max_shafts); !error.empty()) return error;
-        const std::size_t contacts = train_.shafts.size() + train_.gears.size() + train_.couplings.size();
+        std::size_t contacts = train_.shafts.size() + train_.gears.size();
+        for (const auto& c : coupling_elements(train_)) contacts += c->is_dry();
         if (std::string error = too_many("shafts, gears and couplings", contacts, max_contacts); !error.empty())
             return error;
         const auto missing = [](const std::string& what, int s) {
@@ -57,10 +58,12 @@ class TrainCheck {
             }
             return {};
         };
-        for (std::string error :
-             {one("motor", train_.motors), two("gear", train_.gears), housings(), two("coupling", train_.couplings)})
+        for (std::string error : {one("motor", train_.motors), two("gear", train_.gears), housings()})
             if (!error.empty()) return error;
         std::string error;
+        Train::each_coupling_kind(train_, [&](const char*, const char* kind, const auto& elements) {
+            if (error.empty()) error = two(kind, elements);
+        });
         Train::each_kind(train_, [&](const char*, const char* kind, const auto& elements) {
             if (error.empty()) error = one(kind, elements);
         });
@@ -138,6 +141,10 @@ class TrainCheck {
             for (std::size_t k = 0; k < elements.size() && error.empty(); ++k)
                 error = too_fine(named(kind, elements[k].name, k), on_shaft(elements[k])->pieces());
         });
+        Train::each_coupling_kind(train_, [&](const char*, const char* kind, const auto& elements) {
+            for (std::size_t k = 0; k < elements.size() && error.empty(); ++k)
+                error = too_fine(named(kind, elements[k].name, k), between_shafts(elements[k])->pieces());
+        });
         if (!error.empty()) return error;
         for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
             const DryFriction& f = train_.shafts[s].friction;
@@ -193,7 +200,7 @@ class TrainCheck {
             join(g.input, g.output);
             if (g.housing != nowhere) join(g.input, g.housing);
         }
-        for (const Coupling& c : train_.couplings) join(c.input, c.output);
+        for (const auto& c : coupling_elements(train_)) join(c->input, c->output);
         std::vector<bool> acted_on(part.size());
         for (const ShaftMotor& m : train_.motors) acted_on[static_cast<std::size_t>(part[m.shaft])] = true;
         for (const auto& e : shaft_elements(train_))
@@ -263,13 +270,17 @@ inline std::string check_start(const Train& train, const std::vector<double>& sp
         return both(g.input, g.output) + " do not fit the rigid gear " + g.name +
                "; their quotient must be its ratio, " + number(g.law.ratio);
     }
-    for (const Coupling& c : train.couplings) {
-        const double in = speed[static_cast<std::size_t>(c.input)], out = speed[static_cast<std::size_t>(c.output)];
-        if (c.kind == Coupling::freewheel && in - out > rounding * std::fmax(std::fabs(in), std::fabs(out)))
-            return both(c.input, c.output) + " do not fit the freewheel " + c.name +
-                   ", whose input cannot be faster than its output; give both the same speed";
-    }
-    return {};
+    std::string error;
+    Train::each_coupling_kind(train, [&](const char*, const char* kind, const auto& elements) {
+        for (const auto& e : elements) {
+            const double in = speed[static_cast<std::size_t>(e.input)], out = speed[static_cast<std::size_t>(e.output)];
+            const bool ahead = in - out > rounding * std::fmax(std::fabs(in), std::fabs(out));
+            if (error.empty() && ahead && between_shafts(e)->is_one_way())
+                error = both(e.input, e.output) + " do not fit the " + kind + ' ' + e.name +
+                        ", whose input cannot be faster than its output; give both the same speed";
+        }
+    });
+    return error;
 }
 
 // Empty, or what is wrong with it. A train is checked before it is assembled.

@@ -1,6 +1,8 @@
 // Speeds and torques of the elements of a train in a regime, as linear forms: each law is stated here once.
 #pragma once
 
+#include <array>
+#include <bit>
 #include <utility>
 
 #include "places.hpp"
@@ -105,13 +107,24 @@ class ElementForms {
             if (e->is_dry() && e->shaft == shaft) F += e->friction(site(shaft), key, true);
         return F;
     }
-    // What a clutch takes while it slips, or holds at rest; of a freewheel, what it passes on backward.
-    Row coupling_capacity(int k, const Key& key, bool at_rest) const {
-        const Coupling& c = train_.couplings[k];
-        const CouplingPlace& p = places_.couplings[k];
-        const double torque = at_rest ? c.holding() : c.torque;
-        if (c.kind == Coupling::clutch) return commanded(terms_, torque, p.input, key.branch[p.branch]);
-        return c.kind == Coupling::safety_clutch ? terms_.one(torque) : Row{};
+    // The shafts that a coupling joins; its slip as tied_speed() has it.
+    Between between(const CouplingElement& c, const Ties& ties) const {
+        Between shafts{terms_, {}};
+        std::array<double, max_shafts> slip;
+        for (unsigned left = tied_speed(coupling_place(c, nowhere), ties, slip); left != 0; left &= left - 1) {
+            const int k = std::countr_zero(left);
+            shafts.slip.c[places_.shafts[k].speed] = slip[k];
+        }
+        return shafts;
+    }
+    // What its dry contact takes while it slips, or holds at rest.
+    Row coupling_capacity(const CouplingElement& c, const Regime& r, bool at_rest) const {
+        return c.capacity(between(c, r.ties), r.key, at_rest);
+    }
+    // What a coupling passes on from its input to its output, by its contact and beside it.
+    Row coupling_torque(const CouplingElement& c, const Regime& r) const {
+        const Row torque = c.torque(between(c, r.ties), r.key);
+        return c.contact == nowhere ? torque : r.contact_torque[c.contact] + torque;
     }
     // What a dry element takes of a shaft that slips.
     Row dry_torque(const ShaftElement& e, const Key& key) const {

@@ -31,7 +31,7 @@ class Equations {
  private:
     void compose_motors(const Key& key, Regime& r) const;
     void compose_gear(int gear, const Key& key, Regime& r, std::vector<Row>& loss) const;
-    void compose_coupling(int coupling, const Key& key, Regime& r) const;
+    void compose_coupling(const CouplingElement& c, const Key& key, Regime& r) const;
     Row shaft_friction(int shaft, const Key& key, const Regime& r, const std::vector<Row>& loss) const;
     Row net_torque(int shaft, const Key& key, const Regime& r) const;
     LockedTorque<Row> locked_torque(int contact, const Key& key, const Regime& r) const;
@@ -59,7 +59,8 @@ inline void Equations::compose(const Key& key, Regime& r, std::vector<Row>& acce
     std::vector<Row> loss(gears);
     compose_motors(key, r);
     for (std::size_t g = 0; g < gears; ++g) compose_gear(static_cast<int>(g), key, r, loss);
-    for (std::size_t k = 0; k < train_.couplings.size(); ++k) compose_coupling(static_cast<int>(k), key, r);
+    for (const auto& c : places_.couplings)
+        if (c->is_dry()) compose_coupling(*c, key, r);
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
         const int c = places_.shafts[s].contact;
         if (c != nowhere) r.contact_torque[c] = shaft_friction(static_cast<int>(s), key, r, loss);
@@ -126,16 +127,15 @@ inline void Equations::compose_gear(int gear, const Key& key, Regime& r, std::ve
     loss[gear] = forms_.losses(gear, T_2).turning(g.loss_plane(key.branch[p.cell]), s) / i;
 }
 
-inline void Equations::compose_coupling(int coupling, const Key& key, Regime& r) const {
-    const Coupling& c = train_.couplings[coupling];
-    const CouplingPlace& p = places_.couplings[coupling];
-    const int slip = mode(key, p.contact);
-    Row& torque = r.contact_torque[p.contact];
+// What its dry contact takes.
+inline void Equations::compose_coupling(const CouplingElement& c, const Key& key, Regime& r) const {
+    const int slip = mode(key, c.contact);
+    Row& torque = r.contact_torque[c.contact];
     if (slip == 0)
-        torque = held(p.contact, r);
-    else if (c.kind != Coupling::freewheel)
+        torque = held(c.contact, r);
+    else if (!c.is_one_way())
         torque = static_cast<double>(slip) *
-                 forms_.coupling_capacity(coupling, key, kept_at_rest(places_.contacts[p.contact], r.ties));
+                 forms_.coupling_capacity(c, r, kept_at_rest(places_.contacts[c.contact], r.ties));
 }
 
 // What the dry contact of a shaft takes. One that "slips" while others keep it at rest gives all that it holds.
@@ -162,8 +162,8 @@ inline Row Equations::net_torque(int shaft, const Key& key, const Regime& r) con
         if (train_.motors[m].shaft == shaft) sum += r.motor_torque[m];
     for (std::size_t g = 0; g < train_.gears.size(); ++g)
         if (train_.gears[g].output == shaft) sum += r.output_torque[g];
-    for (std::size_t k = 0; k < train_.couplings.size(); ++k)
-        if (train_.couplings[k].output == shaft) sum += r.contact_torque[places_.couplings[k].contact];
+    for (const auto& c : places_.couplings)
+        if (c->output == shaft) sum += forms_.coupling_torque(*c, r);
     sum -= p.viscous_friction * forms_.shaft_speed(shaft, r);
     for (const auto& e : places_.acting)
         if (!e->is_dry() && e->shaft == shaft && (e->acts_at_rest() || !r.ties.at_rest[shaft]))
@@ -172,8 +172,8 @@ inline Row Equations::net_torque(int shaft, const Key& key, const Regime& r) con
     if (p.contact != nowhere) sum -= r.contact_torque[p.contact];
     for (std::size_t g = 0; g < train_.gears.size(); ++g)
         if (train_.gears[g].input == shaft) sum -= r.input_torque[g];
-    for (std::size_t k = 0; k < train_.couplings.size(); ++k)
-        if (train_.couplings[k].input == shaft) sum -= r.contact_torque[places_.couplings[k].contact];
+    for (const auto& c : places_.couplings)
+        if (c->input == shaft) sum -= forms_.coupling_torque(*c, r);
     for (std::size_t g = 0; g < train_.gears.size(); ++g)
         if (train_.gears[g].housing == shaft) sum -= r.output_torque[g] - r.input_torque[g];
     for (std::size_t g = 0; g < train_.gears.size(); ++g) {
@@ -206,7 +206,7 @@ inline LockedTorque<Row> Equations::locked_torque(int contact, const Key& key, c
     } else if (c.one_way) {
         locked.has_low = true;
     } else {
-        const Row most = forms_.coupling_capacity(c.element, key, true);
+        const Row most = forms_.coupling_capacity(*places_.couplings[c.element], r, true);
         between(-most, most);
     }
     const int on = places_.shafts[c.b].contact;

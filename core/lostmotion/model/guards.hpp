@@ -40,6 +40,7 @@ class RegimeGuards {
     void add_twist_pieces(int gear);
     void add_speed_pieces(int shaft);
     void add_input_limits();
+    void add_coupling_pieces();
     void add_output_limits();
 
     Guard& add(const Row& form, Guard::Kind kind, int contact, int branch, int neighbour) {
@@ -65,6 +66,7 @@ inline void RegimeGuards::add_all() {
     for (std::size_t g = 0; g < train_.gears.size(); ++g) add_twist_pieces(static_cast<int>(g));
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) add_speed_pieces(static_cast<int>(s));
     add_input_limits();
+    add_coupling_pieces();
     add_output_limits();
     for (std::size_t g = 0; g < train_.gears.size(); ++g) {
         const GearPlace& p = places_.gears[g];
@@ -102,14 +104,12 @@ inline void RegimeGuards::add_gear_capacities() {
 }
 
 inline void RegimeGuards::add_coupling_capacities() {
-    for (std::size_t k = 0; k < train_.couplings.size(); ++k) {
-        const Coupling& c = train_.couplings[k];
-        const CouplingPlace& p = places_.couplings[k];
-        if (regime_.key.modes[p.contact] != 0) continue;
-        const Row& torque = regime_.contact_torque[p.contact];
-        const Row capacity = forms_.coupling_capacity(static_cast<int>(k), regime_.key, true);
-        if (c.kind != Coupling::freewheel) add(capacity - torque, Guard::capacity, p.contact, nowhere, +1);
-        add(capacity + torque, Guard::capacity, p.contact, nowhere, -1);
+    for (const auto& c : places_.couplings) {
+        if (!c->is_dry() || regime_.key.modes[c->contact] != 0) continue;
+        const Row& torque = regime_.contact_torque[c->contact];
+        const Row capacity = forms_.coupling_capacity(*c, regime_, true);
+        if (!c->is_one_way()) add(capacity - torque, Guard::capacity, c->contact, nowhere, +1);
+        add(capacity + torque, Guard::capacity, c->contact, nowhere, -1);
     }
 }
 
@@ -282,17 +282,22 @@ inline void RegimeGuards::add_speed_pieces(int shaft) {
 }
 
 inline void RegimeGuards::add_input_limits() {
-    const auto limits = [&](int input, double low, double high, int contact, int branch) {
-        add_limit_guards(terms_, terms_.input(input), low, high, regime_.key,
-                         {.kind = Guard::input_limit, .contact = contact, .branch = branch}, regime_.guards);
-    };
     for (std::size_t m = 0; m < train_.motors.size(); ++m)
         if (const MotorPlace& p = places_.motors[m]; p.branch != nowhere) {
             const double most = train_.motors[m].command_limit();
-            limits(p.command, -most, most, places_.shafts[train_.motors[m].shaft].contact, p.branch);
+            const int contact = places_.shafts[train_.motors[m].shaft].contact;
+            add_limit_guards(terms_, terms_.input(p.command), -most, most, regime_.key,
+                             {.kind = Guard::input_limit, .contact = contact, .branch = p.branch}, regime_.guards);
         }
-    for (const CouplingPlace& c : places_.couplings)
-        if (c.branch != nowhere) limits(c.input, 0.0, 1.0, c.contact, c.branch);
+}
+
+// Limits of their commands, pieces of their laws over the slip.
+inline void RegimeGuards::add_coupling_pieces() {
+    for (const auto& c : places_.couplings) {
+        const Between shafts = forms_.between(*c, regime_.ties);
+        const bool slips = std::any_of(shafts.slip.c.begin(), shafts.slip.c.end(), [](double v) { return v != 0.0; });
+        c->add_guards(shafts, regime_.key, slips, regime_.guards);
+    }
 }
 
 // Where the output of a controller reaches its limit, or comes back from it.

@@ -64,9 +64,9 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
         const double h = p.hysteresis == nowhere ? 0.0 : now.memory[p.hysteresis];
         event.gear[g] = locked == nowhere ? P : std::clamp(event.gear[g], P - h, P + h);
     }
-    for (std::size_t k = 0; k < train().couplings.size(); ++k)
-        if (const int locked = places().contacts[places().couplings[k].contact].locked; locked != nowhere)
-            event.coupling[k] = now.memory[locked];
+    each_coupling_contact([&](int c) {
+        if (const int locked = places().contacts[c].locked; locked != nowhere) event.coupling[c] = now.memory[locked];
+    });
     for (const auto& e : places().acting)
         if (e->turn != nowhere) now.memory[e->turn] = e->turn_at(now.x[places().shafts[e->shaft].angle]);
     return find(cache, now, event, key);
@@ -81,8 +81,7 @@ Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& ke
     Event event;
     event.before = key;
     for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], now);
-    for (std::size_t k = 0; k < train().couplings.size(); ++k)
-        event.coupling[k] = evaluate(n_, old.contact_torque[places().couplings[k].contact], now);
+    each_coupling_contact([&](int c) { event.coupling[c] = evaluate(n_, old.contact_torque[c], now); });
     now.input[0] = right;
     double margin_size = 0.0, near = 0.0;
     if (fired != nullptr) {
@@ -374,8 +373,7 @@ template <class Sizes>
 bool SwitchedTrain<Sizes>::holds_more(const ContactPlace& c) const {
     if (c.kind == ContactPlace::gear) return false;
     const auto element = static_cast<std::size_t>(c.element);
-    if (c.kind == ContactPlace::coupling)
-        return train().couplings[element].holding() > train().couplings[element].torque;
+    if (c.kind == ContactPlace::coupling) return places().couplings[element]->holds_more();
     const DryFriction& friction = train().shafts[element].friction;
     return friction.holding() > friction.at_zero(0) ||
            std::any_of(places().acting.begin(), places().acting.end(),

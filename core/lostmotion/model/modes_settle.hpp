@@ -29,8 +29,8 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
         if (const MotorPlace& p = places().motors[m]; p.branch != nowhere)
             set(p.branch, side_of(now.input[0][p.command], -most, most));
     }
-    for (const CouplingPlace& c : places().couplings)
-        if (c.branch != nowhere) set(c.branch, side_of(now.input[0][c.input], 0.0, 1.0));
+    for (const auto& c : places().couplings)
+        if (c->branch != nowhere) set(c->branch, c->locate(places().instant_of(*c, now)));
     for (const auto& e : places().acting)
         if (e->branch != nowhere) set(e->branch, e->locate(places().instant_of(*e, now)));
     for (std::size_t s = 0; s < train().shafts.size(); ++s) {
@@ -91,7 +91,7 @@ void SwitchedTrain<Sizes>::hold(const R& r, Now& now, const Event& event) const 
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
         if (p.kind != ContactPlace::shaft)
-            torques[c] = p.kind == ContactPlace::gear ? event.gear[p.element] : event.coupling[p.element];
+            torques[c] = p.kind == ContactPlace::gear ? event.gear[p.element] : event.coupling[c];
     }
     for (const auto& l : r.locked) now.memory[l.memory] = torques[l.contact];
     for (const auto& l : r.locked)
@@ -195,8 +195,7 @@ Found SwitchedTrain<Sizes>::settle_at_limit(Cache& cache, Now& now, const Key& m
     const auto& r = cache.regime(key);
     Event standing = event;
     for (std::size_t g = 0; g < train().gears.size(); ++g) standing.gear[g] = evaluate(n_, r.output_torque[g], now);
-    for (std::size_t k = 0; k < train().couplings.size(); ++k)
-        standing.coupling[k] = evaluate(n_, r.contact_torque[places().couplings[k].contact], now);
+    each_coupling_contact([&](int c) { standing.coupling[c] = evaluate(n_, r.contact_torque[c], now); });
     Key stuck = modes;
     for (int c = 0; c < contacts(); ++c)
         if (r.at_rest[c]) stuck.modes[c] = 0;

@@ -59,7 +59,7 @@ inline std::vector<std::string> input_names(const Assembly& a) {
     for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].command, t.motors[k].name + "_command");
     for (std::size_t k = 0; k < t.shafts.size(); ++k) set(p.shafts[k].load, t.shafts[k].name + "_load_torque");
     for (const auto& e : p.acting) set(e->command, e->name + "_command");
-    for (std::size_t k = 0; k < t.couplings.size(); ++k) set(p.couplings[k].input, t.couplings[k].name + "_command");
+    for (const auto& c : p.couplings) set(c->command, c->name + "_command");
     for (std::size_t k = 0; k < t.controllers.size(); ++k) {
         set(p.controllers[k].reference, t.controllers[k].name + "_reference");
         set(p.controllers[k].reference_rate, t.controllers[k].name + "_reference_rate");
@@ -73,7 +73,7 @@ inline std::string contact_name(const Assembly& a, int contact) {
     switch (c.kind) {
         case ContactPlace::shaft: return a.train().shafts[k].name + "_contact";
         case ContactPlace::gear: return a.train().gears[k].name + "_twist_contact";
-        default: return a.train().couplings[k].name + "_contact";
+        default: return a.places().couplings[k]->name + "_contact";
     }
 }
 
@@ -98,8 +98,8 @@ inline std::vector<std::string> branch_names(const Assembly& a) {
         set(p.gears[k].error_piece, name + ": piece of the transmission error");
         set(p.gears[k].error_corner, name + ": rest on a corner of the transmission error");
     }
-    for (std::size_t k = 0; k < t.couplings.size(); ++k)
-        set(p.couplings[k].branch, t.couplings[k].name + ": limit of the command");
+    for (const auto& c : p.couplings)
+        if (c->branch != nowhere) set(c->branch, c->name + ": " + c->piecewise_law());
     for (const auto& e : p.acting)
         if (e->branch != nowhere) set(e->branch, e->name + ": " + e->piecewise_law());
     for (std::size_t k = 0; k < t.controllers.size(); ++k)

@@ -20,6 +20,11 @@ inline ContactPlace twist_place(const Gear& g, int gear) {
     return c;
 }
 
+// Of two shafts; element: its number.
+inline ContactPlace coupling_place(const CouplingElement& c, int element) {
+    return {ContactPlace::coupling, element, c.input, c.output, 1.0, -1.0, false, c.is_one_way()};
+}
+
 struct MotorPlace {
     int torque = nowhere;   // state
     int command = nowhere;  // input, unless a controller gives it
@@ -33,9 +38,6 @@ struct GearPlace {
     int error_corner = nowhere;  // branch: +1, -1: the input shaft rests on the upper, the lower end of that piece
     int error_turn = nowhere;    // memory
 };
-struct CouplingPlace {
-    int contact = nowhere, input = nowhere, branch = nowhere;
-};
 
 struct ControllerPlace {
     int first_state = nowhere;
@@ -48,9 +50,9 @@ struct Places {
     std::vector<MotorPlace> motors;
     std::vector<ShaftPlace> shafts;
     std::vector<GearPlace> gears;
-    std::vector<CouplingPlace> couplings;
     std::vector<ControllerPlace> controllers;
     ShaftElements acting;
+    CouplingElements couplings;
     std::vector<ContactPlace> contacts;
     std::vector<int> last_shaft;  // of each part of the train, whose angle is kept
 
@@ -62,6 +64,11 @@ struct Places {
         const ShaftPlace& p = shafts[e.shaft];
         return {now.x[p.speed], p.angle == nowhere ? 0.0 : now.x[p.angle],
                 e.command == nowhere ? 0.0 : now.input[0][e.command], e.turn == nowhere ? 0.0 : now.memory[e.turn]};
+    }
+    template <class Now>
+    CouplingInstant instant_of(const CouplingElement& c, const Now& now) const {
+        return {now.x[shafts[c.input].speed] - now.x[shafts[c.output].speed],
+                c.command == nowhere ? 0.0 : now.input[0][c.command]};
     }
 
  private:
@@ -79,9 +86,9 @@ inline Places::Places(const Train& train, bool with_remainders)
     : motors(train.motors.size()),
       shafts(train.shafts.size()),
       gears(train.gears.size()),
-      couplings(train.couplings.size()),
       controllers(train.controllers.size()),
-      acting(shaft_elements(train)) {
+      acting(shaft_elements(train)),
+      couplings(coupling_elements(train)) {
     for (std::size_t k = 0; k < controllers.size(); ++k)
         motors[train.controllers[k].motor].controller = static_cast<int>(k);
     for (std::size_t s = 0; s < shafts.size(); ++s) {
@@ -146,7 +153,8 @@ inline void Places::place_states(const Train& train) {
     };
     for (const Gear& g : train.gears)
         if (g.housing == nowhere) join(g.input, g.output);  // else its twist leaves one angle open
-    for (const Coupling& c : train.couplings) join(c.input, c.output);
+    for (const auto& c : couplings)
+        if (c->is_dry()) join(c->input, c->output);  // what never holds its shafts together leaves each its angle
     for (std::size_t s = 0; s < shafts.size(); ++s)
         if (last[s] == static_cast<int>(s)) last_shaft.push_back(static_cast<int>(s));
     layout.angles = static_cast<int>(last_shaft.size());
@@ -174,10 +182,9 @@ inline void Places::place_contacts(const Train& train) {
         }
     }
     for (std::size_t k = 0; k < couplings.size(); ++k) {
-        const Coupling& c = train.couplings[k];
-        couplings[k].contact = static_cast<int>(contacts.size());
-        contacts.push_back({ContactPlace::coupling, static_cast<int>(k), c.input, c.output, 1.0, -1.0, false,
-                            c.kind == Coupling::freewheel});
+        if (!couplings[k]->is_dry()) continue;
+        couplings[k]->contact = static_cast<int>(contacts.size());
+        contacts.push_back(coupling_place(*couplings[k], static_cast<int>(k)));
     }
     layout.contacts = static_cast<int>(contacts.size());
 }
@@ -189,8 +196,8 @@ inline void Places::place_inputs(const Train& train) {
         if (train.shafts[s].loaded) shafts[s].load = layout.inputs++;
     for (const auto& e : acting)
         if (e->has_command()) e->command = layout.inputs++;
-    for (std::size_t k = 0; k < couplings.size(); ++k)
-        if (train.couplings[k].commanded()) couplings[k].input = layout.inputs++;
+    for (const auto& c : couplings)
+        if (c->has_command()) c->command = layout.inputs++;
     for (std::size_t k = 0; k < controllers.size(); ++k) {
         controllers[k].reference = layout.inputs++;
         if (train.controllers[k].takes(LinearController::Signal::reference_rate))
@@ -226,8 +233,8 @@ inline void Places::place_memory_and_branches(const Train& train) {
             gears[k].error_turn = layout.memory++;
         }
     }
-    for (CouplingPlace& c : couplings)
-        if (c.input != nowhere) c.branch = next++;
+    for (const auto& c : couplings)
+        if (c->piecewise_law() != nullptr) c->branch = next++;
     for (const auto& e : acting) {
         if (e->piecewise_law() != nullptr) e->branch = next++;
         if (e->period() > 0.0) e->turn = layout.memory++;

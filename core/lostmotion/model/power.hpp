@@ -72,10 +72,8 @@ inline std::vector<PowerFlow> power_flows(const Assembly& a, const Regime& r) {
         add(PowerFlow::loss, gear.name, "hysteresis and damping",
             {r.output_torque[g] - a.spring_torque(index(g), r.key), a.twist_rate(index(g), r.key)});
     }
-    for (std::size_t k = 0; k < train.couplings.size(); ++k)
-        add(PowerFlow::loss, train.couplings[k].name, "coupling",
-            {r.contact_torque[places.couplings[k].contact],
-             speed(train.couplings[k].input) - speed(train.couplings[k].output)});
+    for (const auto& c : places.couplings)
+        add(PowerFlow::loss, c->name, c->loss(), {a.coupling_torque(*c, r), speed(c->input) - speed(c->output)});
     return flows;
 }
 

@@ -100,7 +100,7 @@ class SwitchedTrain {
     struct Event {
         Rest at_rest{};
         std::array<double, max_contacts> gear{};      // T_2 of each gear before [N m]
-        std::array<double, max_contacts> coupling{};  // torque of each coupling before [N m]
+        std::array<double, max_contacts> coupling{};  // torque of each coupling before [N m], by contact
         bool with_guard = false;                      // a guard has ended the regime before
         Guard::Kind kind = Guard::outside;            // and what it was
         int contact = nowhere, branch = nowhere, neighbour = 0, memory = nowhere;
@@ -136,6 +136,12 @@ class SwitchedTrain {
     int contacts() const { return assembly_.layout().contacts; }
     const Places& places() const { return assembly_.places(); }
     const Train& train() const { return assembly_.train(); }
+
+    template <class Use>
+    void each_coupling_contact(Use&& use) const {
+        for (int c = 0; c < contacts(); ++c)
+            if (places().contacts[c].kind == ContactPlace::coupling) use(c);
+    }
 
     void set_near_event();
     template <class F>
@@ -330,8 +336,8 @@ class SwitchedTrain {
         double sum = 0.0;
         for (std::size_t g = 0; g < train().gears.size(); ++g)
             sum += std::fabs(evaluate(n_, r.output_torque[g], now) - event.gear[g]);
-        for (std::size_t k = 0; k < train().couplings.size(); ++k)
-            sum += std::fabs(evaluate(n_, r.contact_torque[places().couplings[k].contact], now) - event.coupling[k]);
+        each_coupling_contact(
+            [&](int c) { sum += std::fabs(evaluate(n_, r.contact_torque[c], now) - event.coupling[c]); });
         return sum;
     }
     template <class Cache, class Now, class G>

@@ -6,9 +6,10 @@
 
 #include "../elements/angle_torque.hpp"
 #include "../elements/brake.hpp"
+#include "../elements/clutch.hpp"
 #include "../elements/drag.hpp"
+#include "../elements/freewheel.hpp"
 #include "../elements/spring.hpp"
-#include "../parts/coupling.hpp"
 #include "../parts/gear.hpp"
 #include "../parts/linear_controller.hpp"
 #include "../parts/shaft.hpp"
@@ -20,8 +21,10 @@ struct Train {
     std::vector<Shaft> shafts;
     std::vector<ShaftMotor> motors;
     std::vector<Gear> gears;
-    std::vector<Coupling> couplings;
     std::vector<LinearController> controllers;
+    // What joins two shafts and is no gear.
+    std::vector<Clutch> clutches;
+    std::vector<Freewheel> freewheels;
     // What acts on one shaft.
     std::vector<Brake> brakes;
     std::vector<AngleTorque> angle_torques;
@@ -34,9 +37,16 @@ struct Train {
         use("angle_torques", "angle torque", train.angle_torques);
         use("springs", "spring", train.springs);
     }
+    // The same for each kind of what joins two shafts.
+    template <class Self, class Use>
+    static void each_coupling_kind(Self& train, Use&& use) {
+        use("clutches", "clutch", train.clutches);
+        use("freewheels", "freewheel", train.freewheels);
+    }
 };
 
 using ShaftElements = std::vector<std::unique_ptr<ShaftElement>>;
+using CouplingElements = std::vector<std::unique_ptr<CouplingElement>>;
 
 inline ShaftElements shaft_elements(const Train& train) {
     ShaftElements all;
@@ -46,6 +56,14 @@ inline ShaftElements shaft_elements(const Train& train) {
     for (std::size_t s = 0; s < train.shafts.size(); ++s)
         if (const Shaft& shaft = train.shafts[s]; shaft.has_drag())
             all.push_back(std::make_unique<DragOnShaft>(shaft.name, static_cast<int>(s), shaft.drag));
+    return all;
+}
+
+inline CouplingElements coupling_elements(const Train& train) {
+    CouplingElements all;
+    Train::each_coupling_kind(train, [&](const char*, const char*, const auto& elements) {
+        for (const auto& e : elements) all.push_back(between_shafts(e));
+    });
     return all;
 }
 

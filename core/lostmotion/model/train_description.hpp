@@ -38,15 +38,21 @@ class TrainDescription {
         for (Gear& g : train.gears)
             if (g.name == gear) g.housing = place_of(shaft);
     }
-    void add_coupling(const std::string& name, const std::string& input, const std::string& output, double torque,
-                      double breakaway_torque, Coupling::Kind kind) {
-        train.couplings.push_back({name, kind, place_of(input), place_of(output), torque, breakaway_torque});
-    }
     // What acts on one shaft.
     template <class Element>
     void add(Element element, const std::string& shaft) {
         element.shaft = place_of(shaft);
         Train::each_kind(train, [&](const char*, const char*, auto& elements) {
+            if constexpr (std::is_same_v<std::vector<Element>&, decltype(elements)>)
+                elements.push_back(std::move(element));
+        });
+    }
+    // What joins two shafts.
+    template <class Element>
+    void add(Element element, const std::string& input, const std::string& output) {
+        element.input = place_of(input);
+        element.output = place_of(output);
+        Train::each_coupling_kind(train, [&](const char*, const char*, auto& elements) {
             if constexpr (std::is_same_v<std::vector<Element>&, decltype(elements)>)
                 elements.push_back(std::move(element));
         });

@@ -37,7 +37,7 @@ struct ScenarioParameter {
 
 class ScenarioDescription {
  public:
-    static constexpr double mark = 19533.0, version = 2.0;
+    static constexpr double mark = 19533.0, version = 3.0;
     static constexpr std::size_t head = 3;
 
     static std::vector<double> write(Scenario scenario, std::vector<ScenarioParameter> parameters = {}) {

@@ -211,16 +211,6 @@ void describe(F& f, Gear& g) {
 }
 
 template <class F>
-void describe(F& f, Coupling& c) {
-    f.text("name", c.name);
-    f.choice("kind", c.kind, 3);
-    f.integer("input", c.input, 0, max_number);
-    f.integer("output", c.output, 0, max_number);
-    f.number("torque", c.torque, Range::not_negative);
-    f.number("breakaway_torque", c.breakaway_torque, Range::not_negative);
-}
-
-template <class F>
 void describe(F& f, LinearController& c) {
     const auto signal = [&](LinearController::Signal& s) {
         f.choice("kind", s.kind, 4);
@@ -246,7 +236,14 @@ void describe(F& f, Train& t) {
     f.each("shafts", t.shafts, element);
     f.each("motors", t.motors, element);
     f.each("gears", t.gears, element);
-    f.each("couplings", t.couplings, element);
+    Train::each_coupling_kind(t, [&](const char* table, const char*, auto& elements) {
+        f.each(table, elements, [&](auto& e) {
+            f.text("name", e.name);
+            f.integer("input", e.input, 0, max_number);
+            f.integer("output", e.output, 0, max_number);
+            e.describe(f);
+        });
+    });
     f.each("controllers", t.controllers, element);
     Train::each_kind(t, [&](const char* table, const char*, auto& elements) {
         f.each(table, elements, [&](auto& e) {

@@ -33,7 +33,7 @@ def turns(train: DriveTrain, start: str, end: str) -> float | None:
     """How often shaft `start` turns for one turn of `end`, through gears and clutches; None if none lead there."""
     found, waiting = {start: 1.0}, [start]
     joints = [(g.input, g.output, g.ratio) for g in train.fixed_gears().values()]
-    joints += [(c.input, c.output, 1.0) for table in (train.clutches, train.freewheels) for c in table.values()]
+    joints += train.held_together()
     while waiting:
         here = waiting.pop()
         for one, other, ratio in joints:

@@ -81,6 +81,10 @@ class Clutch(Commanded):
             raise ValueError("is a safety clutch, which has no command; remove engagement_delay and release_delay")
         return self
 
+    def core_fields(self) -> dict[str, Any]:
+        """What the core takes, in SI units."""
+        return {"torque": self.torque, "breakaway_torque": self.holding(), "safety": self.kind == "safety"}
+
 
 class Freewheel(Part):
     """A one-way clutch: it drives the output forward and never backward."""
@@ -89,3 +93,7 @@ class Freewheel(Part):
     """shaft"""
     output: str
     """shaft, which may run ahead"""
+
+    def core_fields(self) -> dict[str, Any]:
+        """What the core takes: no values."""
+        return {}

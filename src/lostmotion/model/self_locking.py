@@ -258,8 +258,7 @@ def _growth(names: list[str], rate: np.ndarray) -> tuple[list[complex], float]:
 
 def _joints(train: DriveTrain) -> list[tuple[str, str, float]]:
     """(input, output, ratio) of all that joins two shafts."""
-    couplings = [(c.input, c.output, 1.0) for table in (train.clutches, train.freewheels) for c in table.values()]
-    return [(g.input, g.output, g.ratio) for g in train.fixed_gears().values()] + couplings
+    return [(g.input, g.output, g.ratio) for g in train.fixed_gears().values()] + train.held_together()
 
 
 def _speeds(train: DriveTrain, gear: Gear, speed: float) -> dict[str, float]:

@@ -32,13 +32,17 @@ Elements = Annotated[dict[str, V], AfterValidator(Named)]
 # What acts on one shaft: tables, and what the core calls them (core/lostmotion/model/train.hpp).
 ON_SHAFTS = {"brakes": "brakes", "gravity": "angle_torques", "angle_torques": "angle_torques", "springs": "springs"}
 
+# What joins two shafts and is no gear: tables, by the names that the core has for them.
+COUPLINGS = ("clutches", "freewheels")
+
 # What the core calls an element (core/lostmotion/model/check.hpp), and the tables that it may stand in.
 TABLES = {
     "shaft": ("shafts",),
     "motor": ("motors",),
     "gear": ("gears",),
     "brake": ("brakes",),
-    "coupling": ("clutches", "freewheels"),
+    "clutch": ("clutches",),
+    "freewheel": ("freewheels",),
     "angle torque": ("gravity", "angle_torques"),
     "spring": ("springs",),
 }
@@ -64,6 +68,10 @@ class TrainElements(Part):
     def fixed_gears(self) -> dict[str, Gear]:
         """Gears whose housing stands: the speeds of their two shafts have the ratio."""
         return {name: gear for name, gear in self.gears.items() if gear.housing is None}
+
+    def held_together(self) -> list[tuple[str, str, float]]:
+        """(input, output, 1) of what may hold two shafts at one speed: clutches and freewheels."""
+        return [(c.input, c.output, 1.0) for table in (self.clutches, self.freewheels) for c in table.values()]
 
     def references(self) -> Iterator[tuple[str, str]]:
         """Each key that names a shaft, and the name."""
@@ -135,11 +143,9 @@ class DriveTrain(TrainElements):
             train.add_motor(name, m.shaft, numbers(m.as_dc(), "motor") | dict(changes), torque_source, limit)
         for name, g in self.gears.items():
             add_gear(train, name, g)
-        for name, c in self.clutches.items():
-            add = train.add_clutch if c.kind == "friction" else train.add_safety_clutch
-            add(name, c.input, c.output, c.torque, c.holding())
-        for name, f in self.freewheels.items():
-            train.add_freewheel(name, f.input, f.output)
+        for table in COUPLINGS:
+            for name, coupling in getattr(self, table).items():
+                train.add_coupling(table, name, coupling.input, coupling.output, coupling.core_fields())
         for table, kind in ON_SHAFTS.items():
             for name, element in getattr(self, table).items():
                 train.add(kind, name, element.shaft, element.core_fields())

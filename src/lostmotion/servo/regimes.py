@@ -240,7 +240,7 @@ def _speeds(axis: Axis, v: float, slip: float) -> dict[str, float]:
         (g.input, g.output, g.ratio * (1.0 + (0.0 if isinstance(g.stiffness, Rigid) else slip)))
         for g in train.fixed_gears().values()
     ]
-    joints += [(c.input, c.output, 1.0) for table in (train.clutches, train.freewheels) for c in table.values()]
+    joints += train.held_together()
     while waiting:
         here = waiting.pop()
         for start, end, i in joints:

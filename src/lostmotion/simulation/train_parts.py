@@ -9,7 +9,7 @@ import numpy as np
 
 from ..control.axis import Bound
 from ..inputs.named import Named
-from ..model.train import TrainElements
+from ..model.train import COUPLINGS, TrainElements
 from .train_scenario import TrainInitial, TrainScenario
 
 INSTANT, LEADING = 0, 2  # of a switching: the column of its instant, and how many come before those of contacts
@@ -42,8 +42,8 @@ def _groups(scenario: TrainScenario) -> list[list[str]]:
 
 def _joined(scenario: TrainScenario) -> Iterator[list[str]]:
     """Shafts that something joins."""
-    for table in (scenario.gears, scenario.clutches, scenario.freewheels):
-        for element in table.values():
+    for table in ("gears", *COUPLINGS):
+        for element in getattr(scenario, table).values():
             yield [element.input, element.output, *filter(None, [getattr(element, "housing", None)])]
     last = list(scenario.shafts)[-1]
     for name, controller in scenario.controllers.items():

@@ -1,0 +1,71 @@
+// What joins two shafts and is no gear: what such an element states about itself, for all that is made of a train, as
+// `shaft_element.hpp` for one shaft.
+//
+// It may have a dry contact, which holds its shafts at one speed as long as that takes no more than its capacity, or a
+// torque over the slip speed, or both. A new law is a file of this directory, with its parameters and a class that
+// states them, and its line in `Train`.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "contact_place.hpp"
+#include "regime.hpp"
+
+namespace lostmotion::model {
+
+// The two shafts that an element joins, in forms.
+struct Between {
+    const Terms& terms;
+    Row slip;  // speed of the input less that of the output [rad/s]; no term is left of it while others keep it at zero
+};
+
+// The same at one instant.
+struct CouplingInstant {
+    double slip = 0.0;     // [rad/s]
+    double command = 0.0;  // if the element has one
+};
+
+class CouplingElement {
+ public:
+    CouplingElement(std::string its_name, int its_input, int its_output)
+        : name(std::move(its_name)), input(its_input), output(its_output) {}
+    virtual ~CouplingElement() = default;
+
+    std::string name;
+    int input, output;  // shafts
+    // Where its own stand, of those that it has: given by `Places`.
+    int command = nowhere;  // input
+    int contact = nowhere;
+    int branch = nowhere;  // of its piecewise law
+
+    // What it has.
+    virtual bool has_command() const { return false; }
+    virtual const char* piecewise_law() const { return nullptr; }  // what its branch is a piece of
+    virtual int pieces() const { return 1; }
+    virtual const char* loss() const = 0;  // what its heat is called
+
+    // Its dry contact: the torque, as a magnitude, that it takes while it slips or holds at rest [N m]; of one that
+    // only drives the output forward, backward.
+    virtual bool is_dry() const { return false; }
+    virtual bool is_one_way() const { return false; }
+    virtual bool holds_more() const { return false; }  // at rest than while it slips
+    virtual Row capacity(const Between&, const Key&, bool /*at_rest*/) const { return Row{}; }
+    virtual double capacity(int /*way*/, const CouplingInstant&, bool /*at_rest*/) const { return 0.0; }
+
+    // Torque that it passes on from input to output beside that [N m]; 0 without slip.
+    virtual Row torque(const Between&, const Key&) const { return Row{}; }
+
+    // The branch at an instant, and in steady motion; what ends the regime.
+    virtual int locate(const CouplingInstant&) const { return 0; }
+    virtual int locate_steady(double /*slip*/) const { return 0; }
+    virtual void add_guards(const Between&, const Key&, bool /*slips*/, std::vector<Guard>&) const {}
+
+ protected:
+    CouplingElement(const CouplingElement&) = default;
+
+    int piece(const Key& key) const { return branch == nowhere ? 0 : key.branch[branch]; }
+};
+
+}  // namespace lostmotion::model
