@@ -14,6 +14,7 @@ import lostmotion as lm
 from conftest import ROOT, TRAINS
 from lostmotion.model.angle_torques import TorqueCurve
 from lostmotion.model.parameters import numbers
+from lostmotion.model.shaft import DragCurve
 from lostmotion.model.torsion import Rigid
 from lostmotion.simulation.train_state import start_values
 
@@ -101,6 +102,14 @@ class Train:
             self.add(function, name, k.input, k.output, k.torque, k.breakaway_torque or 0.0)
         for name, f in train.freewheels.items():
             self.add("lm_add_freewheel", name, f.input, f.output)
+        for name, d in train.dampers.items():
+            drag = None
+            if d.drag is not None:
+                assert isinstance(d.drag, DragCurve)
+                breaks = d.drag.speeds[1:-1]
+                slopes = np.diff(d.drag.torques) / np.diff(d.drag.speeds)
+                drag = c.byref(Curve(doubles(breaks), doubles(slopes), len(breaks)))
+            self.add("lm_add_damper", name, d.input, d.output, d.viscous_friction, drag)
         for name, t in train.angle_torques.items():
             assert isinstance(t, TorqueCurve)
             curve = PeriodicCurve(t.period, doubles(t.angles), doubles(t.torques), len(t.angles))

@@ -27,6 +27,7 @@ SOFT = {"input": "a", "output": "b", "ratio": 2.0, "stiffness": {"kind": "linear
 STIFF = {"input": "a", "output": "b", "ratio": 2.0}
 STRIBECK = {"friction_torque": 0.1, "breakaway_torque": 0.2, "stribeck_speed": 1.0, "friction_error": 0.002}
 FAN = {"kind": "quadratic", "coefficient": 1e-5, "max_speed": 300.0, "error": 0.005}
+FLUID = {"kind": "quadratic", "coefficient": 1e-4, "max_speed": 100.0, "error": 0.01}
 GAP = {"kind": "curve", "backlash": 0.1, "slopes": [100.0]}
 PIVOT = {"kind": "linear", "stiffness": 5.0}
 STOPS = {"kind": "curve", "backlash": 0.4, "slopes": [20.0, 80.0], "breaks": [0.05]}
@@ -43,6 +44,21 @@ ELEMENTS = {
     ),
     "safety clutch": two_shafts(clutches={"c": {"kind": "safety", "input": "a", "output": "b", "torque": 0.6}}),
     "freewheel": two_shafts(freewheels={"f": {"input": "a", "output": "b"}}),
+    "damper": two_shafts(dampers={"d": {"input": "a", "output": "b", "viscous_friction": 5e-3}}),
+    "fluid coupling": two_shafts(
+        dampers={"d": {"input": "a", "output": "b", "drag": FLUID}},
+        shafts={"b": {"inertia": 2e-3, "torque": 0.0, "friction_torque": 0.05}},
+    ),
+    "damper beside a clutch": two_shafts(
+        clutches={"c": {"input": "a", "output": "b", "torque": 0.3}},
+        dampers={"d": {"input": "b", "output": "a", "viscous_friction": 2e-3, "drag": FLUID}},
+        command={"c": {"ramps": [{"rise": 1.0, "duration": 0.3, "begin": 0.1}]}},
+    ),
+    "vibration damper": two_shafts(
+        gears={"g": SOFT},
+        shafts={"ring": {"inertia": 1e-3}},
+        dampers={"d": {"input": "b", "output": "ring", "viscous_friction": 5e-3}},
+    ),
     "gravity": two_shafts(gears={"g": SOFT}, gravity={"arm": {"shaft": "b", "mass": 0.5, "radius": 0.2}}),
     "cogging": two_shafts(
         gears={"g": STIFF},

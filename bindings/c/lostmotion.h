@@ -198,6 +198,9 @@ LM_API int lm_add_clutch(lm_train* train, const char* name, const char* input, c
 LM_API int lm_add_safety_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
                                 double breakaway_torque);
 LM_API int lm_add_freewheel(lm_train* train, const char* name, const char* input, const char* output);
+/* Torque over the slip speed: viscous friction [N m s/rad] and a curve [N m] over [rad/s], or NULL. */
+LM_API int lm_add_damper(lm_train* train, const char* name, const char* input, const char* output,
+                         double viscous_friction, const lm_curve* drag);
 LM_API int lm_add_angle_torque(lm_train* train, const char* name, const char* shaft, const lm_periodic_curve* torque);
 /* A spring to the frame: torque over the angle [N m], against it, from rest_angle [rad] on. */
 LM_API int lm_add_spring(lm_train* train, const char* name, const char* shaft, const lm_curve* curve,

@@ -205,6 +205,17 @@ int lm_add_freewheel(lm_train* train, const char* name, const char* input, const
     return add_coupling(*train, lm::model::Freewheel{}, name, input, output);
 }
 
+int lm_add_damper(lm_train* train, const char* name, const char* input, const char* output, double viscous_friction,
+                  const lm_curve* drag) {
+    lm::model::Damper damper;
+    damper.viscous_friction = viscous_friction;
+    if (drag != nullptr) {
+        const auto curve = [&] { return read(*drag, "damper '" + text(name) + "': drag", damper.drag); };
+        if (train->attempt(curve) != LM_OK) return LM_INVALID;
+    }
+    return add_coupling(*train, std::move(damper), name, input, output);
+}
+
 int lm_add_angle_torque(lm_train* train, const char* name, const char* shaft, const lm_periodic_curve* torque) {
     return train->attempt([&] {
         std::string wrong = name_error(*train, name);

@@ -22,6 +22,7 @@ inline Train named(Train t) {
     name(t.brakes, "brake");
     name(t.clutches, "clutch");
     name(t.freewheels, "freewheel");
+    name(t.dampers, "damper");
     name(t.angle_torques, "angle_torque");
     if (t.shafts[0].name.empty()) name(t.shafts, "shaft");
     return t;

@@ -8,8 +8,9 @@ namespace lostmotion::model {
 
 class RandomTrains {
  public:
-    // housings: those of some gears turn; such a train may not be possible.
-    explicit RandomTrains(unsigned seed, bool housings = false) : housings_(housings), random_(seed) {}
+    // housings: those of some gears turn; such a train may not be possible. dampers: between some shafts.
+    explicit RandomTrains(unsigned seed, bool housings = false, bool dampers = false)
+        : housings_(housings), dampers_(dampers), random_(seed) {}
 
     double uniform(double a, double b) { return std::uniform_real_distribution<double>(a, b)(random_); }
     double spread(double a, double b) { return std::exp(uniform(std::log(a), std::log(b))); }
@@ -116,6 +117,7 @@ class RandomTrains {
         put_housings(t);
         for (Gear& g : t.gears)
             if (g.housing >= 0) g.law.viscous_friction = 0.02 * g.law.ratio;
+        if (dampers_) put_dampers(t);
         return t;
     }
 
@@ -264,7 +266,18 @@ class RandomTrains {
         }
     }
 
-    bool housings_;
+    void put_dampers(Train& t) {
+        const int last = static_cast<int>(t.shafts.size()) - 1;
+        for (int n = pick(1, 2); n > 0; --n) {
+            Damper d{"damper", pick(0, last), pick(0, last)};
+            while (d.output == d.input) d.output = pick(0, last);
+            if (coin()) d.drag = Shaft::quadratic_drag(spread(0.05, 0.5), 4.0, 0.1);
+            if (!(d.drag.max_slope() > 0.0) || coin()) d.viscous_friction = spread(0.05, 1.0);
+            t.dampers.push_back(std::move(d));
+        }
+    }
+
+    bool housings_, dampers_;
     std::mt19937_64 random_;
 };
 

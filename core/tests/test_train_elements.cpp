@@ -231,6 +231,94 @@ TEST_CASE("a freewheel takes hold when its input catches up and lets go when it 
     CHECK(run.speed(1) == doctest::Approx(6.0));
 }
 
+TEST_CASE("the slip of two shafts on a damper decays exponentially, their momentum stays, what is lost is heat") {
+    const double J[] = {2.0, 3.0}, d = 0.6;
+    Train t;
+    t.shafts = {shaft(J[0]), shaft(J[1])};
+    t.dampers = {{"damper", 0, 1, d}};
+    TrainRun run(t);
+    run.speed(0) = 5.0;
+    run.speed(1) = -1.0;
+    run.energy = true;
+    REQUIRE(run.layout().contacts == 0);
+    REQUIRE(run.layout().angles == 2);  // it holds nothing together
+    REQUIRE(run.begin());
+    const double before = stored_energy(run.assembly, run.now.x), momentum = J[0] * 5.0 - J[1] * 1.0;
+    for (int k = 1; k <= 5; ++k) {
+        REQUIRE(run.run(k));
+        CHECK(run.speed(0) - run.speed(1) == doctest::Approx(6.0 * std::exp(-d * (1.0 / J[0] + 1.0 / J[1]) * k)));
+        CHECK(J[0] * run.speed(0) + J[1] * run.speed(1) == doctest::Approx(momentum).epsilon(1e-13));
+    }
+    CHECK(run.events.empty());
+    CHECK(run.least_loss >= 0.0);
+    CHECK(stored_energy(run.assembly, run.now.x) - before ==
+          doctest::Approx(run.gained).scale(run.turned_over).epsilon(1e-10));
+}
+
+TEST_CASE("a damper with a curve passes from piece to piece of its drag at the slip of their edge") {
+    const double J = 1.2, steep = 2.0, flat = 0.5, edge = 1.0, from = 4.0;  // J: both inertias in series
+    for (const double way : {1.0, -1.0}) {
+        Train t;
+        t.shafts = {shaft(2.0), shaft(3.0)};
+        t.dampers = {{"damper", 0, 1, 0.0, TorsionCurve({edge}, {steep, flat})}};
+        TrainRun run(t);
+        run.speed(0) = way * from;
+        REQUIRE(run.begin());
+        REQUIRE(run.run(6.0));
+        // J s' = -(flat s + c) down to the edge, then -steep s.
+        const double c = (steep - flat) * edge, at = J / flat * std::log((flat * from + c) / (flat * edge + c));
+        REQUIRE(run.events.size() == 1);
+        CHECK(run.events[0].kind == Guard::edge);
+        CHECK(run.events[0].time == doctest::Approx(at).epsilon(1e-10));
+        CHECK(run.speed(0) - run.speed(1) ==
+              doctest::Approx(way * edge * std::exp(-steep / J * (6.0 - at))).epsilon(1e-9));
+        CHECK(2.0 * run.speed(0) + 3.0 * run.speed(1) == doctest::Approx(way * 2.0 * from).epsilon(1e-13));
+    }
+}
+
+TEST_CASE("a shaft behind a damper does not creep while its friction holds, and turns once the slip overcomes it") {
+    const double J = 2.0, d = 0.8, M = 3.0, T = 2.0;
+    Train t;
+    t.shafts = {shaft(J), shaft(1.0)};
+    t.shafts[1].friction.torque = T;
+    t.motors = {torque_motor(0)};
+    t.dampers = {{"damper", 0, 1, d}};
+    TrainRun run(t);
+    run.inputs[run.command(0)] = {{M}};
+    REQUIRE(run.begin());
+    // w = M/d (1 - exp(-d t/J)) until d w = T.
+    const double at = -J / d * std::log(1.0 - T / M);
+    REQUIRE(run.run(0.99 * at));
+    CHECK(run.mode(0) == 0);
+    CHECK(run.speed(1) == 0.0);
+    CHECK(run.value(run.regime().contact_torque[0]) == doctest::Approx(d * run.speed(0)));
+    REQUIRE(run.run(1.01 * at));
+    REQUIRE(run.events.size() == 1);
+    CHECK(run.events[0].time == doctest::Approx(at).epsilon(1e-10));
+    CHECK(run.speed(1) > 0.0);
+}
+
+TEST_CASE("a damper beside a closed clutch passes nothing on until that slips") {
+    Train t;
+    t.shafts = {shaft(1.0), shaft(3.0)};
+    t.shafts[1].loaded = true;
+    t.clutches = {{"clutch", 0, 1, 6.0, 0.0, true}};
+    t.dampers = {{"damper", 1, 0, 0.3, TorsionCurve({0.1}, {0.0, 2.0})}};
+    TrainRun run(t);
+    run.speed(0) = run.speed(1) = 1.0;
+    run.inputs[run.load(1)] = {{0.0}, {.slope = 2.0, .from = 4.0}};
+    REQUIRE(run.begin());
+    // The clutch alone passes on a quarter of the load, up to 24 N m.
+    REQUIRE(run.run(15.0));
+    CHECK(run.speed(0) == run.speed(1));
+    CHECK(run.value(run.regime().contact_torque[0]) == doctest::Approx(22.0 / 4.0));
+    REQUIRE(run.run(20.0));
+    REQUIRE(run.events.size() == 2);
+    CHECK(run.events[0].time == doctest::Approx(16.0));
+    CHECK(run.events[1].kind == Guard::edge);
+    CHECK(run.speed(0) > run.speed(1) + 0.1);
+}
+
 TEST_CASE("a holding brake stops a shaft, holds its load and lets it go") {
     Train t;
     t.shafts = {shaft(2.0)};

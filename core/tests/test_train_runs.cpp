@@ -50,6 +50,24 @@ TEST_CASE("exact and adaptive solver agree on a thousand random trains of all el
     CHECK(tally.jammed == 0);
 }
 
+TEST_CASE("solvers agree and the laws that every run obeys hold on random trains with dampers") {
+    RandomTrains random(35, false, true);
+    SolverTally solvers;
+    LawTally laws;
+    for (int n = 0; n < 300; ++n) {
+        CAPTURE(n);
+        compare_solvers(random, 6, 0.5, solvers);
+        check_laws(random, 6, 0.4, laws);
+    }
+    MESSAGE(solvers.compared << " trains compared, largest difference " << solvers.worst << "; " << solvers.undecided
+                             << " that the adaptive solver does not settle");
+    CHECK(solvers.compared > 290);
+    CHECK(solvers.failed() == 0);
+    CHECK(laws.runs > 290);
+    CHECK(laws.residual < 1e-9);
+    CHECK(laws.failed() == 0);
+}
+
 // Trains 17, 45 and 98 of this seed: a twist in a loop that others keep at rest, and contacts at their limits that hold
 // more than they take while they slip.
 TEST_CASE("the laws hold where contacts at their limits hold more than they take while they slip") {

@@ -276,6 +276,18 @@ TEST_CASE("the command that turns a motor: what is behind a clutch, a freewheel,
     of = commands(behind, {0.0, 0.0});
     CHECK(of[0].command_forward == std::numeric_limits<double>::infinity());
     CHECK(of[0].command_backward == -std::numeric_limits<double>::infinity());
+    // A damper passes nothing on to a shaft that turns with its own as slowly, but lets one that turns act on it.
+    Train damped = t;
+    damped.gears = {slow};
+    damped.dampers = {{"damper", 2, 0, 0.3}};
+    CHECK(commands(damped, {0.0, 1.0})[0].command_forward == doctest::Approx(1.25 / 1.6 + 0.5).epsilon(1e-14));
+    damped.shafts[2].name = "turning";
+    TrainSimulation s(damped, 1e-3);
+    REQUIRE(s.reset({{{"turning_speed", 1.0}}, {}}) == "");
+    REQUIRE(s.advance(1e-9, Values{0.0, 0.0}, Values{0.0, 0.0}) == Status::done);
+    of = explain_motors(s.assembly(), point(s));
+    CHECK(of[0].command_forward == doctest::Approx(1.25 / 1.6 + 0.5 - 0.3).epsilon(1e-8));
+    CHECK(of[0].command_backward == doctest::Approx(-1.25 / 1.6 - 0.5 - 0.3).epsilon(1e-8));
     Train loop = chain;
     loop.gears.push_back(spring(0, 2, 8.0, TorsionCurve({}, {100.0})));
     CHECK(std::isnan(commands(loop, {0.0, 0.0})[0].command_forward));

@@ -318,6 +318,14 @@ class TrainSteps {
             if (input == s) row.add(torque_of(static_cast<int>(k)), -1.0);
             if (output == s) row.add(torque_of(static_cast<int>(k)), 1.0);
         }
+        for (const Damper& d : train_.dampers) {
+            if (d.input != s && d.output != s) continue;
+            const double way = d.input == s ? -1.0 : 1.0, slip = speed[at(d.input)] - speed[at(d.output)];
+            const double per_slip = d.drag.slope(d.drag.locate(slip));
+            row.one += way * (d.drag.torque(slip) - per_slip * slip);
+            row.c[at(d.input)] += way * (per_slip + d.viscous_friction);
+            row.c[at(d.output)] -= way * (per_slip + d.viscous_friction);
+        }
         for (const AngleTorque& t : train_.angle_torques)
             if (t.shaft == s) row.one += t.torque(angle[at(s)] + 0.5 * h_ * speed[at(s)]);
         const TorsionCurve& drag = train_.shafts[at(s)].drag;

@@ -67,6 +67,7 @@ if TYPE_CHECKING:
     from .model.couplings import Brake as Brake
     from .model.couplings import Clutch as Clutch
     from .model.couplings import Freewheel as Freewheel
+    from .model.dampers import Damper as Damper
     from .model.drive import Drive as Drive
     from .model.gear import Gear as Gear
     from .model.gearbox import Gearbox as Gearbox
@@ -206,6 +207,7 @@ _HOMES = {
     "live_page.notebook": ("LivePage", "live"),
     "model.angle_torques": ("ErrorCurve", "ErrorHarmonic", "Gravity", "TorqueCurve", "TorqueHarmonic"),
     "model.couplings": ("Brake", "Clutch", "Freewheel"),
+    "model.dampers": ("Damper",),
     "model.drive": ("Drive",),
     "model.gear": ("Gear",),
     "model.gearbox": ("Gearbox", "GearboxLimits"),

@@ -4,9 +4,10 @@
 // everything that gears and clutches join to its shaft, each shaft against its load, its dry friction and the other
 // motors, whose commands stay. The hardest point on the way of each gear counts. A gear driven from its output turns
 // the motor behind it, unless it locks itself; a clutch slips where its capacity is less than what is behind it needs.
-// Torques over angles are those of the present angles. Without a branch that is exact, of any length; where shafts turn
-// several gears, it is too as long as each gear needs more torque on its input the more it is loaded (a self-locking
-// one that overruns needs less), else it is an upper bound.
+// Torques over angles are those of the present angles, and a damper turns a shaft at rest as its other one moves.
+// Without a branch that is exact, of any length; where shafts turn several gears, it is too as long as each gear needs
+// more torque on its input the more it is loaded (a self-locking one that overruns needs less), else it is an upper
+// bound.
 #pragma once
 
 #include <cmath>
@@ -21,7 +22,7 @@ class Breakaway {
  public:
     // now: a point of a motion in the regime r.
     Breakaway(const model::Assembly& a, const model::Regime& r, const model::Instant& now)
-        : assembly_(a), train_(a.train()), key_(r.key), now_(now) {
+        : assembly_(a), train_(a.train()), key_(r.key), ties_(r.ties), now_(now) {
         for (const model::Row& T : r.output_torque) T_2_.push_back(model::evaluate(a.layout(), T, now));
     }
     // Forward s = +1, backward s = -1. Infinite if no command turns it; NaN if it turns a loop or a gear whose housing
@@ -73,8 +74,16 @@ class Breakaway {
         for (const auto& e : assembly_.places().acting)
             if (e->shaft == shaft && e->acts_at_rest())
                 sum += model::evaluate(assembly_.layout(), e->torque(assembly_.site(shaft), key_), now_);
+        if (ties_.at_rest[static_cast<std::size_t>(shaft)])
+            for (const auto& c : assembly_.places().couplings) sum += passed_on(*c, shaft);
         const int load = assembly_.places().shafts[static_cast<std::size_t>(shaft)].load;
         return load == model::nowhere ? sum : sum - input(load);
+    }
+    // To a shaft at rest, by the slip of another one.
+    double passed_on(const model::CouplingElement& c, int shaft) const {
+        if (c.input != shaft && c.output != shaft) return 0.0;
+        const double torque = model::evaluate(assembly_.layout(), c.torque(assembly_.between(c, ties_), key_), now_);
+        return c.output == shaft ? torque : -torque;
     }
     double torque_at_rest(std::size_t m) const {
         const model::ShaftMotor& motor = train_.motors[m];
@@ -155,6 +164,7 @@ class Breakaway {
     const model::Assembly& assembly_;
     const model::Train& train_;
     model::Key key_;
+    model::Ties ties_;
     model::Instant now_;
     std::vector<double> T_2_;
     std::vector<bool> visited_;

@@ -23,7 +23,7 @@ class DragOnShaft final : public ShaftElement {
 
     bool acts_at_rest() const override { return false; }
     Row torque(const Site& on, const Key& key) const override {
-        return -(on.speed(curve_.slope(piece(key))) + on.terms.one(curve_.offset(piece(key))));
+        return -on_piece(on.terms, on.speed(), curve_, piece(key));
     }
     double torque(const ShaftInstant& now) const override { return -curve_.torque(now.speed); }
     int locate(const ShaftInstant& now) const override { return curve_.locate(now.speed); }

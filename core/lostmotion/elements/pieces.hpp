@@ -1,4 +1,4 @@
-// Where a variable leaves its piece of a curve.
+// The pieces of a curve: its value on one, and where a variable leaves it.
 #pragma once
 
 #include <vector>
@@ -9,6 +9,11 @@
 #include "regime.hpp"
 
 namespace lostmotion::model {
+
+// The value of a curve on its piece k.
+inline Row on_piece(const Terms& terms, const Row& variable, const TorsionCurve& curve, int k) {
+    return curve.slope(k) * variable + terms.one(curve.offset(k));
+}
 
 inline void add_piece_guards(const Terms& terms, const Row& variable, const TorsionCurve& curve, int branch,
                              const Key& key, std::vector<Guard>& guards) {

@@ -37,8 +37,7 @@ class SpringOnShaft final : public ShaftElement {
     const char* source() const override { return "spring"; }
 
     Row torque(const Site& on, const Key& key) const override {
-        const int k = piece(key);
-        return -(law_.curve.slope(k) * extension(on) + on.terms.one(law_.curve.offset(k)));
+        return -on_piece(on.terms, extension(on), law_.curve, piece(key));
     }
     double torque(const ShaftInstant& now) const override { return -law_.curve.torque(now.angle - law_.rest_angle); }
     int locate(const ShaftInstant& now) const override { return law_.curve.locate(now.angle - law_.rest_angle); }

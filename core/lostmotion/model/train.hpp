@@ -7,6 +7,7 @@
 #include "../elements/angle_torque.hpp"
 #include "../elements/brake.hpp"
 #include "../elements/clutch.hpp"
+#include "../elements/damper.hpp"
 #include "../elements/drag.hpp"
 #include "../elements/freewheel.hpp"
 #include "../elements/spring.hpp"
@@ -25,6 +26,7 @@ struct Train {
     // What joins two shafts and is no gear.
     std::vector<Clutch> clutches;
     std::vector<Freewheel> freewheels;
+    std::vector<Damper> dampers;
     // What acts on one shaft.
     std::vector<Brake> brakes;
     std::vector<AngleTorque> angle_torques;
@@ -42,6 +44,7 @@ struct Train {
     static void each_coupling_kind(Self& train, Use&& use) {
         use("clutches", "clutch", train.clutches);
         use("freewheels", "freewheel", train.freewheels);
+        use("dampers", "damper", train.dampers);
     }
 };
 

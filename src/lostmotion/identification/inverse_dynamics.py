@@ -101,6 +101,8 @@ def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, po
     for gear in scenario.gears.values():
         n = ratios[gear.input]
         inertia, viscous = inertia + n**2 * gear.inertia, viscous + n**2 * gear.viscous_friction
+    for damper in scenario.dampers.values():
+        viscous += (ratios[damper.input] - ratios[damper.output]) ** 2 * damper.viscous_friction
     for name, motor in scenario.motors.items():
         n = ratios[motor.shaft]
         inertia += n**2 * motor.rotor_inertia
@@ -128,9 +130,10 @@ def _check(scenario: TrainScenario) -> None:
         )
         if not lossless or gear.transmission_error is not None:
             raise InputError(f"gears.{name} has losses over the load or a transmission error")
-    for name, shaft in scenario.shafts.items():
-        if shaft.drag is not None:
-            raise InputError(f"shafts.{name} has a drag over the speed")
+    for table in ("shafts", "dampers"):
+        for name, element in getattr(scenario, table).items():
+            if element.drag is not None:
+                raise InputError(f"{table}.{name} has a drag over the speed")
 
 
 def _motor_torque(

@@ -76,9 +76,9 @@ def _in_windows(rig: Rig, log: Prepared, point: Point, rung: int, length: float,
     known = {**log.facts, **point.of(log)}
     built = rig.built(rig.changes(known, rung, log.segments[0].phase))
     scenario = built.scenario
-    if scenario.axes() or built.remembers or scenario.clutches or scenario.freewheels:
+    if scenario.axes() or built.remembers or scenario.clutches or scenario.freewheels or scenario.dampers:
         raise InputError(
-            "key fit.horizon: the rig has a controller with states of its own or a clutch, whose state no angle shows; "
+            "key fit.horizon: the rig has a controller with states of its own, a clutch or a damper, whose state no angle shows; "
             "leave fit.horizon out"
         )
     time, angle = measured_course(rig, log, position.channel, known)

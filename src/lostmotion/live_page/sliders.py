@@ -113,6 +113,7 @@ TABLES = (
     "shafts",
     "brakes",
     "clutches",
+    "dampers",
     "springs",
     "controller",
     "controllers",

@@ -257,13 +257,24 @@ def _growth(names: list[str], rate: np.ndarray) -> tuple[list[complex], float]:
 
 
 def _joints(train: DriveTrain) -> list[tuple[str, str, float]]:
-    """(input, output, ratio) of all that joins two shafts."""
+    """(input, output, ratio) of all that joins two shafts at a ratio."""
     return [(g.input, g.output, g.ratio) for g in train.fixed_gears().values()] + train.held_together()
 
 
 def _speeds(train: DriveTrain, gear: Gear, speed: float) -> dict[str, float]:
-    """Speeds of all shafts that turn with the input of a gear."""
-    speeds, waiting = {gear.input: speed}, [gear.input]
+    """Speeds of all shafts that turn with the input of a gear; what only a damper joins to them turns along without slip."""
+    speeds: dict[str, float] = {}
+    ends = [ends for d in train.dampers.values() for ends in ((d.input, d.output), (d.output, d.input))]
+    dragged = [(gear.input, speed)]
+    while dragged:
+        _turn(train, *dragged[0], speeds)
+        dragged = [(there, speeds[here]) for here, there in ends if here in speeds and there not in speeds]
+    return speeds
+
+
+def _turn(train: DriveTrain, shaft: str, speed: float, speeds: dict[str, float]) -> None:
+    """Sets the speeds of a shaft and of all that it is joined to."""
+    speeds[shaft], waiting = speed, [shaft]
     while waiting:
         shaft = waiting.pop()
         for one, other, ratio in _joints(train):
@@ -271,7 +282,6 @@ def _speeds(train: DriveTrain, gear: Gear, speed: float) -> dict[str, float]:
                 if here == shaft and there not in speeds:
                     speeds[there] = factor * speeds[here]
                     waiting.append(there)
-    return speeds
 
 
 def _path(train: DriveTrain, gear: Gear) -> list[str]:

@@ -1,4 +1,4 @@
-"""A drive train: shafts joined by gears and clutches, turned by motors, held by brakes, as frozen objects in SI units."""
+"""A drive train: shafts joined by gears, clutches and dampers, turned by motors, held by brakes, as frozen objects in SI units."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from ..inputs.part import Part
 from ..inputs.validation import did_you_mean, shown
 from .angle_torques import AngleTorque, Gravity
 from .couplings import Brake, Clutch, Freewheel
+from .dampers import Damper
 from .gear import Gear
 from .losses import LossMap, MeshEfficiency, WormMesh
 from .motor import ShaftMotor
@@ -33,7 +34,7 @@ Elements = Annotated[dict[str, V], AfterValidator(Named)]
 ON_SHAFTS = {"brakes": "brakes", "gravity": "angle_torques", "angle_torques": "angle_torques", "springs": "springs"}
 
 # What joins two shafts and is no gear: tables, by the names that the core has for them.
-COUPLINGS = ("clutches", "freewheels")
+COUPLINGS = ("clutches", "freewheels", "dampers")
 
 # What the core calls an element (core/lostmotion/model/check.hpp), and the tables that it may stand in.
 TABLES = {
@@ -43,6 +44,7 @@ TABLES = {
     "brake": ("brakes",),
     "clutch": ("clutches",),
     "freewheel": ("freewheels",),
+    "damper": ("dampers",),
     "angle torque": ("gravity", "angle_torques"),
     "spring": ("springs",),
 }
@@ -56,6 +58,7 @@ class TrainElements(Part):
     brakes: Elements[Brake] = Field(default_factory=nothing)
     clutches: Elements[Clutch] = Field(default_factory=nothing)
     freewheels: Elements[Freewheel] = Field(default_factory=nothing)
+    dampers: Elements[Damper] = Field(default_factory=nothing)
     gravity: Elements[Gravity] = Field(default_factory=nothing)
     angle_torques: Elements[AngleTorque] = Field(default_factory=nothing)
     springs: Elements[Spring] = Field(default_factory=nothing)

@@ -369,7 +369,8 @@ def _why_several_regimes_of(train: DriveTrain, core: _core.Train) -> str:
         f"dry contacts: {', '.join(dry)}": bool(dry),
         "a torsion curve of several pieces": curves,
         "a limit of a motor": limits,
-        "drag over speed": any(s.drag is not None for s in shafts),
+        "drag over speed": any(s.drag is not None for s in shafts)
+        or any(d.drag is not None for d in train.dampers.values()),
         "a torque over an angle": bool(train.gravity or train.angle_torques),
         "a spring of several pieces": any(len(s.stiffness.pieces()[1]) > 1 for s in train.springs.values()),
         "a transmission error": any(g.transmission_error is not None for g in gears),

@@ -94,7 +94,7 @@ class MotorState:
 
     The motor is thought to wind up slowly all that it has to turn, from the present torques of the gears: each shaft that
     gears and clutches join to its own, against its load, its friction and the other motors, whose commands stay; clutches slip
-    at their capacity. Inertia is left out, torques over angles are those of the present angles. Exact in trains without branches,
+    at their capacity, a damper turns a shaft at rest as its other shaft moves now. Inertia is left out, torques over angles are those of the present angles. Exact in trains without branches,
     and with them unless a self-locking gear overruns beside another (then an upper bound); docs/drive-trains.md says more.
     """
 

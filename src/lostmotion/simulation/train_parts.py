@@ -21,7 +21,7 @@ SUMS = ("residual", "stored_change", "turned_over")  # of the ledger, over all e
 def parts_of(scenario: TrainScenario) -> list[TrainScenario]:
     """The trains that a scenario consists of, in the order of their first shafts; most often itself alone.
 
-    Shafts belong together that a gear, its housing, a clutch, a freewheel, or a controller joins.
+    Shafts belong together that a gear, its housing, a clutch, a freewheel, a damper, or a controller joins.
     """
     groups = _groups(scenario)
     return [scenario] if len(groups) == 1 else [_part(scenario, shafts) for shafts in groups]

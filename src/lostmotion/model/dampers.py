@@ -1,0 +1,36 @@
+"""Dampers between two shafts: viscous and fluid couplings, eddy-current couplings, torsional vibration dampers."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self
+
+from pydantic import Field, model_validator
+
+from .. import _core
+from ..inputs.part import Part
+from ..inputs.quantities import NotNegative, ViscousFriction
+from .shaft import DragCurve, QuadraticDrag
+
+
+class Damper(Part):
+    """A torque over the slip, the speed of the input less that of the output: it drives the output and brakes the input."""
+
+    input: str
+    """shaft"""
+    output: str
+    """shaft"""
+    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
+    """torque over the slip, in proportion"""
+    drag: Annotated[DragCurve | QuadraticDrag, Field(discriminator="kind")] | None = None
+    """torque over the magnitude of the slip, in addition"""
+
+    @model_validator(mode="after")
+    def _has_a_torque(self) -> Self:
+        if self.drag is None and not self.viscous_friction:
+            raise ValueError("has no torque at any slip; give viscous_friction or drag")
+        return self
+
+    def core_fields(self) -> dict[str, Any]:
+        """What the core takes, in SI units."""
+        drag = _core.TorsionCurve([], [0.0]) if self.drag is None else self.drag.core()
+        return {"viscous_friction": self.viscous_friction, "drag": drag}
