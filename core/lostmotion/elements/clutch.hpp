@@ -37,7 +37,6 @@ class ClutchBetweenShafts final : public CouplingElement {
 
     bool has_command() const override { return !law_.safety; }
     const char* piecewise_law() const override { return has_command() ? "limit of the command" : nullptr; }
-    const char* loss() const override { return "coupling"; }
 
     bool is_dry() const override { return true; }
     bool holds_more() const override { return law_.holding() > law_.torque; }

@@ -44,7 +44,7 @@ class CouplingElement {
     virtual bool has_command() const { return false; }
     virtual const char* piecewise_law() const { return nullptr; }  // what its branch is a piece of
     virtual int pieces() const { return 1; }
-    virtual const char* loss() const = 0;  // what its heat is called
+    virtual const char* loss() const { return "coupling"; }  // what its heat is called
 
     // Its dry contact: the torque, as a magnitude, that it takes while it slips or holds at rest [N m]; of one that
     // only drives the output forward, backward.

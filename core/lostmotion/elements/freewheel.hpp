@@ -21,8 +21,6 @@ class FreewheelBetweenShafts final : public CouplingElement {
  public:
     explicit FreewheelBetweenShafts(const Freewheel& law) : CouplingElement(law.name, law.input, law.output) {}
 
-    const char* loss() const override { return "coupling"; }
-
     bool is_dry() const override { return true; }
     bool is_one_way() const override { return true; }
     double capacity(int way, const CouplingInstant&, bool) const override {
