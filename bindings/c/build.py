@@ -40,6 +40,8 @@ FMU_SOURCES = [
 ]
 # Each FMU and each platform adds to its size: no functions but those of FMI, no tables for exceptions.
 FMU_FLAGS = (*FLAGS, "-DLM_API=", "-ffunction-sections", "-fdata-sections", "-fno-unwind-tables")
+# Of the kernels of FMUs: a twentieth smaller; a step of 0.35 us takes 0.03 us more.
+FMU_KERNEL_FLAGS = ("-mllvm", "-inline-threshold=60", "-mllvm", "-unroll-threshold=40")
 # Of a live page, beside the kernel of its drive: nothing else.
 PAGE_SOURCES = [s for s in INTERFACE if s.stem in ("run", "explanation", "scenario", "freestanding")]
 # With the oldest C library that the libraries for Linux need, and the extension of their names.
@@ -173,7 +175,7 @@ def fmu_library(to: Path, platform: str, kernel: str, optimisation: str = "-O2")
     arguments = ["-target", target, "-mcpu=baseline", *([] if "windows" in platform else ["-fPIC"])]
     flags, directory = (*FMU_FLAGS, f"-DLOSTMOTION_KERNEL={kernel}"), ROOT / "build" / "fmu" / platform / kernel
     made = [
-        compiled([KERNELS[kernel]], arguments, optimisation, directory, flags),
+        compiled([KERNELS[kernel]], arguments, optimisation, directory, (*flags, *FMU_KERNEL_FLAGS)),
         compiled(FMU_SOURCES, arguments, "-Oz", directory, flags),
     ]
     unfinished = library.with_suffix(".unfinished")
