@@ -37,6 +37,12 @@ double ExactSolver<System>::first_turn(Entry& e, double limit) {
                 for (int i = 0; i < D::inputs; ++i) bound += std::fabs(torque.c[D::first_input + i]) * input_bound_[i];
                 const double K = std::fmax(0.0, -b) + bound * h / 3.0;
                 if (v + step * (a - 0.5 * K * step) >= 0.0) continue;
+                if (v == 0.0 && a == 0.0) {
+                    // b s^2/2 - bound s^3/6 at least; without b as well, a torque that changes within rounding so soon.
+                    if (b < 0.0) return at.time();
+                    step = std::min(step, b > 0.0 ? 3.0 * b / bound : 0x1p-12 * h);
+                    continue;
+                }
                 step = K > 0.0 ? (a + std::sqrt(a * a + 2.0 * K * v)) / K : -v / a;
             }
             at.advance(std::fmax(step, std::nextafter(at.time(), limit) - at.time()));
