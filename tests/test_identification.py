@@ -14,17 +14,18 @@ from identification_logs import NOISE, SERVO, TRUTH, servo_plans, servo_task, wr
 from identification_round_trips import round_trip
 from lostmotion.data_sheets.records import read_sheets
 from lostmotion.identification.engine import Engine, Point
+from lostmotion.identification.fit import search
 from lostmotion.identification.formulas import Formula
 from lostmotion.identification.identifiability import _sentence
 from lostmotion.identification.identify import IdentificationResult, identify_task
 from lostmotion.identification.intervals import reach
-from lostmotion.identification.ladder import free_on, start_point
+from lostmotion.identification.ladder import RungResult, chosen, free_on, problem_of, start_point
 from lostmotion.identification.logs import Channel
 from lostmotion.identification.parameters import FreeParameter
 from lostmotion.identification.prepare import prepared, read_all
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
-from lostmotion.reports.identification import loss_curves
+from lostmotion.reports.identification import loss_curves, write_identification
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +73,63 @@ def test_the_answer_is_a_scenario_and_a_data_sheet(found: IdentificationResult, 
     (record,) = read_sheets(sheet)
     source = record.source_of("losses")
     assert source is not None and source.status == "identified"
+
+
+@pytest.fixture(scope="module")
+def failing(logs: Path) -> IdentificationResult:
+    """The friction of the upper rung is `level`, of a log held out 0.25 N*m less, which is negative near the truth of 0.06 N*m."""
+    data = servo_task(logs).model_dump()
+    data["logs"]["files"] = [str(logs / "00[0-4].json")]
+    data["parameters"]["level"] = {"start": 0.3, "max": 1.0, "scale": 0.05}
+    levelled = {"shafts.rotor.friction_torque": "level - 0.25*(kp == 8)"}
+    lowest = ["coulomb_friction", "dead_time"]
+    data["ladder"] = [
+        {"name": "lower", "free": lowest},
+        {"name": "upper", "free": ["level", "resistance", "torque_constant", "armature"], "set": levelled},
+    ]
+    return identify_task(Identification(**data), SERVO, threads=1)
+
+
+def test_a_rung_without_a_run_of_a_log_held_out_is_not_taken(failing: IdentificationResult, tmp_path: Path) -> None:
+    lower, upper = failing.rungs
+    assert upper.fit.point.values["level"] < 0.25 and upper.train < lower.train  # nearer to the logs fitted
+    assert not lower.failed and list(upper.failed) == [e.log for e in failing.errors if e.held_out]
+    assert failing.chosen == 0
+    (said,) = failing.failures()
+    assert "upper: 2 of 2 logs held out without a run, so that this rung is not taken: 001.json, 004.json" in said
+    assert "friction_torque" in said and said in str(failing)
+    page = write_identification(tmp_path, "servo", failing).read_text()
+    assert "(2 without a run)" in page and "of 2 logs held out without a run" in page
+
+
+def test_logs_without_a_run_have_no_error_and_are_said(failing: IdentificationResult, tmp_path: Path) -> None:
+    """The only rung that there is: it is taken, and the page is written without this log."""
+    alone = replace(failing, chosen=1)
+    assert np.isnan(alone.error(held_out=True)).all() and "0 logs held out" not in str(alone)
+    assert "not taken" not in alone.failures()[0]
+    page = write_identification(tmp_path, "servo", alone).read_text()
+    assert "no run" in page
+    assert "001.json,position,held out,no run,," in (tmp_path / "errors.csv").read_text()
+
+
+def test_fewer_logs_without_a_run_come_before_a_small_error(failing: IdentificationResult) -> None:
+    def rung(error: float, *failed: str) -> RungResult:
+        return replace(failing.rungs[0], held_out=error, failed=dict.fromkeys(failed, "why"))
+
+    assert chosen([rung(1.0), rung(0.1, "a")]) == 0
+    assert chosen([rung(0.1, "a"), rung(1.0)]) == 1
+    assert chosen([rung(1.0, "a"), rung(0.5, "b"), rung(0.1, "a", "b")]) == 1
+
+
+def test_a_run_that_fails_at_the_start_values_names_its_log(logs: Path) -> None:
+    task = servo_task(logs)
+    rig = Rig(task, SERVO)
+    prepared_logs = [prepared(task, log, rig.units) for log in read_all(task, SERVO)]
+    point = start_point(task, prepared_logs)
+    wrong = replace(point, nuisance={"002.json": {"coulomb_friction": -1.0}})
+    problem = problem_of(rig, Engine(rig, threads=1), prepared_logs, 0)
+    with pytest.raises(lm.InputError, match=r"002\.json: has no run at the start values of .*friction_torque"):
+        search(problem, wrong, iterations=1)
 
 
 def test_a_product_that_alone_is_determined_is_named(logs: Path) -> None:

@@ -48,10 +48,13 @@ class Engine:
         """by parameter: why its derivatives are differences"""
         self.touching: dict[str, str] = {}
         """by log: why its derivatives are differences from some instant on, where they were last asked for"""
+        self.failed: dict[str, str] = {}
+        """by log: why it has no run, where residuals were last asked for"""
 
     def residuals(self, logs: Sequence[Prepared], point: Point, rung: int) -> list[np.ndarray]:
         """Of each log measured less computed, times the weights of the samples, one row for each measured channel, SI; NaN where the rig has no motion."""
-        return self._residuals([(log, point.of(log)) for log in logs], rung)
+        rows, self.failed = self._residuals([(log, point.of(log)) for log in logs], rung)
+        return rows
 
     def jacobians(
         self, logs: Sequence[Prepared], point: Point, rung: int, parameters: Mapping[str, FreeParameter]
@@ -103,13 +106,22 @@ class Engine:
             above, below = min(values[name] + h, p.max), max(values[name] - h, p.min)
             work += [(log, {**values, name: above}), (log, {**values, name: below})]
             widths.append(above - below)
-        rows = self._residuals(work, rung) if work else []
+        rows = self._residuals(work, rung)[0] if work else []
         return [(a - b) / w for a, b, w in zip(rows[::2], rows[1::2], widths, strict=True)]
 
-    def _residuals(self, requests: Sequence[tuple[Prepared, Mapping[str, float]]], rung: int) -> list[np.ndarray]:
+    def _residuals(
+        self, requests: Sequence[tuple[Prepared, Mapping[str, float]]], rung: int
+    ) -> tuple[list[np.ndarray], dict[str, str]]:
+        """Of each request; and by log why it has no run."""
         self.runs += len(requests)
         found = run_logs(self.rig, requests, rung, threads=self.threads)
-        return [
+        failed = {
+            log.name: str(seen.error or "the run has no finite values")
+            for (log, _), seen in zip(requests, found, strict=True)
+            if seen.error is not None or not np.isfinite(seen.values).all()
+        }
+        rows = [
             (np.array([log.measured[name] for name in log.measured]) - seen.values) * log.weight
             for (log, _), seen in zip(requests, found, strict=True)
         ]
+        return rows, failed

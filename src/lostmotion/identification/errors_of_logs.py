@@ -27,7 +27,7 @@ class LogError:
 
 
 def log_errors(logs: Sequence[Prepared], residuals: Sequence[np.ndarray]) -> list[LogError]:
-    """Of each log and each measured channel, of residuals with their weights; the errors are without."""
+    """Of each log and each measured channel, of residuals with their weights; the errors are without. NaN of a log that has no run."""
     found = []
     for log, rows in zip(logs, residuals, strict=True):
         for (name, measured), r in zip(log.measured.items(), rows / log.weight, strict=True):
@@ -39,8 +39,8 @@ def log_errors(logs: Sequence[Prepared], residuals: Sequence[np.ndarray]) -> lis
 
 
 def total(errors: Sequence[LogError], *, held_out: bool, channel: str) -> tuple[float, float]:
-    """(MAE, RMSE) over all samples of some logs; NaN where there are none."""
-    own = [e for e in errors if e.held_out == held_out and e.channel == channel]
+    """(MAE, RMSE) over all samples of some logs that have a run; NaN where there are none."""
+    own = [e for e in errors if e.held_out == held_out and e.channel == channel and not np.isnan(e.mae)]
     n = sum(e.samples for e in own)
     if n == 0:
         return float("nan"), float("nan")

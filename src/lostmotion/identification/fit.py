@@ -12,7 +12,6 @@ from ..errors import InputError
 from .engine import Engine, Point
 from .parameters import FreeParameter
 from .prepare import Prepared
-from .runs import run_log
 from .task import FitOptions
 
 NORMAL = 1.2533  # of the mean of the magnitude of normally distributed errors, to their standard deviation
@@ -208,10 +207,11 @@ def search(
         The rig has no motion at the start, or no log can be run.
     """
     residuals = problem.engine.residuals(problem.logs, start, problem.rung)
-    for log, r in zip(problem.logs, residuals, strict=True):
-        if not np.isfinite(r).all():
-            run_log(problem.engine.rig, log, start.of(log), problem.rung)  # raises what is wrong
-            raise InputError(f"{log.name}: the run of the rig has no finite values at the start values")
+    for name, why in problem.engine.failed.items():
+        model = problem.engine.rig.rungs()[problem.rung].name
+        raise InputError(
+            f'{name}: has no run at the start values of "{model}": {why}; start elsewhere, or leave it out'
+        )
     point, damping, history = start, 1e-3, []
     names = list(problem.parameters)
     done = small = 0

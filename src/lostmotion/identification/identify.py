@@ -91,7 +91,7 @@ class IdentificationResult:
 
     def lines(self) -> list[str]:
         """The answer as text."""
-        lines = [f"{self.rungs[self.chosen].name}: the rung that is taken"]
+        lines = [f"{self.rungs[self.chosen].name}: the rung that is taken", *(f"  {text}" for text in self.failures())]
         for name, p in self.task.parameters.items():
             if name not in self.intervals:
                 continue
@@ -102,10 +102,25 @@ class IdentificationResult:
             for held_out, what in ((False, "fitted"), (True, "held out")):
                 mae, rmse = self.error(channel, held_out=held_out)
                 if not math.isnan(mae):
-                    n = sum(e.held_out == held_out and e.channel == channel for e in self.errors)
+                    own = [e for e in self.errors if e.held_out == held_out and e.channel == channel]
+                    n = sum(not math.isnan(e.mae) for e in own)
                     lines.append(f"  {channel}, {n} logs {what}: MAE {mae:.5g}, RMSE {rmse:.5g}")
         lines += [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
         return lines + [f"  {text}" for text in [*self.differences(), *self.starts()]]
+
+    def failures(self) -> list[str]:
+        """Logs held out that have no run on a rung, and why; a rung with fewer of them is taken before it."""
+        count = sum(log.held_out for log in self.logs)
+        least = len(self.rungs[self.chosen].failed)
+        found = []
+        for rung in self.rungs:
+            if rung.failed:
+                first, why = next(iter(rung.failed.items()))
+                less = ", so that this rung is not taken" if len(rung.failed) > least else ""
+                found.append(
+                    f"{rung.name}: {len(rung.failed)} of {count} logs held out without a run{less}: {', '.join(rung.failed)} ({first}: {why})"
+                )
+        return found
 
     def differences(self) -> list[str]:
         """Where the derivatives were differences of runs, and why."""
@@ -258,10 +273,13 @@ def _resting(problem: Problem, fit: Fit) -> list[Undetermined]:
 
 
 def residual_table(result: IdentificationResult, variables: tuple[str, ...] = ()) -> dict[str, dict[str, np.ndarray]]:
-    """By log: time, measured and computed channels, and variables of the rig along the run."""
+    """By log: time, measured and computed channels, and variables of the rig along the run; NaN of a log that has no run."""
     assert result.rig is not None
     out = {}
     for log in result.logs:
-        run = run_log(result.rig, log, result.values_for(log.name), result.chosen, variables)
+        if log.name in result.rungs[result.chosen].failed:
+            run = {name: np.full(len(log.time), np.nan) for name in (*log.measured, *variables)}
+        else:
+            run = run_log(result.rig, log, result.values_for(log.name), result.chosen, variables)
         out[log.name] = {"time": log.time, **{f"measured {n}": v for n, v in log.measured.items()}, **run}
     return out

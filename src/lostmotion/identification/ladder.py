@@ -34,7 +34,14 @@ class RungResult:
     train: float
     """mean absolute error in units of the deviations, or SI of the only channel"""
     held_out: float
-    """the same of the logs held out; NaN without such"""
+    """the same of the logs held out that have a run; NaN without such"""
+    failed: dict[str, str]
+    """by log held out that has no run with the values of this rung: why"""
+
+    @property
+    def error(self) -> float:
+        """By which rungs are compared: that of the logs held out, or where there is none, of those fitted."""
+        return self.train if math.isnan(self.held_out) else self.held_out
 
 
 def free_on(task: Identification, rung: int) -> dict[str, FreeParameter]:
@@ -118,15 +125,22 @@ def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, noti
             )
             best = min(best, again, key=lambda f: f.cost)
         point = best.point
-        if task.nuisance and any(log.held_out for log in logs):
-            # What a log that is held out has of its own, such as its zero, is fitted to it; the parameters stay.
-            own = replace(problem_of(rig, engine, [log for log in logs if log.held_out], rung), parameters={})
-            point = search(own, point, iterations=10).point
-            best.point = point
-        residuals = engine.residuals(logs, point, rung)
-        errors = log_errors(logs, residuals)
-        found.append(RungResult(entry.name, best, errors, *_means(task, errors, best)))
+        best.point = point = _with_own(rig, engine, logs, point, rung)
+        errors = log_errors(logs, engine.residuals(logs, point, rung))
+        found.append(RungResult(entry.name, best, errors, *_means(task, errors, best), engine.failed))
     return found
+
+
+def _with_own(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point, rung: int) -> Point:
+    """What a log that is held out has of its own, such as its zero, is fitted to it; the parameters stay."""
+    held_out = [log for log in logs if log.held_out]
+    if not rig.task.nuisance or not held_out:
+        return point
+    engine.residuals(held_out, point, rung)
+    able = [log for log in held_out if log.name not in engine.failed]
+    if not able:
+        return point
+    return search(replace(problem_of(rig, engine, able, rung), parameters={}), point, iterations=10).point
 
 
 def _starts(point: Point, tried: dict[str, tuple[float, ...]]) -> Iterator[Point]:
@@ -156,17 +170,21 @@ def _means(task: Identification, errors: list[LogError], fit: Fit) -> tuple[floa
     units = dict(zip(task.measured, fit.deviations if len(task.measured) > 1 else np.ones(1), strict=True))
     means = []
     for held_out in (False, True):
-        own = [e for e in errors if e.held_out == held_out]
+        own = [e for e in errors if e.held_out == held_out and not math.isnan(e.mae)]
         n = sum(e.samples for e in own)
         means.append(sum(e.mae / units[e.channel] * e.samples for e in own) / n if n else math.nan)
     return means[0], means[1]
 
 
 def chosen(rungs: Sequence[RungResult]) -> int:
-    """The lowest rung that no higher one betters by more than `GAIN` of the held-out error, or of the error where none is held out."""
-    errors = [r.train if math.isnan(r.held_out) else r.held_out for r in rungs]
+    """The lowest rung that no higher one betters by more than `GAIN` of the held-out error, or of the error where none is held out.
+
+    One with which fewer of the logs held out have no run is better, whatever its error.
+    """
     taken = 0
-    for k, error in enumerate(errors):
-        if error < errors[taken] * (1.0 - GAIN):
+    for k, rung in enumerate(rungs):
+        best = rungs[taken]
+        less = len(rung.failed) - len(best.failed)
+        if less < 0 or (less == 0 and rung.error < best.error * (1.0 - GAIN)):
             taken = k
     return taken

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..identification.identify import IdentificationResult, residual_table
-from ..identification.ladder import free_on
+from ..identification.ladder import RungResult, free_on
 from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..units.conversion import si_factor
@@ -49,9 +49,7 @@ def write_identification(directory: Path, name: str, result: IdentificationResul
             e.log,
             e.channel,
             "held out" if e.held_out else "fitted",
-            f"{e.mae:.6g}",
-            f"{e.rmse:.6g}",
-            f"{100 * e.fit:.4g}",
+            *(["no run", "", ""] if math.isnan(e.mae) else [f"{e.mae:.6g}", f"{e.rmse:.6g}", f"{100 * e.fit:.4g}"]),
         ]
         for e in result.errors
     ]
@@ -64,10 +62,8 @@ def write_identification(directory: Path, name: str, result: IdentificationResul
     page = directory / "identified.html"
     context = {
         "title": result.task.title or name,
-        "rungs": [
-            [r.name, f"{r.train:.5g}", "" if math.isnan(r.held_out) else f"{r.held_out:.5g}", k == result.chosen]
-            for k, r in enumerate(result.rungs)
-        ],
+        "rungs": [[r.name, f"{r.train:.5g}", _held_out(r), k == result.chosen] for k, r in enumerate(result.rungs)],
+        "failures": result.failures(),
         "parameters": parameters,
         "undetermined": [u.text for u in result.undetermined],
         "bounds": [*result.at_bounds, *result.differences()],
@@ -81,6 +77,12 @@ def write_identification(directory: Path, name: str, result: IdentificationResul
     }
     write_text(page, render_page("reports/identification.html.jinja", **context))
     return page
+
+
+def _held_out(rung: RungResult) -> str:
+    """The error of the logs held out, and how many have none."""
+    error = "" if math.isnan(rung.held_out) else f"{rung.held_out:.5g}"
+    return f"{error} ({len(rung.failed)} without a run)".strip() if rung.failed else error
 
 
 def parameter_rows(result: IdentificationResult) -> list[list[str]]:
