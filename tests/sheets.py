@@ -38,7 +38,7 @@ def sheet(**changes) -> GearboxSheet:
 
 def gearbox_of(record: GearboxSheet) -> lm.Gearbox:
     built = build_loss_map(record)
-    curve = record.torsion_curve()
+    curve = record.torsion()
     return lm.Gearbox(**record.scalars(), stiffness=curve, hysteresis=record.hysteresis(curve), losses=built.losses)
 
 

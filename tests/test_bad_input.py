@@ -266,7 +266,9 @@ FUNCTIONS = [
     (lambda s: lm.periodic_motion(s.drive(), command=0.1), "needs at least one sine"),
     (lambda s: lm.build_loss_map(lm.GearboxSheet(name="x", kind="other", ratio=3)), "lacks rated_output_torque"),
     (
-        lambda s: lm.TestRig(s.replace(**{"gearbox.stiffness": {"kind": "rigid"}, "gearbox.hysteresis": None}).gearbox),
+        lambda s: lm.TestRig(
+            s.replace(**{"gearbox.stiffness": {"kind": "rigid"}, "gearbox.hysteresis": None}).gearbox
+        ).loop(1.0),
         "rigid",
     ),
     (lambda s: s.replace(**{"load.inertia": "1 000 kg*m^2"}), 'key load.inertia: "1 000 kg*m^2" has separators'),

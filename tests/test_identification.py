@@ -75,6 +75,33 @@ def test_the_answer_is_a_scenario_and_a_data_sheet(found: IdentificationResult, 
     assert source is not None and source.status == "identified"
 
 
+def test_the_data_sheet_of_a_rigid_gear_makes_a_gearbox_and_is_measured(
+    found: IdentificationResult, tmp_path: Path
+) -> None:
+    """The loss of the rung that is taken is load_friction T in both directions: efficiencies 1/(1 + c) and 1 - c."""
+    from typer.testing import CliRunner
+
+    from lostmotion.cli.entry import app
+
+    sheet = tmp_path / "gearbox.toml"
+    sheet.write_text(found.record_text())
+    gearbox, c = lm.gearbox(str(sheet)), found.values["load_friction"]
+    assert gearbox.stiffness.kind == "rigid" and "nothing of its stiffness" in gearbox.note
+    rig = lm.TestRig(gearbox)
+    assert rig.efficiency(0.5, 1.0) == pytest.approx(1.0 / (1.0 + c), rel=1e-9)
+    assert rig.efficiency(0.5, -1.0) == pytest.approx(1.0 - c, rel=1e-9)
+    run = CliRunner().invoke(app, ["rig", str(sheet), "-o", str(tmp_path / "rig")])
+    assert run.exit_code == 0, run.output
+    assert "stiffness, lost motion and hysteresis: none: the gearbox is given as rigid" in run.output
+    page = (tmp_path / "rig" / "rig.html").read_text()
+    assert "nothing of its stiffness" in page and "efficiency over load" in (tmp_path / "rig" / "rig.csv").read_text()
+    servo = (SERVO / "servo.toml").read_text()
+    begin, end = servo.index("ratio = 1"), servo.index("[gravity")
+    (tmp_path / "again.toml").write_text(f'{servo[:begin]}gearbox = "gearbox.toml"\n{servo[end:]}')
+    again = lm.load(tmp_path / "again.toml").gears["train"]
+    assert again.stiffness.kind == "rigid" and again.losses == gearbox.losses
+
+
 @pytest.fixture(scope="module")
 def failing(logs: Path) -> IdentificationResult:
     """The friction of the upper rung is `level`, of a log held out 0.25 N*m less, which is negative near the truth of 0.06 N*m."""

@@ -9,6 +9,7 @@ import lostmotion as lm
 from lostmotion.data_sheets.components import gearbox_table
 from lostmotion.data_sheets.loss_map_builder import build_loss_map
 from lostmotion.data_sheets.records import find
+from lostmotion.model.losses import efficiency_map
 from lostmotion.test_rig.comparison import compare
 from lostmotion.test_rig.rig import TestRig
 from sheets import ARCMIN, COMPLETE, RPM, gearbox_of, sheet
@@ -47,6 +48,36 @@ def test_hysteresis_loss_comes_back_as_the_width_of_the_loop_and_the_loop_has_th
     # twist stands, which have no width.
     h = record.torsion_curve().torque(0.3 * ARCMIN)
     assert loop.area == pytest.approx(2.0 * h * np.ptp(loop.twist), rel=1e-3)
+
+
+def test_a_rigid_gearbox_is_measured_but_for_its_torsion():
+    """In a steady state it loses what the same gearbox with a torsion does, and breaks loose at the torques of its sheet."""
+    compliant = TestRig(gearbox_of(sheet()))
+    rig = TestRig(gearbox_of(sheet(stiffness=None, rigid=True)))
+    for load in (1.0, 0.3, -1.0):
+        assert rig.efficiency(200.0, load) == pytest.approx(compliant.efficiency(200.0, load), rel=1e-6)
+    assert rig.no_load_torque(2000 * RPM) == pytest.approx(0.105, rel=1e-6)
+    assert rig.starting_torque() == pytest.approx(0.037, rel=1e-6)
+    assert rig.backdriving_torque() == pytest.approx(3.89, rel=1e-6)
+    assert rig.lost_motion() == 0.0
+    with pytest.raises(lm.InputError, match="a rigid gearbox has no torsion to measure"):
+        rig.loop(52.0)
+
+
+def test_a_rigid_sheet_has_no_twist():
+    with pytest.raises(lm.InputError, match="is rigid and has backlash"):
+        sheet(stiffness=None, rigid=True, backlash="1 arcmin")
+
+
+@pytest.mark.parametrize("stiffness", [{"kind": "rigid"}, {"kind": "linear", "stiffness": 100.0}])
+def test_what_nothing_holds_starts_at_once(stiffness: dict):
+    """Losses in proportion to the load alone: no torque is needed to start; driven backwards it holds only if it is self-locking."""
+    for eta_b, torque in ((0.7, 0.0), (-0.2, None)):
+        losses = efficiency_map(0.8, eta_b)
+        rig = TestRig(
+            lm.Gearbox(ratio=2, rated_input_speed=1, rated_output_torque=1, stiffness=stiffness, losses=losses)
+        )
+        assert rig.starting_torque() == 0.0 and rig.backdriving_torque() == torque
 
 
 def test_inner_loops_remember_their_own_turning_point():

@@ -67,8 +67,8 @@ def gearbox_table(
         except ValueError as error:
             raise InputError(f"gearbox {error}") from None
     table: dict[str, Any] = sheet.scalars() | {"limits": sheet.limits().model_dump()}
-    if sheet.stiffness is not None:
-        table["stiffness"] = sheet.torsion_curve().model_dump()
+    if (torsion := sheet.torsion()) is not None:
+        table["stiffness"] = torsion.model_dump()
     if built is not None:
         table["losses"] = built.losses.model_dump()
     if notes := [*filter(None, [sheet.note]), *(built.notes if built else ())]:

@@ -17,11 +17,12 @@ from ..inputs.quantities import (
     Positive,
     Speed,
     Stiffness,
+    Switch,
     Torque,
     ViscousFriction,
 )
 from ..model.gearbox import GearboxLimits
-from ..model.torsion import Hysteresis, LinearStiffness, TorsionCurve
+from ..model.torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
 from .loss_data import Efficiency, LossData
 from .sheet import Record
 
@@ -82,6 +83,8 @@ class GearboxSheet(Record):
     viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
     """on the input shaft, beside the losses"""
     stiffness: StiffnessData | None = None
+    rigid: Switch = False
+    """without any twist, so that there is no stiffness: of a gear that was identified, or is taken, as such"""
     backlash: Annotated[Angle, NotNegative] | None = None
     """total gap at the output"""
     hysteresis_loss: Annotated[Angle, Positive] | None = None
@@ -89,6 +92,14 @@ class GearboxSheet(Record):
     hysteresis_efficiency: Efficiency | None = None
     """eta_H of (16), where the loop itself is known"""
     losses: LossData = LossData()
+
+    @model_validator(mode="after")
+    def _rigid_has_no_twist(self) -> Self:
+        if self.rigid:
+            for key in ("stiffness", "backlash", "hysteresis_loss", "hysteresis_efficiency"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f"is rigid and has {key}; a rigid gearbox has no twist, so leave one of them out")
+        return self
 
     @model_validator(mode="after")
     def _one_hysteresis(self) -> Self:
@@ -105,11 +116,17 @@ class GearboxSheet(Record):
             out["rated_input_speed"] = f"see {self.where('rated_input_speed')}"
         if self.inertia is None:
             out["inertia"] = f"moment of inertia on the input shaft; see {self.where('inertia')}"
-        if self.stiffness is None:
+        if self.stiffness is None and not self.rigid:
             out["stiffness"] = f"torsional stiffness; see {self.where('stiffness')}"
         if self.losses.empty:
             out["losses"] = f"an efficiency or a loss table; see {self.where('losses.efficiency')}"
         return out
+
+    def torsion(self) -> TorsionCurve | Rigid | None:
+        """The compliance, where the sheet says it."""
+        if self.rigid:
+            return Rigid()
+        return None if self.stiffness is None else self.torsion_curve()
 
     def torsion_curve(self) -> TorsionCurve:
         """The torsion curve, with the backlash as its first segment."""

@@ -9,9 +9,11 @@ from typing import Any
 from ..data_sheets.gearbox_sheet import GearboxSheet
 from ..data_sheets.sheet import Source
 from ..model.gear import Gear
-from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
+from ..model.losses import ConstantEfficiency, LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..model.torsion import LinearStiffness, TorsionCurve
 from ..simulation.train_scenario import TrainScenario
+
+RIGID = "The logs were compared with a rig whose gear is rigid, so that they say nothing of its stiffness: this record makes a rigid gearbox."
 
 
 def toml_text(tables: Mapping[str, Any], comment: str = "") -> str:
@@ -87,14 +89,19 @@ def gear_sheet(gear: Gear, name: str, title: str, source: str) -> GearboxSheet:
         data["stiffness"] = {"slopes": [gear.stiffness.stiffness]}
     elif isinstance(gear.stiffness, TorsionCurve):
         data |= _of_curve(gear.stiffness)
+    else:
+        data["rigid"] = True
     losses = gear.losses
+    if isinstance(losses, ConstantEfficiency) and losses.efficiency == 1.0:
+        losses = efficiency_map(1.0, 1.0)
     if isinstance(losses, MeshEfficiency | WormMesh):
         losses = efficiency_map(*losses.efficiencies())
     if isinstance(losses, LossMap):
         data["losses"] = {"table": losses.model_dump()}
     given = {key: value for key, value in data.items() if value is not None}
     sources = (Source(data=tuple(sorted(given)), status="identified", text=source),)
-    return GearboxSheet(kind="other", name=name, title=title, sources=sources, **given)
+    note = RIGID if "rigid" in given else ""
+    return GearboxSheet(kind="other", name=name, title=title, note=note, sources=sources, **given)
 
 
 def sheet_text(sheet: GearboxSheet) -> str:

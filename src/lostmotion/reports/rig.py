@@ -23,32 +23,42 @@ SHADES = ("#0b3c5d", "#3a7ca5", "#7fae3f", "#b8b8b8")
 
 
 def panels(report: RigReport, sheet: GearboxSheet | None) -> list[Panel]:
-    """The six panels of the sheet."""
+    """The six panels of the sheet; the four without torsion of a rigid gearbox."""
     efficiency, lost = _over_load(report, "efficiency"), _over_load(report, "loss_torque")
     rpm, no_load = RPM * report.map["input_speed"].values, report.no_load[1]
-    twist, torque = report.initial_loading
     running = [Curve("rig", rpm, no_load, _line(SHADES[0]))]
-    torsion = [Curve("rig, first loading", 1e3 * twist, torque, _line(SHADES[0]))]
     if sheet is not None:
         efficiency += _printed_efficiency(sheet)
         running += _printed_no_load_torque(sheet)
-        torsion += _printed_torsion(sheet)
-    loops = [
-        Curve(f"±{loop.amplitude:.3g} N·m", 1e3 * loop.twist, loop.torque, _line(shade))
-        for loop, shade in zip(report.loops, SHADES, strict=False)
-    ]
     load, values = report.map["load"].values, report.map["efficiency"].values
     across = [
         Curve(f"load {load[j]:g}", rpm, values[j], _line(shade))
         for j, shade in zip((2, 4, 5, 7), SHADES[::-1], strict=True)
     ]
     relative, share, at_input = "relative load [-]", "efficiency [-]", "at the input [N·m]"
-    angle, output, rated = "twist [mrad]", "output torque [N·m]", report.gearbox.rated_output_torque
     return [
         Panel("efficiency over load (motor drives)", relative, share, tuple(efficiency), y_range=(0.0, 1.0)),
         Panel("efficiency over speed", "input speed [rpm]", share, tuple(across), y_range=(0.0, 1.0)),
         Panel("torque lost", relative, at_input, tuple(lost)),
         Panel("no-load running torque", "input speed [rpm]", at_input, tuple(running)),
+        *_torsion_panels(report, sheet),
+    ]
+
+
+def _torsion_panels(report: RigReport, sheet: GearboxSheet | None) -> list[Panel]:
+    """First loading and loops; none of a rigid gearbox."""
+    if report.initial_loading is None:
+        return []
+    twist, torque = report.initial_loading
+    torsion = [Curve("rig, first loading", 1e3 * twist, torque, _line(SHADES[0]))]
+    if sheet is not None:
+        torsion += _printed_torsion(sheet)
+    loops = [
+        Curve(f"±{loop.amplitude:.3g} N·m", 1e3 * loop.twist, loop.torque, _line(shade))
+        for loop, shade in zip(report.loops, SHADES, strict=False)
+    ]
+    angle, output, rated = "twist [mrad]", "output torque [N·m]", report.gearbox.rated_output_torque
+    return [
         Panel("torsion, input locked", angle, output, tuple(torsion)),
         Panel(f"hysteresis loops (rated {rated:g} N·m)", angle, output, tuple(loops)),
     ]
@@ -93,11 +103,6 @@ def _printed_torsion(sheet: GearboxSheet) -> list[Curve]:
 def summary_rows(report: RigReport) -> list[tuple[str, str]]:
     """What the rig says of itself, beside the comparison."""
     back = report.backdriving_torque
-    loop, g = report.loops[0], report.gearbox
-    # Without their cause, what is measured is rounding.
-    hysteresis = g.hysteresis is not None and g.hysteresis.efficiency < 1.0
-    backlash = not isinstance(g.stiffness, Rigid) and g.stiffness.pieces()[1][0] == 0.0
-    width = practical(loop.width, "rad") if hysteresis or backlash else "none: neither hysteresis nor backlash is given"
     return [
         ("starting torque at the input", f"{report.starting_torque:.4g} N·m"),
         (
@@ -105,6 +110,21 @@ def summary_rows(report: RigReport) -> list[tuple[str, str]]:
             f"{back:.4g} N·m" if back is not None else "none up to three times rated torque: self-locking",
         ),
         *_overrunning_rows(report),
+        *_torsion_rows(report),
+    ]
+
+
+def _torsion_rows(report: RigReport) -> list[tuple[str, str]]:
+    """Lost motion and what is read off the largest loop."""
+    g = report.gearbox
+    if isinstance(g.stiffness, Rigid):
+        return [("stiffness, lost motion and hysteresis", "none: the gearbox is given as rigid, without any twist")]
+    loop = report.loops[0]
+    # Without their cause, what is measured is rounding.
+    hysteresis = g.hysteresis is not None and g.hysteresis.efficiency < 1.0
+    backlash = g.stiffness.pieces()[1][0] == 0.0
+    width = practical(loop.width, "rad") if hysteresis or backlash else "none: neither hysteresis nor backlash is given"
+    return [
         (f"lost motion at ±{100 * LOST_MOTION_LOAD:.0f} % of rated torque", practical(report.lost_motion, "rad")),
         ("width of the loop at zero torque, rated torque in both directions", width),
         ("energy lost in that loop", f"{loop.area:.4g} J" if hysteresis else "none: no hysteresis is given"),
@@ -137,7 +157,7 @@ def write_sheet(
     """
     directory.mkdir(parents=True, exist_ok=True)
     drawn = panels(report, sheet)
-    png = save_figure(plots.draw(drawn, 2, (10.0, 10.5)), directory, "rig")
+    png = save_figure(plots.draw(drawn, 2, (10.0, 1.75 * len(drawn))), directory, "rig")
     write_text(directory / "rig.csv", panels_csv(drawn))
     write_text(
         directory / "comparison.csv",

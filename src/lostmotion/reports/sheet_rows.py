@@ -22,7 +22,12 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
 
     for name in type(record).model_fields:
         value = getattr(record, name)
-        if name in Record.model_fields or name == "kind" or value is None or name not in record.model_fields_set:
+        if (
+            name in Record.model_fields
+            or name == "kind"
+            or value in (None, False)
+            or name not in record.model_fields_set
+        ):
             continue
         label = name.replace("_", " ")
         if name == "stiffness":
@@ -31,6 +36,8 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
                 add(name, f"torsional stiffness K{k + 1}{upto}", f"{slope:.4g} N·m/rad")
             if value.scatter:
                 add(name, "scatter of the stiffness", f"±{100 * value.scatter:.0f} %")
+        elif name == "rigid":
+            add(name, "torsional stiffness", "rigid: no twist")
         elif name == "losses":
             _add_losses(value, add)
         elif isinstance(value, Winding):

@@ -32,10 +32,10 @@ class RigReport:
     """efficiency and loss torque, motor driving"""
     no_load: tuple[Any, Any]
     """input speeds [rad/s], torques [N·m]"""
-    initial_loading: tuple[Any, Any]
-    """twist [rad], torque [N·m] of the first loading"""
+    initial_loading: tuple[Any, Any] | None
+    """twist [rad], torque [N·m] of the first loading; none of a rigid gearbox, which has no twist"""
     loops: tuple[Loop, ...]
-    """at falling amplitudes, the largest at rated torque"""
+    """at falling amplitudes, the largest at rated torque; none of a rigid gearbox"""
     starting_torque: float
     backdriving_torque: float | None
     lost_motion: float
@@ -82,8 +82,8 @@ def measure(
         gearbox=gearbox,
         map=rig.efficiency_map(speeds, LOADS, progress),
         no_load=(speeds, done(np.array([rig.no_load_torque(n) for n in speeds]))),
-        initial_loading=done(rig.initial_loading_curve(1.2 * T_2R)),
-        loops=tuple(done(rig.loop(share * T_2R)) for share in LOOPS),
+        initial_loading=done(None if rig.rigid else rig.initial_loading_curve(1.2 * T_2R)),
+        loops=tuple(done(rig.loop(share * T_2R)) for share in LOOPS if not rig.rigid),
         starting_torque=done(rig.starting_torque()),
         backdriving_torque=done(rig.backdriving_torque()),
         lost_motion=done(rig.lost_motion()),

@@ -35,6 +35,9 @@ FLYWHEEL = 1e9  # [kg m2] on the input: keeps its speed, or stays at rest, whate
 RIG_FREQUENCY = 20.0  # [Hz] of the load on the stiffest segment of the curve, damped critically
 SETTLING = 4.0  # [s] until a steady state is read
 RAMP = 400.0  # [s] of a slow ramp
+RIGID_LOAD = (
+    0.01  # inertia of the load on a rigid gearbox, of that on its input: with a large one a lossy rigid mesh may jam
+)
 LOST_MOTION_LOAD = 0.03  # of rated torque, where lost motion is read
 
 
@@ -54,7 +57,7 @@ class TestRig:
     Parameters
     ----------
     gearbox
-        Any but a rigid one; a gear of a drive train is measured alone, as `Gear.gearbox` says.
+        A rigid one has no torsion to measure; a gear of a drive train is measured alone, as `Gear.gearbox` says.
     """
 
     __test__ = False  # no test case of pytest
@@ -63,16 +66,27 @@ class TestRig:
     def __init__(self, gearbox: Gearbox | Gear) -> None:
         if isinstance(gearbox, Gear):
             gearbox = gearbox.gearbox()
-        if isinstance(gearbox.stiffness, Rigid):
-            raise InputError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
         self.gearbox = gearbox
-        self.breaks, self.slopes = gearbox.stiffness.pieces()
+        self.rigid = isinstance(gearbox.stiffness, Rigid)
+        """without a twist"""
+        self.breaks: tuple[float, ...] = ()
+        self.slopes: tuple[float, ...] = ()
+        if not isinstance(gearbox.stiffness, Rigid):
+            self.breaks, self.slopes = map(tuple, gearbox.stiffness.pieces())
+        self.load = self._load()
+
+    def _load(self) -> Load:
+        """Damped critically on the gearbox; on a rigid one, where nothing swings, small beside the input shaft."""
+        if self.rigid:
+            return Load(inertia=RIGID_LOAD * (self.gearbox.inertia or 1.0) * self.gearbox.ratio**2)
         k = max(self.slopes)
         omega = 2.0 * np.pi * RIG_FREQUENCY
-        self.load = Load(inertia=k / omega**2, viscous_friction=2.0 * k / omega)
+        return Load(inertia=k / omega**2, viscous_friction=2.0 * k / omega)
 
     def _twist_at(self, torque: float) -> float:
         """Where the torsion curve has this torque: a start without transient."""
+        if self.rigid:
+            return 0.0
         rest, previous = abs(torque), 0.0
         for b, slope in zip([*self.breaks, np.inf], self.slopes, strict=True):
             if slope > 0.0 and rest <= slope * (b - previous):
@@ -149,7 +163,15 @@ class TestRig:
 
     @checked
     def torsion(self, turning_points: Iterable[Torque], samples: Count = 2000) -> xarray.Dataset:
-        """Twist and torque while the load torque goes from 0 through the turning points [N·m], one ramp each."""
+        """Twist and torque while the load torque goes from 0 through the turning points [N·m], one ramp each.
+
+        Raises
+        ------
+        InputError
+            The gearbox is rigid.
+        """
+        if self.rigid:
+            raise InputError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
         points = [0.0, *turning_points]
         times = [RAMP * k for k in range(len(points))]
         # The locked input is a flywheel at rest; the load torque pulls against the output.
@@ -200,7 +222,9 @@ class TestRig:
         return Loop(amplitude, last["twist"].values, last["output_torque"].values)
 
     def lost_motion(self) -> float:
-        """Twist [rad] between loads of -3 % and +3 % of rated torque."""
+        """Twist [rad] between loads of -3 % and +3 % of rated torque; 0 of a rigid gearbox."""
+        if self.rigid:
+            return 0.0
         loop = self.loop(LOST_MOTION_LOAD * self.gearbox.rated_output_torque)
         return float(np.ptp(loop.twist))
 
@@ -247,7 +271,9 @@ class TestRig:
 
     @staticmethod
     def _break_away(result: xarray.Dataset) -> tuple[float, float]:
-        """(instant [s], output torque [N·m]) at which the input shaft first starts to turn."""
+        """(instant [s], output torque [N·m]) at which the input shaft first starts to turn: at once where nothing holds it."""
+        if result["input_contact"].values[0] != 0:
+            return 0.0, float(result["output_torque"].values[0])
         switchings = switchings_of(result)
         freed = (switchings["input_contact_before"] == 0) & (switchings["input_contact_after"] != 0)
         events = np.flatnonzero(freed.values)
