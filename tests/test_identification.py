@@ -25,7 +25,8 @@ from lostmotion.identification.parameters import FreeParameter
 from lostmotion.identification.prepare import prepared, read_all
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
-from lostmotion.reports.identification import loss_curves, write_identification
+from lostmotion.reports.identification import correlations, loss_curves, write_identification
+from lostmotion.reports.plots import correlation_map
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +101,25 @@ def test_the_data_sheet_of_a_rigid_gear_makes_a_gearbox_and_is_measured(
     (tmp_path / "again.toml").write_text(f'{servo[:begin]}gearbox = "gearbox.toml"\n{servo[end:]}')
     again = lm.load(tmp_path / "again.toml").gears["train"]
     assert again.stiffness.kind == "rigid" and again.losses == gearbox.losses
+
+
+def test_the_page_maps_all_correlations(found: IdentificationResult, tmp_path: Path) -> None:
+    """Against the inverse of the normal equations by another way, of those that can be inverted; on the page all names and numbers."""
+    names, C = correlations(found)
+    assert names == list(found.fit.free)
+    scale = 1.0 / np.sqrt(np.diag(found.fit.normal))
+    covariance = np.linalg.inv(found.fit.normal * np.outer(scale, scale)) * np.outer(scale, scale)
+    d = np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(C, covariance / np.outer(d, d), atol=1e-6)
+    axes, bar = correlation_map(names, C).axes
+    assert [t.get_text() for t in axes.get_xticklabels()] == [t.get_text() for t in axes.get_yticklabels()] == names
+    assert [t.get_text() for t in axes.texts] == [f"{x:+.2f}" for x in C.ravel()]
+    assert bar.get_ylabel() == "correlation [-]"
+    page = write_identification(tmp_path, "servo", found).read_text()
+    i, j = max(((i, j) for i in range(len(names)) for j in range(i)), key=lambda ij: abs(C[ij]))
+    assert f"Strongest: {names[i]} and {names[j]} {C[i, j]:+.2f}" in page
+    table = [line.split(",") for line in (tmp_path / "correlation.csv").read_text().splitlines()]
+    assert table[0][1:] == names and float(table[1 + i][1 + j]) == pytest.approx(C[i, j], rel=1e-5)
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,12 +17,16 @@ from . import plots
 from .pages import embed, panels_csv, render_page, save_figure, table_csv, write_text
 from .panels import Curve, Panel
 
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
 MEASURED: dict[str, Any] = {"color": "0.45", "linestyle": "-", "linewidth": 1.0}
 COMPUTED: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.2}
 DOTS: dict[str, Any] = {"color": "#0b3c5d", "linestyle": "", "marker": ".", "markersize": 1.5, "alpha": 0.35}
 LINE: dict[str, Any] = {"color": "#0b3c5d", "linestyle": "-", "linewidth": 1.4}
 COLUMNS = 4
 PER_FIGURE = 24  # overlays
+PAIRS = 8  # of the strongest correlations, in words
 MANY = 20_000  # points of a cloud of residuals
 
 
@@ -41,6 +45,8 @@ def write_identification(directory: Path, name: str, result: IdentificationResul
         png = save_figure(plots.draw(panels, columns, (10.0, 0.6 + 2.4 * rows)), directory, drawn)
         write_text(directory / f"{drawn}.csv", panels_csv(panels))
         figures.append(embed(png, title, caption, drawn))
+    if result.fit.free:
+        figures.append(_correlation_figure(directory, result))
     write_text(directory / "identified.toml", result.scenario_text())
     if result.task.record:
         write_text(directory / "gearbox.toml", result.record_text())
@@ -127,15 +133,6 @@ def _figures(result: IdentificationResult) -> list[tuple[str, str, str, list[Pan
                 min(3, len(panels)),
             )
         )
-    found.append(
-        (
-            "correlation",
-            "Correlations",
-            "Of the errors of the parameters, from the logs alone.",
-            [_correlation(result)],
-            1,
-        )
-    )
     if result.profiles:
         panels = [_profile(result, name) for name in result.profiles]
         found.append(
@@ -203,36 +200,28 @@ def _clouds(
     return panels
 
 
-def _correlation(result: IdentificationResult) -> Panel:
-    """The largest correlations as bars, pair by pair."""
+def correlations(result: IdentificationResult) -> tuple[list[str], np.ndarray]:
+    """Names of the free parameters, and the correlations of their errors, from the logs alone."""
     names = list(free_on(result.task, result.chosen))
-    C = np.linalg.pinv(result.fit.normal) if names else np.zeros((0, 0))
+    C = np.linalg.pinv(result.fit.normal)
     d = np.sqrt(np.maximum(np.diag(C), 1e-300))
-    pairs = sorted(
-        (
-            (abs(C[i, j] / d[i] / d[j]), C[i, j] / d[i] / d[j], f"{a}, {names[j]}")
-            for i, a in enumerate(names)
-            for j in range(i)
-        ),
-        reverse=True,
-    )[:8]
-    curves = tuple(
-        Curve(
-            f"{text}: {value:+.2f}",
-            np.array([0.0, value]),
-            np.array([k, k], float),
-            {"color": _shade(k), "linewidth": 5.0},
-        )
-        for k, (_, value, text) in enumerate(pairs)
+    C = C / np.outer(d, d)
+    np.fill_diagonal(C, 1.0)
+    return names, C
+
+
+def _correlation_figure(directory: Path, result: IdentificationResult) -> Markup:
+    """The whole matrix as a heat map and as a table, and its strongest pairs in words."""
+    names, C = correlations(result)
+    png = save_figure(plots.correlation_map(names, C), directory, "correlation")
+    rows = [[name, *(f"{value:.6g}" for value in row)] for name, row in zip(names, C, strict=True)]
+    write_text(directory / "correlation.csv", table_csv(["parameter", *names], rows))
+    pairs = sorted(((i, j) for i in range(len(names)) for j in range(i)), key=lambda ij: -abs(C[ij]))[:PAIRS]
+    words = "; ".join(f"{names[i]} and {names[j]} {C[i, j]:+.2f}" for i, j in pairs)
+    caption = (
+        "Of the errors of the parameters, from the logs alone: near +1 or -1 two of them can hardly be told apart."
     )
-    return Panel(
-        "strongest pairs",
-        "correlation [-]",
-        "pair",
-        curves or (Curve("none", np.zeros(2), np.zeros(2), LINE),),
-        x_range=(-1.05, 1.05),
-        y_range=(-1.0, max(8.0, len(pairs))),
-    )
+    return embed(png, "Correlations", f"{caption} Strongest: {words}." if words else caption, "correlation")
 
 
 def _shade(k: int) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -205,6 +205,26 @@ def loss_map(speeds: Any, loads: Any, values: Any, note: str = "") -> Figure:
     curves.legend(fontsize=8, ncols=2)
     if note:
         figure.supxlabel(note, fontsize=8, color="0.35")
+    return figure
+
+
+@in_our_looks
+def correlation_map(names: Sequence[str], values: Any) -> Figure:
+    """A matrix of correlations as a heat map: dark where strong, the number in each cell says the sign in grey too."""
+    n = len(names)
+    side = 2.6 + 0.55 * n
+    figure = Picture(figsize=(side, side - 0.6))
+    axes = figure.add_subplot()
+    axes.grid(visible=False)
+    image = axes.imshow(values, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+    axes.set_xticks(range(n), names, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
+    axes.set_yticks(range(n), names, fontsize=8)
+    axes.tick_params(length=0)
+    axes.spines[:].set_visible(False)
+    for i, j in np.ndindex(n, n):
+        ink = "white" if abs(values[i, j]) > 0.6 else "black"
+        axes.text(j, i, f"{values[i, j]:+.2f}", ha="center", va="center", fontsize=7.5, color=ink)
+    figure.colorbar(image, ax=axes, label="correlation [-]", shrink=0.8)
     return figure
 
 
