@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,7 +26,14 @@ from lostmotion.identification.parameters import FreeParameter
 from lostmotion.identification.prepare import prepared, read_all
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
-from lostmotion.reports.identification import correlations, loss_curves, write_identification
+from lostmotion.reports.identification import (
+    correlations,
+    friction_curve,
+    friction_curves,
+    loop_curves,
+    loss_curves,
+    write_identification,
+)
 from lostmotion.reports.plots import correlation_map
 
 
@@ -120,6 +128,44 @@ def test_the_page_maps_all_correlations(found: IdentificationResult, tmp_path: P
     assert f"Strongest: {names[i]} and {names[j]} {C[i, j]:+.2f}" in page
     table = [line.split(",") for line in (tmp_path / "correlation.csv").read_text().splitlines()]
     assert table[0][1:] == names and float(table[1 + i][1 + j]) == pytest.approx(C[i, j], rel=1e-5)
+
+
+def test_the_friction_of_a_motor_s_shaft_is_drawn_without_its_back_emf_too(found: IdentificationResult) -> None:
+    """With the bridge closed it is T_C + (b + k_t^2/R) w, with the bridge open T_C + b w."""
+    closed, opened = friction_curves(found, "rotor")
+    v = found.values
+    assert opened.label == "torque_enable == 0"
+    np.testing.assert_allclose(opened.y, v["coulomb_friction"] + v["viscous_friction"] * opened.x, rtol=1e-12)
+    np.testing.assert_allclose(closed.y - opened.y, v["torque_constant"] ** 2 / v["resistance"] * opened.x, rtol=1e-9)
+    assert friction_curves(found, "arm") == ()
+
+
+def test_the_friction_of_a_shaft_has_that_of_its_motor_s_bearings_without_back_emf() -> None:
+    text = """
+    [shafts.rotor]
+    viscous_friction = 0.01
+    friction_torque = 0.2
+    [motors.m]
+    shaft = "rotor"
+    rotor_inertia = 1e-3
+    friction_torque = 0.1
+    rated_torque = 1.0
+    rated_speed = 100.0
+    armature_voltage_constant = 1.5
+    electrical_time_constant = 1e-3
+    [simulation]
+    duration = 1
+    sample_interval = 0.1
+    """
+    curve = friction_curve(lm.TrainScenario(**tomllib.loads(text)), "rotor", "friction")
+    assert curve is not None
+    np.testing.assert_allclose(curve.y, 0.3 + 0.01 * curve.x, rtol=1e-12)
+
+
+def test_loops_bear_the_names_of_their_logs() -> None:
+    run = {"g_twist": np.array([0.0, 1e-3]), "g_output_torque": np.array([0.0, 5.0])}
+    table = {"runs/locked-ramp.csv": run, "other.csv": {}, "braked.csv": run}
+    assert [c.label for c in loop_curves("g", table)] == ["runs/locked-ramp", "braked"]
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from ..identification.identify import IdentificationResult, residual_table
 from ..identification.ladder import RungResult, free_on
 from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
+from ..simulation.train_scenario import TrainScenario
 from ..units.conversion import si_factor
 from . import plots
 from .pages import embed, panels_csv, render_page, save_figure, table_csv, write_text
@@ -26,6 +28,7 @@ DOTS: dict[str, Any] = {"color": "#0b3c5d", "linestyle": "", "marker": ".", "mar
 LINE: dict[str, Any] = {"color": "#0b3c5d", "linestyle": "-", "linewidth": 1.4}
 COLUMNS = 4
 PER_FIGURE = 24  # overlays
+LOOPS = 3  # logs whose loops are drawn
 PAIRS = 8  # of the strongest correlations, in words
 MANY = 20_000  # points of a cloud of residuals
 
@@ -145,7 +148,10 @@ def _figures(result: IdentificationResult) -> list[tuple[str, str, str, list[Pan
             )
         )
     if laws := _laws(result, table):
-        caption = "Of the identified rig. What it adds to a shaft's viscous friction, such as the back-e.m.f. of a motor, is in there."
+        caption = (
+            "Of the identified rig. What it adds to a shaft's viscous friction, such as the back-e.m.f. of a motor, is in there, but for a phase "
+            "that is without it: the curve of a phase with the motor off is the friction alone."
+        )
         found.append(("laws", "Friction, losses and torsion", caption, laws, min(2, len(laws))))
     return found
 
@@ -174,7 +180,7 @@ def _overlays(result: IdentificationResult, log: str, held_out: bool, run: dict[
         )
         panels.append(
             Panel(
-                f"{str(Path(log).with_suffix(''))[-28:]}{' (held out)' if held_out else ''}",
+                f"{_short(log)}{' (held out)' if held_out else ''}",
                 "time [s]",
                 channel,
                 curves,
@@ -247,37 +253,65 @@ def _profile(result: IdentificationResult, name: str) -> Panel:
 def _laws(result: IdentificationResult, table: dict[str, dict[str, np.ndarray]]) -> list[Panel]:
     """Friction of the shafts over speed, and the loops of gears with a twist."""
     panels = []
-    for name, shaft in result.scenario.shafts.items():
-        slipping, at_rest, speeds, torques = shaft.friction()
-        top = max([5.0, *speeds]) if len(speeds) else 10.0
-        w = np.linspace(1e-3, top, 200)
-        dry = np.interp(w, speeds, torques) if len(speeds) else np.full(200, slipping)
-        if max(float(np.max(dry)), at_rest, shaft.viscous_friction) > 0.0:
-            panels.append(
-                Panel(
-                    f"friction of {name}",
-                    "speed [rad/s]",
-                    "torque [N·m]",
-                    (Curve("dry and viscous", w, dry + shaft.viscous_friction * w, LINE),),
-                )
-            )
+    for name in result.scenario.shafts:
+        if curves := friction_curves(result, name):
+            panels.append(Panel(f"friction of {name}", "speed [rad/s]", "torque [N·m]", curves))
     for name, gear in result.scenario.gears.items():
         if curves := loss_curves(gear):
             panels.append(Panel(f"losses of {name}", "output torque [N·m]", "lost at the output [N·m]", curves))
-        if any(f"{name}_twist" in run for run in table.values()):
-            runs = list(table.values())[:3]
-            curves = tuple(
-                Curve(
-                    f"log {k + 1}",
-                    1e3 * r[f"{name}_twist"],
-                    r[f"{name}_output_torque"],
-                    {"color": _shade(k), "linewidth": 1.0},
-                )
-                for k, r in enumerate(runs)
-                if f"{name}_output_torque" in r
-            )
+        if curves := loop_curves(name, table):
             panels.append(Panel(f"torsion of {name}", "twist [mrad]", "output torque [N·m]", curves))
     return panels
+
+
+def friction_curves(result: IdentificationResult, shaft: str) -> tuple[Curve, ...]:
+    """Friction of a shaft and of its motor's bearings over speed, and in the phases in which it is another.
+
+    What a file adds to the viscous friction for the back-e.m.f. of a motor is not in that of a phase with the motor off: this one
+    is the friction alone.
+    """
+    found: dict[str, Curve] = {}
+    for label, scenario in [("dry and viscous", result.scenario), *_phases(result)]:
+        curve = friction_curve(scenario, shaft, label)
+        if curve is not None and not any(np.array_equal(curve.y, other.y) for other in found.values()):
+            found[label] = curve
+    return tuple(replace(c, style={**LINE, "color": _shade(k)}) for k, c in enumerate(found.values()))
+
+
+def _phases(result: IdentificationResult) -> list[tuple[str, TrainScenario]]:
+    """The rig in each phase of the task, with the values found, by what the phase is."""
+    rig, first = result.rig, result.logs[0]
+    assert rig is not None
+    values = {**first.facts, **result.values_for(first.name)}
+    changes = [rig.changes(values, result.chosen, k) for k in range(len(result.task.phases))]
+    return [(str(p.when), rig.built(c).scenario) for p, c in zip(result.task.phases, changes, strict=True)]
+
+
+def friction_curve(scenario: TrainScenario, name: str, label: str) -> Curve | None:
+    """Friction of a shaft and of the bearings of its motors over speed; none without any."""
+    shaft = scenario.shafts[name]
+    slipping, at_rest, speeds, torques = shaft.friction()
+    w = np.linspace(1e-3, max([5.0, *speeds]) if len(speeds) else 10.0, 200)
+    dry = np.interp(w, speeds, torques) if len(speeds) else np.full(200, slipping)
+    bearings = sum(m.friction_torque for m in scenario.motors.values() if m.shaft == name)
+    if max(float(np.max(dry)), at_rest, bearings, shaft.viscous_friction) <= 0.0:
+        return None
+    return Curve(label, w, dry + bearings + shaft.viscous_friction * w, LINE)
+
+
+def loop_curves(gear: str, table: dict[str, dict[str, np.ndarray]]) -> tuple[Curve, ...]:
+    """Torque of a gear over its twist in the first logs, by the names of the logs."""
+    twist, torque = f"{gear}_twist", f"{gear}_output_torque"
+    runs = [(log, run) for log, run in table.items() if twist in run and torque in run][:LOOPS]
+    return tuple(
+        Curve(_short(log), 1e3 * run[twist], run[torque], {"color": _shade(k), "linewidth": 1.0})
+        for k, (log, run) in enumerate(runs)
+    )
+
+
+def _short(log: str) -> str:
+    """The name of a log without the ending of its file, of a long one the end."""
+    return str(Path(log).with_suffix(""))[-28:]
 
 
 def loss_curves(gear: Gear) -> tuple[Curve, ...]:
