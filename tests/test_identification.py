@@ -17,7 +17,7 @@ from lostmotion.data_sheets.records import read_sheets
 from lostmotion.identification.engine import Engine, Point
 from lostmotion.identification.fit import search
 from lostmotion.identification.formulas import Formula
-from lostmotion.identification.identifiability import _sentence
+from lostmotion.identification.identifiability import Undetermined, _sentence
 from lostmotion.identification.identify import IdentificationResult, identify_task
 from lostmotion.identification.intervals import reach
 from lostmotion.identification.ladder import RungResult, chosen, free_on, problem_of, start_point
@@ -168,6 +168,17 @@ def test_loops_bear_the_names_of_their_logs() -> None:
     assert [c.label for c in loop_curves("g", table)] == ["runs/locked-ramp", "braked"]
 
 
+def test_correlations_of_what_the_logs_do_not_tell_are_numbers(found: IdentificationResult) -> None:
+    """Of two parameters that only act as a sum, and of one without any effect."""
+    names = list(found.fit.free)
+    normal = np.eye(len(names))
+    normal[:2, :2], normal[2, :], normal[:, 2] = 1e12, 0.0, 0.0
+    rungs = list(found.rungs)
+    rungs[found.chosen] = replace(rungs[found.chosen], fit=replace(found.fit, normal=normal))
+    _, C = correlations(replace(found, rungs=rungs))
+    assert np.isfinite(C).all() and np.abs(C).max() == 1.0 and not C[2, 3:].any()
+
+
 @pytest.fixture(scope="module")
 def failing(logs: Path) -> IdentificationResult:
     """The friction of the upper rung is `level`, of a log held out 0.25 N*m less, which is negative near the truth of 0.06 N*m."""
@@ -212,6 +223,23 @@ def test_fewer_logs_without_a_run_come_before_a_small_error(failing: Identificat
     assert chosen([rung(1.0), rung(0.1, "a")]) == 0
     assert chosen([rung(0.1, "a"), rung(1.0)]) == 1
     assert chosen([rung(1.0, "a"), rung(0.5, "b"), rung(0.1, "a", "b")]) == 1
+
+
+def test_a_rung_that_leaves_more_undetermined_has_to_gain_more(failing: IdentificationResult) -> None:
+    """A twentieth, not a hundredth of the error; and what is passed over for that is said, with what the logs do not tell."""
+    unsure = [Undetermined({"direction": 1.0}, 2.0, "direction is not determined by these logs; give a stall torque")]
+
+    def rung(error: float, *more: Undetermined) -> RungResult:
+        return replace(failing.rungs[0], name="upper", held_out=error, failed={}, undetermined=list(more))
+
+    assert chosen([rung(1.0), rung(0.98)]) == 1
+    assert chosen([rung(1.0), rung(0.96, *unsure)]) == 0
+    assert chosen([rung(1.0), rung(0.94, *unsure)]) == 1
+    assert chosen([rung(1.0, *unsure), rung(0.98, *unsure)]) == 1
+    result = replace(failing, rungs=[rung(1.0), rung(0.96, *unsure)], chosen=0)
+    (said,) = result.passed_over()
+    assert said.startswith("upper: not taken for a gain of 4 %") and unsure[0].text in said and said in str(result)
+    assert replace(failing, rungs=[rung(1.0), rung(0.995, *unsure)], chosen=0).passed_over() == []
 
 
 def test_a_run_that_fails_at_the_start_values_names_its_log(logs: Path) -> None:

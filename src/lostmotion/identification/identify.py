@@ -19,7 +19,7 @@ from .fit import Fit, Problem, linearised
 from .gather import gathered
 from .identifiability import Undetermined, at_bounds, resting_on, undetermined
 from .intervals import Interval, bootstrap, profile
-from .ladder import RungResult, begun_with, chosen, climb, free_on, problem_of, start_point
+from .ladder import GAIN, RungResult, begun_with, chosen, climb, free_on, problem_of, start_point
 from .prepare import Prepared
 from .record import gear_sheet, scenario_text, sheet_text
 from .rig import Rig
@@ -91,7 +91,10 @@ class IdentificationResult:
 
     def lines(self) -> list[str]:
         """The answer as text."""
-        lines = [f"{self.rungs[self.chosen].name}: the rung that is taken", *(f"  {text}" for text in self.failures())]
+        lines = [
+            f"{self.rungs[self.chosen].name}: the rung that is taken",
+            *(f"  {text}" for text in [*self.failures(), *self.passed_over()]),
+        ]
         for name, p in self.task.parameters.items():
             if name not in self.intervals:
                 continue
@@ -107,6 +110,22 @@ class IdentificationResult:
                     lines.append(f"  {channel}, {n} logs {what}: MAE {mae:.5g}, RMSE {rmse:.5g}")
         lines += [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
         return lines + [f"  {text}" for text in [*self.differences(), *self.starts()]]
+
+    def passed_over(self) -> list[str]:
+        """Rungs with a smaller error that were not taken, since the logs do not tell what they free."""
+        taken, found = self.rungs[self.chosen], []
+        for rung in self.rungs[self.chosen + 1 :]:
+            gain = 1.0 - rung.error / taken.error
+            if (
+                gain > GAIN
+                and len(rung.failed) <= len(taken.failed)
+                and len(rung.undetermined) > len(taken.undetermined)
+            ):
+                text = "; ".join(u.text for u in rung.undetermined)
+                found.append(
+                    f"{rung.name}: not taken for a gain of {100 * gain:.2g} %, since these logs do not determine its parameters: {text}"
+                )
+        return found
 
     def failures(self) -> list[str]:
         """Logs held out that have no run on a rung, and why; a rung with fewer of them is taken before it."""

@@ -14,6 +14,7 @@ from .engine import Engine, Point
 from .errors_of_logs import LogError, log_errors
 from .fit import Fit, Problem, search
 from .formulas import number
+from .identifiability import Undetermined, undetermined
 from .motion import windows
 from .parameters import FreeParameter
 from .prepare import Prepared
@@ -21,6 +22,7 @@ from .rig import Rig
 from .task import Identification
 
 GAIN = 0.01  # of the held-out error, by which a higher rung must be better to be taken
+GAIN_UNDETERMINED = 0.05  # the same, where its parameters leave more directions undetermined
 Notify = Callable[[str, int, float], None]
 
 
@@ -37,6 +39,8 @@ class RungResult:
     """the same of the logs held out that have a run; NaN without such"""
     failed: dict[str, str]
     """by log held out that has no run with the values of this rung: why"""
+    undetermined: list[Undetermined]
+    """what the logs cannot tell of the parameters of this rung"""
 
     @property
     def error(self) -> float:
@@ -126,8 +130,9 @@ def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, noti
             best = min(best, again, key=lambda f: f.cost)
         point = best.point
         best.point = point = _with_own(rig, engine, logs, point, rung)
+        unsure = undetermined(task, best, free_on(task, rung))
         errors = log_errors(logs, engine.residuals(logs, point, rung))
-        found.append(RungResult(entry.name, best, errors, *_means(task, errors, best), engine.failed))
+        found.append(RungResult(entry.name, best, errors, *_means(task, errors, best), engine.failed, unsure))
     return found
 
 
@@ -179,12 +184,14 @@ def _means(task: Identification, errors: list[LogError], fit: Fit) -> tuple[floa
 def chosen(rungs: Sequence[RungResult]) -> int:
     """The lowest rung that no higher one betters by more than `GAIN` of the held-out error, or of the error where none is held out.
 
-    One with which fewer of the logs held out have no run is better, whatever its error.
+    One that leaves more directions undetermined has to gain `GAIN_UNDETERMINED`: its error says little of values that the logs do
+    not tell. One with which fewer of the logs held out have no run is better, whatever its error.
     """
     taken = 0
     for k, rung in enumerate(rungs):
         best = rungs[taken]
         less = len(rung.failed) - len(best.failed)
-        if less < 0 or (less == 0 and rung.error < best.error * (1.0 - GAIN)):
+        gain = GAIN_UNDETERMINED if len(rung.undetermined) > len(best.undetermined) else GAIN
+        if less < 0 or (less == 0 and rung.error < best.error * (1.0 - gain)):
             taken = k
     return taken

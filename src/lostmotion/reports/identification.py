@@ -72,7 +72,7 @@ def write_identification(directory: Path, name: str, result: IdentificationResul
     context = {
         "title": result.task.title or name,
         "rungs": [[r.name, f"{r.train:.5g}", _held_out(r), k == result.chosen] for k, r in enumerate(result.rungs)],
-        "failures": result.failures(),
+        "failures": [*result.failures(), *result.passed_over()],
         "parameters": parameters,
         "undetermined": [u.text for u in result.undetermined],
         "bounds": [*result.at_bounds, *result.differences()],
@@ -209,9 +209,11 @@ def _clouds(
 def correlations(result: IdentificationResult) -> tuple[list[str], np.ndarray]:
     """Names of the free parameters, and the correlations of their errors, from the logs alone."""
     names = list(free_on(result.task, result.chosen))
-    C = np.linalg.pinv(result.fit.normal)
-    d = np.sqrt(np.maximum(np.diag(C), 1e-300))
-    C = C / np.outer(d, d)
+    size = np.sqrt(np.diag(result.fit.normal))
+    scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)  # so that no unit hides a parameter
+    C = np.linalg.pinv(result.fit.normal * np.outer(scale, scale), rcond=1e-12, hermitian=True)
+    d = np.sqrt(np.maximum(np.diag(C), 0.0))
+    C = np.clip(np.divide(C, np.outer(d, d), out=np.zeros_like(C), where=np.outer(d, d) > 0.0), -1.0, 1.0)
     np.fill_diagonal(C, 1.0)
     return names, C
 

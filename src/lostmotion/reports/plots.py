@@ -212,8 +212,8 @@ def loss_map(speeds: Any, loads: Any, values: Any, note: str = "") -> Figure:
 def correlation_map(names: Sequence[str], values: Any) -> Figure:
     """A matrix of correlations as a heat map: dark where strong, the number in each cell says the sign in grey too."""
     n = len(names)
-    side = 2.6 + 0.55 * n
-    figure = Picture(figsize=(side, side - 0.6))
+    cells, label = 0.6 * n, 0.08 * max(map(len, names))  # [inch]
+    figure = Picture(figsize=(cells + label + 2.2, cells + label + 1.0))
     axes = figure.add_subplot()
     axes.grid(visible=False)
     image = axes.imshow(values, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
