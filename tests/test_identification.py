@@ -18,7 +18,7 @@ from lostmotion.identification.engine import Engine, Point
 from lostmotion.identification.fit import search
 from lostmotion.identification.formulas import Formula
 from lostmotion.identification.identifiability import Undetermined, _sentence
-from lostmotion.identification.identify import IdentificationResult, identify_task
+from lostmotion.identification.identify import IdentificationResult, _notes, identify_task
 from lostmotion.identification.intervals import reach
 from lostmotion.identification.ladder import RungResult, chosen, free_on, problem_of, start_point
 from lostmotion.identification.logs import Channel
@@ -177,6 +177,17 @@ def test_correlations_of_what_the_logs_do_not_tell_are_numbers(found: Identifica
     rungs[found.chosen] = replace(rungs[found.chosen], fit=replace(found.fit, normal=normal))
     _, C = correlations(replace(found, rungs=rungs))
     assert np.isfinite(C).all() and np.abs(C).max() == 1.0 and not C[2, 3:].any()
+
+
+def test_values_of_the_header_that_files_lack_are_noted_once(logs: Path) -> None:
+    task = servo_task(logs)
+    task = task.model_copy(update={"logs": task.logs.model_copy(update={"header": {"arm_mass": 0.0, "room": 3}})})
+    rig = Rig(task, SERVO)
+    read = read_all(task, SERVO)[:3]
+    read[1] = replace(read[1], header={k: v for k, v in read[1].header.items() if k != "arm_mass"})
+    notes = _notes([prepared(task, log, rig.units) for log in read])
+    assert notes["000.json and 2 more"] == ("taken from logs.header: room = 3, which the file lacks",)
+    assert notes["001.json"] == ("taken from logs.header: arm_mass = 0.0, which the file lacks",)
 
 
 @pytest.fixture(scope="module")

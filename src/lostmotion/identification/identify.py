@@ -20,7 +20,7 @@ from .gather import gathered
 from .identifiability import Undetermined, at_bounds, resting_on, undetermined
 from .intervals import Interval, bootstrap, profile
 from .ladder import GAIN, RungResult, begun_with, chosen, climb, free_on, problem_of, start_point
-from .prepare import Prepared
+from .prepare import DEFAULT, Prepared
 from .record import gear_sheet, scenario_text, sheet_text
 from .rig import Rig
 from .runs import run_log
@@ -264,7 +264,7 @@ def identify_logs(
         intervals,
         [*undetermined(task, fit, free), *_resting(problem, fit)],
         at_bounds(fit, free),
-        {log.name: log.log.notes for log in logs if log.log.notes},
+        _notes(logs),
         rig.scenario_at(first, fit.point.of(first), best),
         found,
         engine.by_differences,
@@ -273,6 +273,25 @@ def identify_logs(
         rig,
         logs,
     )
+
+
+def _notes(logs: list[Prepared]) -> dict[str, tuple[str, ...]]:
+    """By log; a value of `logs.header` that several logs take is noted once, with their number."""
+    takers: dict[str, list[str]] = {}
+    for log in logs:
+        for note in log.log.notes:
+            if note.startswith(DEFAULT):
+                takers.setdefault(note, []).append(log.name)
+    shared = {note for note, names in takers.items() if len(names) > 1}
+    found: dict[str, tuple[str, ...]] = {}
+    for note, names in takers.items():
+        if note in shared:
+            where = f"{names[0]} and {len(names) - 1} more"
+            found[where] = (*found.get(where, ()), note)
+    for log in logs:
+        if own := tuple(note for note in log.log.notes if note not in shared):
+            found[log.name] = own
+    return found
 
 
 def _resting(problem: Problem, fit: Fit) -> list[Undetermined]:

@@ -18,6 +18,7 @@ from .readers import find_logs, read_log
 from .screening import screened
 from .task import FormulaText, Identification
 
+DEFAULT = "taken from logs.header: "  # how a note on such a value begins
 KINDS = ("rad", "rad/s", "N*m", "A", "V", "N", "m", "m/s", "s", "K", "rad/s^2", "m/s^2", "W", "Pa")
 
 
@@ -117,6 +118,8 @@ def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepar
     measured = {name: m.channel for name, m in task.measured.items()}
     inputs = {name: i.channel for name, i in task.inputs.items()}
     header = {**task.logs.header, **log.header}
+    for key in sorted(task.logs.header.keys() - log.header.keys()):
+        log = log.noted(f"{DEFAULT}{key} = {task.logs.header[key]!r}, which the file lacks")
     header |= {key: float(channel in log.channels) for key, channel in task.logs.channels.items()}
     absent = {
         i.channel: Channel(np.full(len(log.time), i.default))
