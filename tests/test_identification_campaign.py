@@ -56,6 +56,22 @@ def test_a_gearbox_with_backlash_is_found_again(tmp_path: Path) -> None:
         assert result.values[name] == pytest.approx(value, rel=2e-3), name
 
 
+def test_hysteresis_is_chosen_by_the_loop_held_out_and_found_within_its_interval(
+    gearbox: lm.Gearbox, tmp_path: Path
+) -> None:
+    lossy = gearbox.model_copy(update={"hysteresis": lm.Hysteresis(efficiency=0.9)})
+    result = lm.identify(lm.write_campaign(tmp_path, lossy))
+    without, with_it = result.rungs
+    assert [e.log for e in result.errors if e.held_out] == ["locked-ramp-half.csv"] * 3
+    assert result.chosen == 1 and with_it.held_out < 0.8 * without.held_out
+    interval = result.intervals["hysteresis_efficiency"]
+    assert interval.low <= 0.9 <= interval.high and interval.high - interval.low < 0.02
+    sheet = tmp_path / "gearbox.toml"
+    sheet.write_text(result.record_text())
+    found = lm.gearbox(str(sheet)).hysteresis
+    assert found is not None and found.efficiency == result.values["hysteresis_efficiency"]
+
+
 def test_a_torque_ripple_is_found_by_a_slow_run(tmp_path: Path) -> None:
     directory = tmp_path / "campaign"
     run = CliRunner().invoke(app, ["rig", NAME, "--logs", str(directory), "--ripple", "2 0.004 N*m"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ INTERVAL = 5e-3  # [s] between samples
 PERIOD = 4.0  # [s] of a ramp
 RISE = 0.5  # [s] until a run without ramp has its full torque
 DAMPING = 0.05  # damping ratio of the mesh, which data sheets do not give
+HALF = "locked-ramp-half"  # the smaller loop of a gearbox with hysteresis
 OFF = 1.25  # by which start values are off, so that the logs have to bring them back
 ENCODERS = {"motor_angle": 2 * math.pi / 2**16, "output_angle": 2 * math.pi / 2**22}  # steps [rad]
 TORQUE_NOISE = 2e-3  # of the rated output torque
@@ -41,7 +42,8 @@ def experiments(gearbox: Gearbox, ripple: TorqueHarmonic | None = None) -> list[
     """Locked ramp, runs without load, back-driving, runs against a brake: time, header and inputs of each.
 
     Torques go up to the rated one, speeds to about the rated one; the header says whether the output is locked, and the
-    coefficient of the brake [N·m·s/rad]. With a torque ripple, it also turns slowly under a constant torque.
+    coefficient of the brake [N·m·s/rad]. With a torque ripple, it also turns slowly under a constant torque. With hysteresis there is
+    a locked ramp up to half the torque, too, and the header says how far a log reaches.
     """
     torque, speed = gearbox.rated_output_torque, gearbox.rated_input_speed
     motor = torque / gearbox.ratio
@@ -53,15 +55,20 @@ def experiments(gearbox: Gearbox, ripple: TorqueHarmonic | None = None) -> list[
 
     def plan(name: str, t: np.ndarray, locked: float, brake: float, command: np.ndarray, load: np.ndarray) -> Log:
         channels = {"motor_torque": Channel(command, "N*m"), "load_torque": Channel(load, "N*m")}
-        return Log(f"{name}.csv", t, channels, {"locked": locked, "brake": brake})
+        reach = {"reach": 0.5 if name == HALF else 1.0} if _has_hysteresis(gearbox) else {}
+        return Log(f"{name}.csv", t, channels, {"locked": locked, "brake": brake, **reach})
 
     still = np.zeros(len(short))
     rise = np.where(
         short < RISE, 0.5 - 0.5 * np.cos(math.pi * short / RISE), 1.0
     )  # a jump would leave the drive ringing
     slow = [plan("ripple", short, 0.0, SLOW * brake, rise * 0.5 * motor, still)] if ripple is not None else []
+    locked = 1.2 * motor * _triangle(time / PERIOD)
+    loops = [plan("locked-ramp", time, 1.0, 0.0, locked, np.zeros(len(time)))]
+    if _has_hysteresis(gearbox):
+        loops.append(plan(HALF, time, 1.0, 0.0, 0.5 * locked, np.zeros(len(time))))
     return [
-        plan("locked-ramp", time, 1.0, 0.0, 1.2 * motor * _triangle(time / PERIOD), np.zeros(len(time))),
+        *loops,
         plan("no-load", short, 0.0, 0.0, rise * 0.5 * motor * np.cos(swing * short), still),
         plan("no-load-slow", short, 0.0, 0.0, rise * 0.25 * motor * np.cos(swing * short), still),
         plan("back-driving", short, 0.0, 0.0, still, rise * 0.6 * torque * np.cos(swing * short)),
@@ -132,6 +139,10 @@ def parameters(gearbox: Gearbox, ripple: TorqueHarmonic | None = None) -> tuple[
     if damping := mesh_damping(gearbox):
         values["mesh_damping"] = damping
         formulas["gears.gearbox.mesh_damping"] = "mesh_damping"
+    if _has_hysteresis(gearbox):
+        assert gearbox.hysteresis is not None
+        values["hysteresis_efficiency"] = gearbox.hysteresis.efficiency
+        formulas["gears.gearbox.hysteresis.efficiency"] = "hysteresis_efficiency"
     losses = gearbox.losses
     if isinstance(losses, LossMap):
         speeds, loads, table = losses.whole()
@@ -156,6 +167,19 @@ def parameters(gearbox: Gearbox, ripple: TorqueHarmonic | None = None) -> tuple[
     return values, formulas
 
 
+def _has_hysteresis(gearbox: Gearbox) -> bool:
+    return gearbox.hysteresis is not None and gearbox.hysteresis.efficiency < 1.0
+
+
+def _ladder(gearbox: Gearbox, names: Iterable[str]) -> dict[str, Any]:
+    """Of a gearbox with hysteresis: models without and with it, and the smaller loop held out, by which one is chosen."""
+    if not _has_hysteresis(gearbox):
+        return {}
+    plain = [name for name in names if name != "hysteresis_efficiency"]
+    rungs = [{"name": "without hysteresis", "free": plain}, {"name": "hysteresis", "free": ["hysteresis_efficiency"]}]
+    return {"ladder": rungs}
+
+
 def identification(gearbox: Gearbox, title: str = "", ripple: TorqueHarmonic | None = None) -> dict[str, Any]:
     """The identification file of the campaign, as tables."""
     values, formulas = parameters(gearbox, ripple)
@@ -165,7 +189,10 @@ def identification(gearbox: Gearbox, title: str = "", ripple: TorqueHarmonic | N
         "title": title,
         "scenario": "rig.toml",
         "record": "gear.gearbox",
-        "logs": {"files": ["logs/*.csv"]},
+        "logs": {
+            "files": ["logs/*.csv"],
+            **({"held_out": "locked == 1 and reach < 1"} if _has_hysteresis(gearbox) else {}),
+        },
         "inputs": {
             "drive_command": {"channel": "motor_torque", "interpolation": "linear"},
             "output_load_torque": {"channel": "load_torque", "interpolation": "linear"},
@@ -185,7 +212,13 @@ def identification(gearbox: Gearbox, title: str = "", ripple: TorqueHarmonic | N
             **formulas,
         },
         "parameters": {name: _free(name, value) for name, value in values.items()},
-        "fit": {"loss": "linear", "first": "locked == 1 or brake > 0"},  # they do not ring, and have few impacts
+        **_ladder(gearbox, values),
+        # Without hysteresis the errors are those of the sensors alone; with it, the long errors of runs that turn at other instants
+        # have minima in which the linear loss stays.
+        "fit": {
+            "loss": "huber" if _has_hysteresis(gearbox) else "linear",
+            "first": "locked == 1 or brake > 0",
+        },  # they do not ring, and have few impacts
     }
 
 
@@ -196,8 +229,9 @@ def _encoder(name: str, noise: dict[str, float]) -> dict[str, float]:
 def _free(name: str, value: float) -> dict[str, Any]:
     if name == "ripple_phase":
         return {"start": value + PHASE_OFF, "min": value - math.pi, "max": value + math.pi}
-    if name == "efficiency":
-        return {"start": 1.0 - OFF * (1.0 - value), "min": 0.01, "max": 1.0}
+    if name in ("efficiency", "hysteresis_efficiency"):
+        off = {"off": 1.0} if name == "hysteresis_efficiency" else {}
+        return {"start": 1.0 - OFF * (1.0 - value), "min": 0.01, "max": 1.0, **off}
     return {"start": OFF * value, "min": 0.1 * value, "max": 10.0 * value, "logarithmic": True}
 
 

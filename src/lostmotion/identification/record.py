@@ -85,6 +85,10 @@ def gear_sheet(gear: Gear, name: str, title: str, source: str) -> GearboxSheet:
         "rated_input_speed": gear.rated_input_speed,
     }
     data["inertia"] = gear.inertia
+    if gear.viscous_friction > 0.0:
+        data["viscous_friction"] = gear.viscous_friction
+    if gear.hysteresis is not None:
+        data["hysteresis_efficiency"] = gear.hysteresis.efficiency
     if isinstance(gear.stiffness, LinearStiffness):
         data["stiffness"] = {"slopes": [gear.stiffness.stiffness]}
     elif isinstance(gear.stiffness, TorsionCurve):
