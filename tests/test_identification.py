@@ -20,7 +20,7 @@ from lostmotion.identification.formulas import Formula
 from lostmotion.identification.identifiability import Undetermined, _sentence
 from lostmotion.identification.identify import IdentificationResult, _notes, identify_task
 from lostmotion.identification.intervals import reach
-from lostmotion.identification.ladder import RungResult, chosen, free_on, problem_of, start_point
+from lostmotion.identification.ladder import RungResult, chosen, climb, free_on, problem_of, start_point
 from lostmotion.identification.logs import Channel
 from lostmotion.identification.parameters import FreeParameter
 from lostmotion.identification.prepare import prepared, read_all
@@ -262,6 +262,27 @@ def test_a_run_that_fails_at_the_start_values_names_its_log(logs: Path) -> None:
     problem = problem_of(rig, Engine(rig, threads=1), prepared_logs, 0)
     with pytest.raises(lm.InputError, match=r"002\.json: has no run at the start values of .*friction_torque"):
         search(problem, wrong, iterations=1)
+
+
+@pytest.mark.parametrize("starts", [(0.5, 2.0, 6.0), (6.0, 2.0, 0.5)])
+def test_of_several_starts_the_fit_with_the_smallest_error_is_taken(starts: tuple[float, ...], logs: Path) -> None:
+    """After one iteration they are far from one another; the deviation of the position is not given, so each fit has its own."""
+    data = servo_task(logs).model_dump()
+    data["logs"]["files"] = [str(logs / "00[01].json")]
+    data["logs"]["held_out"] = None
+    data["fit"] |= {"iterations": 1, "regression": False}
+
+    def error(*tried: float) -> float:
+        rung = {"name": "one", "free": ["torque_constant"], "multi_start": {"torque_constant": tried}}
+        task = Identification(**(data | {"ladder": [rung]}))
+        rig = Rig(task, SERVO)
+        read = [prepared(task, log, rig.units) for log in read_all(task, SERVO)]
+        (only,) = climb(rig, Engine(rig, threads=1), read, start_point(task, read), lambda *_: None)
+        return only.fit.mae
+
+    alone = [error(value) for value in starts]
+    assert max(alone) > 1.5 * min(alone)
+    assert error(*starts) == min(alone)
 
 
 def test_a_product_that_alone_is_determined_is_named(logs: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from conftest import ROOT
 from lostmotion.identification.engine import Engine, Point
+from lostmotion.identification.identify import identify_logs
 from lostmotion.identification.ladder import free_on, start_point
 from lostmotion.identification.prepare import Prepared, prepared, read_all
 from lostmotion.identification.rig import Rig
@@ -78,6 +79,14 @@ def test_the_axis_follows_its_voltage_in_open_loop() -> None:
     # As measured when these values were found, to the last figure given.
     assert rmse == pytest.approx([2.2621e-3, 4.2617e-3], abs=1e-5)
     assert [log.held_out for log in logs] == [False, True]
+
+
+@needs_data
+def test_the_rung_that_is_taken_is_nearer_than_a_drive_of_four_parameters() -> None:
+    rig, logs = rig_and_logs("identify.toml")
+    result = identify_logs(rig, logs)
+    assert result.chosen > 0
+    assert result.error("position", held_out=True)[1] < 4.8e-3  # RMSE [m]
 
 
 @needs_data

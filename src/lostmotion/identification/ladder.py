@@ -110,12 +110,13 @@ def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, noti
         if rung > 0:
             point = replace(point, values=point.values | {n: p.start for n, p in added.items()})
         best: Fit | None = None
+        problem = problem_of(rig, engine, train, rung)
         for tried in _starts(point, entry.multi_start):
             fit = _one(rig, engine, train, rung, tried, entry.name, notify)
-            if best is None or fit.cost < best.cost:
+            if best is None or _cost(problem, fit, best) < best.cost:
                 best = fit
         assert best is not None
-        if found and found[-1].fit.cost < best.cost * (1.0 - 1e-9):
+        if found and _cost(problem_of(rig, engine, train, rung - 1), found[-1].fit, best) < best.cost * (1.0 - 1e-9):
             # The rung should contain that below: begin there, with what is new switched off.
             below = {n: p.off if p.off is not None else p.start for n, p in added.items()}
             again = _one(
@@ -127,13 +128,20 @@ def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, noti
                 entry.name,
                 notify,
             )
-            best = min(best, again, key=lambda f: f.cost)
+            if _cost(problem, again, best) < best.cost:
+                best = again
         point = best.point
         best.point = point = _with_own(rig, engine, logs, point, rung)
         unsure = undetermined(task, best, free_on(task, rung))
         errors = log_errors(logs, engine.residuals(logs, point, rung))
         found.append(RungResult(entry.name, best, errors, *_means(task, errors, best), engine.failed, unsure))
     return found
+
+
+def _cost(problem: Problem, fit: Fit, other: Fit) -> float:
+    """The cost of a fit in the units of another, so that the two can be compared: each has found deviations of its own."""
+    residuals = problem.engine.residuals(problem.logs, fit.point, problem.rung)
+    return problem.cost(residuals, other.deviations, fit.point, other.correlation)
 
 
 def _with_own(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point, rung: int) -> Point:
