@@ -8,6 +8,7 @@ import numpy as np
 
 from conftest import ROOT
 from lostmotion.identification.logs import Channel, Log
+from lostmotion.identification.readers import find_logs, read_log
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification, load_identification
 from lostmotion.identification.virtual import virtual_log, write_servo_json
@@ -25,6 +26,11 @@ TRUTH = {
     "direction": 0.2,
 }
 NOISE = 5e-4  # rad
+
+
+def read_all(task: Identification, directory: Path) -> list[Log]:
+    """All logs of a task, as they are read."""
+    return [read_log(path, time=task.logs.time) for path in find_logs(task.logs.files, directory)]
 
 
 def servo_task(directory: Path, **changes: object) -> Identification:

@@ -11,7 +11,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT
-from identification_logs import NOISE, SERVO, TRUTH, servo_plans, servo_task, write_servo_logs
+from identification_logs import NOISE, SERVO, TRUTH, read_all, servo_plans, servo_task, write_servo_logs
 from identification_round_trips import round_trip
 from lostmotion.data_sheets.records import read_sheets
 from lostmotion.identification.engine import Engine, Point
@@ -23,7 +23,7 @@ from lostmotion.identification.intervals import reach
 from lostmotion.identification.ladder import RungResult, chosen, climb, free_on, problem_of, start_point
 from lostmotion.identification.logs import Channel
 from lostmotion.identification.parameters import FreeParameter
-from lostmotion.identification.prepare import prepared, read_all
+from lostmotion.identification.prepare import prepared
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
 from lostmotion.reports.identification import (

@@ -10,7 +10,8 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT
-from lostmotion.identification.prepare import prepared, read_all
+from identification_logs import read_all
+from lostmotion.identification.prepare import prepared
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.runs import run_log
 from lostmotion.identification.task import Identification, load_identification

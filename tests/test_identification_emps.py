@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from conftest import ROOT
+from identification_logs import read_all
 from lostmotion.identification.engine import Engine, Point
 from lostmotion.identification.identify import identify_logs
 from lostmotion.identification.ladder import free_on, start_point
-from lostmotion.identification.prepare import Prepared, prepared, read_all
+from lostmotion.identification.prepare import Prepared, prepared
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.runs import run_log
 from lostmotion.identification.start import regressed

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from identification_logs import SERVO, TRUTH, servo_plans, servo_task, write_servo_logs
+from identification_logs import SERVO, TRUTH, read_all, servo_plans, servo_task, write_servo_logs
 from lostmotion.identification.engine import Engine, Point
 from lostmotion.identification.identify import identify_logs
 from lostmotion.identification.ladder import free_on, start_point
 from lostmotion.identification.logs import Channel, Log
 from lostmotion.identification.motion import windows
-from lostmotion.identification.prepare import Prepared, prepared, read_all
+from lostmotion.identification.prepare import Prepared, prepared
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.start import regressed
 from lostmotion.identification.task import Identification

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,9 +18,7 @@ from .rig import Rig, names_of
 MANY = 12  # values of what a condition names, up to which they are listed
 
 
-def gathered(
-    rig: Rig, directory: Path, notify: Callable[[], None] = lambda: None
-) -> tuple[list[Prepared], dict[str, str]]:
+def gathered(rig: Rig, directory: Path) -> tuple[list[Prepared], dict[str, str]]:
     """All logs of a task that can be used, screened, and by name of the others why they cannot.
 
     Raises
@@ -39,7 +37,6 @@ def gathered(
             logs.append(prepared(task, replace(read, name=name), rig.units))
         except InputError as problem:
             left_out[name] = _without(str(problem), path, name)
-        notify()
     known = frozenset().union(*(log.facts for log in logs))
     for log in logs:
         if why := _unlike(rig, log, known):

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from ..errors import InputError
 from ..units.conversion import si_value
 from .formulas import Formula
 from .logs import Channel, Log
-from .readers import find_logs, read_log
 from .screening import screened
 from .task import FormulaText, Identification
 
@@ -85,21 +83,6 @@ def channel_factor(written: str, of_file: str, unit: str, where: str) -> float:
         except ValueError as error:
             problem = problem or error
     raise InputError(f"{where}: the unit {text!r} is not known ({problem}); write it with measured or inputs ... unit")
-
-
-def read_all(task: Identification, directory: Path, notify: Callable[[], None] = lambda: None) -> list[Log]:
-    """All logs of a task.
-
-    Raises
-    ------
-    InputError
-        One of them cannot be read.
-    """
-    found = []
-    for path in find_logs(task.logs.files, directory):
-        found.append(read_log(path, time=task.logs.time))
-        notify()
-    return found
 
 
 def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepared:
