@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import ruckig
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import lostmotion as lm
@@ -461,6 +461,7 @@ def test_any_limits_and_moves_are_refused_in_one_plain_line_or_end_where_they_sh
     values=st.lists(st.floats(-1e6, 1e6) | extremes, max_size=6),
     interpolation=st.sampled_from(["linear", "cubic"]),
 )
+@example(times=[0.0, 1.0, 4e14], values=[0.0, 0.0, 0.0], interpolation="cubic")
 def test_any_series_is_refused_in_one_plain_line_or_passes_through_its_points(times, values, interpolation) -> None:
     try:
         reference = lm.TorqueReference(samples={"times": times, "values": values, "interpolation": interpolation})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import warnings
 from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar
 
@@ -46,12 +47,13 @@ class Series(Samples[V], Generic[V]):
 
         values = [float(v) for v in self.values]  # type: ignore[arg-type]
         try:
-            spline = CubicSpline(
-                self.times, values
-            )  # the third derivative is continuous at the second point and the last but one
-        except ValueError:
+            with warnings.catch_warnings(action="error"):  # of intervals that differ by more than a number resolves
+                # The third derivative is continuous at the second point and the last but one.
+                spline = CubicSpline(self.times, values)
+        except (ValueError, Warning):
             raise ValueError(
-                "has samples that overflow as a cubic spline; lay their times further apart, or check the values"
+                "has samples that overflow as a cubic spline; lay their times further apart or more evenly, "
+                "or check the values"
             ) from None
         factors = np.array([[1.0], [1.0], [2.0], [6.0]])  # of derivatives: value, first, second, third
         curve = zip(self.times, *(factors * spline.c[::-1]).tolist(), strict=False)
