@@ -48,9 +48,7 @@ class Drive {
     double min_rigid_inertia() const {
         const double i2 = gearbox.ratio * gearbox.ratio;
         double least = gearbox.losses == Gearbox::constant_efficiency ? 1.0 / gearbox.efficiency : 1.0;
-        if (gearbox.losses == Gearbox::loss_map)
-            for (int t = 0; t < gearbox.map.triangles(); ++t)
-                least = std::min(least, 1.0 + gearbox.map.plane(t).per_load);
+        if (gearbox.losses == Gearbox::loss_map) least = std::min(least, 1.0 + gearbox.map.least_slope_over_load());
         return input_inertia() + least * load.inertia / i2;
     }
 

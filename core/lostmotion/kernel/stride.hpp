@@ -13,9 +13,9 @@
 namespace lostmotion {
 
 // States and inputs at up to `most` instants of one regime, variable by variable.
-template <class D>
+template <class D, int most = 64>
 struct InstantsOf {
-    static constexpr int max_count = 64;
+    static constexpr int max_count = most;
     static_assert(max_count % vec_width == 0);
     using Column = std::array<double, max_count>;
 

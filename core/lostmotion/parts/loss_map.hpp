@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace lostmotion {
@@ -141,6 +142,14 @@ class LossMap {
     bool load_interval_in_data(int j) const { return j > 0 && j < load_intervals() - 1; }
 
     int triangles() const { return 2 * cells_along_speed() * load_intervals(); }
+    // Of all triangles: each has a side along mu, and each such side belongs to one.
+    double least_slope_over_load() const {
+        double least = std::numeric_limits<double>::infinity();
+        for (std::size_t j = 0; j + 1 < loads_.size(); ++j)
+            for (std::size_t i = 0; i < speeds_.size(); ++i)
+                least = std::fmin(least, (value(j + 1, i) - value(j, i)) / (loads_[j + 1] - loads_[j]));
+        return least;
+    }
 
  private:
     int cells_along_speed() const { return static_cast<int>(speeds_.size()) - 1; }

@@ -57,17 +57,14 @@ class PowerIntegral {
         void powers(const Propagator<D>& p, Cursor<D>& c, Powers& out) const {
             const auto u = c.input().template jet<orders>();
             Powers a, b;
-            State x = c.x();
-            for (int k = 0; k < orders; ++k) {
-                if (k == 1) x = c.rate();
-                if (k > 1) x = p.rates().higher(x, u[k - 1]);
-                if (k == 0) {
-                    left.evaluate(left_constant, x, u[0], a[0]);
-                    right.evaluate(right_constant, x, u[0], b[0]);
-                } else {
-                    left.rates(x, u[k], a[k]);
-                    right.rates(x, u[k], b[k]);
-                }
+            left.evaluate(left_constant, c.x(), u[0], a[0]);
+            right.evaluate(right_constant, c.x(), u[0], b[0]);
+            State rate = c.rate();
+            for (int k = 1;; ++k) {
+                left.rates(rate, u[k], a[k]);
+                right.rates(rate, u[k], b[k]);
+                if (k + 1 == orders) break;
+                rate = p.rates().higher(rate, u[k]);
             }
             for (int f = 0; f < count(); f += vec_width) {
                 const auto l = at(a, f), r = at(b, f);

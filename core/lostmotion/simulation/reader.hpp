@@ -1,6 +1,7 @@
 // Reads the channels of a drive at many instants of a regime.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cstddef>
@@ -16,45 +17,73 @@ struct Reading {
     std::array<double, n_channels> value;
 };
 
-using Instants = InstantsOf<DriveDims>;
-
 // Reads the channels in one regime, as many instants at once as the instruction set holds numbers.
 class Reader {
  public:
     Reader(const Drive& drive, const Regime& r, const Memory& m)
         : drive_(drive), regime_(r), memory_(m), has_map_(drive.gearbox.losses == Gearbox::loss_map) {}
 
-    // A channel at the instants k, k + 1, ...
-    Vec read(int channel, const Instants& at, int k) const {
+    // A channel at the first n instants, rounded up to whole vectors.
+    template <class Instants>
+    void read(int channel, const Instants& at, int n, double* out) const {
+        const auto each = [&](auto&& value) {
+            for (int k = 0; k < n; k += vec_width) store(value(k), out + k);
+        };
+        const auto column = [&](const auto& c) { each([&](int k) { return load(&c[k]); }); };
+        const auto form = [&](LinearForm f) {  // by value: in registers
+            const double constant = constant_part(f, memory_);
+            each([&](int k) { return evaluate(f, constant, at, k); });
+        };
+        const auto mode = [&](Contact c) {
+            if (regime_.at_rest[c] || regime_.key.modes[c] != absent)
+                std::fill_n(out, n, regime_.at_rest[c] ? 0.0 : static_cast<double>(regime_.key.modes[c]));
+            else
+                each([&](int k) { return sign_of_speed(c, at, k); });
+        };
         switch (channel) {
-            case ch_command: return load(&at.u[0][k]);
-            case ch_load_torque: return load(&at.u[1][k]);
-            case ch_motor_torque: return evaluate(regime_.source_torque, at, k);
-            case ch_motor_speed: return load(&at.x[motor_speed][k]);
-            case ch_load_speed: return load(&at.x[load_speed][k]);
-            case ch_load_angle: return load(&at.x[load_angle][k]);
-            case ch_twist: return load(&at.x[twist][k]);
-            case ch_output_torque: return evaluate(regime_.output_torque, at, k);
-            case ch_input_torque: return input_torque(at, k);
-            case ch_loss_coefficient: return loss_coefficient(at, k);
-            case ch_input_contact: return mode(input_contact, at, k);
-            case ch_twist_contact: return mode(twist_contact, at, k);
-            default: assert(channel == ch_load_contact); return mode(load_contact, at, k);
+            case ch_command: column(at.u[0]); return;
+            case ch_load_torque: column(at.u[1]); return;
+            case ch_motor_torque: form(regime_.source_torque); return;
+            case ch_motor_speed: column(at.x[motor_speed]); return;
+            case ch_load_speed: column(at.x[load_speed]); return;
+            case ch_load_angle: column(at.x[load_angle]); return;
+            case ch_twist: column(at.x[twist]); return;
+            case ch_output_torque: form(regime_.output_torque); return;
+            case ch_input_torque:
+                form(regime_.input_torque);
+                if (shares()) each([&](int k) { return input_torque(load(out + k), at, k); });
+                return;
+            case ch_loss_coefficient:
+                form(regime_.loss_torque);
+                each([&](int k) { return loss_coefficient(load(out + k), at, k); });
+                return;
+            case ch_input_contact: mode(input_contact); return;
+            case ch_twist_contact: mode(twist_contact); return;
+            default: assert(channel == ch_load_contact); mode(load_contact);
         }
     }
     Reading operator()(const State& x, const std::array<double, n_inputs>& u) const {
-        Instants at;
+        InstantsOf<DriveDims, vec_width> at;
         at.set(0, load(x), u);
         Reading out;
-        for (const int c : all_channels) out.value[static_cast<std::size_t>(c)] = read(c, at, 0)[0];
+        for (const int c : all_channels) {
+            std::array<double, vec_width> value;
+            read(c, at, 1, value.data());
+            out.value[static_cast<std::size_t>(c)] = value[0];
+        }
         return out;
     }
 
  private:
-    // None of the forms depends on the load angle.
+    template <class Instants>
     Vec evaluate(const LinearForm& f, const Instants& at, int k) const {
-        const auto term = [&](Term t, const Instants::Column& column) { return f.c[t] * load(&column[k]); };
-        return constant_part(f, memory_) +
+        return evaluate(f, constant_part(f, memory_), at, k);
+    }
+    // None of the forms depends on the load angle.
+    template <class Instants>
+    static Vec evaluate(const LinearForm& f, double constant, const Instants& at, int k) {
+        const auto term = [&](Term t, const typename Instants::Column& column) { return f.c[t] * load(&column[k]); };
+        return constant +
                ((term(motor_torque, at.x[0]) + term(motor_speed, at.x[1])) +
                 (term(load_speed, at.x[2]) + term(twist, at.x[3]))) +
                (term(command, at.u[0]) + term(load_torque, at.u[1]));
@@ -67,9 +96,9 @@ class Reader {
     double loss_at_rest(double T_2, double F) const { return drive_.gearbox.loss_torque(T_2, 0.0, way_of(F)); }
     static int way_of(double F) { return F >= 0.0 ? +1 : -1; }
 
-    Vec input_torque(const Instants& at, int k) const {
-        Vec T_1 = evaluate(regime_.input_torque, at, k);
-        if (!shares()) return T_1;
+    // Of one that shares, from the torque without the share of the gear.
+    template <class Instants>
+    Vec input_torque(Vec T_1, const Instants& at, int k) const {
         const Vec T_2 = evaluate(regime_.output_torque, at, k), F = evaluate(regime_.input_friction, at, k);
         for (int lane = 0; lane < vec_width; ++lane) {
             const double gear = loss_at_rest(T_2[lane], F[lane]) / drive_.gearbox.ratio;
@@ -79,9 +108,9 @@ class Reader {
         return T_1;
     }
 
-    Vec loss_coefficient(const Instants& at, int k) const {
-        const Gearbox& g = drive_.gearbox;
-        Vec lost = evaluate(regime_.loss_torque, at, k);
+    // From the loss of a speed forward.
+    template <class Instants>
+    Vec loss_coefficient(Vec lost, const Instants& at, int k) const {
         if (shares()) {
             const Vec T_2 = evaluate(regime_.output_torque, at, k), F = evaluate(regime_.input_friction, at, k);
             for (int lane = 0; lane < vec_width; ++lane) lost[lane] = loss_at_rest(T_2[lane], F[lane]);
@@ -90,13 +119,12 @@ class Reader {
         } else {
             lost *= signs(load(&at.x[motor_speed][k]));
         }
-        return lost / g.rated_output_torque;
+        return lost / drive_.gearbox.rated_output_torque;
     }
 
-    // Mode of a contact: +-1 slipping, 0 stuck. One that the drive does not have shows the sign of its speed.
-    Vec mode(Contact c, const Instants& at, int k) const {
-        if (regime_.at_rest[c]) return Vec{};
-        if (regime_.key.modes[c] != absent) return Vec{} + static_cast<double>(regime_.key.modes[c]);
+    // Of a contact that the drive does not have.
+    template <class Instants>
+    Vec sign_of_speed(Contact c, const Instants& at, int k) const {
         const Vec w_M = load(&at.x[motor_speed][k]), w = load(&at.x[load_speed][k]);
         return signs(c == input_contact ? w_M : c == load_contact ? w : w_M / drive_.gearbox.ratio - w);
     }

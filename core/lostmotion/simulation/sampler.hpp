@@ -106,7 +106,7 @@ class SamplerOf {
                     instants_.set(k, load(p.cursor.x()), p.cursor.input().values());
                 }
             }
-            for (int k = 0; k < n; k += vec_width) write(reader, next + k, k, n);
+            write(reader, next, n);
             next += static_cast<std::size_t>(n);
             if (next == p.end) return true;
             if (next % 4096 == 0 && interrupted != nullptr && interrupted(interrupted_context)) return false;
@@ -126,7 +126,7 @@ class SamplerOf {
                 if (k > 0) p.cursor.leap_to(instant(next + static_cast<std::size_t>(k)), step);
                 instants_.set(k, load(p.cursor.x()), p.cursor.input().values());
             }
-            for (int k = 0; k < n; k += vec_width) write(reader, next + static_cast<std::size_t>(k), k, n);
+            write(reader, next, n);
             next += static_cast<std::size_t>(n);
             if (next == p.end) return true;
             if (interrupted != nullptr && interrupted(interrupted_context)) return false;
@@ -159,17 +159,19 @@ class SamplerOf {
         while (k < count_ && within(k)) ++k;
         return k;
     }
-    // All channels at the instants k, k + 1, ... of n, of which the first is the sample `at`. What goes beyond these is
-    // written again by the segment that they belong to, but must not go beyond the channel.
-    void write(const Reader& reader, std::size_t at, int k, int n) {
+    // All channels at n instants, of which the first is the sample `at`. What goes beyond these is written again by the
+    // segment that they belong to, but must not go beyond the channel.
+    void write(const Reader& reader, std::size_t at, int n) {
         double* to = out_ + at;
-        const bool whole = at + vec_width <= count_;
+        const bool has_room = at + static_cast<std::size_t>(n + vec_width - 1) / vec_width * vec_width <= count_;
         for (const int c : channels_) {
-            const Vec value = reader.read(c, instants_, k);
-            if (whole)
-                store(value, to);
-            else
-                for (int lane = 0; k + lane < n; ++lane) to[lane] = value[lane];
+            if (has_room) {
+                reader.read(c, instants_, n, to);
+            } else {
+                typename Instants::Column values;
+                reader.read(c, instants_, n, values.data());
+                std::copy_n(values.begin(), n, to);
+            }
             to += count_;
         }
     }

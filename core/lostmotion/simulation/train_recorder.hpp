@@ -122,12 +122,15 @@ class TrainRecorder {
     void sample(Solver& solver, const typename System::Regime& r, const typename D::Memory& m,
                 const DenseStepOf<D>& dense, bool last) {
         if (!r.in_data) report_.left_data_at = std::fmin(report_.left_data_at, dense.begin);
-        InstantsOf<D> at;
+        InstantsOf<D, vec_width> at;
         dense_samples_.within(dense, last, solver, [&](std::size_t k, const StateOf<D>& x, const InputsOf<D>& input) {
             at.set(0, load(x), input);
             const TrainReader<D> reader(model_, r, m);
-            for (std::size_t c = 0; c < channels_.size(); ++c)
-                out_[c * options_.samples + k] = reader.read(channels_[c], at, 0)[0];
+            for (std::size_t c = 0; c < channels_.size(); ++c) {
+                std::array<double, vec_width> value;
+                reader.read(channels_[c], at, 1, value.data());
+                out_[c * options_.samples + k] = value[0];
+            }
         });
     }
     void end() {
