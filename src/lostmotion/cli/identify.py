@@ -67,7 +67,7 @@ def _print_summary(result: IdentificationResult) -> None:
         )
         _print_some([f"  {name}: {why}" for name, why in result.left_out.items()])
     if result.notes:
-        print(f"Notes on {len(result.notes)} logs:")
+        print("Notes on the logs:")
         _print_some([f"  {name}: {note}" for name, notes in result.notes.items() for note in notes])
 
 
