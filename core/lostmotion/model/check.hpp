@@ -268,7 +268,7 @@ inline std::string check_start(const Train& train, const std::vector<double>& sp
                    number(speed[static_cast<std::size_t>(g.housing)]) +
                    " rad/s; relative to it their quotient must be its ratio, " + number(g.law.ratio);
         return both(g.input, g.output) + " do not fit the rigid gear " + g.name +
-               "; their quotient must be its ratio, " + number(g.law.ratio);
+               "; their quotient must be its ratio, " + number(g.law.ratio) + ", to twelve digits";
     }
     std::string error;
     Train::each_coupling_kind(train, [&](const char*, const char* kind, const auto& elements) {

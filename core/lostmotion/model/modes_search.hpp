@@ -381,25 +381,46 @@ bool SwitchedTrain<Sizes>::holds_more(const ContactPlace& c) const {
 }
 
 // Where a contact holds more than it takes while it slips, both rest and slip may be consistent: it does not break away
-// by itself.
+// by itself as long as rest is, be it that contact or others that are at their limits then. Of several rests, that with
+// most contacts at rest whose torques change least.
 template <class Sizes>
 template <class Cache, class Now, class Memory>
-void SwitchedTrain<Sizes>::hold_where_possible(Cache& cache, Now& now, const Memory& before, Key modes,
+void SwitchedTrain<Sizes>::hold_where_possible(Cache& cache, Now& now, const Memory& before, const Key& modes,
                                                const Event& event, Key& key) const {
-    for (int c = 0; c < contacts(); ++c) {
-        if (modes.modes[c] == 0 || !event.at_rest[c] || !holds_more(places().contacts[c])) continue;
-        Key held = modes, found;
-        held.modes[c] = 0;
-        const auto memory = now.memory;
+    std::vector<int> breaking, others;  // contacts that are to slip from rest: those that hold more, and the others
+    for (int c = 0; c < contacts(); ++c)
+        if (modes.modes[c] != 0 && event.at_rest[c])
+            (holds_more(places().contacts[c]) ? breaking : others).push_back(c);
+    if (breaking.empty()) return;
+    const std::vector<int> holding_more = breaking;
+    breaking.insert(breaking.end(), others.begin(), others.end());
+    const std::size_t n = std::min(breaking.size(), most_held);
+    const auto slipping = now.memory;
+    auto of_best = slipping;
+    Key best;
+    std::ptrdiff_t most = 0;
+    double least = 0.0;
+    for (unsigned held = 1; held < 1u << n; ++held) {
+        Key trial = modes, found;
+        for (std::size_t k = 0; k < n; ++k)
+            if (held >> k & 1) trial.modes[breaking[k]] = 0;
         now.memory = before;
-        if ((at_its_limit(held) ? settle_at_limit(cache, now, held, event, found)
-                                : settle(cache, now, held, event, found).found) == Found::yes) {
-            modes = held;
-            key = found;
-        } else {
-            now.memory = memory;
-        }
+        if ((at_its_limit(trial) ? settle_at_limit(cache, now, trial, event, found)
+                                 : settle(cache, now, trial, event, found).found) != Found::yes)
+            continue;
+        const auto& r = cache.regime(found);
+        const auto rest = [&](int c) { return r.at_rest[c]; };
+        if (std::ranges::none_of(holding_more, rest)) continue;
+        const std::ptrdiff_t count = std::ranges::count_if(breaking, rest);
+        const double change = torque_change(r, now, event);
+        if (count < most || (count == most && !(change < least))) continue;
+        most = count;
+        least = change;
+        best = found;
+        of_best = now.memory;
     }
+    now.memory = most > 0 ? of_best : slipping;
+    if (most > 0) key = best;
 }
 
 // By how much the contacts' guards of a regime are violated, each in units of the sum of its terms' magnitudes: by the

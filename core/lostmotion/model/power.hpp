@@ -66,7 +66,8 @@ inline std::vector<PowerFlow> power_flows(const Assembly& a, const Regime& r) {
         add(PowerFlow::loss, gear.name, "mesh",
             mesh_power(r.input_torque[g], r.output_torque[g], a.per_input(index(g), r.key), relative));
         if (gear.housing != nowhere && gear.law.viscous_friction > 0.0)
-            add(PowerFlow::loss, gear.name, "viscous friction", {a.housing_friction(index(g), r), relative});
+            add(PowerFlow::loss, gear.name, "viscous friction on the housing",
+                {a.housing_friction(index(g), r), relative});
         if (gear.rigid() || a.twist_rests(index(g), r)) continue;
         // All of the output torque that is not the spring's.
         add(PowerFlow::loss, gear.name, "hysteresis and damping",

@@ -173,7 +173,7 @@ class SwitchedTrain {
     template <class Cache, class Now>
     Found pivot(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
     template <class Cache, class Now, class Memory>
-    void hold_where_possible(Cache& cache, Now& now, const Memory& before, Key modes, const Event& event,
+    void hold_where_possible(Cache& cache, Now& now, const Memory& before, const Key& modes, const Event& event,
                              Key& key) const;
     template <class Cache, class Now>
     Trial settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const;
@@ -347,7 +347,8 @@ class SwitchedTrain {
 
     static constexpr double max_violation = 1e-6;                                      // that rounding may make
     static constexpr double on_corner = 8.0 * std::numeric_limits<double>::epsilon();  // of an angle and its period
-    static constexpr double max_tried = 729.0;  // combinations that are tried as a last resort
+    static constexpr std::size_t most_held = 8;  // contacts of which each set is tried at rest
+    static constexpr double max_tried = 729.0;   // combinations that are tried as a last resort
     static constexpr std::size_t from_one_start = 300, longest_pivoting = 600;
 
     const Assembly& assembly_;

@@ -168,11 +168,7 @@ class TrainRun {
         channels_ = train_channels(*assembly_);
         const model::Layout n = model::Places(train, true).layout;
         using model::Widest;
-        if (!model::fits<Widest>(train, n))
-            error_ = "the train has " + std::to_string(n.coupled) + " coupled states, " + std::to_string(n.inputs) +
-                     " inputs and " + std::to_string(n.contacts) + " dry contacts; at most " +
-                     std::to_string(Widest::coupled) + ", " + std::to_string(Widest::inputs) + " and " +
-                     std::to_string(Widest::contacts) + " are possible";
+        if (!model::fits<Widest>(train, n)) error_ = too_large<Widest>(train, n);
     }
     const std::string& error() const { return error_; }
     const model::Assembly& assembly() const { return *assembly_; }
@@ -243,6 +239,22 @@ class TrainRun {
     }
 
  private:
+    template <class D>
+    static std::string too_large(const model::Train& train, const model::Layout& n) {
+        std::string error;
+        const auto compare = [&](int count, int most, const char* what) {
+            if (count > most)
+                error += (error.empty() ? "the train has " : ", ") + std::to_string(count) + " " + what + " (at most " +
+                         std::to_string(most) + ")";
+        };
+        compare(n.coupled, D::coupled, "coupled states");
+        compare(n.angles, D::angles, "parts that no gear joins");
+        compare(n.inputs, D::inputs, "inputs");
+        compare(n.contacts, D::contacts, "dry contacts");
+        compare(n.memory, D::memory, "torques and turns of angles to remember");
+        compare(static_cast<int>(train.gears.size()), D::contacts, "gears");
+        return error + "; leave some out";
+    }
     std::string error_;
     std::unique_ptr<model::Assembly> assembly_;
     std::vector<TrainChannel> channels_;
