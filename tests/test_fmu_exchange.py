@@ -228,3 +228,43 @@ def test_with_windings_inside_there_is_co_simulation_alone(tmp_path: Path) -> No
     description = fmpy.read_model_description(str(path))
     assert description.modelExchange is None
     assert description.coSimulation is not None
+
+
+@pytest.mark.parametrize("name", ["worm-lowering", "lossy-rigid-gear"])
+def test_directional_derivatives_of_what_a_contact_at_rest_shares(name: str, tmp_path: Path) -> None:
+    """An input shaft that rests holds a torque that bearing and gear share as their capacities are: central differences."""
+    scenario = lm.load(name)
+    if name == "lossy-rigid-gear":  # at rest, held by the load
+        scenario = scenario.replace(**{"command": 6.0, "load.torque": 10.0})
+    lm.export_fmu(scenario, tmp_path / "x.fmu")
+    model = Model(tmp_path / "x.fmu", tmp_path / "open")
+    drive = isinstance(scenario, lm.Scenario)
+    outputs = ["input_torque", "loss_coefficient"] if drive else ["worm_gear_input_torque", "worm_contact_torque"]
+    contact = "input_contact" if drive else "worm_contact"
+    references = [model.reference[o] for o in outputs]
+    point = (c_double * model.n)()
+    model.fmu.getContinuousStates(point, model.n)
+    assert model.fmu.getReal([model.reference[contact]]) == [0.0]
+    inputs = {"command": 6.0, "load_torque": 10.0} if drive else {}
+    checked = 0
+
+    def values(states: list[float], given: dict[str, float]) -> np.ndarray:
+        model.rates(0.0, states, **given)
+        return np.array(model.fmu.getReal(references))
+
+    for known in [*model.states, *inputs]:
+        if known in ("state.load_angle", "state.drum_angle", "state.motor_speed", "state.rotor_speed"):
+            continue
+        step = 1e-7
+        ends = []
+        for side in (step, -step):
+            moved = [x + side * (s == known) for x, s in zip(point, model.states, strict=True)]
+            ends.append(values(moved, {k: v + side * (k == known) for k, v in inputs.items()}))
+        values(list(point), inputs)
+        exact = model.fmu.getDirectionalDerivative(references, [model.reference[known]], [1.0])
+        differences = (ends[0] - ends[1]) / (2.0 * step)
+        assert list(exact) == pytest.approx(list(differences), rel=1e-6, abs=1e-6), known
+        checked += bool(np.any(differences))
+    assert checked > 1
+    model.fmu.terminate()
+    model.fmu.freeInstance()

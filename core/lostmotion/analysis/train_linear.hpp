@@ -39,6 +39,38 @@ inline LinearRegime linearize(const model::Assembly& a, const std::vector<TrainC
         out.push_back(constant);
         return out;
     };
+    // The torque on the input shaft of a gear; while that is at rest, what its contact holds, F, is shared by what is
+    // dry there as the capacities are: T_1 + F l/C, see TrainReader.
+    const auto input_torque = [&](std::size_t gear) {
+        std::vector<double> total = row(r.input_torque[gear]);
+        const model::Gear& g = a.train().gears[gear];
+        const int contact = a.places().shafts[static_cast<std::size_t>(g.input)].contact;
+        if (!g.has_dry_losses() || p.key.modes[static_cast<std::size_t>(contact)] != 0) return total;
+        const auto value = [&](const model::Row& f) { return model::evaluate(n, f, p.now); };
+        const model::Row &friction = r.contact_torque[static_cast<std::size_t>(contact)],
+                         &output = r.output_torque[gear];
+        const double F = value(friction), T_2 = value(output);
+        const int s = F >= 0.0 ? 1 : -1;
+        const auto margin = std::ranges::find_if(r.guards, [&](const model::Guard& guard) {
+            return guard.kind == model::Guard::capacity && guard.contact == contact && (guard.neighbour > 0) == (s > 0);
+        });
+        if (margin == r.guards.end()) return total;
+        const double C = value(margin->form) + s * F;
+        if (!(C > 0.0)) return total;
+        const model::MeshLoss loss = g.loss(s * T_2, 0.0);
+        const double l = loss.torque / g.law.ratio, own = F * l / (C * C);
+        // A product of three: their parts in the value are in the constant.
+        const auto add = [&](const model::Row& f, double factor) {
+            const std::vector<double> part = row(f);
+            for (std::size_t k = 0; k < total.size(); ++k) total[k] += factor * part[k];
+            total.back() -= factor * value(f);
+        };
+        add(friction, l / C - s * own);
+        add(output, F * s * loss.per_torque / (g.law.ratio * C));
+        add(margin->form, -own);
+        total.back() += F * l / C;
+        return total;
+    };
     LinearRegime out;
     for (std::size_t k = 0; k < names.size(); ++k) {
         if (!moves[k]) continue;
@@ -55,7 +87,10 @@ inline LinearRegime linearize(const model::Assembly& a, const std::vector<TrainC
         if (c.kind == Channel::state) add(c, model::Row::unit(static_cast<int>(first(k))));
         if (c.kind == Channel::motor_torque) add(c, r.motor_torque[k]);
         if (c.kind == Channel::output_torque) add(c, r.output_torque[k]);
-        if (c.kind == Channel::input_torque) add(c, r.input_torque[k]);
+        if (c.kind == Channel::input_torque) {
+            out.outputs.push_back(c.name);
+            out.output.push_back(input_torque(k));
+        }
         if (c.kind == Channel::contact_torque) add(c, r.contact_torque[k]);
         if (c.kind == Channel::output) add(c, a.controller_command(c.index, p.key));
         if (c.kind == Channel::error) add(c, a.controller_error(c.index));

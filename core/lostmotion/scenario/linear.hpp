@@ -38,10 +38,27 @@ inline void of_drive(Simulation& s, const double* states, const double* inputs, 
     channels[ch_twist] = states[twist];
     channels[ch_output_torque] = along(r.output_torque);
     channels[ch_input_torque] = along(r.input_torque);
+    const Gearbox& gearbox = s.drive().gearbox;
+    if (gearbox.losses == Gearbox::loss_map && r.key.modes[input_contact] == 0) {
+        // At rest the contact holds F, of which the gear takes F l/C, and C = T_c + l (Reader).
+        const auto value = [&](const LinearForm& f) {
+            return evaluate(f, s.snapshot().x, s.snapshot().memory, s.snapshot().input);
+        };
+        const double F = value(r.input_friction), T_2 = value(r.output_torque), i = gearbox.ratio;
+        const int way = F >= 0.0 ? 1 : -1;
+        const double mu = way * T_2 / gearbox.rated_output_torque, l = gearbox.loss_torque(T_2, 0.0, way) / i,
+                     C = s.drive().motor.friction_torque + l;
+        const double loss = way * gearbox.map.plane(gearbox.map.triangle(mu, 0.0)).per_load * along(r.output_torque);
+        channels[ch_loss_coefficient] = loss / gearbox.rated_output_torque;
+        if (C > 0.0)
+            channels[ch_input_torque] +=
+                along(r.input_friction) * l / C + F * loss / i * s.drive().motor.friction_torque / (C * C);
+        return;
+    }
     const double slips = static_cast<double>(r.key.modes[input_contact]);
     channels[ch_loss_coefficient] =
         (r.key.modes[input_contact] == absent ? (s.snapshot().x[motor_speed] < 0.0 ? -1.0 : 1.0) : slips) *
-        along(r.loss_torque) / s.drive().gearbox.rated_output_torque;
+        along(r.loss_torque) / gearbox.rated_output_torque;
 }
 
 // Of a train by its matrices.
