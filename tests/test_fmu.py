@@ -353,3 +353,124 @@ def test_directional_derivatives_are_those_of_the_inputs(drive: Slave) -> None:
     outputs = [drive.reference[name] for name in ("motor_torque", "output_torque")]
     # Both are states or follow from them: an input changes them later.
     assert list(drive.fmu.getDirectionalDerivative(outputs, known, [1.0])) == [0.0, 0.0]
+
+
+HELD_DRUM = """
+[shafts.drum]
+inertia = 1.0
+friction_torque = 2.0
+breakaway_torque = 4.0
+torque = 6.0
+[shafts.rotor]
+inertia = 1.0
+[gears.g]
+input = "rotor"
+output = "drum"
+ratio = 1.0
+[simulation]
+duration = 1.0
+sample_interval = 0.1
+"""
+
+
+@pytest.fixture
+def drum(tmp_path: Path, monkeypatch: Any) -> Path:
+    (tmp_path / "drum.toml").write_text(HELD_DRUM)
+    path = tmp_path / "drum.fmu"
+    lm.export_fmu(lm.load(tmp_path / "drum.toml"), path)
+    return path
+
+
+def test_what_is_read_before_the_first_step_commits_nothing(drum: Path, tmp_path: Path) -> None:
+    """The load of the file would break the drum away; that of the first step does not."""
+    for name, reads in (("unread", False), ("read", True)):
+        slave = Slave(drum, tmp_path / name)
+        if reads:
+            assert slave.read()["drum_speed"] == 0.0
+        slave.step(0.5, drum_load_torque=(3.0, 3.0))
+        assert slave.read()["drum_speed"] == 0.0
+        slave.close()
+
+
+def test_initial_values_set_before_initialization_are_those_of_the_start(paper: Path, tmp_path: Path) -> None:
+    slave = Slave(paper, tmp_path, {"initial.load_angle": 0.5})
+    scenario = lm.load("paper-2dof-nl-small").replace(**{"initial.load_angle": 0.5})
+    python = lm.Simulation(scenario, step=scenario.simulation.sample_interval)
+    slave.step(0.01, command=(0.5, 0.5))
+    python.advance(0.01, command=0.5)
+    assert slave.read()["load_angle"] == python["load_angle"] > 0.49
+    with pytest.raises(Exception, match="fmi2SetReal failed with status 2"):
+        slave.set({"initial.load_angle": 0.1})
+    assert "is of the start" in slave.said[-1]
+    slave.close()
+
+
+def test_a_friction_that_gives_or_takes_a_dry_contact(drum: Path, tmp_path: Path) -> None:
+    """Outputs keep their names where the simulation has a contact more; one that would be lost is refused."""
+    before = Slave(drum, tmp_path / "before", {"shafts.rotor.friction_torque": 1.0})
+    before.step(0.5, drum_load_torque=(6.0, 6.0))
+    scenario = lm.load(tmp_path / "drum.toml").replace(**{"shafts.rotor.friction_torque": 1.0})
+    result = lm.simulate(scenario.replace(**{"simulation.duration": 0.5, "simulation.sample_interval": 0.5}))
+    values = before.read()
+    assert values["drum_speed"] == pytest.approx(float(result["drum_speed"][-1]), rel=1e-12)
+    assert values["drum_contact"] == -1.0
+    with pytest.raises(Exception, match="fmi2SetReal failed with status 2"):
+        before.set({"shafts.rotor.friction_torque": 0.0})
+    before.step(0.1, drum_load_torque=(6.0, 6.0))
+    before.close()
+    during = Slave(drum, tmp_path / "during")
+    during.step(0.1, drum_load_torque=(6.0, 6.0))
+    with pytest.raises(Exception, match="fmi2SetReal failed with status 2"):
+        during.set({"shafts.rotor.friction_torque": 1.0})
+    assert "dry contact more" in during.said[-1]
+    with pytest.raises(Exception, match="fmi2SetReal failed with status 2"):
+        during.set({"shafts.drum.friction_torque": 0.0, "shafts.drum.breakaway_torque": 0.0})
+    assert "drum_contact" in during.said[-1]
+    during.step(0.1, drum_load_torque=(6.0, 6.0))
+    during.close()
+
+
+def test_parameters_that_fit_together_alone_are_set_and_restored_together(tmp_path: Path) -> None:
+    lm.export_fmu(lm.load("position-axis"), tmp_path / "axis.fmu")
+    slave = Slave(tmp_path / "axis.fmu", tmp_path)
+    moves = ["controller.reference.moves.0.to", "controller.reference.moves.1.to"]
+    first = slave.fmu.getFMUState()
+    values = slave.fmu.getReal([slave.reference[m] for m in moves])
+    for order in (moves, moves[::-1]):
+        far = {m: math.radians(100.0 if m == moves[0] else 60.0) for m in order}
+        slave.set(far)
+        slave.step(0.01)
+        slave.time = 0.0
+        slave.fmu.setFMUState(first)
+        assert slave.fmu.getReal([slave.reference[m] for m in moves]) == values
+    slave.fmu.freeFMUState(first)
+    slave.close()
+
+
+def test_delays_of_brakes_are_no_parameters(tmp_path: Path) -> None:
+    """An importer gives what acts, at once."""
+    brake = '[brakes.b]\nshaft = "drum"\ntorque = 5.0\nengagement_delay = 0.1\n[command.b]\nmean = 1.0\n'
+    (tmp_path / "braked.toml").write_text(HELD_DRUM + brake)
+    lm.export_fmu(lm.load(tmp_path / "braked.toml"), tmp_path / "braked.fmu")
+    names = [v.name for v in fmpy.read_model_description(str(tmp_path / "braked.fmu")).modelVariables]
+    assert "brakes.b.torque" in names
+    assert not [n for n in names if n.endswith("_delay")]
+
+
+def test_more_indicators_than_there_can_be_are_refused(drum: Path, tmp_path: Path) -> None:
+    for count in ("99999999999", "-1"):
+        fmpy.extract(str(drum), unzipdir=str(tmp_path / count))
+        names = tmp_path / count / "resources" / "names.txt"
+        lines = [f"indicators {count}" if x.startswith("indicators") else x for x in names.read_text().splitlines()]
+        names.write_text("\n".join(lines) + "\n")
+        from fmpy.fmi2 import FMU2Slave
+
+        description = fmpy.read_model_description(str(drum))
+        fmu = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=str(tmp_path / count),
+            modelIdentifier="lostmotion",
+            instanceName="drum",
+        )
+        with pytest.raises(Exception, match="instantiate"):
+            fmu.instantiate()

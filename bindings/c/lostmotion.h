@@ -62,6 +62,9 @@ LM_API const char* lm_scenario_parameter_key(const lm_scenario* scenario, size_t
 LM_API const char* lm_scenario_parameter_unit(const lm_scenario* scenario, size_t k);
 LM_API double lm_scenario_get(const lm_scenario* scenario, size_t k);
 LM_API int lm_scenario_set(lm_scenario* scenario, size_t k, double value);
+/* All parameters at once, values[lm_scenario_parameter_count]: what does not fit beside old values may fit beside new
+ * ones. Nothing changes if one is wrong. */
+LM_API int lm_scenario_set_all(lm_scenario* scenario, const double* values);
 
 /* Straight lines, each from a time on: value and slope; and sines: amplitude, frequency [Hz], phase [rad]. */
 typedef struct {
@@ -220,7 +223,8 @@ LM_API lm_simulation* lm_simulation_new(lm_train* train, double step);
  * given step by step. */
 LM_API lm_simulation* lm_simulation_from(lm_scenario* scenario, double step);
 /* The simulation goes on at its time, in its state, with the scenario as it is now: with other values of parameters.
- * The contacts are found anew. */
+ * The contacts are found anew. LM_INVALID if the variables are others, as where a friction that was 0 gives a shaft a
+ * dry contact. */
 LM_API int lm_go_on_with(lm_simulation* simulation, lm_scenario* scenario, double step);
 LM_API void lm_simulation_free(lm_simulation* simulation);
 LM_API const char* lm_error(const lm_simulation* simulation);

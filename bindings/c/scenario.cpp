@@ -101,6 +101,13 @@ double lm_scenario_get(const lm_scenario* scenario, size_t k) {
     const lm::ScenarioParameter* p = parameter(scenario, k);
     return p != nullptr ? p->value : std::nan("");
 }
+int lm_scenario_set_all(lm_scenario* scenario, const double* values) {
+    return scenario->changed(attempted([&]() -> std::string {
+        const std::size_t n = scenario->description.parameters().size();
+        if (values == nullptr && n > 0) return "there are no values";
+        return scenario->description.set_all({values, n});
+    }));
+}
 int lm_scenario_set(lm_scenario* scenario, size_t k, double value) {
     return scenario->changed(attempted([&] { return scenario->description.set(k, value); }));
 }

@@ -34,6 +34,11 @@ const lm::Variable* variable_of(const lm_simulation& s, lm_kind kind, std::size_
     return place < 0 ? nullptr : &v.all()[static_cast<std::size_t>(place)];
 }
 
+bool same_variables(const lm::Variables& a, const lm::Variables& b) {
+    return std::equal(a.all().begin(), a.all().end(), b.all().begin(), b.all().end(),
+                      [](const lm::Variable& x, const lm::Variable& y) { return x.name == y.name; });
+}
+
 }  // namespace
 
 extern "C" {
@@ -67,6 +72,8 @@ int lm_go_on_with(lm_simulation* simulation, lm_scenario* scenario, double step)
     const auto &before = simulation->simulation.names(), &after = next.simulation.names();
     if (before.states != after.states || before.inputs != after.inputs)
         return simulation->failed("the scenario has other elements");
+    if (!same_variables(simulation->simulation.variables(), next.simulation.variables()))
+        return simulation->failed("the scenario has other variables: a dry contact has come or gone");
     next.simulation.go_on_from(simulation->simulation);
     std::swap(simulation->simulation, next.simulation);
     return LM_OK;

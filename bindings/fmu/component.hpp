@@ -53,9 +53,7 @@ class Component {
         return ok;
     }
     int set_values(const unsigned* reference, std::size_t n, const double* value) {
-        for (std::size_t k = 0; k < n; ++k)
-            if (const Ended e = instance.set(reference[k], value[k]); e != ok) return ended(e);
-        return ok;
+        return ended(instance.set(reference, n, value));
     }
     // Of a call for variables of a type that there is none of.
     int none(std::size_t n, const char* sentence) { return n == 0 ? int{ok} : failed(sentence); }

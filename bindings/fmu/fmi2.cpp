@@ -63,10 +63,7 @@ FMU_API int fmi2SetupExperiment(void* c, Boolean, double, double start, Boolean,
     return fmu::ok;
 }
 FMU_API int fmi2EnterInitializationMode(void*) { return fmu::ok; }
-FMU_API int fmi2ExitInitializationMode(void* c) {
-    of(c).instance.exit_initialization();
-    return fmu::ok;
-}
+FMU_API int fmi2ExitInitializationMode(void* c) { return of(c).ended(of(c).instance.exit_initialization()); }
 FMU_API int fmi2Terminate(void*) { return fmu::ok; }
 FMU_API int fmi2Reset(void* c) { return of(c).ended(of(c).instance.reset()); }
 

@@ -51,10 +51,7 @@ FMU_API int fmi3EnterInitializationMode(void* c, bool, double, double start, boo
     of(c).instance.set_start_time(start);
     return fmu::ok;
 }
-FMU_API int fmi3ExitInitializationMode(void* c) {
-    of(c).instance.exit_initialization();
-    return fmu::ok;
-}
+FMU_API int fmi3ExitInitializationMode(void* c) { return of(c).ended(of(c).instance.exit_initialization()); }
 FMU_API int fmi3EnterEventMode(void*) { return fmu::ok; }
 FMU_API int fmi3EnterStepMode(void*) { return fmu::ok; }
 FMU_API int fmi3EnterConfigurationMode(void*) { return fmu::ok; }

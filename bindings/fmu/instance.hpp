@@ -42,13 +42,17 @@ class Instance {
 
     // Back to the beginning, with the values of the parameters that the file has.
     Ended reset() {
-        running_ = false;
         if (std::string wrong = read(); !wrong.empty()) return failed(wrong);
+        running_ = false;
         begin();
         return ok;
     }
     void set_start_time(double t) { start_ = time_ = t; }
-    void exit_initialization() { running_ = true; }
+    Ended exit_initialization() {
+        if (const Ended e = apply(); e != ok) return e;
+        running_ = true;
+        return ok;
+    }
     double time() const { return is_exchange() ? time_ : start_ + lm_time(simulation_.get()); }
 
     // --- values by reference ---
@@ -63,33 +67,27 @@ class Instance {
         } else if (is_parameter(reference)) {
             value = lm_scenario_get(scenario_.get(), reference - first_parameter);
         } else if (const std::size_t* output = variables_.output(reference)) {
-            if (const Ended e = refresh(); e != ok) return e;
+            if (const Ended e = uncommitted([this] { return refresh(); }); e != ok) return e;
             value = values_[*output];
         } else {
             return get_of_state(reference, value);
         }
         return ok;
     }
-    Ended set(unsigned reference, double value) {
-        if (!std::isfinite(value)) return failed("a value is not finite");
-        if (const std::size_t* k = variables_.input(reference)) {
-            if (inputs_[*k] == value) return ok;
-            inputs_[*k] = value;
-            read_ = false;
-            moved_ = true;
-            if (!running_) changed_ = true;
-            return ok;
+    // Parameters are set all at once, or none.
+    Ended set(const unsigned* references, std::size_t n, const double* values) {
+        std::vector<double> wanted;
+        for (std::size_t j = 0; j < n; ++j) {
+            const unsigned reference = references[j];
+            if (!std::isfinite(values[j])) return failed("a value is not finite");
+            if (is_parameter(reference)) {
+                if (wanted.empty()) wanted = values_of_parameters();
+                wanted[reference - first_parameter] = values[j];
+            } else if (const Ended e = set_input(reference, values[j]); e != ok) {
+                return e;
+            }
         }
-        if (variables_.input_rate(reference) != nullptr)
-            return set_input_rate(reference - first_input_rate + first_input, 1, value);
-        if (!is_parameter(reference)) return unknown(reference);
-        const std::size_t k = reference - first_parameter;
-        if (lm_scenario_get(scenario_.get(), k) == value) return ok;
-        if (lm_scenario_set(scenario_.get(), k, value) != LM_OK)
-            return failed(lm_scenario_error(scenario_.get()), discard);
-        changed_ = true;
-        read_ = false;
-        return ok;
+        return wanted.empty() ? ok : set_parameters(wanted);
     }
     // Of an input, by its own reference; only the first derivative is taken.
     Ended set_input_rate(unsigned reference, int order, double rate) {
@@ -104,7 +102,6 @@ class Instance {
     // Of variables or derivatives in a direction of inputs and states.
     Ended directional_derivative(const unsigned* unknowns, std::size_t n_unknowns, const unsigned* knowns,
                                  const double* seed, std::size_t n_knowns, double* out) {
-        if (const Ended e = refresh(); e != ok) return e;
         std::vector<double> dx(states_.size()), du(inputs_.size()), rates(states_.size()), variables(values_.size());
         for (std::size_t k = 0; k < n_knowns; ++k) {
             if (const std::size_t* input = variables_.input(knowns[k]))
@@ -114,8 +111,14 @@ class Instance {
             else if (variables_.input_rate(knowns[k]) == nullptr)
                 return unknown(knowns[k]);
         }
-        if (lm_directional_derivative(simulation_.get(), dx.data(), du.data(), rates.data(), variables.data()) != LM_OK)
-            return failed();
+        const Ended found = uncommitted([&] {
+            if (const Ended e = hold(); e != ok) return e;
+            lm_simulation* simulation = simulation_.get();
+            return lm_directional_derivative(simulation, dx.data(), du.data(), rates.data(), variables.data()) == LM_OK
+                       ? ok
+                       : failed();
+        });
+        if (found != ok) return found;
         for (std::size_t k = 0; k < n_unknowns; ++k) {
             if (const std::size_t* output = variables_.output(unknowns[k]))
                 out[k] = variables[*output];
@@ -134,13 +137,14 @@ class Instance {
         if (is_exchange()) return failed("this instance is for Model Exchange");
         if (!(std::isfinite(interval) && interval >= 1e-12 && interval <= 1e12))
             return failed("the communication step must lie between 1e-12 s and 1e12 s");
-        if (!(std::fabs(from - time()) <= 1e-3 * interval + 1e-9 * std::fabs(from)))
+        if (!(std::isfinite(from) && std::fabs(from - time()) <= 1e-3 * interval + 1e-9 * std::fabs(from)))
             return failed("the communication point is " + std::to_string(from) + " s, but the FMU is at " +
                           std::to_string(time()) + " s");
         if (const Ended e = apply(); e != ok) return e;
         end_ = inputs_;
         for (std::size_t k = 0; k < end_.size(); ++k) end_[k] += rates_[k] * interval;
         if (lm_advance(simulation_.get(), interval, inputs_.data(), end_.data()) != LM_OK) return failed();
+        committed_ = true;
         read_ = false;
         return ok;
     }
@@ -228,27 +232,33 @@ class Instance {
         lm_get_state(simulation_.get(), to.data() + n);
         return ok;
     }
+    // If it is refused, all stays as it was.
     Ended set_state(const double* from, std::size_t n) {
-        if (n != state_size() || from[0] != mark || from[1] != static_cast<double>(n))
+        const std::size_t numbers = head + parameters() + 2 * inputs_.size();
+        if (n <= numbers || from[0] != mark || from[1] != static_cast<double>(n) ||
+            !std::all_of(from, from + numbers, [](double number) { return std::isfinite(number); }))
             return failed("these bytes are no state of this FMU");
-        for (std::size_t k = 0; k < parameters(); ++k) {
-            if (lm_scenario_get(scenario_.get(), k) == from[head + k]) continue;
-            if (lm_scenario_set(scenario_.get(), k, from[head + k]) != LM_OK)
-                return failed(lm_scenario_error(scenario_.get()));
-            changed_ = true;
-        }
-        running_ = false;
-        if (const Ended e = apply(); e != ok) return e;
+        const std::vector<double> before = values_of_parameters();
         const double* inputs = from + head + parameters();
         const double* rates = inputs + inputs_.size();
-        if (lm_set_state(simulation_.get(), rates + inputs_.size()) != LM_OK) return failed();
+        if (lm_scenario_set_all(scenario_.get(), from + head) != LM_OK)
+            return failed(lm_scenario_error(scenario_.get()));
+        std::unique_ptr<lm_simulation, Free> other;
+        if (changed_ || values_of_parameters() != before)
+            other.reset(lm_simulation_from(scenario_.get(), usual_step()));
+        lm_simulation* to = other ? other.get() : simulation_.get();
+        if (numbers + lm_state_size(to) != n || lm_set_state(to, rates + inputs_.size()) != LM_OK) {
+            lm_scenario_set_all(scenario_.get(), before.data());
+            return failed("these bytes are no state of this FMU");
+        }
+        if (other) use(std::move(other));
         start_ = from[2];
         running_ = from[3] != 0.0;
         inputs_.assign(inputs, rates);
         rates_.assign(rates, rates + inputs_.size());
         time_ = start_ + lm_time(simulation_.get());
         lm_states(simulation_.get(), states_.data());
-        read_ = moved_ = false;
+        changed_ = read_ = moved_ = committed_ = false;
         return ok;
     }
 
@@ -273,33 +283,89 @@ class Instance {
             numbers.insert(numbers.end(), buffer, buffer + n);
         std::fclose(file);
         char wrong[500];
-        scenario_.reset(lm_scenario_read(numbers.data(), numbers.size(), wrong, sizeof wrong));
-        if (!scenario_) return path_ + ": " + wrong;
-        if (!variables_.references_given || lm_scenario_give_references(scenario_.get(), 1) == LM_OK) return {};
-        return lm_scenario_error(scenario_.get());
+        std::unique_ptr<lm_scenario, Free> found(lm_scenario_read(numbers.data(), numbers.size(), wrong, sizeof wrong));
+        if (!found) return path_ + ": " + wrong;
+        if (variables_.references_given && lm_scenario_give_references(found.get(), 1) != LM_OK)
+            return lm_scenario_error(found.get());
+        scenario_ = std::move(found);
+        return {};
     }
     void begin() {
         make_simulation();
         lm_simulation* s = simulation_.get();
         inputs_.assign(lm_count(s, LM_INPUTS), 0.0);
         rates_.assign(inputs_.size(), 0.0);
-        values_.assign(lm_count(s, LM_VARIABLES), 0.0);
         for (std::size_t k = 0; k < inputs_.size(); ++k) inputs_[k] = lm_input_at_start(s, k);
     }
     double usual_step() const { return lm_scenario_interval(scenario_.get()); }
     void make_simulation() {
-        simulation_.reset(lm_simulation_from(scenario_.get(), usual_step()));
+        use(std::unique_ptr<lm_simulation, Free>(lm_simulation_from(scenario_.get(), usual_step())));
+        changed_ = false;
+    }
+    // Its variables may lie in other places than those of the one before: a dry contact has some.
+    void use(std::unique_ptr<lm_simulation, Free> simulation) {
+        simulation_ = std::move(simulation);
+        variables_.find(simulation_.get(), "");
+        values_.assign(lm_count(simulation_.get(), LM_VARIABLES), 0.0);
         states_.assign(lm_count(simulation_.get(), LM_STATES), 0.0);
         lm_states(simulation_.get(), states_.data());
-        changed_ = read_ = false;
+        read_ = committed_ = false;
         moved_ = true;
+    }
+
+    Ended set_input(unsigned reference, double value) {
+        const std::size_t* k = variables_.input(reference);
+        if (k == nullptr)
+            return variables_.input_rate(reference) != nullptr
+                       ? set_input_rate(reference - first_input_rate + first_input, 1, value)
+                       : unknown(reference);
+        if (inputs_[*k] == value) return ok;
+        inputs_[*k] = value;
+        read_ = false;
+        moved_ = true;
+        if (!running_) changed_ = true;
+        return ok;
+    }
+    std::vector<double> values_of_parameters() const {
+        std::vector<double> values(parameters());
+        for (std::size_t k = 0; k < values.size(); ++k) values[k] = lm_scenario_get(scenario_.get(), k);
+        return values;
+    }
+    Ended set_parameters(const std::vector<double>& wanted) {
+        const std::vector<double> before = values_of_parameters();
+        if (wanted == before) return ok;
+        for (std::size_t k = 0; k < wanted.size() && running_; ++k) {
+            const std::string key = lm_scenario_parameter_key(scenario_.get(), k);
+            if (wanted[k] != before[k] && key.starts_with("initial."))
+                return failed("parameter " + key + " is of the start; set it before the first step", discard);
+        }
+        if (lm_scenario_set_all(scenario_.get(), wanted.data()) != LM_OK)
+            return failed(lm_scenario_error(scenario_.get()), discard);
+        if (std::string wrong = lost_variable(); !wrong.empty()) {
+            lm_scenario_set_all(scenario_.get(), before.data());
+            return failed(wrong, discard);
+        }
+        changed_ = true;
+        read_ = false;
+        return ok;
+    }
+    // With the parameters as they are: an output that there would no longer be, or a variable that a simulation which
+    // runs has not.
+    std::string lost_variable() const {
+        const std::unique_ptr<lm_simulation, Free> next(lm_simulation_from(scenario_.get(), usual_step()));
+        Variables found = variables_;
+        const std::string wrong = found.find(next.get(), "with these values of the parameters");
+        if (!wrong.empty()) return wrong + ", which this FMU has; take a small friction in place of 0";
+        if (running_ && lm_count(next.get(), LM_VARIABLES) != values_.size())
+            return "with these values of the parameters there is a dry contact more; set them before the first step";
+        return {};
     }
     // The parameters as they are set into the simulation.
     Ended apply() {
         if (!changed_) return ok;
         if (running_) {
             if (lm_go_on_with(simulation_.get(), scenario_.get(), usual_step()) != LM_OK) return failed();
-            changed_ = false;
+            changed_ = committed_ = false;
         } else {
             make_simulation();
         }
@@ -313,11 +379,28 @@ class Instance {
         moved_ = false;
         return ok;
     }
+    // What is read before the first step, or after a change of parameters before the next, commits nothing: neither the
+    // modes of the contacts nor a tick of the controllers, since inputs may still change at this instant.
+    template <class Read>
+    Ended uncommitted(Read&& reads) {
+        if (const Ended e = place(); e != ok) return e;
+        if (is_exchange() ? running_ : committed_) return reads();
+        std::vector<double> kept(lm_state_size(simulation_.get()));
+        lm_get_state(simulation_.get(), kept.data());
+        const Ended e = reads();
+        lm_set_state(simulation_.get(), kept.data());
+        moved_ = true;
+        return e;
+    }
+    // The inputs of this instant.
+    Ended hold() {
+        if (const Ended e = place(); e != ok) return e;
+        return is_exchange() || lm_hold(simulation_.get(), inputs_.data()) == LM_OK ? ok : failed();
+    }
     // The variables of this instant.
     Ended refresh() {
-        if (const Ended e = place(); e != ok) return e;
         if (read_) return ok;
-        if (!is_exchange() && lm_hold(simulation_.get(), inputs_.data()) != LM_OK) return failed();
+        if (const Ended e = hold(); e != ok) return e;
         if (lm_read(simulation_.get(), values_.data()) != LM_OK) return failed();
         read_ = true;
         return ok;
@@ -327,14 +410,18 @@ class Instance {
         const bool guard = reference >= first_guard && reference - first_guard < indicator_count();
         const std::size_t *state = variables_.state(reference), *derivative = variables_.derivative(reference);
         if (!guard && state == nullptr && derivative == nullptr) return unknown(reference);
-        if (const Ended e = refresh(); e != ok) return e;
         scratch_.assign(guard ? std::max(indicator_count(), lm_guard_count(simulation_.get())) : states_.size(), 1.0);
         if (state != nullptr) {
+            if (const Ended e = place(); e != ok) return e;
             lm_states(simulation_.get(), scratch_.data());
             value = scratch_[*state];
             return ok;
         }
-        if ((guard ? lm_guards : lm_rates)(simulation_.get(), scratch_.data()) != LM_OK) return failed();
+        const Ended found = uncommitted([&] {
+            if (const Ended e = hold(); e != ok) return e;
+            return (guard ? lm_guards : lm_rates)(simulation_.get(), scratch_.data()) == LM_OK ? ok : failed();
+        });
+        if (found != ok) return found;
         value = scratch_[guard ? reference - first_guard : *derivative];
         return ok;
     }
@@ -355,9 +442,10 @@ class Instance {
     std::vector<double> scratch_;
     double start_ = 0.0, time_ = 0.0;  // [s]; time_: of the importer's integrator
     bool running_ = false;
-    bool changed_ = false;  // parameters, since the simulation was made, or inputs before it runs
-    bool moved_ = true;     // the importer's integrator, or an input, since it was placed
-    bool read_ = false;     // the variables are those of this instant
+    bool changed_ = false;    // parameters, since the simulation was made, or inputs before it runs
+    bool moved_ = true;       // the importer's integrator, or an input, since it was placed
+    bool read_ = false;       // the variables are those of this instant
+    bool committed_ = false;  // the simulation has begun to move with these parameters
 };
 
 }  // namespace lostmotion::fmu

@@ -25,6 +25,8 @@ enum Reference : unsigned {
 };
 
 struct Variables {
+    static constexpr std::size_t max_indicators = first_parameter - first_guard;
+
     std::string identifier;                    // by which modelDescription.xml and resources know each other
     std::size_t indicators = 0;                // how many are declared
     bool references_given = false;             // are those of sampled controllers inputs?
@@ -57,7 +59,9 @@ struct Variables {
             if (kind == "input") {
                 input_names.push_back(word('\n'));
             } else if (kind == "indicators") {
-                indicators = static_cast<std::size_t>(std::strtoul(word('\n').c_str(), nullptr, 10));
+                const std::string count = word('\n');
+                indicators = static_cast<std::size_t>(std::strtoul(count.c_str(), nullptr, 10));
+                if (indicators > max_indicators) return path + ": there cannot be " + count + " indicators";
             } else if (kind == "output") {
                 output_names.push_back(word('\n'));
             } else if (kind == "state") {

@@ -63,12 +63,32 @@ class ScenarioDescription {
     // What these return is wrong with a value, or nothing; then the scenario has changed.
     std::string set(std::size_t k, double value) {
         if (k >= parameters_.size()) return "there is no parameter of this number";
-        ScenarioParameter& p = parameters_[k];
-        const double before = std::exchange(p.value, value);
-        std::string error = std::isfinite(value) ? apply() : "it must be finite";
-        if (error.empty()) return error;
-        p.value = before;
-        return "parameter " + p.key + ": " + error;
+        std::vector<double> values = values_of_parameters();
+        values[k] = value;
+        return set_all(values);
+    }
+    // All at once: what does not fit beside old values may fit beside new ones.
+    std::string set_all(std::span<const double> values) {
+        if (values.size() != parameters_.size())
+            return "there are " + std::to_string(parameters_.size()) + " parameters";
+        const std::vector<double> before = values_of_parameters();
+        std::string changed;
+        bool finite = true;
+        for (std::size_t k = 0; k < values.size(); ++k) {
+            if (values[k] == before[k]) continue;
+            changed += (changed.empty() ? "parameter " : ", ") + parameters_[k].key;
+            finite = finite && std::isfinite(values[k]);
+            parameters_[k].value = values[k];
+        }
+        const std::string error = !finite ? "it must be finite" : changed.empty() ? "" : apply();
+        if (error.empty()) return {};
+        for (std::size_t k = 0; k < values.size(); ++k) parameters_[k].value = before[k];
+        return changed + ": " + error;
+    }
+    std::vector<double> values_of_parameters() const {
+        std::vector<double> values;
+        for (const ScenarioParameter& p : parameters_) values.push_back(p.value);
+        return values;
     }
 
     std::string set_times(double duration, double interval) {

@@ -172,8 +172,15 @@ def _of_signals(scenario: Scenario | TrainScenario, key: str, references: bool) 
         given = references and parts[:2] == ["controller", "reference"]
         return given or parts[0] == "command" or parts[:2] == ["load", "torque"]
     of_shaft = parts[0] == "shafts" and parts[2:3] == ["torque"]
+    # Of the command of a brake or a clutch: what the importer gives acts at once.
+    delay = parts[0] in ("brakes", "clutches") and parts[-1] in ("engagement_delay", "release_delay")
     of_controller = parts[0] == "controllers" and parts[2] == "reference"
-    return parts[0] == "command" or of_shaft or (of_controller and (references or parts[1] in scenario.continuous()))
+    return (
+        parts[0] == "command"
+        or of_shaft
+        or delay
+        or (of_controller and (references or parts[1] in scenario.continuous()))
+    )
 
 
 # What a reference is of: its unit and meaning, as of the core.
