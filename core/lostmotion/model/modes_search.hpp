@@ -400,10 +400,18 @@ void SwitchedTrain<Sizes>::hold_where_possible(Cache& cache, Now& now, const Mem
     Key best;
     std::ptrdiff_t most = 0;
     double least = 0.0;
-    for (unsigned held = 1; held < 1u << n; ++held) {
+    // Those at their limits may hold against the way in which they would slip.
+    int combinations = 1;
+    for (std::size_t k = 0; k < n; ++k) combinations *= 3;
+    for (int number = 0; number < combinations; ++number) {
         Key trial = modes, found;
-        for (std::size_t k = 0; k < n; ++k)
-            if (held >> k & 1) trial.modes[breaking[k]] = 0;
+        bool possible = true;
+        for (std::size_t k = 0, left = static_cast<std::size_t>(number); k < n; ++k, left /= 3) {
+            const auto mode = static_cast<std::int8_t>(static_cast<int>(left % 3) - 1);
+            possible = possible && !(mode > 0 && places().contacts[breaking[k]].one_way);
+            trial.modes[breaking[k]] = mode;
+        }
+        if (!possible || trial.modes == modes.modes) continue;
         now.memory = before;
         if ((at_its_limit(trial) ? settle_at_limit(cache, now, trial, event, found)
                                  : settle(cache, now, trial, event, found).found) != Found::yes)

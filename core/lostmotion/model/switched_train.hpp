@@ -347,7 +347,7 @@ class SwitchedTrain {
 
     static constexpr double max_violation = 1e-6;                                      // that rounding may make
     static constexpr double on_corner = 8.0 * std::numeric_limits<double>::epsilon();  // of an angle and its period
-    static constexpr std::size_t most_held = 8;  // contacts of which each set is tried at rest
+    static constexpr std::size_t most_held = 5;  // contacts whose combinations are tried at rest
     static constexpr double max_tried = 729.0;   // combinations that are tried as a last resort
     static constexpr std::size_t from_one_start = 300, longest_pivoting = 600;
 
