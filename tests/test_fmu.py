@@ -474,3 +474,10 @@ def test_more_indicators_than_there_can_be_are_refused(drum: Path, tmp_path: Pat
         )
         with pytest.raises(Exception, match="instantiate"):
             fmu.instantiate()
+
+
+def test_a_title_that_xml_cannot_hold_is_refused(tmp_path: Path) -> None:
+    scenario = lm.load("paper-2dof-nl-small").replace(title="a\u0001b")
+    with pytest.raises(lm.InputError, match=r"title: 'a\\x01b' holds a control character"):
+        lm.export_fmu(scenario, tmp_path / "x.fmu")
+    assert not list(tmp_path.iterdir())

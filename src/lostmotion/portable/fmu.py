@@ -99,6 +99,10 @@ def export_fmu(
         raise InputError(f"{path}: must end in .fmu")
     if fmi not in PLATFORMS:
         raise InputError(f"fmi: {fmi} must be 2 (FMI 2.0) or 3 (FMI 3.0)")
+    if any(ord(letter) < 32 and letter not in "\t\n\r" for letter in scenario.title or ""):
+        raise InputError(
+            f"title: {scenario.title!r} holds a control character, which modelDescription.xml cannot; remove it"
+        )
     if not controllers:
         scenario = without_controllers(scenario)
     if references:
