@@ -428,58 +428,6 @@ def test_a_saved_result_of_a_train_is_read_back_and_run_again(tmp_path: Path, en
     assert halved.gears["belt"].ratio == 1.0
 
 
-def joint_rest(tmp_path: Path, torque_a: str, torque_b: str, coulomb: float = 3.0) -> Any:
-    """Two shafts on a rigid gear, one of which holds more than it takes while it slips."""
-    path = tmp_path / "rest.toml"
-    path.write_text(
-        f"""
-[shafts.a]
-inertia = 1
-friction_torque = {coulomb}
-breakaway_torque = 5
-torque = {{ {torque_a} }}
-[shafts.b]
-inertia = 1
-friction_torque = 1.5
-torque = {{ {torque_b} }}
-[gears.g]
-input = "a"
-output = "b"
-ratio = 1
-[simulation]
-duration = 8
-sample_interval = 0.5
-"""
-    )
-    return lm.simulate(lm.load(path))
-
-
-@pytest.mark.parametrize("coulomb", [3.0, 5.0])
-@pytest.mark.parametrize("rise", [0.0, -1.0])
-def test_two_shafts_at_rest_break_away_when_both_have_given_what_they_hold(
-    rise: float, coulomb: float, tmp_path: Path
-) -> None:
-    """Up to 5 N*m + 1.5 N*m, though one alone is at its limit from 5 N*m on; from there on the other takes the rest."""
-    result = joint_rest(
-        tmp_path,
-        "ramps = [{ rise = 10, duration = 10 }]",
-        f"ramps = [{{ rise = {rise}, duration = 10 }}]",
-        coulomb,
-    )
-    time = np.asarray(result["time"])
-    away = 6.5 / (1.0 + 0.1 * rise)
-    moves = np.asarray(result["a_speed"]) != 0.0
-    assert (moves == (time > away)).all()
-    rests = time < away
-    assert np.asarray(result["g_output_torque"])[rests] == pytest.approx(-np.maximum(time[rests] - 5.0, 0.0), abs=1e-12)
-
-
-def test_rest_at_a_start_beyond_what_one_shaft_holds_changes_the_torques_least(tmp_path: Path) -> None:
-    result = joint_rest(tmp_path, "mean = 5.5", "mean = -0.55")
-    assert not np.asarray(result["a_speed"]).any()
-    assert np.asarray(result["g_output_torque"]) == pytest.approx(-0.5, abs=1e-12)
-
-
 def test_losses_of_a_gear_on_a_turning_housing_are_apart_from_those_of_a_shaft_of_its_name(tmp_path: Path) -> None:
     path = tmp_path / "planetary.toml"
     path.write_text(

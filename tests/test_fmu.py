@@ -374,7 +374,7 @@ sample_interval = 0.1
 
 
 @pytest.fixture
-def drum(tmp_path: Path, monkeypatch: Any) -> Path:
+def drum(tmp_path: Path) -> Path:
     (tmp_path / "drum.toml").write_text(HELD_DRUM)
     path = tmp_path / "drum.fmu"
     lm.export_fmu(lm.load(tmp_path / "drum.toml"), path)
@@ -458,19 +458,16 @@ def test_delays_of_brakes_are_no_parameters(tmp_path: Path) -> None:
 
 
 def test_more_indicators_than_there_can_be_are_refused(drum: Path, tmp_path: Path) -> None:
+    from fmpy.fmi2 import FMU2Slave
+
+    guid = fmpy.read_model_description(str(drum)).guid
     for count in ("99999999999", "-1"):
         fmpy.extract(str(drum), unzipdir=str(tmp_path / count))
         names = tmp_path / count / "resources" / "names.txt"
         lines = [f"indicators {count}" if x.startswith("indicators") else x for x in names.read_text().splitlines()]
         names.write_text("\n".join(lines) + "\n")
-        from fmpy.fmi2 import FMU2Slave
-
-        description = fmpy.read_model_description(str(drum))
         fmu = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=str(tmp_path / count),
-            modelIdentifier="lostmotion",
-            instanceName="drum",
+            guid=guid, unzipDirectory=str(tmp_path / count), modelIdentifier="lostmotion", instanceName="drum"
         )
         with pytest.raises(Exception, match="instantiate"):
             fmu.instantiate()

@@ -53,11 +53,9 @@ PLATFORMS = {
     "x86_64-darwin": ("x86_64-macos", ".dylib"),
     "aarch64-darwin": ("aarch64-macos", ".dylib"),
 }
+WASM = ("-target", "wasm32-wasi")
 # Small blocks are cleared and copied in place: an engine leaves memory.fill and memory.copy to a function of its own.
-WASM = (
-    *("-target", "wasm32-wasi", "-msimd128"),
-    *("-mllvm", "-max-store-memset=32", "-mllvm", "-max-store-memcpy=32"),
-)
+WASM_CODE = (*WASM, "-msimd128", "-mllvm", "-max-store-memset=32", "-mllvm", "-max-store-memcpy=32")
 # Of what solves drives in a live page: browsers inline and unroll nothing, and their calls and loops cost more. Trains become a quarter larger by it.
 INLINED = ("-mllvm", "-inline-threshold=350", "-mllvm", "-unroll-threshold=600")
 # Binaryen, which npm installs for the page: modules become an eighth smaller and some per cent faster.
@@ -117,7 +115,7 @@ def linked(to: Path, made: Sequence[Path], *exports: str) -> None:
     """A WebAssembly module that imports nothing; `_initialize` is to be called first."""
     unfinished = to.with_suffix(".unfinished.wasm")
     options = ("-mexec-model=reactor", "-s", *(f"-Wl,{e}" for e in exports), f"-Wl,-z,stack-size={STACK}")
-    zig("cc", *WASM[:2], *options, *made, "-o", unfinished)
+    zig("cc", *WASM, *options, *made, "-o", unfinished)
     unfinished.replace(to)
 
 
@@ -127,7 +125,7 @@ def wasm(to: Path, optimisation: str = "-O3") -> Path:
     with (to.parent / f".{to.name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
         groups = [*([kernel] for kernel in KERNELS.values()), INTERFACE]
-        made = objects(groups, WASM, optimisation, to.parent / f"{to.stem}-objects")
+        made = objects(groups, WASM_CODE, optimisation, to.parent / f"{to.stem}-objects")
         if not to.exists() or to.stat().st_mtime < max(o.stat().st_mtime for o in made):
             linked(to, made, "--export=malloc", "--export=free", "--export-dynamic")
     return to
@@ -148,7 +146,7 @@ def page_core(kernel: str, optimisation: str = "-O3") -> Path:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
         # For size, but for what solves: of drives that is compiled where it is called.
         fast = [KERNELS[kernel], *(s for s in PAGE_SOURCES if kernel == "drive" and s.stem == "run")]
-        target = (*WASM, f"-DLOSTMOTION_KERNEL={kernel}")
+        target = (*WASM_CODE, f"-DLOSTMOTION_KERNEL={kernel}")
         made = [
             compiled(fast, (*target, *(INLINED if kernel == "drive" else ())), optimisation, directory),
             compiled([s for s in PAGE_SOURCES if s not in fast], target, "-Oz", directory),

@@ -244,8 +244,7 @@ class Instance {
         if (lm_scenario_set_all(scenario_.get(), from + head) != LM_OK)
             return failed(lm_scenario_error(scenario_.get()));
         std::unique_ptr<lm_simulation, Free> other;
-        if (changed_ || values_of_parameters() != before)
-            other.reset(lm_simulation_from(scenario_.get(), usual_step()));
+        if (changed_ || values_of_parameters() != before) other = simulation_now();
         lm_simulation* to = other ? other.get() : simulation_.get();
         if (numbers + lm_state_size(to) != n || lm_set_state(to, rates + inputs_.size()) != LM_OK) {
             lm_scenario_set_all(scenario_.get(), before.data());
@@ -298,8 +297,12 @@ class Instance {
         for (std::size_t k = 0; k < inputs_.size(); ++k) inputs_[k] = lm_input_at_start(s, k);
     }
     double usual_step() const { return lm_scenario_interval(scenario_.get()); }
+    // From its start, with the parameters as they are.
+    std::unique_ptr<lm_simulation, Free> simulation_now() const {
+        return std::unique_ptr<lm_simulation, Free>(lm_simulation_from(scenario_.get(), usual_step()));
+    }
     void make_simulation() {
-        use(std::unique_ptr<lm_simulation, Free>(lm_simulation_from(scenario_.get(), usual_step())));
+        use(simulation_now());
         changed_ = false;
     }
     // Its variables may lie in other places than those of the one before: a dry contact has some.
@@ -341,22 +344,22 @@ class Instance {
         }
         if (lm_scenario_set_all(scenario_.get(), wanted.data()) != LM_OK)
             return failed(lm_scenario_error(scenario_.get()), discard);
-        if (std::string wrong = lost_variable(); !wrong.empty()) {
+        auto next = simulation_now();
+        if (std::string wrong = lost_variable(next.get()); !wrong.empty()) {
             lm_scenario_set_all(scenario_.get(), before.data());
             return failed(wrong, discard);
         }
-        changed_ = true;
+        if (!running_) use(std::move(next));
+        changed_ = changed_ || running_;
         read_ = false;
         return ok;
     }
-    // With the parameters as they are: an output that there would no longer be, or a variable that a simulation which
-    // runs has not.
-    std::string lost_variable() const {
-        const std::unique_ptr<lm_simulation, Free> next(lm_simulation_from(scenario_.get(), usual_step()));
+    // An output that there would no longer be in another simulation, or a variable that one which runs has not.
+    std::string lost_variable(const lm_simulation* next) const {
         Variables found = variables_;
-        const std::string wrong = found.find(next.get(), "with these values of the parameters");
+        const std::string wrong = found.find(next, "with these values of the parameters");
         if (!wrong.empty()) return wrong + ", which this FMU has; take a small friction in place of 0";
-        if (running_ && lm_count(next.get(), LM_VARIABLES) != values_.size())
+        if (running_ && lm_count(next, LM_VARIABLES) != values_.size())
             return "with these values of the parameters there is a dry contact more; set them before the first step";
         return {};
     }

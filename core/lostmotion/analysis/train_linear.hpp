@@ -7,6 +7,7 @@
 
 #include "../model/names.hpp"
 #include "../simulation/train_point.hpp"
+#include "shared_torque.hpp"
 
 namespace lostmotion {
 
@@ -39,36 +40,20 @@ inline LinearRegime linearize(const model::Assembly& a, const std::vector<TrainC
         out.push_back(constant);
         return out;
     };
-    // The torque on the input shaft of a gear; while that is at rest, what its contact holds, F, is shared by what is
-    // dry there as the capacities are: T_1 + F l/C, see TrainReader.
     const auto input_torque = [&](std::size_t gear) {
         std::vector<double> total = row(r.input_torque[gear]);
-        const model::Gear& g = a.train().gears[gear];
-        const int contact = a.places().shafts[static_cast<std::size_t>(g.input)].contact;
-        if (!g.has_dry_losses() || p.key.modes[static_cast<std::size_t>(contact)] != 0) return total;
         const auto value = [&](const model::Row& f) { return model::evaluate(n, f, p.now); };
-        const model::Row &friction = r.contact_torque[static_cast<std::size_t>(contact)],
-                         &output = r.output_torque[gear];
-        const double F = value(friction), T_2 = value(output);
-        const int s = F >= 0.0 ? 1 : -1;
-        const auto margin = std::ranges::find_if(r.guards, [&](const model::Guard& guard) {
-            return guard.kind == model::Guard::capacity && guard.contact == contact && (guard.neighbour > 0) == (s > 0);
-        });
-        if (margin == r.guards.end()) return total;
-        const double C = value(margin->form) + s * F;
-        if (!(C > 0.0)) return total;
-        const model::MeshLoss loss = g.loss(s * T_2, 0.0);
-        const double l = loss.torque / g.law.ratio, own = F * l / (C * C);
-        // A product of three: their parts in the value are in the constant.
-        const auto add = [&](const model::Row& f, double factor) {
+        const SharedTorque shared = shared_torque(a, r, gear, value);
+        if (shared.margin == nullptr) return total;
+        const auto add_tangent = [&](const model::Row& f, double derivative) {
             const std::vector<double> part = row(f);
-            for (std::size_t k = 0; k < total.size(); ++k) total[k] += factor * part[k];
-            total.back() -= factor * value(f);
+            for (std::size_t k = 0; k < total.size(); ++k) total[k] += derivative * part[k];
+            total.back() -= derivative * value(f);
         };
-        add(friction, l / C - s * own);
-        add(output, F * s * loss.per_torque / (g.law.ratio * C));
-        add(margin->form, -own);
-        total.back() += F * l / C;
+        add_tangent(*shared.friction, shared.by_friction);
+        add_tangent(*shared.output, shared.by_output);
+        add_tangent(shared.margin->form, shared.by_margin);
+        total.back() += shared.value();
         return total;
     };
     LinearRegime out;

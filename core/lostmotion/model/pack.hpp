@@ -12,11 +12,24 @@
 
 namespace lostmotion::model {
 
-// Does a train fit into a kernel of these dimensions? Guards are counted regime by regime.
+// Calls use(count, most, what) for all that a kernel of these dimensions limits of a train. Guards are counted regime
+// by regime.
+template <class D, class Use>
+void each_size(const Train& train, const Layout& n, Use&& use) {
+    use(n.coupled, D::coupled, "coupled states");
+    use(n.angles, D::angles, "parts that no gear joins");
+    use(n.inputs, D::inputs, "inputs");
+    use(n.contacts, D::contacts, "dry contacts");
+    use(n.memory, D::memory, "torques and turns of angles to remember");
+    use(static_cast<int>(train.gears.size()), D::contacts, "gears");
+}
+
+// Does a train fit into a kernel of these dimensions?
 template <class D>
 bool fits(const Train& train, const Layout& n) {
-    return n.coupled <= D::coupled && n.angles <= D::angles && n.memory <= D::memory && n.inputs <= D::inputs &&
-           n.contacts <= D::contacts && static_cast<int>(train.gears.size()) <= D::contacts;
+    bool all = true;
+    each_size<D>(train, n, [&](int count, int most, const char*) { all = all && count <= most; });
+    return all;
 }
 
 template <class D>

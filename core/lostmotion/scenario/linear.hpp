@@ -40,14 +40,14 @@ inline void of_drive(Simulation& s, const double* states, const double* inputs, 
     channels[ch_input_torque] = along(r.input_torque);
     const Gearbox& gearbox = s.drive().gearbox;
     if (gearbox.losses == Gearbox::loss_map && r.key.modes[input_contact] == 0) {
-        // At rest the contact holds F, of which the gear takes F l/C, and C = T_c + l (Reader).
+        // At rest the contact holds F, of which the gear takes F l/C (Reader).
         const auto value = [&](const LinearForm& f) {
             return evaluate(f, s.snapshot().x, s.snapshot().memory, s.snapshot().input);
         };
         const double F = value(r.input_friction), T_2 = value(r.output_torque), i = gearbox.ratio;
         const int way = F >= 0.0 ? 1 : -1;
         const double mu = way * T_2 / gearbox.rated_output_torque, l = gearbox.loss_torque(T_2, 0.0, way) / i,
-                     C = s.drive().motor.friction_torque + l;
+                     C = s.drive().input_capacity(T_2, 0.0, way);
         const double loss = way * gearbox.map.plane(gearbox.map.triangle(mu, 0.0)).per_load * along(r.output_torque);
         channels[ch_loss_coefficient] = loss / gearbox.rated_output_torque;
         if (C > 0.0)

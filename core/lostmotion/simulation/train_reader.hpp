@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -152,12 +153,15 @@ class TrainReader {
         InstantsOf<D, vec_width> at;
         at.set(0, load(x), u);
         std::vector<double> out;
-        for (std::size_t c = 0; c < model_.channels.size(); ++c) {
-            std::array<double, vec_width> value;
-            read(static_cast<int>(c), at, 1, value.data());
-            out.push_back(value[0]);
-        }
+        for (std::size_t c = 0; c < model_.channels.size(); ++c) out.push_back(first(static_cast<int>(c), at));
         return out;
+    }
+    // A channel at the first instant.
+    template <class Instants>
+    double first(int channel, const Instants& at) const {
+        std::array<double, vec_width> value;
+        read(channel, at, 1, value.data());
+        return value[0];
     }
 
  private:

@@ -126,11 +126,8 @@ class TrainRecorder {
         dense_samples_.within(dense, last, solver, [&](std::size_t k, const StateOf<D>& x, const InputsOf<D>& input) {
             at.set(0, load(x), input);
             const TrainReader<D> reader(model_, r, m);
-            for (std::size_t c = 0; c < channels_.size(); ++c) {
-                std::array<double, vec_width> value;
-                reader.read(channels_[c], at, 1, value.data());
-                out_[c * options_.samples + k] = value[0];
-            }
+            for (std::size_t c = 0; c < channels_.size(); ++c)
+                out_[c * options_.samples + k] = reader.first(channels_[c], at);
         });
     }
     void end() {

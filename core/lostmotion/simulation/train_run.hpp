@@ -166,9 +166,7 @@ class TrainRun {
         if (!error_.empty()) return;
         assembly_ = std::make_unique<model::Assembly>(train);
         channels_ = train_channels(*assembly_);
-        const model::Layout n = model::Places(train, true).layout;
-        using model::Widest;
-        if (!model::fits<Widest>(train, n)) error_ = too_large<Widest>(train, n);
+        error_ = too_large(train, model::Places(train, true).layout);
     }
     const std::string& error() const { return error_; }
     const model::Assembly& assembly() const { return *assembly_; }
@@ -239,22 +237,17 @@ class TrainRun {
     }
 
  private:
-    template <class D>
+    // What of it is too much for any kernel, or nothing.
     static std::string too_large(const model::Train& train, const model::Layout& n) {
         std::string error;
-        const auto compare = [&](int count, int most, const char* what) {
+        model::each_size<model::Widest>(train, n, [&](int count, int most, const char* what) {
             if (count > most)
                 error += (error.empty() ? "the train has " : ", ") + std::to_string(count) + " " + what + " (at most " +
                          std::to_string(most) + ")";
-        };
-        compare(n.coupled, D::coupled, "coupled states");
-        compare(n.angles, D::angles, "parts that no gear joins");
-        compare(n.inputs, D::inputs, "inputs");
-        compare(n.contacts, D::contacts, "dry contacts");
-        compare(n.memory, D::memory, "torques and turns of angles to remember");
-        compare(static_cast<int>(train.gears.size()), D::contacts, "gears");
-        return error + "; leave some out";
+        });
+        return error.empty() ? error : error + "; leave some out";
     }
+
     std::string error_;
     std::unique_ptr<model::Assembly> assembly_;
     std::vector<TrainChannel> channels_;
