@@ -30,6 +30,7 @@ class Page {
   private d: Description;
   private run?: Run;
   private long = false;
+  private complete = false; // has a whole run been shown? Its beginning alone is not played
   private warning = ""; // of the address, beside the first run
   private pinned?: Run;
   private waiting = false;
@@ -87,7 +88,6 @@ class Page {
     this.attempt(() => this.begin());
     addEventListener("resize", () => this.later());
     addEventListener("hashchange", () => this.follow());
-    if (this.run) this.bar.start();
   }
 
   /** Once in a frame, however often a slider reports. */
@@ -167,7 +167,10 @@ class Page {
     this.stand.use(this.d, run);
     this.margins.use(this.changes);
     this.response.use(this.d);
-    if (performance.getEntriesByName("whole-run").length === 0) whenShown(() => performance.mark("whole-run"));
+    if (this.complete) return;
+    this.complete = true;
+    this.bar.start();
+    whenShown(() => performance.mark("whole-run"));
   }
 
   /** What is shown from now on: a whole run, or its beginning. */

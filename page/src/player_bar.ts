@@ -33,8 +33,9 @@ export class PlayerBar {
 
   /** Plays, unless the user wants little motion. */
   start(): void {
-    if (!matchMedia("(prefers-reduced-motion: reduce)").matches) this.toggle();
-    else this.hold(this.player.length / 3);
+    if (matchMedia("(prefers-reduced-motion: reduce)").matches) return this.hold(this.player.length / 3);
+    this.player.play();
+    this.label();
   }
 
   hold(time: number): void {
