@@ -400,6 +400,19 @@ void SwitchedTrain<Sizes>::hold_where_possible(Cache& cache, Now& now, const Mem
     Key best;
     std::ptrdiff_t most = 0;
     double least = 0.0;
+    const auto take_if_better = [&](const Key& found) {
+        const auto& r = cache.regime(found);
+        const auto rest = [&](int c) { return r.at_rest[c]; };
+        if (std::ranges::none_of(holding_more, rest)) return;
+        const std::ptrdiff_t count = std::ranges::count_if(breaking, rest);
+        const double change = torque_change(r, now, event);
+        if (count < most || (count == most && !(change < least))) return;
+        most = count;
+        least = change;
+        best = found;
+        of_best = now.memory;
+    };
+    take_if_better(key);  // others may hold what is at its limit
     // Those at their limits may hold against the way in which they would slip.
     int combinations = 1;
     for (std::size_t k = 0; k < n; ++k) combinations *= 3;
@@ -414,18 +427,8 @@ void SwitchedTrain<Sizes>::hold_where_possible(Cache& cache, Now& now, const Mem
         if (!possible || trial.modes == modes.modes) continue;
         now.memory = before;
         if ((at_its_limit(trial) ? settle_at_limit(cache, now, trial, event, found)
-                                 : settle(cache, now, trial, event, found).found) != Found::yes)
-            continue;
-        const auto& r = cache.regime(found);
-        const auto rest = [&](int c) { return r.at_rest[c]; };
-        if (std::ranges::none_of(holding_more, rest)) continue;
-        const std::ptrdiff_t count = std::ranges::count_if(breaking, rest);
-        const double change = torque_change(r, now, event);
-        if (count < most || (count == most && !(change < least))) continue;
-        most = count;
-        least = change;
-        best = found;
-        of_best = now.memory;
+                                 : settle(cache, now, trial, event, found).found) == Found::yes)
+            take_if_better(found);
     }
     now.memory = most > 0 ? of_best : slipping;
     if (most > 0) key = best;
