@@ -52,15 +52,16 @@ inline std::vector<double> describe_train(const std::string& title, const TrainD
     return scenario_numbers(std::move(s));
 }
 
-// Of each parameter its key, unit and value, and of each number that follows from it the place, whether it follows from
-// the reciprocal value, offset and slope.
-using ParameterOfDescription =
-    std::tuple<std::string, std::string, double, std::vector<std::tuple<int, bool, double, double>>>;
+// Of each parameter its key, unit and value, above which, from which on and up to which it may be, and of each number
+// that follows from it the place, whether it follows from the reciprocal value, offset and slope.
+using ParameterOfDescription = std::tuple<std::string, std::string, double, std::tuple<double, double, double>,
+                                          std::vector<std::tuple<int, bool, double, double>>>;
 inline std::vector<double> write_description(const std::vector<double>& scenario,
                                              const std::vector<ParameterOfDescription>& parameters) {
     std::vector<ScenarioParameter> all;
-    for (const auto& [key, unit, value, effects] : parameters) {
-        all.push_back({key, unit, value, {}});
+    for (const auto& [key, unit, value, range, effects] : parameters) {
+        const auto& [above, at_least, at_most] = range;
+        all.push_back({key, unit, value, {}, {above, at_least, at_most}});
         for (const auto& [place, reciprocal, offset, slope] : effects)
             all.back().effects.push_back(
                 {place, reciprocal ? Effect::reciprocal : Effect::proportional, offset, slope});

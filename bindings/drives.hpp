@@ -102,6 +102,13 @@ inline void bind_drives(nb::module_& m) {
                const TorsionCurve* curve,
                const LossMap* map) { new (self) SharedDrive(make_drive(parameters, torque_source, curve, map)); },
             "parameters"_a, "torque_source"_a, "torsion_curve"_a.none(), "loss_map"_a.none())
+        .def("contact_names",
+             [](const SharedDrive& d) {
+                 std::vector<std::string> names;
+                 for (const ContactName& c : contact_names)
+                     if (d.drive.has(c.value)) names.push_back(c.name);
+                 return names;
+             })
         .def("min_rigid_inertia", [](const SharedDrive& d) { return d.drive.min_rigid_inertia(); })
         .def(
             "smallest_command",

@@ -2,6 +2,7 @@
 
 import ctypes as c
 import math
+import zlib
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from lostmotion.inputs.quantities import NotNegative
 from lostmotion.portable.description import numbers_of
 from lostmotion.portable.parameters import Effect, Parameter, Parameters, parameters_of, predicted
 from test_c_interface import INPUTS, INVALID, OK, STATES, VARIABLES, Signal, doubles, library  # noqa: F401
@@ -243,7 +245,25 @@ def test_a_parameter_that_is_set_gives_the_run_of_the_changed_scenario(library: 
     for name in ("load_speed", "motor_torque", "twist"):
         assert np.allclose(told[name], wanted[name], rtol=1e-9, atol=1e-9 * float(np.abs(wanted[name]).max()))
     assert there.set("load.inertia", -1.0) == INVALID
-    assert there.error() == "parameter load.inertia: drive.load.inertia is -1; it must be finite and > 0"
+    assert there.error() == "parameter load.inertia: -1 must be greater than 0"
+
+
+@pytest.mark.parametrize("name", ["paper-2dof-nl-small", "belt-before-gearbox"])
+def test_a_parameter_keeps_to_the_range_of_scenario_files(library: c.CDLL, name: str) -> None:  # noqa: F811
+    scenario = lm.load(name)
+    there = Scenario(library, lm.description(scenario))
+    seen = 0
+    for p in parameters_of(scenario, numbers_of).parameters:
+        low = p.limit.gt if p.limit.ge is None else p.limit.ge
+        for outside in [v for v in (None if low is None else low - 1.0, p.limit.gt) if v is not None] + (
+            [] if p.limit.le is None else [p.limit.le + 44.0]
+        ):
+            with pytest.raises(lm.InputError) as refused:
+                scenario.replace(**{p.key: outside})
+            assert there.set(p.key, outside) == INVALID
+            assert there.error() == f"parameter {p.key}: {outside:g} must{str(refused.value).partition(' must')[2]}"
+            seen += 1
+    assert seen > 15
 
 
 def test_what_is_predicted_of_several_parameters_is_what_the_scenario_has(found: Parameters) -> None:
@@ -267,14 +287,20 @@ def test_what_cannot_be_set_is_said(found: Parameters) -> None:
     assert gain.unit == "1/s"
 
 
+def sealed(numbers: np.ndarray) -> np.ndarray:
+    """With the checksum of what they are, by another implementation of CRC-32."""
+    return np.concatenate([numbers[:2], [zlib.crc32(numbers[3:].astype("<f8").tobytes())], numbers[3:]])
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
         (lambda n: n[:0], "these numbers are no description of a scenario"),
         (lambda n: n[:100], "the description is cut off"),
-        (lambda n: np.append(n, 0.0), "the description goes on beyond its end"),
         (lambda n: np.concatenate([n[:1], [99.0], n[2:]]), "the description is of another version; write it anew"),
-        (lambda n: np.concatenate([n[:3], np.where(n[3:] == 2.0, math.nan, n[3:])]), " is nan; it must be "),
+        (lambda n: np.append(n, 0.0), "the description is damaged: its checksum is wrong; write it anew"),
+        (lambda n: sealed(np.append(n, 0.0)), "the description goes on beyond its end"),
+        (lambda n: sealed(np.concatenate([n[:4], np.where(n[4:] == 2.0, math.nan, n[4:])])), " is nan; it must be "),
     ],
 )
 def test_numbers_that_are_no_description_are_refused(
@@ -295,7 +321,9 @@ def test_a_law_of_ones_own_cannot_be_described() -> None:
 
 
 def test_what_is_zero_in_a_sum_can_be_changed() -> None:
-    frictions = [Parameter(key, "N*m*s/rad", 0.0, (Effect(0, False, 0.0, 1.0),)) for key in ("shaft", "gear")]
+    frictions = [
+        Parameter(key, "N*m*s/rad", 0.0, (Effect(0, False, 0.0, 1.0),), NotNegative) for key in ("shaft", "gear")
+    ]
     assert predicted(np.zeros(1), frictions, {"shaft": 0.25, "gear": 0.5}) == [0.75]
 
 

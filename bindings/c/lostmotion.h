@@ -56,7 +56,7 @@ LM_API double lm_scenario_interval(const lm_scenario* scenario); /* of the sampl
 LM_API int lm_scenario_set_times(lm_scenario* scenario, double duration, double interval);
 
 /* The parameters that can be set, by their keys in scenario files, such as "load.inertia"; values in SI. A value that
- * cannot be used leaves the scenario as it was. */
+ * cannot be used, or is outside its range in scenario files, leaves the scenario as it was. */
 LM_API size_t lm_scenario_parameter_count(const lm_scenario* scenario);
 LM_API const char* lm_scenario_parameter_key(const lm_scenario* scenario, size_t k);
 LM_API const char* lm_scenario_parameter_unit(const lm_scenario* scenario, size_t k);

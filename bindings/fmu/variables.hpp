@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "../c/lostmotion.h"
+#include "lostmotion/scenario/checksum.hpp"
 #include "resources.hpp"
 
 namespace lostmotion::fmu {
@@ -36,10 +37,17 @@ struct Variables {
     std::vector<std::string> input_names, output_names, state_names;
 
     // Lines: the identifier, "references" if these are given, then "indicators N", "input NAME", "output NAME" or
-    // "state NAME N", where 10^N is its nominal value (an integer, since the decimal point depends on the locale).
-    // Returns what is wrong, or nothing.
+    // "state NAME N", where 10^N is its nominal value (an integer, since the decimal point depends on the locale), at
+    // last "checksum N" of all lines before. Returns what is wrong, or nothing.
     std::string read(const std::string& path) {
-        const std::string text = text_of_file(path);
+        std::string text = text_of_file(path);
+        if (text.empty()) return path + " cannot be read";
+        const std::size_t last = text.rfind("checksum ");
+        const std::string told = last == std::string::npos ? "" : text.substr(last);
+        if (last != std::string::npos) text.resize(last);
+        Checksum sum;
+        sum.add(text);
+        if (told != "checksum " + std::to_string(sum.value()) + "\n") return path + " is damaged; export the FMU anew";
         std::size_t at = 0;
         const auto word = [&](char end) {
             const std::size_t to = std::min(text.find(end, at), text.size());
@@ -48,7 +56,6 @@ struct Variables {
             return found;
         };
         identifier = word('\n');
-        if (identifier.empty()) return path + " cannot be read";
         while (at < text.size()) {
             if (text.compare(at, 11, "references\n") == 0) {
                 references_given = true;

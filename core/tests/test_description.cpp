@@ -114,6 +114,27 @@ TEST_SUITE("description") {
         CHECK(d.set(0, 2.125) == "");
         CHECK(same(ScenarioDescription::write(d.scenario()), plain));
     }
+    TEST_CASE("a parameter keeps to its range") {
+        Scenario s = paper_scenario();
+        s.drive.load.inertia = 2.125;  // no other number is the same
+        ScenarioParameter p = load_inertia(ScenarioDescription::write(s), s.drive);
+        p.range = {1e-3, 0.5, 8.0};
+        ScenarioDescription d(ScenarioDescription::write(s, {p}));
+        REQUIRE(d.error() == "");
+        CHECK(d.set(0, 1e-3) == "parameter load.inertia: 0.001 must be greater than 0.001");
+        CHECK(d.set(0, 0.4) == "parameter load.inertia: 0.4 must be at least 0.5");
+        CHECK(d.set(0, 8.5) == "parameter load.inertia: 8.5 must be at most 8");
+        CHECK(d.set(0, std::nan("")) == "parameter load.inertia: it must be finite");
+        CHECK(d.scenario().drive.load.inertia == s.drive.load.inertia);
+        CHECK(d.set(0, 8.0) == "");
+        CHECK(d.set(0, 0.5) == "");
+        CHECK(d.scenario().drive.load.inertia == 0.5);
+    }
+    TEST_CASE("the checksum is that of ISO 3309") {
+        Checksum sum;
+        sum.add("123456789");
+        CHECK(sum.value() == 0xcbf43926u);
+    }
     TEST_CASE("damaged numbers are refused or make a scenario that can be run, never a crash") {
         std::mt19937_64 bits(3);
         model::RandomTrains random(7);
@@ -122,7 +143,7 @@ TEST_SUITE("description") {
             const model::Train train = random_train(random);
             if (TrainRun(train).error().empty()) originals.push_back(ScenarioDescription::write(train_scenario(train)));
         }
-        int refused = 0, accepted = 0, run = 0;
+        int unnoticed = 0, refused = 0, accepted = 0, run = 0;
         for (int n = 0; n < 6000; ++n) {
             std::vector<double> numbers = originals[n % originals.size()];
             for (auto left = 1 + bits() % 3; left > 0; --left) {
@@ -135,6 +156,10 @@ TEST_SUITE("description") {
                     default: numbers[at] = odd_number(bits);
                 }
             }
+            const bool changed = !same(numbers, originals[n % originals.size()]);
+            if (changed && ScenarioDescription(numbers).error().empty()) ++unnoticed;
+            // As a program that writes wrong numbers would leave it.
+            if (numbers.size() >= ScenarioDescription::head) numbers[2] = ScenarioDescription::checksum(numbers);
             const ScenarioDescription d(numbers);
             if (!d.error().empty()) {
                 ++refused;
@@ -148,6 +173,7 @@ TEST_SUITE("description") {
             (void)sim.advance(1e-6, u, u);
             ++run;
         }
+        CHECK(unnoticed == 0);
         CHECK(refused > 2000);
         CHECK(accepted > 200);
         CHECK(run > 10);

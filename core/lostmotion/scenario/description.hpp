@@ -1,14 +1,18 @@
 // A scenario as a row of numbers that a program without Python can read and alter:
 //
-//   mark, version, count of the numbers of the scenario, these (scenario.hpp), then its parameters
+//   mark, version, checksum of all that follows, count of the numbers of the scenario, these (scenario.hpp), then its
+//   parameters
 //
-// A parameter is a number of the scenario in the words of its file, such as "load.inertia", and says which numbers
-// follow from it: each is offset + slope v, or offset + slope/v. A number that follows from several is their product,
-// in terms of its present value, if that is not 0 and all of them are without an offset, else the sum of their changes.
+// A parameter is a number of the scenario in the words of its file, such as "load.inertia", with the range that it has
+// there, and says which numbers follow from it: each is offset + slope v, or offset + slope/v. A number that follows
+// from several is their product, in terms of its present value, if that is not 0 and all of them are without an offset,
+// else the sum of their changes.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -17,6 +21,7 @@
 #include <utility>
 #include <vector>
 
+#include "checksum.hpp"
 #include "scenario.hpp"
 
 namespace lostmotion {
@@ -29,16 +34,35 @@ struct Effect {
     double operator()(double v) const { return offset + (law == proportional ? slope * v : slope / v); }
 };
 
+// What a value may be; infinite where there is no limit.
+struct ParameterRange {
+    double above = -std::numeric_limits<double>::infinity(), at_least = above, at_most = -above;
+
+    // What is wrong with a value, or nothing.
+    std::string refuses(double v) const {
+        const auto must = [v](const char* be, double limit) {
+            char text[96];
+            std::snprintf(text, sizeof text, "%.10g must be %s %g", v, be, limit);
+            return std::string(text);
+        };
+        return !(v > above)       ? must("greater than", above)
+               : !(v >= at_least) ? must("at least", at_least)
+               : !(v <= at_most)  ? must("at most", at_most)
+                                  : "";
+    }
+};
+
 struct ScenarioParameter {
     std::string key, unit;
     double value = 0.0;  // SI
     std::vector<Effect> effects;
+    ParameterRange range = {};
 };
 
 class ScenarioDescription {
  public:
-    static constexpr double mark = 19533.0, version = 3.0;
-    static constexpr std::size_t head = 3;
+    static constexpr double mark = 19533.0, version = 4.0;
+    static constexpr std::size_t head = 4;
 
     static std::vector<double> write(Scenario scenario, std::vector<ScenarioParameter> parameters = {}) {
         FieldWriter body;
@@ -48,10 +72,17 @@ class ScenarioDescription {
     // The numbers of a scenario with its parameters.
     static std::vector<double> write(const std::vector<double>& body, std::vector<ScenarioParameter> parameters) {
         FieldWriter f;
-        f.numbers = {mark, version, static_cast<double>(body.size())};
+        f.numbers = {mark, version, 0.0, static_cast<double>(body.size())};
         f.numbers.insert(f.numbers.end(), body.begin(), body.end());
         describe(f, parameters, body.size());
+        f.numbers[2] = checksum(f.numbers);
         return std::move(f.numbers);
+    }
+    // Of a description, of at least its head.
+    static double checksum(std::span<const double> numbers) {
+        Checksum sum;
+        sum.add(numbers.subspan(head - 1));
+        return sum.value();
     }
 
     // error(): what is wrong with the numbers, or empty. Then nothing else may be asked for.
@@ -73,14 +104,16 @@ class ScenarioDescription {
             return "there are " + std::to_string(parameters_.size()) + " parameters";
         const std::vector<double> before = values_of_parameters();
         std::string changed;
-        bool finite = true;
         for (std::size_t k = 0; k < values.size(); ++k) {
             if (values[k] == before[k]) continue;
-            changed += (changed.empty() ? "parameter " : ", ") + parameters_[k].key;
-            finite = finite && std::isfinite(values[k]);
-            parameters_[k].value = values[k];
+            const std::string& key = parameters_[k].key;
+            if (!std::isfinite(values[k])) return "parameter " + key + ": it must be finite";
+            if (std::string wrong = parameters_[k].range.refuses(values[k]); !wrong.empty())
+                return "parameter " + key + ": " + wrong;
+            changed += (changed.empty() ? "parameter " : ", ") + key;
         }
-        const std::string error = !finite ? "it must be finite" : changed.empty() ? "" : apply();
+        for (std::size_t k = 0; k < values.size(); ++k) parameters_[k].value = values[k];
+        const std::string error = changed.empty() ? "" : apply();
         if (error.empty()) return {};
         for (std::size_t k = 0; k < values.size(); ++k) parameters_[k].value = before[k];
         return changed + ": " + error;
@@ -126,6 +159,9 @@ class ScenarioDescription {
             f.text("key", p.key);
             f.text("unit", p.unit);
             f.number("value", p.value);
+            f.number("above", p.range.above, Range::bound);
+            f.number("at_least", p.range.at_least, Range::bound);
+            f.number("at_most", p.range.at_most, Range::bound);
             f.each("effects", p.effects, [&](Effect& e) {
                 f.integer("place", e.place, 0, static_cast<long>(places) - 1);
                 f.choice("law", e.law, 2);
@@ -142,9 +178,10 @@ class ScenarioDescription {
     std::string read(std::span<const double> numbers) {
         if (numbers.size() < head || numbers[0] != mark) return "these numbers are no description of a scenario";
         if (numbers[1] != version) return "the description is of another version; write it anew";
-        const double count = numbers[2];
+        const double count = numbers[head - 1];
         if (!(count >= 1.0 && count <= static_cast<double>(numbers.size() - head)) || count != std::floor(count))
             return "the description is cut off";
+        if (numbers[2] != checksum(numbers)) return "the description is damaged: its checksum is wrong; write it anew";
         const auto n = static_cast<std::size_t>(count);
         body_.assign(numbers.begin() + head, numbers.begin() + static_cast<std::ptrdiff_t>(head + n));
         FieldReader f(numbers.subspan(head + n));

@@ -44,7 +44,7 @@ def description(scenario: Scenario | TrainScenario, *, parameters: bool = True) 
     InputError
         A controller has a law of your own, which only Python can call.
     """
-    return described(scenario)[0] if parameters else _written(scenario, ())
+    return described(scenario)[0] if parameters else written(scenario, ())
 
 
 def described(scenario: Scenario | TrainScenario) -> tuple[np.ndarray, list[tuple[str, float]]]:
@@ -55,14 +55,12 @@ def described(scenario: Scenario | TrainScenario) -> tuple[np.ndarray, list[tupl
     InputError
     """
     found = parameters_of(scenario, numbers_of).parameters
-    return _written(scenario, found), [(p.key, p.value) for p in found]
+    return written(scenario, found), [(p.key, p.value) for p in found]
 
 
-def _written(scenario: Scenario | TrainScenario, parameters: Sequence[Parameter]) -> np.ndarray:
-    values = [
-        (p.key, p.unit, p.value, [(e.place, e.reciprocal, e.offset, e.slope) for e in p.effects]) for p in parameters
-    ]
-    return np.array(_core.write_description(numbers_of(scenario).tolist(), values))
+def written(scenario: Scenario | TrainScenario, parameters: Sequence[Parameter]) -> np.ndarray:
+    """The description with these parameters."""
+    return np.array(_core.write_description(numbers_of(scenario).tolist(), [p.core() for p in parameters]))
 
 
 def numbers_of(scenario: Scenario | TrainScenario) -> np.ndarray:

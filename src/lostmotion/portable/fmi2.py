@@ -18,6 +18,7 @@ from .fmu_model import (
     generation_tool,
     is_of_start,
     parameter_meaning,
+    parameter_range,
     rate_unit,
 )
 
@@ -89,7 +90,7 @@ def _add_variables(variables: ET.Element, model: Model) -> None:
         real = {"unit": rate_unit(v.unit), "derivative": str(first + k)}
         add(f"der(state.{v.name})", FIRST_DERIVATIVE + k, f"time derivative of state.{v.name}", real, **local)
     for k, p in enumerate(model.parameters):
-        real = {"unit": p.unit, "start": repr(p.value)}
+        real = {"unit": p.unit} | parameter_range(p) | {"start": repr(p.value)}
         kind = "fixed" if is_of_start(p) else "tunable"
         meaning = parameter_meaning(p)
         add(p.key, FIRST_PARAMETER + k, meaning, real, causality="parameter", variability=kind, initial="exact")

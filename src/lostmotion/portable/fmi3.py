@@ -20,6 +20,7 @@ from .fmu_model import (
     generation_tool,
     is_of_start,
     parameter_meaning,
+    parameter_range,
     rate_unit,
 )
 
@@ -87,8 +88,9 @@ def _add_variables(variables: ET.Element, model: Model) -> None:
         meaning = "positive while the contacts stay as they are"
         add(f"event_indicator.{k}", FIRST_INDICATOR + k, meaning, "1", **local)
     for k, p in enumerate(model.parameters):
-        kind = {"causality": "parameter", "variability": "fixed" if is_of_start(p) else "tunable"}
-        add(p.key, FIRST_PARAMETER + k, parameter_meaning(p), p.unit, initial="exact", start=repr(p.value), **kind)
+        kind = {"causality": "parameter", "variability": "fixed" if is_of_start(p) else "tunable", "initial": "exact"}
+        kind |= parameter_range(p) | {"start": repr(p.value)}
+        add(p.key, FIRST_PARAMETER + k, parameter_meaning(p), p.unit, **kind)
 
 
 def terminals(model: Model) -> bytes:

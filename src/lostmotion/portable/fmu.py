@@ -26,7 +26,7 @@ from ..simulation.train_scenario import TrainScenario
 from ..simulation.train_variables import axis_variables, train_variables
 from ..simulation.variables import VARIABLES
 from . import fmi2, fmi3
-from .description import kernel_of, numbers_of
+from .description import kernel_of, numbers_of, written
 from .fmu_model import Declared, Model, page
 from .parameters import Parameter, parameters_of
 
@@ -112,10 +112,7 @@ def export_fmu(
     parameters = tuple(
         p for p in parameters_of(scenario, numbers_of).parameters if not _of_signals(scenario, p.key, references)
     )
-    values = [
-        (p.key, p.unit, p.value, [(e.place, e.reciprocal, e.offset, e.slope) for e in p.effects]) for p in parameters
-    ]
-    resource = np.array(_core.write_description(numbers_of(scenario).tolist(), values)).astype("<f8").tobytes()
+    resource = written(scenario, parameters).astype("<f8").tobytes()
     model = _model(scenario, parameters, hashlib.sha256(resource).hexdigest()[:32], references)
     icon = (files("lostmotion") / "portable" / "icon.png").read_bytes()
 
@@ -213,13 +210,9 @@ def _model(
         names, signals = ["command", "load_torque"], {"command": scenario.command, "load_torque": scenario.load.torque}
     sizes, states = _sizes(scenario)
     inputs = [name for name in names if name not in controlled]
-    held = controlled | shown  # from tick to tick
-    by_name = {
-        v.name: Declared(
-            v.name, v.unit, v.meaning, sizes.get(v.name, 0.0), v.name in held or v.name.endswith("contact")
-        )
-        for v in variables
-    }
+    # From tick to tick, or from one switching to the next. Where there is no contact, its variable follows a sign.
+    held = controlled | shown | set(scenario.core().contact_names())
+    by_name = {v.name: Declared(v.name, v.unit, v.meaning, sizes.get(v.name, 0.0), v.name in held) for v in variables}
     windings = any(c.current.kind == "field_oriented" for c in axes.values())
     given = {f"{motor}_reference" if motor else "reference": c for motor, c in axes.items() if references_given}
     references = [Declared(name, *_REFERENCES[c.reference.kind], 0.0) for name, c in given.items()]

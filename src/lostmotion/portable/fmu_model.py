@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import math
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
@@ -99,7 +100,8 @@ class Model:
         """What the library reads to know which variable has which value reference: bindings/fmu/variables.hpp."""
         lines = [self.guid, *(["references"] if self.references_given else []), f"indicators {self.indicators}"]
         lines += [f"input {v.name}" for v in self.inputs] + [f"output {v.name}" for v in self.outputs]
-        return "\n".join([*lines, *(f"state {v.name} {v.decade}" for v in self.states)]) + "\n"
+        text = "\n".join([*lines, *(f"state {v.name} {v.decade}" for v in self.states)]) + "\n"
+        return f"{text}checksum {zlib.crc32(text.encode())}\n"
 
 
 def rate_unit(unit: str) -> str:
@@ -164,6 +166,12 @@ def add_default_experiment(root: ET.Element, model: Model) -> None:
 def parameter_meaning(p: Parameter) -> str:
     """What a parameter is."""
     return f"value of the key {p.key}" + (", at t = 0" if is_of_start(p) else "")
+
+
+def parameter_range(p: Parameter) -> dict[str, str]:
+    """The attributes min and max of a parameter. One that must be above a limit has the limit itself as its min."""
+    low = p.limit.gt if p.limit.ge is None else p.limit.ge
+    return {name: repr(v) for name, v in (("min", low), ("max", p.limit.le)) if v is not None}
 
 
 def is_of_start(p: Parameter) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..inputs.quantities import Limit
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
-from ..studies.units import unit_in
+from ..studies.units import limit_in, unit_in
 
 AnyScenario = Scenario | TrainScenario
 Numbers = Callable[[AnyScenario], np.ndarray]
@@ -47,6 +49,16 @@ class Parameter:
     unit: str
     value: float
     effects: tuple[Effect, ...]
+    limit: Limit
+    """the range of its value in scenario files"""
+
+    def core(self) -> tuple[str, str, float, tuple[float, float, float], list[tuple[int, bool, float, float]]]:
+        """As `write_description` of the core takes it."""
+        limit = self.limit
+        bounds = [(limit.gt, -math.inf), (limit.ge, -math.inf), (limit.le, math.inf)]
+        above, at_least, at_most = (none if bound is None else bound for bound, none in bounds)
+        effects = [(e.place, e.reciprocal, e.offset, e.slope) for e in self.effects]
+        return self.key, self.unit, self.value, (above, at_least, at_most), effects
 
 
 @dataclass(frozen=True)
@@ -77,7 +89,7 @@ def parameters_of(scenario: AnyScenario, numbers: Numbers) -> Parameters:
         if isinstance(law, str):
             refused[key] = law
         elif law:
-            found.append(Parameter(key, unit or "1", value, law))
+            found.append(Parameter(key, unit or "1", value, law, limit_in(type(scenario), key)))
     return _together(scenario, found, refused, base, numbers)
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
+from ..inputs.quantities import Limit
 from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
 from ..simulation.scenario import Scenario, json_schema
@@ -27,15 +28,32 @@ def unit_in(form: type[Scenario | TrainScenario], key: str) -> str | None:
     return _unit(key, train_schema if form is TrainScenario else json_schema)
 
 
+def limit_in(form: type[Scenario | TrainScenario], key: str) -> Limit:
+    """The range that a value of the short or of the long form may have, whatever the others are."""
+    nodes = _nodes(key, train_schema if form is TrainScenario else json_schema)
+    numbers = [node for node in nodes if node.get("type") == "number"]
+
+    def bound(name: str, widest: Callable[[list[float]], float]) -> float | None:
+        given = [node[name] for node in numbers if name in node]
+        return widest(given) if given and len(given) == len(numbers) else None
+
+    return Limit(gt=bound("exclusiveMinimum", min), ge=bound("minimum", min), le=bound("maximum", max))
+
+
 @cache
 def _unit(key: str, schema: Callable[[], dict[str, Any]]) -> str | None:
+    return next((unit for node in _nodes(key, schema) if (unit := unit_in_schema(node)) is not None), None)
+
+
+def _nodes(key: str, schema: Callable[[], dict[str, Any]]) -> list[Mapping[str, Any]]:
+    """Of a dotted key, in the JSON Schema; none if it is not known."""
     place = tuple(int(part) if part.isdecimal() else part for part in key.split("."))
     found, nodes = follow(_made(schema), place)
     if found != place:
-        return None
+        return []
     if any({"mean", "sines"} <= node.get("properties", {}).keys() for node in nodes):
-        return _unit(f"{key}.mean", schema)  # a signal, which one value makes constant
-    return next((unit for node in nodes if (unit := unit_in_schema(node)) is not None), None)
+        return _nodes(f"{key}.mean", schema)  # a signal, which one value makes constant
+    return nodes
 
 
 @cache
