@@ -7,33 +7,6 @@ TEST_SUITE_BEGIN("sensitivity");
 
 namespace lostmotion::model {
 
-// Differences of a run are rounded to some 1e-12 of its values over the step; where two steps agree to 2.5e-9, they
-// must with the derivative to 1e-8.
-void compare_one(unsigned seed, bool closed_loop, SensitivityTally& tally) {
-    CAPTURE(seed);
-    RandomTrains random(seed);
-    const RandomCase c = random_case(random, 5, 0.3, closed_loop);
-    compare_sensitivities(c, some_knobs(random, c, 1), 0.3, tally, 1e-8, "differs");
-}
-
-SensitivityTally compare_random(unsigned seed, int trains, bool closed_loop) {
-    SensitivityTally tally;
-    for (int n = 0; n < trains; ++n) compare_one(seed + static_cast<unsigned>(n), closed_loop, tally);
-    return tally;
-}
-
-TEST_CASE("derivatives of 300 random trains are those of differences of their runs") {
-    const SensitivityTally open = compare_random(5000, 200, false), closed = compare_random(7000, 100, true);
-    const long compared = open.compared + closed.compared, switchings = open.switchings + closed.switchings;
-    const double worst = std::fmax(open.worst, closed.worst);
-    MESSAGE(compared << " numbers compared, " << switchings << " switchings, largest difference " << worst);
-    CHECK(open.failed_runs + closed.failed_runs == 0);
-    CHECK(open.wrong + closed.wrong == 0);
-    CHECK(open.ended + closed.ended < 10);
-    CHECK(open.compared > 10000);
-    CHECK(closed.compared > 5000);
-}
-
 // Gears between shafts that stand. In the first group the friction of the shaft that a gear turns bounds its torque; in
 // the second a contact reaches its limit at the switching, where the torques are those of its slipping.
 TEST_CASE("derivatives of torques that rest leaves open") {
