@@ -254,10 +254,8 @@ def test_a_parameter_keeps_to_the_range_of_scenario_files(library: c.CDLL, name:
     there = Scenario(library, lm.description(scenario))
     seen = 0
     for p in parameters_of(scenario, numbers_of).parameters:
-        low = p.limit.gt if p.limit.ge is None else p.limit.ge
-        for outside in [v for v in (None if low is None else low - 1.0, p.limit.gt) if v is not None] + (
-            [] if p.limit.le is None else [p.limit.le + 44.0]
-        ):
+        limits = ((p.limit.gt, -1.0), (p.limit.gt, 0.0), (p.limit.ge, -1.0), (p.limit.le, 44.0))
+        for outside in [limit + beyond for limit, beyond in limits if limit is not None]:
             with pytest.raises(lm.InputError) as refused:
                 scenario.replace(**{p.key: outside})
             assert there.set(p.key, outside) == INVALID

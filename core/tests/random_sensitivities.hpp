@@ -1,6 +1,8 @@
 // Derivatives of runs of random trains, against differences of the runs themselves.
 #pragma once
 
+#include <doctest/doctest.h>
+
 #include <functional>
 #include <set>
 
@@ -309,6 +311,7 @@ inline std::vector<Knob> some_knobs(RandomTrains& random, const RandomCase& c, i
 // Differences of a run are rounded to some 1e-12 of its values over the step; where two steps agree to 2.5e-9, they
 // must with the derivative to 1e-8.
 inline void compare_one(unsigned seed, bool closed_loop, SensitivityTally& tally) {
+    CAPTURE(seed);
     RandomTrains random(seed);
     const RandomCase c = random_case(random, 5, 0.3, closed_loop);
     compare_sensitivities(c, some_knobs(random, c, 1), 0.3, tally, 1e-8, "differs");
