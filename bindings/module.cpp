@@ -1,5 +1,6 @@
 // Thin binding: the core as a Python module.
 #include "descriptions.hpp"
+#include "elementary.hpp"
 #include "names.hpp"
 #include "responses.hpp"
 #include "runs.hpp"
@@ -12,6 +13,7 @@ NB_MODULE(CORE_MODULE, m) {
     nb::exception<SolverError>(m, "SolverError", PyExc_RuntimeError).attr("__doc__") =
         "The motion has no continuation; the message names time and contact.";
     bind_names(m);
+    bind_elementary(m);
     bind_drives(m);
     bind_runs(m);
     bind_control(m);

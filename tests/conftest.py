@@ -24,11 +24,6 @@ CONTROLLED = [path for path in ALL_SCENARIOS if "[controller" in path.read_text(
 """with a controller"""
 
 
-def follows_target(scenario: lm.Scenario | lm.TrainScenario) -> bool:
-    """Whether a reference does: what it feeds the core is numpy's, which is not equal on all processors."""
-    return any(getattr(c.reference, "target", None) for c in scenario.axes().values())
-
-
 # A shell that runs the tests in the background has Ctrl-C ignored, which the processes that they interrupt would inherit.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -31,12 +31,15 @@ HEADER = """\
 # A number is written as a hexadecimal float, which is all its bits. A series has the SHA-256 of its numbers (8 bytes each, little
 # endian), their count and some of them by position (first, quarters, last, and the one of the largest magnitude), so that
 # a change of the last bit can be told from a wrong value. A list of decimals is compared within a tolerance.
-# The core has its own sine and cosine: another system's libraries change nothing.
+# Series of scenarios with quantised encoders also have a short hash of each of up to 64 blocks, which locates the first
+# difference. Another system's mathematical libraries change nothing: see src/lostmotion/reproducible.py.
 """
 
 # LAPACK's eigenvalues of a Jacobian J are those of a matrix within eps |J| of it, |J| < 1.5 here. Multipliers of zero may
 # belong to a defective pair, which that moves by sqrt(eps |J|) = 2e-8; all others move less.
 TOLERANCE = 1e-7
+
+BLOCKS = 64
 
 STEADY = ("load_speed", "twist", "output_torque")
 STEPPED = ("paper-2dof-nl-small", "step-to-standstill")
@@ -143,8 +146,8 @@ def of_study(scenario: lm.Scenario) -> Values:
 # --- the file ----------------------------------------------------------------------------------------------
 
 
-def entry(value: Any) -> Any:
-    """A value as it is recorded."""
+def entry(value: Any, blocks: bool = False) -> Any:
+    """A value as it is recorded; with short hashes of its blocks if asked for."""
     if isinstance(value, list):
         return value
     if not isinstance(value, np.ndarray):
@@ -155,11 +158,30 @@ def entry(value: Any) -> Any:
         return {"sha256": hashlib.sha256(b"").hexdigest(), "count": 0, "at": {}}
     largest = int(np.argmax(np.abs(np.nan_to_num(numbers, nan=0.0))))
     places = sorted({0, n // 4, n // 2, 3 * n // 4, n - 1, largest})
-    return {
+    out = {
         "sha256": hashlib.sha256(numbers.tobytes()).hexdigest(),
         "count": n,
         "at": {str(k): float(numbers[k]).hex() for k in places},
     }
+    return out | {"blocks": "".join(block_hashes(numbers))} if blocks else out
+
+
+def block_size(count: int) -> int:
+    return max(1, math.ceil(count / BLOCKS))
+
+
+def block_hashes(numbers: np.ndarray) -> list[str]:
+    """Four hexadecimal digits of each block."""
+    size = block_size(len(numbers))
+    return [hashlib.sha256(numbers[k : k + size].tobytes()).hexdigest()[:4] for k in range(0, len(numbers), size)]
+
+
+def quantised(scenario: str) -> bool:
+    """Whether an encoder of a scenario rounds: 1e-16 may then become one step of the encoder after seconds."""
+    path = ROOT / "scenarios" / f"{scenario}.toml"
+    axes = lm.load(path).axes().values() if path.exists() else ()
+    encoders = [e for c in axes for e in (getattr(c, "encoder", None), getattr(c, "position_encoder", None)) if e]
+    return any(not e.ideal and e.step > 0.0 for e in encoders)
 
 
 def bits_of(values: np.ndarray) -> np.ndarray:
@@ -180,8 +202,9 @@ def as_key(name: str) -> str:
 
 
 def record(groups: Groups) -> None:
+    located = {name for name in groups if name.endswith(".samples") and quantised(name.removesuffix(".samples"))}
     tables = (
-        "\n".join([f"[{name}]", *(f"{as_key(k)} = {as_toml(entry(v))}" for k, v in values.items())])
+        "\n".join([f"[{name}]", *(f"{as_key(k)} = {as_toml(entry(v, name in located))}" for k, v in values.items())])
         for name, values in groups.items()
     )
     FILE.write_text("\n\n".join([HEADER.rstrip(), *tables]) + "\n", encoding="utf-8")
@@ -213,12 +236,29 @@ def difference(then: Any, now: Any) -> str:
     if isinstance(now, list):
         off = max(abs(a - b) for a, b in zip(then, now, strict=True))
         return f"differs by {off:.2g}; {TOLERANCE:g} is allowed" if off > TOLERANCE else ""
-    if entry(now) == then:
+    located = isinstance(then, dict) and "blocks" in then
+    if entry(now, located) == then:
         return ""
     if not isinstance(now, np.ndarray):
         return off_by(float.fromhex(then), float(now))
     parts = [] if then["count"] == now.size else [f"{then['count']} numbers recorded, {now.size} now"]
+    if located:
+        parts.append(first_difference(then["blocks"], now))
     return "; ".join([*parts, farthest_off({int(k): float.fromhex(v) for k, v in then["at"].items()}, now)])
+
+
+def first_difference(then: str, now: np.ndarray) -> str:
+    """Where a series of a scenario with quantised encoders first differs, which is the difference that counts."""
+    numbers = bits_of(now)
+    size, hashes = block_size(len(numbers)), block_hashes(numbers)
+    recorded = [then[k : k + 4] for k in range(0, len(then), 4)]
+    pairs = zip(recorded, hashes, strict=False)
+    k = next((k for k, (a, b) in enumerate(pairs) if a != b), min(len(recorded), len(hashes)))
+    here = ", ".join(float(v).hex() for v in numbers[k * size : k * size + 3])
+    return (
+        f"first difference in samples {k * size} to {min((k + 1) * size, len(numbers)) - 1} (now {here}, ...); this first "
+        "difference counts, since a quantised encoder turns a last bit into one of its steps later on"
+    )
 
 
 def farthest_off(then: dict[int, float], now: np.ndarray) -> str:

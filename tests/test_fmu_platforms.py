@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 import lostmotion as lm
-from conftest import ROOT, follows_target
+from conftest import ROOT
 from lostmotion.portable import fmu as exporting
 from lostmotion.portable.parameters import Parameters
 
@@ -33,11 +33,6 @@ RUNNERS: dict[str, tuple[str, list[str] | None]] = {
     "x86_64-windows": ("x86_64-windows-gnu", [WINE] if WINE else None),
 }
 STEPS, INTERVAL = 200, 1e-3
-
-
-def scenarios() -> list[str]:
-    """All that are shipped, but for those whose references follow a target."""
-    return [name for name in lm.shipped_scenarios() if not follows_target(lm.load(name))]
 
 
 def built_driver(platform: str, to: Path) -> Path:
@@ -81,7 +76,7 @@ def test_other_platforms_give_the_bits_of_python(platform: str, tmp_path: Path, 
         pytest.skip(f"nothing here runs programs for {platform}")
     monkeypatch.setattr(exporting, "parameters_of", lambda *_: Parameters((), {}))
     driver = built_driver(platform, tmp_path)
-    for name in scenarios():
+    for name in lm.shipped_scenarios():
         scenario = lm.load(name)
         path = tmp_path / f"{name}.fmu"
         lm.export_fmu(scenario, path, libraries=BUILT)

@@ -4,10 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 import golden
 from conftest import run_in_build
 from lostmotion import _instruction_set
+
+DISPATCHED = list(__cpu_dispatch__)
+"""sets of instructions that NumPy has code of its own for, beyond those that it takes for granted"""
 
 SERIES = np.linspace(-1.0, 3.0, 101)
 RECORDED = {"some-scenario.samples": {"twist": golden.entry(SERIES), "end": golden.entry(2.0)}}
@@ -22,10 +26,35 @@ def test_every_bit_is_as_recorded(build: str) -> None:
     )
 
 
-def test_a_processor_without_fused_multiply_add_gives_the_same_bits(monkeypatch) -> None:
-    monkeypatch.setenv("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2,-AVX512F")
-    done = run_in_build("any", golden.__file__)
+# NumPy's and the C library's own choice of code for a processor, reduced to that of older ones.
+AVX_512 = [name for name in DISPATCHED if "512" in name or name == "X86_V4"]
+PROCESSORS = {
+    "without AVX-512": (AVX_512, "-AVX512F,-AVX512VL"),
+    "without fused multiply-add": (DISPATCHED, "-FMA,-FMA4,-AVX512F"),
+    "with SSE alone": (DISPATCHED, "-FMA,-FMA4,-AVX,-AVX2,-AVX512F,-BMI2"),
+}
+
+
+@pytest.mark.parametrize("processor", PROCESSORS)
+def test_every_processor_gives_the_same_bits(processor: str, monkeypatch) -> None:
+    disabled, hidden = PROCESSORS[processor]
+    monkeypatch.setenv("NPY_DISABLE_CPU_FEATURES", " ".join(disabled))
+    monkeypatch.setenv("GLIBC_TUNABLES", f"glibc.cpu.hwcaps={hidden}")
+    done = run_in_build("any", "-W", "ignore", golden.__file__)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_masks_of_processors_change_what_numpy_computes(monkeypatch) -> None:
+    """Otherwise the masks would show nothing. Only where this processor has features to mask."""
+    script = (
+        "import numpy as np; from numpy._core._multiarray_umath import __cpu_features__ as f; print(sum(f.values()))"
+    )
+    counts = []
+    for disabled in ("", " ".join(DISPATCHED)):
+        monkeypatch.setenv("NPY_DISABLE_CPU_FEATURES", disabled)
+        counts.append(int(run_in_build("any", "-W", "ignore", "-c", script).stdout))
+    present = [name for name in DISPATCHED if __cpu_features__.get(name)]
+    assert counts[1] <= counts[0] - len(present)
 
 
 def test_what_is_recorded_is_read_back_the_same(tmp_path, monkeypatch) -> None:
@@ -59,6 +88,17 @@ def test_a_change_between_the_recorded_numbers_is_seen() -> None:
     assert lines(changed) == [
         "some-scenario.samples.twist: the numbers recorded with their values are the same, others differ"
     ]
+
+
+def test_the_first_difference_of_a_series_with_quantised_encoders_is_located() -> None:
+    recorded = {"axis.samples": {"angle": golden.entry(SERIES, blocks=True)}}  # blocks of 2 samples
+    changed = SERIES.copy()
+    changed[7] = np.nextafter(changed[7], 9.0)
+    changed[60:] += 1e-3
+    (line,) = golden.differences({"axis.samples": {"angle": changed}}, recorded)
+    assert line.startswith("axis.samples.angle: first difference in samples 6 to 7 (now ")
+    assert "this first difference counts" in line
+    assert list(golden.differences({"axis.samples": {"angle": SERIES}}, recorded)) == []
 
 
 def test_the_sign_of_zero_counts_and_the_payload_of_nan_does_not() -> None:

@@ -20,6 +20,7 @@ PACKAGE = ROOT / "src" / "lostmotion"
 LAYERS = [
     {"errors", "_instruction_set"},
     {"_core", "atomic_writer"},
+    {"reproducible"},
     {"units"},
     {"inputs"},
     {"model"},
@@ -127,6 +128,78 @@ def test_what_binds_to_a_platform_is_recognised() -> None:
         assert re.search(PLATFORM, line)
     for line in ("std::sqrt(x)", "std::floor(x)", "sine_cosine(x)", "#include <memory>", "// country"):
         assert not re.search(PLATFORM, line)
+
+
+# What Python derives from a scenario before the core sees it. These packages take functions that each platform rounds
+# differently from `reproducible`, which has them from the core.
+DERIVES = ("units", "inputs", "model", "control", "data_sheets", "simulation", "reproducible")
+OUTSIDE = {
+    "control/satellites": "SGP4 and its spline are libraries; docs/theory.md leaves satellites out of the promise",
+    "model/self_locking": "its eigenvalues decide a verdict and enter no run",
+    "units/conversion": "its powers are of decimal numbers",
+}
+ROUNDED_DIFFERENTLY = {
+    *(
+        "sin",
+        "cos",
+        "tan",
+        "arcsin",
+        "arccos",
+        "arctan",
+        "arctan2",
+        "asin",
+        "acos",
+        "atan",
+        "atan2",
+        "sinh",
+        "cosh",
+        "tanh",
+    ),
+    *("exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "pow", "power", "float_power", "cbrt", "hypot", "sinc"),
+    *("linalg", "fft", "interp", "dot", "vdot", "inner", "matmul", "einsum", "tensordot", "convolve", "correlate"),
+    *("polyfit", "polyval", "geomspace", "logspace", "trapezoid", "fsum", "sumprod", "dist", "gamma", "erf"),
+}
+
+
+def rounded_differently(code: str) -> list[str]:
+    """Uses of functions and operators whose last bits depend on the platform, each with its line."""
+    found = []
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            if node.value.id in ("np", "math", "numpy") and node.attr in ROUNDED_DIFFERENTLY:
+                found.append(f"line {node.lineno}: {node.value.id}.{node.attr}")
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):
+            found.append(f"line {node.lineno}: @")
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+            # Powers of two and of whole numbers are exact.
+            base, power = (x.value if isinstance(x, ast.Constant) else None for x in (node.left, node.right))
+            if not (isinstance(base, int) and isinstance(power, int)) and base != 2.0:
+                found.append(f"line {node.lineno}: **")
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module or ""]
+            found += [f"line {node.lineno}: {name}" for name in names if name.split(".")[0] == "scipy"]
+    return found
+
+
+def test_what_enters_the_core_is_rounded_alike_on_every_platform() -> None:
+    concerned = [m for m in MODULES if room_of(m) in DERIVES and str(m) not in OUTSIDE]
+    uses = {str(m): rounded_differently((PACKAGE / m).with_suffix(".py").read_text()) for m in concerned}
+    assert {m: found for m, found in uses.items() if found} == {}, "use the functions of lostmotion.reproducible"
+
+
+def test_functions_that_platforms_round_differently_are_recognised() -> None:
+    for line in (
+        "np.sin(x)",
+        "math.log10(x)",
+        "x**2",
+        "x ** 0.5",
+        "a @ b",
+        "np.linalg.solve(a, b)",
+        "from scipy import x",
+    ):
+        assert rounded_differently(line), line
+    for line in ("sin(x)", "x * x", "2.0**-11", "2**53", "10**6", "np.sqrt(x)", "math.ldexp(x, 2)", "f(**options)"):
+        assert not rounded_differently(line), line
 
 
 SCREEN = 50  # lines of a function, without its heading and docstring

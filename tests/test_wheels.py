@@ -9,7 +9,6 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Collection
 from itertools import product
 from pathlib import Path
 from zipfile import ZipFile
@@ -17,7 +16,7 @@ from zipfile import ZipFile
 import pytest
 
 import lostmotion as lm
-from conftest import CONTROLLED, ROOT, follows_target
+from conftest import ROOT
 
 DIST = Path(os.environ.get("LOSTMOTION_WHEELS", ROOT / "dist"))
 WHEELS = {p.name.split("-", 2)[2].removesuffix(".whl"): p for p in sorted(DIST.glob("lostmotion-*.whl"))}
@@ -53,22 +52,16 @@ def test_a_wheel_holds_all_that_a_user_needs(tag: str) -> None:
     assert {f"lostmotion/scenarios/{name}.toml" for name in lm.shipped_scenarios()} <= set(names)
 
 
-TARGETS = {path.stem for path in CONTROLLED if follows_target(lm.load(path))}
-"""Scenarios whose references follow a target: what they feed the core is numpy's, which is not equal on all processors."""
-
-
-def same_bits(
-    python: list[str], *, build: str = "any", home: Path, packages: str = "", but: Collection[str] = ()
-) -> None:
-    """tests/golden.py by another Python, far from the checkout's own package; some scenarios may differ."""
+def same_bits(python: list[str], *, build: str = "any", home: Path, packages: str = "") -> None:
+    """tests/golden.py by another Python, far from the checkout's own package."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")} | {"LOSTMOTION_CORE": build}
     if packages:
         environment["PYTHONPATH"] = packages
     golden = [*python, str(ROOT / "tests" / "golden.py")]
     told = subprocess.run(golden, env=environment, cwd=home, capture_output=True, text=True, check=False)
     assert told.stderr == ""
-    assert [line for line in told.stdout.splitlines() if line.partition(".")[0] not in but] == []
-    assert told.returncode == 0 or but
+    assert told.stdout == ""
+    assert told.returncode == 0
 
 
 def of_linux(abi: str) -> str:
@@ -105,4 +98,4 @@ def test_the_wheel_for_aarch64_gives_the_same_bits_under_qemu(tmp_path: Path) ->
     pip = [sys.executable, "-m", "pip", "install", "-q", "--python-version=3.11", "--only-binary=:all:", *platforms]
     subprocess.run([*pip, f"--target={tmp_path}", f"{WHEELS[tag]}{NEEDED}"], check=True)
     python = [QEMU, "-L", str(ARM), str(ARM / "usr" / "bin" / "python3.11")]
-    same_bits(python, home=tmp_path, packages=str(tmp_path), but=TARGETS)
+    same_bits(python, home=tmp_path, packages=str(tmp_path))

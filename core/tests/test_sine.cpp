@@ -5,6 +5,7 @@
 #include <limits>
 #include <random>
 
+#include "lostmotion/kernel/arctangent.hpp"
 #include "lostmotion/kernel/powers.hpp"
 #include "lostmotion/kernel/sine.hpp"
 
@@ -85,5 +86,67 @@ TEST_SUITE("powers") {
             CHECK(error(inverse_fifth_root(x), powq(x, __float128(-1) / 5)) < 1.5);
         }
         for (int k = -200; k <= 200; ++k) CHECK(inverse_fifth_root(std::ldexp(1.0, 5 * k)) == std::ldexp(1.0, -k));
+    }
+    // Beyond 1 the difference has at most twice the error of the exponential, and rounds once more.
+    TEST_CASE("the exponential less one is exact to three units in the last place") {
+        std::mt19937_64 random(11);
+        std::uniform_real_distribution<double> share(-1.0, 1.0);
+        for (const double reach : {1e-300, 1e-12, 1e-3, 0.34, 1.0, 1.5, 5.0, 100.0, 700.0})
+            for (int k = 0; k < 20000; ++k) {
+                const double x = reach * share(random);
+                CHECK(error(exponential_minus_one(x), expm1q(x)) < 3.0);
+            }
+        CHECK(exponential_minus_one(0.0) == 0.0);
+        CHECK(exponential_minus_one(-1e3) == -1.0);
+    }
+    // log m = 2 s + ..., |s| < 0.172, is rounded four times, the sum with k log 2 once more.
+    TEST_CASE("the logarithm is exact to two units in the last place") {
+        std::mt19937_64 random(12);
+        std::uniform_real_distribution<double> exponent(-1000.0, 1000.0), near(0.5, 2.0);
+        for (int k = 0; k < 40000; ++k) {
+            const double x = k % 2 == 0 ? std::exp2(exponent(random)) : near(random);
+            CHECK(error(logarithm(x), logq(x)) < 2.0);
+        }
+        CHECK(logarithm(1.0) == 0.0);
+    }
+    TEST_CASE("powers are exact to two units in the last place and three of their exponent") {
+        std::mt19937_64 random(13);
+        std::uniform_real_distribution<double> exponent(-60.0, 60.0), share(-4.0, 4.0);
+        for (int k = 0; k < 40000; ++k) {
+            const double x = std::exp2(exponent(random)), y = share(random);
+            CHECK(error(power(x, y), powq(x, y)) < 2.0 + 3.0 * std::fabs(y * std::log(x)));
+        }
+        CHECK(power(2.0, 0.0) == 1.0);
+        CHECK(power(10.0, 400.0) == std::numeric_limits<double>::infinity());
+        CHECK(power(10.0, -400.0) == 0.0);
+    }
+    // The last step leaves the half unit of its sum and what is rounded in a correction of a few units.
+    TEST_CASE("the cube root is exact to 0.7 units in the last place") {
+        std::mt19937_64 random(14);
+        std::uniform_real_distribution<double> exponent(-1020.0, 1020.0);
+        for (int k = 0; k < 20000; ++k) {
+            const double x = std::exp2(exponent(random));
+            CHECK(error(cube_root(x), cbrtq(x)) < 0.7);
+            CHECK(cube_root(-x) == -cube_root(x));
+        }
+        for (int k = -300; k <= 300; ++k) CHECK(cube_root(27.0 * std::ldexp(1.0, 3 * k)) == std::ldexp(3.0, k));
+        CHECK(cube_root(0.0) == 0.0);
+        CHECK(cube_root(5e-324) == std::ldexp(1.0, -358));
+    }
+    TEST_CASE("the arctangent is exact to 1.5 units in the last place, in all quadrants") {
+        std::mt19937_64 random(15);
+        std::uniform_real_distribution<double> share(-1.0, 1.0), exponent(-300.0, 300.0);
+        for (int k = 0; k < 200000; ++k) {
+            const double scale = k % 3 == 0 ? std::exp2(exponent(random)) : 1.0, y = share(random) * scale,
+                         x = share(random);
+            CHECK(error(arctangent(y, x), atan2q(y, x)) < 1.5);
+        }
+        for (const double y : {0.0, -0.0, 1.0, -1.0, HUGE_VAL, -HUGE_VAL, 1e300, 1e-300})
+            for (const double x : {0.0, -0.0, 1.0, -1.0, HUGE_VAL, -HUGE_VAL, 1e300, 1e-300}) {
+                CAPTURE(y);
+                CAPTURE(x);
+                CHECK(arctangent(y, x) == static_cast<double>(atan2q(y, x)));
+                CHECK(std::signbit(arctangent(y, x)) == std::signbit(static_cast<double>(atan2q(y, x))));
+            }
     }
 }

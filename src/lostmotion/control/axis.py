@@ -15,6 +15,7 @@ from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor
 from ..model.parameters import MotorLaw
 from ..model.train import DriveTrain
+from ..reproducible import expm1
 from .camera import core_camera, core_tracker
 from .continuous import ContinuousController
 from .controller import Controller
@@ -124,7 +125,7 @@ class _Place:
                 self.ratio(self.shaft, shaft, "position_encoder.shaft"), ticks
             )
             if c.blend_time is not None:
-                out.position_share = -math.expm1(-c.loop_time("position") / c.blend_time)
+                out.position_share = -expm1(-c.loop_time("position") / c.blend_time)
 
     def _loops(self, out: _core.Axis) -> None:
         c = self.controller
@@ -161,7 +162,7 @@ class _Place:
                 'current.kind: "pi" needs a motor with a winding, and this one is a torque source; take "ideal" or "first_order"'
             )
         k_N = m.armature_voltage_constant
-        share = -math.expm1(-self.controller.loop_time("current") / m.electrical_time_constant)
+        share = -expm1(-self.controller.loop_time("current") / m.electrical_time_constant)
         out = _core.CurrentLoop()
         out.gain = loop.gain / (k_N * share)
         out.integral_gain = loop.gain / k_N
@@ -190,7 +191,7 @@ class _Place:
         out = _core.FieldOrientation()
         out.winding = [float(value) for value in dataclasses.astuple(phase)]
         gains = [
-            -loop.gain * phase.resistance / math.expm1(-phase.resistance * time / L)
+            -loop.gain * phase.resistance / expm1(-phase.resistance * time / L)
             for L in (phase.inductance_d, phase.inductance_q)
         ]
         out.gain_d, out.gain_q = gains

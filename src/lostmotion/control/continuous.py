@@ -31,6 +31,7 @@ from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor
 from ..model.signals import CommandSignal, Signal, Step
 from ..model.train import DriveTrain
+from ..reproducible import sin
 from .loops import FirstOrderCurrent, IdealCurrent, Share, VoltageCommand
 
 MAX_ORDER = 8  # of a state space
@@ -251,7 +252,7 @@ class ContinuousController(Part):
         if pid is None or pid.gains[2] == 0.0 or pid.filter_time == 0.0:
             return {}
         value = self.reference.breakpoint_list()[0][1]
-        value += sum(a * math.sin(phase) for a, _, phase in self.reference.sine_list())
+        value += sum(a * sin(phase) for a, _, phase in self.reference.sine_list())
         return {f"{motor}_filter": pid.derivative_weight * value - measured}
 
     def output_limit(self, motor: Motor) -> float:

@@ -63,8 +63,8 @@ class Encoder(Part):
             return self.resolution
         turn = 2.0 * math.pi
         if self.lines is None:
-            return turn / 2.0 ** (self.bits or 0)
-        return turn / (self.lines * (4.0 if self.bits is None else 2.0**self.bits))
+            return math.ldexp(turn, -(self.bits or 0))
+        return turn / (self.lines * math.ldexp(1.0, 2 if self.bits is None else self.bits))
 
     def core(self, scale: float, ticks: int) -> _core.Sensor:
         """The solver's encoder: turns of what is controlled for one of its shaft, and base ticks in a sample time."""

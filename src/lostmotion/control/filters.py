@@ -12,6 +12,7 @@ from .. import _core
 from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import Frequency, NotNegative, Number, Positive, Time
+from ..reproducible import tan
 
 MAX_ORDER = _core.DiscreteSystem.max_order
 
@@ -102,16 +103,18 @@ def prewarped(
         raise InputError(
             f"has frequency = {frequency:g} Hz, but its loop samples at {1.0 / sample_time:g} Hz; it must be below half of that"
         )
-    c = 1.0 / math.tan(math.pi * frequency * sample_time)
+    c = 1.0 / tan(math.pi * frequency * sample_time)
     order = len(denominator) - 1
 
     def in_z(coefficients: list[float]) -> np.ndarray:
         total = np.zeros(order + 1)
+        factor = 1.0
         for power, a in enumerate(reversed(coefficients)):
-            term = np.array([a * c**power])
-            for factor in [[1.0, -1.0]] * power + [[1.0, 1.0]] * (order - power):
-                term = np.convolve(term, factor)
+            term = np.array([a * factor])
+            for sign in [-1.0] * power + [1.0] * (order - power):  # times z + sign
+                term = np.append(term, 0.0) + sign * np.append(0.0, term)
             total += term
+            factor *= c
         return total
 
     return in_z(numerator), in_z(denominator)

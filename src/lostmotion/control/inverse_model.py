@@ -27,6 +27,7 @@ from ..model.gear import Gear
 from ..model.losses import ConstantEfficiency, LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
+from ..reproducible import expm1
 
 Range = tuple[Annotated[Number, NotNegative], Annotated[Number, NotNegative]]
 TorqueRange = tuple[Annotated[Torque, NotNegative], Annotated[Torque, NotNegative]]
@@ -155,8 +156,8 @@ class InverseModel(Part):
             out.present = True
             out.input_time = self.load_observer.input_time
             out.load_time = self.load_observer.load_time
-            out.input_share = -math.expm1(-sample_time / out.input_time)
-            out.load_share = -math.expm1(-sample_time / out.load_time)
+            out.input_share = -expm1(-sample_time / out.input_time)
+            out.load_share = -expm1(-sample_time / out.load_time)
             out.bandwidth = 2.0 * math.pi * (self.load_observer.speed_bandwidth or 0.0)
         return out
 

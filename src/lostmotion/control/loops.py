@@ -26,6 +26,7 @@ from ..inputs.quantities import (
     ViscousFriction,
     Whole,
 )
+from ..reproducible import expm1
 from .filters import Filter
 
 Share = Limit(ge=0.0, le=1.0)
@@ -146,7 +147,7 @@ class SpeedLoop(Part):
         out.kind = getattr(_core.SpeedEstimate.Kind, e.kind)
         if isinstance(e, Difference):
             out.span = e.span
-            out.smoothing = -math.expm1(-sample_time / e.time_constant) if e.time_constant > 0.0 else 1.0
+            out.smoothing = -expm1(-sample_time / e.time_constant) if e.time_constant > 0.0 else 1.0
         elif isinstance(e, Observer):
             out.bandwidth = 2.0 * math.pi * e.bandwidth
             out.damping = e.damping

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ..reproducible import cbrt
+
 SEGMENTS = 8  # the last is rest
 JERK_SIGNS = (1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0, 0.0)
 
@@ -30,7 +32,7 @@ def segment_durations(distance: Any, speed: Any, acceleration: Any, jerk: Any) -
     """
     D, v, a, j = np.broadcast_arrays(*(np.asarray(x, float) for x in (distance, speed, acceleration, jerk)))
     D = np.abs(D)
-    by_distance, by_speed, by_acceleration = np.cbrt(0.5 * D) / np.cbrt(j), np.sqrt(v) / np.sqrt(j), a / j
+    by_distance, by_speed, by_acceleration = cbrt(0.5 * D) / cbrt(j), np.sqrt(v) / np.sqrt(j), a / j
     t = np.minimum(np.minimum(by_distance, by_speed), by_acceleration)
     reached = by_acceleration <= t  # the limit of acceleration
     with np.errstate(all="ignore"):  # of the branches not taken, and of a move of no length

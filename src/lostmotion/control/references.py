@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import itertools
 import math
-import warnings
 from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..errors import InputError, need
+from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import Acceleration, Angle, Jerk, NotNegative, Positive, Speed, Time, Torque
 from ..inputs.validation import shown
 from ..model.signals import Breakpoint, Samples, TimeFunction, taylor
+from ..reproducible import cos, cubic_spline, sin
 from .profiles import segments
 from .satellites import Satellite
 from .targets import Circle, FlyBy, Star, Track, Weave
@@ -42,21 +42,16 @@ class Series(Samples[V], Generic[V]):
     def breakpoints(self) -> list[Breakpoint]:
         if self.interpolation == "linear":
             return super().breakpoints()
-        need("scipy", "a cubic series", "control")
-        from scipy.interpolate import CubicSpline
-
         values = [float(v) for v in self.values]  # type: ignore[arg-type]
-        try:
-            with warnings.catch_warnings(action="error"):  # of intervals that differ by more than a number resolves
-                # The third derivative is continuous at the second point and the last but one.
-                spline = CubicSpline(self.times, values)
-        except (ValueError, Warning):
+        factors = np.array([[1.0], [1.0], [2.0], [6.0]])  # of derivatives: value, first, second, third
+        with np.errstate(all="ignore"):
+            pieces = factors * cubic_spline(self.times, np.array(values))
+        if not np.isfinite(pieces).all():
             raise ValueError(
                 "has samples that overflow as a cubic spline; lay their times further apart or more evenly, "
                 "or check the values"
-            ) from None
-        factors = np.array([[1.0], [1.0], [2.0], [6.0]])  # of derivatives: value, first, second, third
-        curve = zip(self.times, *(factors * spline.c[::-1]).tolist(), strict=False)
+            )
+        curve = zip(self.times, *pieces.tolist(), strict=False)
         return self._held([*curve, (self.times[-1], values[-1], 0.0)])
 
 
@@ -114,8 +109,11 @@ class Reference(TimeFunction[V], Generic[V]):
         for amplitude, frequency, phase in self.sine_list():
             omega = 2.0 * math.pi * frequency
             angle = omega * t + phase
-            for n, wave in enumerate((np.sin(angle), np.cos(angle), -np.sin(angle), -np.cos(angle))):
-                found[n] = found[n] + amplitude * omega**n * wave
+            sine, cosine = sin(angle), cos(angle)
+            factor = amplitude
+            for n, wave in enumerate((sine, cosine, -sine, -cosine)):
+                found[n] = found[n] + factor * wave
+                factor *= omega
         value, rate, second, third = found
         return value, rate, second, third
 

@@ -11,6 +11,7 @@ from pydantic import Field, field_validator, model_validator
 
 from ..errors import need
 from ..inputs.quantities import Angle, Length, Limit, Time
+from ..reproducible import cos, sin
 from .targets import ORDER, Jet, TargetPath
 
 # The earth, WGS 84.
@@ -24,7 +25,7 @@ J2000 = 2451545.0  # Julian date
 def sidereal_time(days: float, more: np.ndarray) -> np.ndarray:
     """Greenwich mean sidereal time [rad] so many and so many more days of UT1 after J2000 (IAU 1982; Aoki et al. 1982)."""
     T = (days + more) / 36525.0
-    beyond = 8640184.812866 * T + 0.093104 * T**2 - 6.2e-6 * T**3  # [s] of sidereal time, beside one turn a day
+    beyond = 8640184.812866 * T + 0.093104 * T * T - 6.2e-6 * T * T * T  # [s] of sidereal time, beside one turn a day
     return np.asarray(2.0 * math.pi * ((days % 1.0 + more) + (67310.54841 + beyond) / DAY))
 
 
@@ -100,9 +101,9 @@ class Satellite(TargetPath):
             )
         turn = sidereal_time(whole - J2000, shares + self.ut1 / DAY) + self.longitude
         # Axes of the place: east, north, up, in the equatorial frame that turns through the sidereal time.
-        cos, sin = np.cos(turn), np.sin(turn)
-        cl, sl = math.cos(self.latitude), math.sin(self.latitude)
-        out, across = 1e3 * (cos * r[:, 0] + sin * r[:, 1]), 1e3 * (cos * r[:, 1] - sin * r[:, 0])
+        c, s = cos(turn), sin(turn)
+        cl, sl = cos(self.latitude), sin(self.latitude)
+        out, across = 1e3 * (c * r[:, 0] + s * r[:, 1]), 1e3 * (c * r[:, 1] - s * r[:, 0])
         square = FLATTENING * (2.0 - FLATTENING)
         curvature = EQUATOR / math.sqrt(1.0 - square * sl * sl)
         out = out - (curvature + self.altitude) * cl

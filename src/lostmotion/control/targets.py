@@ -12,9 +12,9 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..errors import need
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Frequency, Length, LinearSpeed, NotNegative, Positive, Speed, Time
+from ..reproducible import arctan2, cos, cubic_spline, sin
 
 ORDER = 4  # coefficients of the series: value to third derivative
 TOLERANCE = 1e-13  # [rad], of a piece of third degree between two instants
@@ -53,14 +53,14 @@ def angle_of(y: Jet, x: Jet) -> Jet:
     rate = quotient(
         product(k * y[1:], x[:-1]) - product(y[:-1], k * x[1:]), product(x[:-1], x[:-1]) + product(y[:-1], y[:-1])
     )
-    return np.vstack([np.unwrap(np.arctan2(y[0], x[0]))[None], rate / k])
+    return np.vstack([np.unwrap(arctan2(y[0], x[0]))[None], rate / k])
 
 
 def sine_and_cosine(angle: np.ndarray, rate: float) -> tuple[Jet, Jet]:
     """Of an angle that grows at a constant rate [rad/s]."""
-    factors = np.array([1.0, rate, rate**2 / 2.0, rate**3 / 6.0])[:, None]
-    sin, cos = np.sin(angle), np.cos(angle)
-    return factors * np.array([sin, cos, -sin, -cos]), factors * np.array([cos, -sin, -cos, sin])
+    factors = np.array([1.0, rate, rate * rate / 2.0, rate * rate * rate / 6.0])[:, None]
+    s, c = sin(angle), cos(angle)
+    return factors * np.array([s, c, -s, -c]), factors * np.array([c, -s, -c, s])
 
 
 def straight(start: np.ndarray | float, rate: float, t: np.ndarray) -> Jet:
@@ -105,12 +105,12 @@ class TargetPath(Part):
             found = np.array(self.at(t))
             step = self.duration / n
             # The fourth derivative from the third ones.
-            remainder = np.abs(np.diff(found[3])).max() * step**3 / 24.0
+            remainder = np.abs(np.diff(found[3])).max() * step * step * step / 24.0
             if not np.isfinite(found).all() or n > MAX_PIECES:
                 raise ValueError("passes too near to the station: its angle changes faster than numbers can follow")
             if remainder <= TOLERANCE:
                 break
-            n = math.ceil(1.1 * n * max(1.0, (remainder / TOLERANCE) ** 0.25))
+            n = math.ceil(1.1 * n * max(1.0, math.sqrt(math.sqrt(remainder / TOLERANCE))))
         last = (self.duration, float(found[0, -1]), 0.0, 0.0, 0.0)
         return [*map(tuple, np.vstack([t, found])[:, :-1].T.tolist()), last]
 
@@ -181,8 +181,8 @@ class Circle(TargetPath):
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
         omega = self.speed / self.radius
-        sin, cos = sine_and_cosine(self.start + omega * t, omega)
-        return self.radius * sin, straight(self.distance, 0.0, t) + self.radius * cos, straight(self.height, 0.0, t)
+        s, c = sine_and_cosine(self.start + omega * t, omega)
+        return self.radius * s, straight(self.distance, 0.0, t) + self.radius * c, straight(self.height, 0.0, t)
 
 
 class Track(TargetPath):
@@ -208,11 +208,12 @@ class Track(TargetPath):
         return self
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
-        need("scipy", "a measured track", "control")
-        from scipy.interpolate import CubicSpline
-
-        spline = CubicSpline(self.times, np.array([self.x, self.y, self.z]).T)
-        x, y, z = np.array([spline(t, k) / math.factorial(k) for k in range(ORDER)]).transpose(2, 0, 1)
+        pieces = cubic_spline(self.times, np.array([self.x, self.y, self.z]).T)
+        k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
+        s = (t - np.array(self.times)[k])[:, None]
+        value, rate, half, sixth = pieces[:, k]
+        here = [value + s * (rate + s * (half + s * sixth)), rate + s * (2.0 * half + 3.0 * s * sixth)]
+        x, y, z = np.array([*here, half + 3.0 * s * sixth, sixth + 0.0 * s]).transpose(2, 0, 1)
         return x, y, z
 
 
@@ -228,8 +229,8 @@ class Star(TargetPath):
     """at which the hour angle grows; for the sun 7.2722e-5 rad/s"""
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
-        sin, cos = sine_and_cosine(self.hour_angle + self.rate * t, self.rate)
-        sd, cd, sl, cl = (f(v) for v in (self.declination, self.latitude) for f in (math.sin, math.cos))
+        s, c = sine_and_cosine(self.hour_angle + self.rate * t, self.rate)
+        sd, cd, sl, cl = (f(v) for v in (self.declination, self.latitude) for f in (sin, cos))
         one = straight(1.0, 0.0, t)
         # East, north, up.
-        return -cd * sin, cl * sd * one - sl * cd * cos, sl * sd * one + cl * cd * cos
+        return -cd * s, cl * sd * one - sl * cd * c, sl * sd * one + cl * cd * c

@@ -80,12 +80,12 @@ def identical_damping(drive: TwoInertias, damping: float) -> SpeedGains:
         R < 4 zeta^2, where no gains give it.
     """
     R, J, w = drive.inertia_ratio, drive.motor_inertia, drive.antiresonance
-    if 4.0 * damping**2 > R:
+    if 4.0 * damping * damping > R:
         raise InputError(
-            f"identical damping of {damping:g} needs an inertia ratio of load to motor of at least {4.0 * damping**2:.4g}, "
+            f"identical damping of {damping:g} needs an inertia ratio of load to motor of at least {4.0 * damping * damping:.4g}, "
             f"and it is {R:.4g}; take damping = {0.5 * math.sqrt(R):.4g} or less"
         )
-    return SpeedGains(2.0 * damping * J * w * math.sqrt(R + 4.0 - 4.0 * damping**2), J * w * w)
+    return SpeedGains(2.0 * damping * J * w * math.sqrt(R + 4.0 - 4.0 * damping * damping), J * w * w)
 
 
 def identical_radius(drive: TwoInertias) -> SpeedGains:
@@ -117,9 +117,9 @@ def identical_real_part(drive: TwoInertias, damping: float) -> SpeedGains:
     InputError
         R is outside the range that this gives, where no gains do it.
     """
-    R, J, w, z2 = drive.inertia_ratio, drive.motor_inertia, drive.antiresonance, damping**2
+    R, J, w, z2 = drive.inertia_ratio, drive.motor_inertia, drive.antiresonance, damping * damping
     widest = (1.0 - z2) / (1.0 + z2)
-    low, high = 4.0 * z2, widest**2 + 8.0 * z2 / (1.0 + z2)
+    low, high = 4.0 * z2, widest * widest + 8.0 * z2 / (1.0 + z2)
     if not low <= R <= high:
         raise InputError(
             f"identical real part with a damping of {damping:g} needs an inertia ratio of load to motor from {low:.4g} to "
@@ -161,12 +161,12 @@ def suited(drive: TwoInertias, lag: float, position_time: float) -> CascadeGains
         Sample time of the position loop [s].
     """
     optimum = symmetrical_optimum(drive.motor_inertia + drive.load_inertia, lag)
-    if math.isfinite(drive.stiffness) and drive.inertia_ratio >= 4.0 * ALIKE**2:
+    if math.isfinite(drive.stiffness) and drive.inertia_ratio >= 4.0 * ALIKE * ALIKE:
         alike = identical_damping(drive, ALIKE)
         if alike.gain <= optimum.gain:
             # w_1 w_2 = w_a^2, w_1 + w_2 = K_p/(2 zeta J_M)
             w_a, both = drive.antiresonance, alike.gain / (2.0 * ALIKE * drive.motor_inertia)
-            slow = 2.0 * w_a**2 / (both + math.sqrt(both**2 - 4.0 * w_a**2))
+            slow = 2.0 * w_a * w_a / (both + math.sqrt(both * both - 4.0 * w_a * w_a))
             wait = 2.0 * ALIKE / slow + HELD * position_time
             return CascadeGains("identical damping", alike, 0.5 / wait)
     wait = optimum.filter_time + HELD * position_time

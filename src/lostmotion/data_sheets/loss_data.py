@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Self
 
 from pydantic import model_validator
@@ -19,6 +18,7 @@ from ..inputs.quantities import (
     Torque,
 )
 from ..model.losses import LossMap
+from ..reproducible import log10, power
 
 Efficiency = Annotated[Number, Limit(gt=0.0, le=1.0)]
 
@@ -59,12 +59,12 @@ class Lubricant(Part):
         """Kinematic viscosity [m^2/s] at a temperature [°C], by Ubbelohde and Walther (ASTM D341)."""
 
         def w(nu: float) -> float:
-            return math.log10(math.log10(nu * 1e6 + 0.7))
+            return log10(log10(nu * 1e6 + 0.7))
 
-        t40, t100 = math.log10(313.15), math.log10(373.15)
+        t40, t100 = log10(313.15), log10(373.15)
         slope = (w(self.viscosity_100) - w(self.viscosity_40)) / (t100 - t40)
-        exponent = w(self.viscosity_40) + slope * (math.log10(temperature + 273.15) - t40)
-        return float(10.0 ** (10.0**exponent) - 0.7) * 1e-6
+        exponent = w(self.viscosity_40) + slope * (log10(temperature + 273.15) - t40)
+        return (power(10.0, power(10.0, exponent)) - 0.7) * 1e-6
 
 
 class LossData(Part):

@@ -14,12 +14,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number, Temperature
 from ..model.losses import LossMap
+from ..reproducible import interpolate, power
 from ..units.practical import RPM
 from .gearbox_sheet import GearboxSheet
 from .loss_data import EfficiencyPoint, LossData
@@ -97,7 +96,7 @@ class _LoadPart:
     def __call__(self, mu: float) -> float:
         x, y = [0.0, *self.loads], [0.0, *self.values]
         if mu <= x[-1]:
-            return float(np.interp(mu, x, y))
+            return interpolate(mu, x, y)
         slope = max(0.0, (y[-1] - y[-2]) / (x[-1] - x[-2]))
         return y[-1] + slope * (mu - x[-1])
 
@@ -119,7 +118,7 @@ class _Unloaded:
         """In motion: straight between the speeds, down to the lesser of starting and slowest running torque."""
         x, y = [0.0, *self.curve], [min(self.start, next(iter(self.curve.values()))), *self.curve.values()]
         if v <= x[-1]:
-            return float(np.interp(v, x, y))
+            return interpolate(v, x, y)
         return y[-1] + max(0.0, (y[-1] - y[-2]) / (x[-1] - x[-2])) * (v - x[-1])
 
 
@@ -230,8 +229,8 @@ class _Builder:
             )
         out = {}
         for v in sorted({v for curve in self.curves.values() for v in curve}):
-            at = [float(np.interp(v, sorted(c), [c[x] for x in sorted(c)])) for c in (self.curves[t] for t in known)]
-            out[v] = float(np.interp(temperature, known, at))
+            at = [interpolate(v, sorted(c), [c[x] for x in sorted(c)]) for c in (self.curves[t] for t in known)]
+            out[v] = interpolate(temperature, known, at)
         return out
 
     def _viscosity_factor(self, losses: LossData, reference: float, wanted: float) -> float:
@@ -242,7 +241,7 @@ class _Builder:
                 f"{self.sheet.name}: has data for {reference:g} °C only; for {wanted:g} °C it also needs losses.lubricant "
                 "(viscosity_40, viscosity_100) or no_load_torque at several temperatures"
             )
-        return float((losses.lubricant.viscosity(wanted) / losses.lubricant.viscosity(reference)) ** VISCOSITY_EXPONENT)
+        return power(losses.lubricant.viscosity(wanted) / losses.lubricant.viscosity(reference), VISCOSITY_EXPONENT)
 
     # --- what the load adds: areas 1 and 4 ---
 
@@ -348,5 +347,5 @@ class _Builder:
         if mu == 0.0:
             return without, self.no_load_origin if v in self.unloaded.curve else "filled in: along the speed"
         known = sorted(parts)
-        added = float(np.interp(v, known, [parts[x](mu) for x in known]))
+        added = interpolate(v, known, [parts[x](mu) for x in known])
         return without + added, parts[v].origin(mu) if v in parts else "filled in: along the speed"

@@ -20,6 +20,7 @@ from ..inputs.quantities import (
     Switch,
     Whole,
 )
+from ..reproducible import arctan
 
 
 class ConstantEfficiency(Part):
@@ -150,9 +151,9 @@ class WormMesh(Part):
         """(lead angle, friction angle) [rad]."""
         g, r = self.lead_angle, self.friction_angle
         if g is None:
-            g = math.atan(self.module * self.starts / self.diameter)  # type: ignore[operator]
+            g = arctan(self.module * self.starts / self.diameter)  # type: ignore[operator]
         if r is None:
-            r = math.atan(self.friction_coefficient)  # type: ignore[arg-type]
+            r = arctan(self.friction_coefficient)  # type: ignore[arg-type]
         return g, r
 
     def efficiencies(self) -> tuple[float, float]:

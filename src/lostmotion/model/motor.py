@@ -26,6 +26,7 @@ from ..inputs.quantities import (
     Voltage,
     argument,
 )
+from ..reproducible import total
 from ..units.practical import practical
 from .synchronous_motor import PhaseValues, Winding
 
@@ -67,7 +68,7 @@ class MotorLimits(Part):
     @property
     def winding_to_ambient(self) -> float | None:
         """Thermal resistance [K/W]."""
-        return self.thermal_resistance if self.thermal_parts is None else sum(self.thermal_parts)
+        return self.thermal_resistance if self.thermal_parts is None else total(self.thermal_parts)
 
 
 # Keys of `[motor]` that only a DC motor has.
@@ -205,7 +206,7 @@ class Motor(Part):
         limits = self.limits
         if limits is None or limits.resistance is None or limits.torque_constant is None:
             return None
-        return limits.resistance / limits.torque_constant**2, 25.0
+        return limits.resistance / (limits.torque_constant * limits.torque_constant), 25.0
 
     @property
     def no_load_speed(self) -> float:

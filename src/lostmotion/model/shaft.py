@@ -82,7 +82,7 @@ class QuadraticDrag(Part):
     """by which the straight lines depart from the parabola at most; left out, 0.1 % of the torque at max_speed"""
 
     def core(self) -> _core.TorsionCurve:
-        top = self.coefficient * self.max_speed**2
+        top = self.coefficient * self.max_speed * self.max_speed
         return _core.quadratic_drag(self.coefficient, self.max_speed, SHARE * top if self.error is None else self.error)
 
 

@@ -17,6 +17,7 @@ from pydantic import Field, model_validator
 from .. import _core
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Frequency, NotNegative, Number, Positive, Time, Torque, Whole
+from ..reproducible import sin, total
 from .wind import AnyWind
 
 V = TypeVar("V")  # the value of the signal, with its unit
@@ -76,7 +77,7 @@ class Chirp(Part, Generic[V]):
         rate = (self.end_frequency - self.begin_frequency) / self.duration
         amplitude = float(self.amplitude)  # type: ignore[arg-type]
         times = [self.duration * k / n for k in range(n + 1)]
-        values = [amplitude * math.sin(2.0 * math.pi * (self.begin_frequency + 0.5 * rate * t) * t) for t in times]
+        values = [amplitude * sin(2.0 * math.pi * (self.begin_frequency + 0.5 * rate * t) * t) for t in times]
         lines = _polyline([self.begin + t for t in times], values)
         return [*lines[:-1], (self.begin + self.duration, 0.0, 0.0)]
 
@@ -163,9 +164,9 @@ class TimeFunction(Part, Generic[V]):
             while waiting and waiting[0][0][0] <= time:
                 active.append(waiting.popleft())
             here = [_at(piece, time, self.derivatives) for piece in active]
-            value = mean + sum((d[0] for d in here), final)
-            breakpoints.append((time, value, *(sum((d[k] for d in here), 0.0) for k in orders)))
-            final += sum(d[0] for piece, d in zip(active, here, strict=True) if time >= piece[-1][0])
+            value = mean + total((d[0] for d in here), final)
+            breakpoints.append((time, value, *(total(d[k] for d in here) for k in orders)))
+            final += total(d[0] for piece, d in zip(active, here, strict=True) if time >= piece[-1][0])
             active = [piece for piece in active if time < piece[-1][0]]
         return breakpoints
 
@@ -222,7 +223,7 @@ class Signal(TimeFunction[V], Generic[V]):
         lines = self.breakpoint_list()
         values = [value for _, value, _ in lines]
         values += [value + slope * (end - begin) for (begin, value, slope), (end, *_) in itertools.pairwise(lines)]
-        return max(values) + sum(abs(amplitude) for amplitude, *_ in self.sine_list())
+        return max(values) + total(abs(amplitude) for amplitude, *_ in self.sine_list())
 
     def mirrored(self) -> Self:
         """The same signal with the other sign."""

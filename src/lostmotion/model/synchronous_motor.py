@@ -22,6 +22,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from ..inputs.part import Part
@@ -110,7 +111,7 @@ MISREADINGS = {
     math.sqrt(2.0): "as between rms and peak",
     math.sqrt(3.0): "as between line to line and phase",
     math.sqrt(6.0): "as between line to line, rms, and phase, peak",
-    TORQUE.factors["torque_constant_block"] ** -1: "as between block commutation and one ampere peak",
+    1.0 / TORQUE.factors["torque_constant_block"]: "as between block commutation and one ampere peak",
     math.sqrt(2.0) * TORQUE.factors["torque_constant_block"]: "as between one ampere rms and block commutation",
 }
 
@@ -143,7 +144,7 @@ class PhaseValues:
     @property
     def copper_loss(self) -> float:
         """Heat of the three phases to a torque squared, 1.5 R i² = 1.5 R (M/(1.5 p psi))² [W/(N·m)²]."""
-        return 1.5 * self.resistance / self.torque_constant**2
+        return 1.5 * self.resistance / (self.torque_constant * self.torque_constant)
 
     def torque(self, i_d: Any, i_q: Any) -> Any:
         """1.5 p (psi i_q + (L_d - L_q) i_d i_q) [N·m], of currents [A]."""
@@ -159,7 +160,7 @@ class PhaseValues:
         """Amplitude of the voltage of a phase [V], with that of the decoupling, u_d = -w_e L_q i_q, for u_q [V], torque [N·m]
         and speed [rad/s]."""
         u_d = self.pole_pairs * speed * self.inductance_q * torque / self.torque_constant
-        return (u_q**2 + u_d**2) ** 0.5
+        return np.sqrt(u_q * u_q + u_d * u_d)
 
 
 class Winding(Part):

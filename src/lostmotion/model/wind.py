@@ -23,6 +23,7 @@ from ..inputs.quantities import (
     TorqueSpectrum,
     Whole,
 )
+from ..reproducible import cbrt, cos, exp, fourier_sum, interpolate, log, sin
 
 MAX_POINTS = 2**17
 KARMAN = 0.4
@@ -70,9 +71,10 @@ class Wind(Part):
         n = f.size * self.points_per_period
         # Raw bits of a counter-based generator, whose order is that of the frequencies: a longer spectrum keeps the phases.
         phase = 2.0 * math.pi * (np.random.Philox(key=self.seed).random_raw(f.size) >> np.uint64(11)) * 2.0**-53
-        amplitudes = np.zeros(n // 2 + 1, complex)
-        amplitudes[1 : f.size + 1] = 0.5 * n * np.sqrt(2.0 * self.spectrum(f) / self.duration) * np.exp(1j * phase)
-        gusts = np.fft.irfft(amplitudes, n)
+        amplitude = np.sqrt(2.0 * self.spectrum(f) / self.duration)
+        real, imaginary = np.zeros((2, n))
+        real[1 : f.size + 1], imaginary[1 : f.size + 1] = amplitude * cos(phase), amplitude * sin(phase)
+        gusts, _ = fourier_sum(real, imaginary)
         return self.duration / n * np.arange(n + 1), self.mean() + np.append(gusts, gusts[0])
 
     def breakpoints(self) -> list[tuple[float, ...]]:
@@ -101,9 +103,9 @@ class WindOfTable(Wind):
         return self
 
     def spectrum(self, frequency: np.ndarray) -> np.ndarray:
-        log = np.interp(np.log(frequency), np.log(self.frequencies), np.log(self.densities))
         inside = (frequency >= self.frequencies[0]) & (frequency <= self.frequencies[-1])
-        return np.where(inside, np.exp(log), 0.0)
+        points, densities = log(np.array(self.frequencies)), log(np.array(self.densities))
+        return np.where(inside, exp(interpolate(log(frequency), points, densities)), 0.0)
 
 
 class WindOnArea(Wind):
@@ -126,10 +128,11 @@ class WindOnArea(Wind):
         raise NotImplementedError
 
     def mean(self) -> float:
-        return 0.5 * self.density * self.drag_coefficient * self.area * self.lever * self.speed**2
+        return 0.5 * self.density * self.drag_coefficient * self.area * self.lever * self.speed * self.speed
 
     def spectrum(self, frequency: np.ndarray) -> np.ndarray:
-        return (2.0 * self.mean() / self.speed) ** 2 * self.gusts(frequency)
+        per_speed = 2.0 * self.mean() / self.speed
+        return per_speed * per_speed * self.gusts(frequency)
 
 
 class Davenport(WindOnArea):
@@ -144,7 +147,8 @@ class Davenport(WindOnArea):
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
         V = self.speed if self.speed_at_10_m is None else self.speed_at_10_m
         x = 1200.0 * frequency / V
-        return np.asarray(4.0 * self.surface_drag * V**2 * x**2 / (1.0 + x**2) ** (4.0 / 3.0) / frequency)
+        root = cbrt(1.0 + x * x)
+        return np.asarray(4.0 * self.surface_drag * V * V * x * x / ((1.0 + x * x) * root) / frequency)
 
 
 class VonKarman(WindOnArea):
@@ -158,9 +162,10 @@ class VonKarman(WindOnArea):
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
         x = frequency * self.length_scale / self.speed
-        return np.asarray(
-            4.0 * (self.turbulence * self.speed) ** 2 * x / (1.0 + 70.8 * x**2) ** (5.0 / 6.0) / frequency
-        )
+        deviation = self.turbulence * self.speed
+        base = 1.0 + 70.8 * x * x
+        power = base / np.sqrt(cbrt(base))  # base^(5/6)
+        return np.asarray(4.0 * deviation * deviation * x / power / frequency)
 
 
 class Kaimal(WindOnArea):
@@ -181,9 +186,11 @@ class Kaimal(WindOnArea):
         return self
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
-        friction = KARMAN * self.speed / math.log(self.height / self.roughness_length)
+        friction = KARMAN * self.speed / log(self.height / self.roughness_length)
         x = frequency * self.height / self.speed
-        return np.asarray(105.0 * friction**2 * x / (1.0 + 33.0 * x) ** (5.0 / 3.0) / frequency)
+        base = 1.0 + 33.0 * x
+        root = cbrt(base)
+        return np.asarray(105.0 * friction * friction * x / (base * root * root) / frequency)
 
 
 AnyWind = Annotated[WindOfTable | Davenport | VonKarman | Kaimal, Field(discriminator="kind")]

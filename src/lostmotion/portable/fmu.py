@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import zipfile
 from collections.abc import Mapping
 from importlib.resources import files
@@ -20,6 +19,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from ..model.signals import CommandSignal, Signal
+from ..reproducible import sin, total
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
@@ -243,7 +243,7 @@ def _unnamed(scenario: Scenario) -> dict[str, Controller]:
 
 def _at_start(signal: Signal[Any]) -> float:
     """Its value at t = 0."""
-    sines = sum(amplitude * math.sin(phase) for amplitude, _, phase in signal.sine_list())
+    sines = total(amplitude * sin(phase) for amplitude, _, phase in signal.sine_list())
     return float(signal.breakpoint_list()[0][1]) + sines
 
 

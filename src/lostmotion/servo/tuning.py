@@ -171,7 +171,7 @@ def tune(
         K_v = (
             None
             if axis.controller.position is None
-            else position_gain(_lowest_bandwidth(_with(axis, gains, None), "speed"))
+            else rounded(position_gain(_lowest_bandwidth(_with(axis, gains, None), "speed")))
         )
     return _tuning(scenario, axis, rule, why, gains, K_v)
 
@@ -197,6 +197,15 @@ def _by_poles(axis: Axis, rule: Callable[[Any], SpeedGains], what: str) -> tuple
     return rule(
         d
     ), f"{what}, inertia ratio {d.inertia_ratio:.4g}, anti-resonance {hertz:.4g} Hz, secant stiffness to rated torque"
+
+
+def rounded(gain: float) -> float:
+    """A gain that a search found, to four significant digits.
+
+    Eigenvalues and minima of libraries differ in their last digits from processor to processor; what is simulated with the
+    gain must not.
+    """
+    return float(f"{gain:.4g}")
 
 
 def _by_margins(axis: Axis, phase_margin: float) -> tuple[SpeedGains, str]:
@@ -235,7 +244,7 @@ def _by_margins(axis: Axis, phase_margin: float) -> tuple[SpeedGains, str]:
         )
     degrees = math.degrees(phase_margin)
     return gains(
-        kept
+        rounded(kept)
     ), f"phase margin {degrees:.4g} degrees and gain margin {GAIN_MARGIN:g} kept in {len(points)} regimes"
 
 
@@ -252,8 +261,8 @@ def _by_search(axis: Axis, goal: str, peak: float) -> tuple[SpeedGains, str, flo
     known: dict[tuple[float, ...], tuple[float, float]] = {}
 
     def tuned(x: np.ndarray) -> tuple[SpeedGains, float | None]:
-        K_p, T_i, *K_v = np.exp(x)
-        return SpeedGains(float(K_p), float(K_p / T_i)), float(K_v[0]) if K_v else None
+        K_p, T_i, *K_v = (rounded(float(value)) for value in np.exp(x))
+        return SpeedGains(K_p, K_p / T_i), K_v[0] if K_v else None
 
     def judged(x: np.ndarray) -> tuple[float, float]:
         """Logarithm of the goal, and what is left of the peak of sensitivity."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import math
 import re
 from collections.abc import Iterator, Mapping
 from statistics import NormalDist
@@ -18,6 +17,7 @@ from ..inputs.part import Part
 from ..inputs.quantities import Switch
 from ..inputs.validation import shown
 from ..model.signals import Signal
+from ..reproducible import exp, log
 from ..simulation.keys import list_index
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
@@ -143,8 +143,8 @@ class Vary(Part):
         elif self.uniform is not None:
             out = self.uniform[0] + u * (self.uniform[1] - self.uniform[0])
         elif self.log_uniform is not None:
-            a, b = (math.log(x) for x in self.log_uniform)
-            out = np.exp(a + u * (b - a))
+            a, b = (log(x) for x in self.log_uniform)
+            out = exp(a + u * (b - a))
         elif self.normal is not None:
             out = np.vectorize(NormalDist(self.normal.mean, self.normal.deviation).inv_cdf, otypes=[float])(u)
         else:

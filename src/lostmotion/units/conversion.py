@@ -108,7 +108,7 @@ def si_factor(unit: str) -> float:
         units = read_unit(unit)
     except UnknownUnitError as error:
         raise ValueError(_unknown("1", unit, error.symbol, "")) from None
-    return float(registry().Quantity(1.0, _registry_text(units)).to_base_units().magnitude)
+    return float(registry(exact=True).Quantity(Decimal(1), _registry_text(units)).to_base_units().magnitude)
 
 
 def _wanted(unit: str) -> str:
