@@ -1,56 +1,84 @@
-# make demo, make test, make bench, make docs, make lint: each sets up all it needs in .venv on a fresh machine.
+# make demo, make check, make test, make bench, make docs: each sets up all it needs in .venv on a fresh machine.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-FORMATTED := $(wildcard core/lostmotion/*/*.hpp core/kernels/*.[ch]pp core/tests/*.[ch]pp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.[ch]pp bindings/fmu/*.[ch]pp examples/*.c benchmarks/*.[ch]pp)
-SOURCES := $(wildcard core/lostmotion/*/*.hpp core/kernels/* bindings/*.[ch]pp bindings/c/*.[ch]* bindings/fmu/*.[ch]pp scenarios/*.toml) CMakeLists.txt pyproject.toml
+CORE_SOURCES := $(wildcard core/lostmotion/*/*.[ch]pp core/kernels/*.[ch]pp)
+FORMATTED := $(CORE_SOURCES) $(wildcard core/tests/*.[ch]pp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.[ch]pp bindings/fmu/*.[ch]pp examples/*.c benchmarks/*.[ch]pp)
+SOURCES := $(CORE_SOURCES) $(wildcard bindings/*.[ch]pp) CMakeLists.txt
+# One build tree for the extension, the C library, the library of FMUs and the tests of the core.
+TREE := build/native
+PACKAGE := src/lostmotion
+CMAKE := $(BIN)/cmake
+BUILD := $(CMAKE) --build $(TREE)
+NODE := command -v npm >/dev/null
 
-.PHONY: demo test bench docs lint format clean
+.PHONY: demo check test bench docs lint format clean
 .DELETE_ON_ERROR:
 # Not every ninja understands the job server of every make.
 unexport MAKEFLAGS
 
 demo: $(VENV)/built
+	@! $(NODE) || $(MAKE) --no-print-directory demo-page
 	$(BIN)/lostmotion reproduce -o out
+	@if $(NODE); then $(BIN)/lostmotion live paper-2dof-nl-small -o out/live.html; \
+	else echo 'Without node the live page was not built; with it, make demo leaves it at out/live.html.'; fi
+	@echo
+	@echo 'Made: out/report.html, the reproduction of the paper, with its figures beside it.'
+	@! test -f out/live.html || echo 'Made: out/live.html, the drive of the paper to try out in a browser.'
+	@echo 'Next: $(BIN)/lostmotion run paper-2dof-nl-small --plot run.png'
+	@echo '      $(BIN)/lostmotion rig schaeffler-rt1-h-20-100'
+	@echo '      $(BIN)/lostmotion servo position-axis'
 
-test: lint test-core test-page test-python
+# After a change: what finds most faults. make test runs all.
+check: lint test-core check-python
+test: lint test-core test-sanitized test-page test-python
 
-.PHONY: test-python
-test-python: c-library page-where-node
-	$(BIN)/pip install -q --group portable --group examples
+.PHONY: test-python check-python
+test-python: c-library fmu-library page-where-node $(VENV)/examples
 	$(BIN)/pytest
+# Without what takes minutes: each such test says why it is worth its time.
+check-python: $(VENV)/dev fmu-library c-library
+	$(BIN)/pytest -m 'not slow' --durations=0 --durations-min=5
 
-.PHONY: test-core
-test-core: $(VENV)/tools
-	echo '#include <doctest/doctest.h>' | c++ -E -x c++ - >/dev/null 2>&1 || { apt-get update -q && apt-get install -qy doctest-dev; }
-	$(BIN)/cmake -S . -B build/core -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_TESTS=ON -DLOSTMOTION_WERROR=ON >build/core.log
-	$(BIN)/cmake --build build/core
-	$(BIN)/ctest --test-dir build/core --output-on-failure --parallel 2
+# With the objects of the extension, and again under sanitizers with two of the kernels.
+.PHONY: test-core test-sanitized with-core-tests
+DOCTEST := echo '\#include <doctest/doctest.h>' | c++ -E -x c++ - >/dev/null 2>&1 || { apt-get update -q && apt-get install -qy doctest-dev; }
+with-core-tests: $(VENV)/built
+	$(DOCTEST)
+	@$(CMAKE) $(TREE) -DLOSTMOTION_TESTS=ON >build/core.log || { cat build/core.log; false; }
+test-core: with-core-tests
+	$(BUILD) --target core_tests core_tests_many
+	$(BIN)/ctest --test-dir $(TREE) --output-on-failure --parallel 2 --tests-regex '^core'
+test-sanitized: with-core-tests
+	$(BUILD) --target core_tests_sanitized
+	$(BIN)/ctest --test-dir $(TREE) --output-on-failure --parallel 2 --tests-regex '^sanitized'
 
-# The library of the C interface, bindings/c/lostmotion.h, from what the extension for any processor is made of.
-.PHONY: c-library
+# The library of the C interface, bindings/c/lostmotion.h, from what the extension is made of.
+.PHONY: c-library fmu-library
 c-library: $(VENV)/built
-	directory=$$(ls -td build/python-*/ | head -1) && $(BIN)/cmake --build $$directory --target lostmotion_c && \
-		mkdir -p build/c && cp $$directory/liblostmotion.* build/c/
+	$(BUILD) --target lostmotion_c
+	mkdir -p build/c && cp $(TREE)/liblostmotion.* build/c/
 	@echo 'cc -I$(abspath bindings/c) PROGRAM.c -L$(abspath build/c) -llostmotion -lm'
+# The library of FMUs for this platform. `lostmotion fmu` calls this when it first needs it.
+fmu-library: $(VENV)/built
+	$(BUILD) --target lostmotion_fmu
+	mkdir -p $(PACKAGE)/fmu_libraries && cp -r $(TREE)/fmu/* $(PACKAGE)/fmu_libraries/
 
 # The same library as WebAssembly, and as the libraries of FMUs for all platforms, by the Zig compiler.
 .PHONY: wasm fmu
-wasm: $(VENV)/tools
-	$(BIN)/pip install -q --group portable
+wasm: $(VENV)/portable
 	$(BIN)/python bindings/c/build.py wasm build/wasm/lostmotion.wasm
-fmu: $(VENV)/tools
-	$(BIN)/pip install -q --group portable
+fmu: $(VENV)/portable
 	$(BIN)/python bindings/c/build.py fmu src/lostmotion/fmu_libraries
 
 # Those libraries, as far as this machine can run them: QEMU and Wine, if they are installed.
 .PHONY: test-fmu
-test-fmu: $(VENV)/built $(VENV)/portable
+test-fmu: $(VENV)/portable
 	$(BIN)/pytest -n0 -rs tests/test_fmu_platforms.py
 
 # FMUs with inputs and reference results, as the FMI cross-check asks for them.
 .PHONY: cross-check
-cross-check: $(VENV)/built
+cross-check: $(VENV)/dev fmu-library
 	$(BIN)/python bindings/fmu/cross_check.py build/cross-check
 
 # Wheels for all platforms, dist/*.whl, by the Zig compiler; the headers of Python 3.12 have to be at hand.
@@ -65,7 +93,7 @@ wheels: page $(VENV)/portable
 
 # In environments of their own, which take what they need from the package index.
 .PHONY: test-wheels aarch64-python
-test-wheels: $(VENV)/built
+test-wheels: $(VENV)/dev
 	$(BIN)/pytest -n0 -rs tests/test_wheels.py
 # Debian's Python for aarch64, which QEMU runs.
 ARM := build/aarch64
@@ -77,58 +105,64 @@ aarch64-python:
 	for p in $(ARM)/packages/*.deb; do dpkg -x $$p $(ARM); done
 
 # The live page, src/lostmotion/live_page/page.html, and its cores, one for each kernel, which the wheel carries.
-LIVE := src/lostmotion/live_page
-NODE := command -v npm >/dev/null || (echo 'npm is missing: without node the live page is not built'; false)
-.PHONY: page
-page: $(LIVE)/page.html $(LIVE)/wide.wasm.gz
+# `lostmotion live` calls page-KERNEL when it first needs a core.
+LIVE := $(PACKAGE)/live_page
+KERNELS := drive narrow middle wide
+NEED_NODE := $(NODE) || (echo 'npm is missing: without node the live page is not built'; false)
+WASM_SOURCES := $(SOURCES) $(wildcard bindings/c/*) page/src/core.ts
+.PHONY: page demo-page $(KERNELS:%=page-%)
+page: $(KERNELS:%=page-%)
+$(KERNELS:%=page-%): page-%: $(LIVE)/page.html $(LIVE)/%.wasm.gz
+demo-page: page-drive
 $(LIVE)/page.html: page/node_modules/installed $(wildcard page/*.ts page/*.html page/src/*)
 	cd page && npm run --silent build
 	cp build/page/index.html $@
-# The last of them to be written.
-$(LIVE)/wide.wasm.gz: $(SOURCES) $(wildcard bindings/c/*) page/src/core.ts | $(VENV)/portable page/node_modules/installed
-	$(BIN)/python bindings/c/build.py page $(LIVE)
-	touch $@
+$(KERNELS:%=$(LIVE)/%.wasm.gz): $(LIVE)/%.wasm.gz: $(WASM_SOURCES) | $(VENV)/zig page/node_modules/installed
+	@echo 'Compiling the core of the live page (kernel: $*) to WebAssembly; this takes about a minute.'
+	$(BIN)/python bindings/c/build.py page $(LIVE) $*
 page/node_modules/installed: page/package.json page/package-lock.json
-	@$(NODE)
+	@$(NEED_NODE)
 	cd page && npm ci --silent
 	touch $@
-$(VENV)/portable: $(VENV)/tools
+$(VENV)/zig: $(VENV)/tools
+	$(BIN)/pip install -q ziglang
+	touch $@
+$(VENV)/portable: $(VENV)/dev
 	$(BIN)/pip install -q --group portable
 	touch $@
 
 # In Chromium; left out where there is no node.
 .PHONY: page-where-node test-page
-page-where-node: $(VENV)/built
-	@$(NODE) || exit 0; $(MAKE) page
+page-where-node: $(VENV)/dev
+	@! $(NODE) || $(MAKE) page
 test-page: page-where-node
 	@$(NODE) || exit 0; { command -v chromium >/dev/null || { apt-get update -q && apt-get install -qy chromium; }; } && cd page && npm run --silent lint && npm test --silent
 
-# 100,000 random drives of each kind; CASES and SEED choose others.
+# All random cases of the core's tests, and 100,000 random drives of each kind; CASES and SEED choose others.
 CASES ?= 100000
 SEED ?= 1
 .PHONY: soak
-soak: $(VENV)/tools
-	echo '#include <doctest/doctest.h>' | c++ -E -x c++ - >/dev/null 2>&1 || { apt-get update -q && apt-get install -qy doctest-dev; }
-	$(BIN)/cmake -S . -B build/core -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_TESTS=ON -DLOSTMOTION_WERROR=ON >build/core.log
-	$(BIN)/cmake --build build/core --target soak
-	build/core/core/tests/soak $(CASES) $(SEED)
+soak: with-core-tests
+	$(BUILD) --target core_tests core_tests_many soak
+	LOSTMOTION_CASES=1 $(BIN)/ctest --test-dir $(TREE) --output-on-failure --parallel 2 --tests-regex '^core'
+	$(TREE)/core/tests/soak $(CASES) $(SEED)
 
-bench: $(VENV)/built
+bench: $(VENV)/dev fmu-library
 	$(BIN)/pip install -q --group bench
 	command -v valgrind >/dev/null || { apt-get update -q && apt-get install -qy valgrind; } || echo 'without valgrind'
 	echo '#include <cvode/cvode.h>' | c++ -E -x c++ - >/dev/null 2>&1 || { apt-get update -q && apt-get install -qy libsundials-dev; } || echo 'without SUNDIALS'
 	command -v npm >/dev/null && $(MAKE) page c-library || echo 'without the live page'
 	$(BIN)/python benchmarks/baseline.py build/baseline
-	$(BIN)/cmake -S . -B build/bench -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_BENCHMARKS=ON -DLOSTMOTION_WERROR=ON -DLOSTMOTION_BASELINE=$(abspath build/baseline) >build/bench.log
+	$(BIN)/cmake -S . -B build/bench -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_BENCHMARKS=ON -DLOSTMOTION_BUILD=all -DLOSTMOTION_WERROR=ON -DLOSTMOTION_BASELINE=$(abspath build/baseline) >build/bench.log
 	$(BIN)/cmake --build build/bench
 	$(BIN)/python benchmarks/bench.py build/bench
 
-docs: $(VENV)/built page
+docs: $(VENV)/dev page
 	$(BIN)/pip install -q "lostmotion[docs]"
 	$(BIN)/python docs/generate.py
 	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build
 
-lint: $(VENV)/built
+lint: $(VENV)/dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -138,24 +172,37 @@ lint: $(VENV)/built
 stub: $(VENV)/built
 	$(BIN)/python -m nanobind.stubgen -q -m lostmotion._core -o src/lostmotion/_core.pyi
 
-format: $(VENV)/tools
+format: $(VENV)/dev
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $(FORMATTED)
 
-# Tools and libraries, then the package itself; only what changed is compiled again.
+# What compiles, the package with the libraries of its report, then the extension; only what changed is compiled again.
 $(VENV)/tools: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { apt-get update -q && apt-get install -qy python3-venv && $(PYTHON) -m venv $(VENV); }
 	command -v c++ >/dev/null || { apt-get update -q && apt-get install -qy g++; }
-	@echo 'Installing tools and libraries into $(VENV); this takes a minute or two.'
+	@echo 'Installing libraries into $(VENV): about half a minute.'
 	$(BIN)/pip install -q --upgrade "pip>=25.1"
-	$(BIN)/pip install -q --group dev
+	$(BIN)/pip install -q --group build
+	$(BIN)/pip install -q --no-build-isolation --config-settings=wheel.cmake=false --editable ".[report]"
 	mkdir -p build
 	touch $@
-
 $(VENV)/built: $(VENV)/tools $(SOURCES)
-	@echo 'Compiling the core in up to two builds; this takes one to five minutes.'
-	$(BIN)/pip install -q --no-build-isolation --config-settings=cmake.define.LOSTMOTION_WERROR=ON --editable ".[all]"
+	@$(BIN)/python -c 'import os; n = os.cpu_count() or 1; print(f"Compiling the core on {n} processors: about {max(1, round(200 / n / 30) / 2):g} min.")'
+	@$(CMAKE) -S . -B $(TREE) -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DPython_EXECUTABLE=$(abspath $(BIN)/python) \
+		-Dnanobind_DIR=$$($(BIN)/python -m nanobind --cmake_dir) -DLOSTMOTION_PYTHON=ON -DLOSTMOTION_WERROR=ON >build/cmake.log || { cat build/cmake.log; false; }
+	$(BUILD)
+	@rm -f $(PACKAGE)/_core_*.so $(PACKAGE)/_instruction_set*.so
+	@$(CMAKE) --install $(TREE) --prefix src >build/install.log
+	@ln -sfn ../../scenarios $(PACKAGE)/scenarios
+	touch $@
+# All extras, and what tests and checks need.
+$(VENV)/dev: $(VENV)/built
+	$(BIN)/pip install -q --group dev
+	$(BIN)/pip install -q --no-build-isolation --config-settings=wheel.cmake=false --editable ".[all]"
+	touch $@
+$(VENV)/examples: $(VENV)/portable
+	$(BIN)/pip install -q --group examples
 	touch $@
 
 clean:

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import baseline
+import build_times
 import closed_loops
 import costs
 import gradients
@@ -86,6 +87,7 @@ def main() -> None:
     )
     one_run.section(report, scenario, programs)
     baseline.section(report, build, _instruction_set.builds())
+    build_times.section(report)
     trains.section(report, programs)
     closed_loops.section(report, programs)
     gradients.section(report)

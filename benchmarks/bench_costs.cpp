@@ -3,16 +3,12 @@
 #include <cstdio>
 
 #include "lostmotion/analysis/drive_response.hpp"
+#include "lostmotion/solver/adaptive_solver.hpp"
 #include "paper_run.hpp"
 
 using namespace lostmotion;
 
 namespace {
-
-struct Nothing {
-    bool segment(const Segment<SwitchedDrive>&) { return true; }
-    void step(const Regime&, const Memory&, const DenseStepOf<DriveDims>&, bool) {}
-};
 
 struct Cost {
     double again = 0.0, first = 0.0;  // [ms], the same drive again and a new one
@@ -55,7 +51,7 @@ void costs() {
 // Follows a transient until no state changes by more than `tolerance` of its size over a period. Returns the periods.
 template <class Solver>
 int follow(Solver& solver, double period, double tolerance) {
-    Nothing nothing;
+    Observer<SwitchedDrive> nothing;
     solver.begin(0.0, {}, {});
     std::array<double, n_states> size{};
     for (int k = 1; k <= 20000; ++k) {

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "lostmotion/simulation/sampler.hpp"
 #include "lostmotion/simulation/stepping.hpp"
 #include "paper_run.hpp"
 
@@ -13,11 +14,6 @@ using namespace lostmotion;
 namespace {
 
 constexpr std::array<int, 2> compared{ch_load_speed, ch_twist};
-
-struct SamplesOnly {
-    Sampler sampler;
-    bool segment(const Segment<SwitchedDrive>& s) { return sampler.segment(s); }
-};
 
 // The same drive again and again.
 class Repeated {
@@ -29,9 +25,9 @@ class Repeated {
           solver_(system_, paper.signals, 1e-3, paper.drive.balanced_scale()),
           table(n_channels * paper.samples) {}
     void run() {
-        SamplesOnly observer{Sampler(paper_.drive, 0.0, 1e-3, paper_.samples, table.data(), channels_)};
+        Sampler sampler(paper_.drive, 0.0, 1e-3, paper_.samples, table.data(), channels_);
         solver_.begin(0.0, {}, {});
-        solver_.advance(2.0, observer);
+        solver_.advance(2.0, sampler);
     }
 
  private:

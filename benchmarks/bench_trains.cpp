@@ -10,13 +10,6 @@ using namespace lostmotion;
 
 namespace {
 
-struct Nothing {
-    template <class S>
-    bool segment(const S&) {
-        return true;
-    }
-};
-
 template <class System>
 struct Run {
     const System& system;
@@ -28,7 +21,7 @@ struct Run {
 
     void operator()(RegimeCache<System>& cache) {
         ExactSolver<System> solver(system, signals, 1e-3, scale, &cache);
-        Nothing nothing;
+        Observer<System> nothing;
         Status status = solver.begin(0.0, start, {});
         if (status == Status::done) status = solver.advance(duration, nothing);
         if (status != Status::done) {

@@ -5,7 +5,8 @@
 #include "interruption.hpp"
 #include "lostmotion/analysis/train_explain.hpp"
 #include "lostmotion/analysis/train_linear.hpp"
-#include "lostmotion/simulation/stepping.hpp"
+#include "lostmotion/simulation/reader.hpp"
+#include "lostmotion/simulation/run.hpp"
 #include "train.hpp"
 
 namespace lostmotion::binding {
@@ -57,20 +58,16 @@ inline nb::tuple linearize_state(const Drive&, const Regime& r, const State& x, 
 template <class Use>
 nb::tuple at_instant(const SharedDrive& shared, const Signal& command, const Signal& load_torque, const StateNumbers& x,
                      double capacity, double time, Use&& use) {
-    const Signals signals{command, load_torque};
-    const SwitchedDrive system(shared.drive);
-    ExactSolver<SwitchedDrive> solver(system, signals, 1e-3, shared.drive.balanced_scale());
-    solver.interrupted = poll_signals;
-    NoObserver nothing;
-    Status status = solver.begin(0.0, to_state(x), {capacity, 0.0});
-    if (status == Status::done && time > 0.0) {
+    RunRequest request;
+    request.duration = time;
+    request.interrupted = poll_signals;
+    DrivePoint p;
+    {
         nb::gil_scoped_release release;
-        status = solver.advance(time, nothing);
+        p = reach(shared.drive, {command, load_torque}, {to_state(x), {capacity, 0.0}}, request);
     }
-    check(status, solver.time(), solver.stopped_at());
-    InputState<DriveDims> input(signals, solver.basis());
-    input.anchor(time);
-    return use(shared.drive, solver.regime(), solver.state(), solver.memory(), input.values());
+    check(p.status, p.time, p.contact);
+    return use(shared.drive, p.regime, p.x, p.memory, p.input);
 }
 
 // --- trains ---

@@ -6,7 +6,7 @@
 #include <tuple>
 #include <vector>
 
-#include "lostmotion/analysis/sensitive_batch.hpp"
+#include "lostmotion/analysis/sensitive_run.hpp"
 #include "train.hpp"
 
 namespace lostmotion::binding {

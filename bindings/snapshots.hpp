@@ -2,7 +2,7 @@
 #pragma once
 
 #include "arrays.hpp"
-#include "kernels/kernels.hpp"
+#include "lostmotion/simulation/train_stepping.hpp"
 
 namespace lostmotion::binding {
 

@@ -12,7 +12,6 @@
 #include "control.hpp"
 #include "drives.hpp"
 #include "interruption.hpp"
-#include "kernels/kernels.hpp"
 #include "lostmotion/analysis/steady_regime.hpp"
 #include "lostmotion/analysis/train_batch.hpp"
 #include "lostmotion/model/train_description.hpp"

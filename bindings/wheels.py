@@ -21,10 +21,12 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import nanobind
-from c.build import CORE_FLAGS, KERNELS, PLATFORMS, ROOT, fmu, objects, zig
+from c.build import CORE_FLAGS, KERNELS, PLATFORMS, ROOT, fmu, objects, room, zig
 
 HERE = Path(__file__).resolve().parent
 BUILD = ROOT / "build" / "wheels"
+MODEL = room("analysis", "control", "elements", "model", "scenario", "simulation")
+MODULE = [HERE / f"{name}.cpp" for name in ("module", "elementary")]
 LIBRARIES = ROOT / "src" / "lostmotion" / "fmu_libraries"
 PAGE = ROOT / "src" / "lostmotion" / "live_page" / "page.html"
 # The builds of the core, as in CMakeLists.txt: the processors they are for.
@@ -129,12 +131,14 @@ def headers(version: str) -> Path:
     return to
 
 
-def compiled(sources: Sequence[Path], platform: Platform, cpu: str, directory: Path, *flags: str) -> list[Path]:
+def compiled(
+    sources: Sequence[Path], optimisation: str, platform: Platform, cpu: str, directory: Path, *flags: str
+) -> list[Path]:
     """Object files for a platform and its processors."""
     position = [] if platform.system == "windows" else ["-fPIC"]
     target = ["-target", platform.target, f"-mcpu={cpu}", *position]
     return objects(
-        [[source] for source in sources], target, "-O3", BUILD / platform.name / directory, (*CORE_FLAGS, *flags)
+        [[source] for source in sources], target, optimisation, BUILD / platform.name / directory, (*CORE_FLAGS, *flags)
     )
 
 
@@ -168,13 +172,18 @@ def extension(platform: Platform, python: Python, name: str, made: Sequence[Path
 def extensions(platform: Platform, python: Python, to: Path) -> None:
     """The extension modules of a wheel into a directory."""
     flags = python.flags()
-    nano = compiled([Path(nanobind.source_dir()) / "nb_combined.cpp"], platform, "baseline", Path(python.tag), *flags)
-    chooser = compiled([HERE / "instruction_set.cpp"], platform, "baseline", Path(python.tag), *flags)
+    nano = compiled(
+        [Path(nanobind.source_dir()) / "nb_combined.cpp"], "-O3", platform, "baseline", Path(python.tag), *flags
+    )
+    chooser = compiled([HERE / "instruction_set.cpp"], "-Os", platform, "baseline", Path(python.tag), *flags)
     extension(platform, python, "_instruction_set", [*chooser, *nano], to)
     for build, cpu in BUILDS[platform.processor].items():
         name = f"_core_{build}"
-        kernels = compiled(list(KERNELS.values()), platform, cpu, Path(build))
-        own = compiled([HERE / "module.cpp"], platform, cpu, Path(python.tag) / build, *flags, f"-DCORE_MODULE={name}")
+        analyses = [kernel.with_name(f"{kernel.stem}_analysis.cpp") for kernel in KERNELS.values()]
+        kernels = compiled(list(KERNELS.values()), "-O3", platform, cpu, Path(build))
+        kernels += compiled(MODEL, "-O2", platform, cpu, Path(build) / "model")
+        kernels += compiled(analyses, "-Os", platform, cpu, Path(build))
+        own = compiled(MODULE, "-Os", platform, cpu, Path(python.tag) / build, *flags, f"-DCORE_MODULE={name}")
         extension(platform, python, name, [*own, *kernels, *nano], to)
 
 

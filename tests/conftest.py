@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from importlib.util import find_spec
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import lostmotion as lm
+from lostmotion import _instruction_set
 
 ROOT = Path(__file__).parent.parent
 ALL_SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
@@ -37,6 +39,11 @@ def large() -> Path:
 @pytest.fixture(scope="session")
 def small() -> Path:
     return ROOT / "scenarios" / "paper-2dof-nl-small.toml"
+
+
+def installed_builds() -> list[str]:
+    """Names of the builds of the core that are installed and run here: one from source, all that suit from a wheel."""
+    return [name for name in _instruction_set.builds() if find_spec(f"lostmotion._core_{name}")]
 
 
 def run_in_build(build: str, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -27,6 +27,18 @@ ROOT = HERE.parent.parent
 KERNELS = {name: ROOT / "core" / "kernels" / f"{name}.cpp" for name in ("wide", "middle", "narrow", "drive")}
 # Sources that are compiled as one, in less time and to less code.
 Group = Sequence[Path]
+CORE = ROOT / "core" / "lostmotion"
+
+
+def room(*names: str) -> list[Path]:
+    """The sources of directories of the core."""
+    return [source for name in names for source in sorted((CORE / name).glob("*.cpp"))]
+
+
+# What is called at each tick, at each new regime, and now and then.
+TICKS, REGIMES = room("control"), room("elements", "model", "simulation")
+REST = [*(CORE / "analysis" / f"{name}.cpp" for name in ("breakaway", "explain", "train_explain", "train_linear"))]
+REST += room("scenario")
 INTERFACE = [HERE / f"{name}.cpp" for name in ("run", "simulation", "explanation", "scenario", "train", "freestanding")]
 CORE_FLAGS = (
     *("-std=gnu++20", "-g0", "-fvisibility=hidden", "-fno-sanitize=all", f"-I{ROOT / 'core'}"),
@@ -35,6 +47,7 @@ CORE_FLAGS = (
 FLAGS = (*CORE_FLAGS, "-fno-exceptions", "-fno-rtti")
 # Of an FMU, beside the kernel of its drive or train: no runs in one go.
 FMU_SOURCES = [
+    *(source for source in REST if source.stem not in ("explanation", "whole_run")),
     *(s for s in INTERFACE if s.stem in ("simulation", "scenario", "freestanding")),
     *(HERE.parent / "fmu" / f"{name}.cpp" for name in ("fmi2", "fmi3")),
 ]
@@ -43,7 +56,7 @@ FMU_FLAGS = (*FLAGS, "-DLM_API=", "-ffunction-sections", "-fdata-sections", "-fn
 # Of the kernels of FMUs: a twentieth smaller; a step of 0.35 us takes 0.03 us more.
 FMU_KERNEL_FLAGS = ("-mllvm", "-inline-threshold=60", "-mllvm", "-unroll-threshold=40")
 # Of a live page, beside the kernel of its drive: nothing else.
-PAGE_SOURCES = [s for s in INTERFACE if s.stem in ("run", "explanation", "scenario", "freestanding")]
+PAGE_SOURCES = [*REST, *(s for s in INTERFACE if s.stem in ("run", "explanation", "scenario", "freestanding"))]
 # With the oldest C library that the libraries for Linux need, and the extension of their names.
 PLATFORMS = {
     "x86_64-linux": ("x86_64-linux-gnu.2.17", ".so"),
@@ -124,7 +137,7 @@ def wasm(to: Path, optimisation: str = "-O3") -> Path:
     to.parent.mkdir(parents=True, exist_ok=True)
     with (to.parent / f".{to.name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
-        groups = [*([kernel] for kernel in KERNELS.values()), INTERFACE]
+        groups = [*([kernel] for kernel in KERNELS.values()), [*TICKS, *REGIMES], [*REST, *INTERFACE]]
         made = objects(groups, WASM_CODE, optimisation, to.parent / f"{to.stem}-objects")
         if not to.exists() or to.stat().st_mtime < max(o.stat().st_mtime for o in made):
             linked(to, made, "--export=malloc", "--export=free", "--export-dynamic")
@@ -144,12 +157,12 @@ def page_core(kernel: str, optimisation: str = "-O3") -> Path:
     to = directory / "core.wasm"
     with (directory / ".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
-        # For size, but for what solves: of drives that is compiled where it is called.
-        fast = [KERNELS[kernel], *(s for s in PAGE_SOURCES if kernel == "drive" and s.stem == "run")]
         target = (*WASM_CODE, f"-DLOSTMOTION_KERNEL={kernel}")
+        inlined = (*target, *(INLINED if kernel == "drive" else ()))
         made = [
-            compiled(fast, (*target, *(INLINED if kernel == "drive" else ())), optimisation, directory),
-            compiled([s for s in PAGE_SOURCES if s not in fast], target, "-Oz", directory),
+            compiled([*TICKS, KERNELS[kernel]], inlined, optimisation, directory),
+            compiled(REGIMES, target, "-O2", directory),
+            compiled(PAGE_SOURCES, target, "-Oz", directory),
         ]
         calls = ROOT / "page" / "src" / "core.ts"
         if not to.exists() or to.stat().st_mtime < max(p.stat().st_mtime for p in (*made, calls)):
@@ -177,7 +190,8 @@ def fmu_library(to: Path, platform: str, kernel: str, optimisation: str = "-O2")
     arguments = ["-target", target, "-mcpu=baseline", *([] if "windows" in platform else ["-fPIC"])]
     flags, directory = (*FMU_FLAGS, f"-DLOSTMOTION_KERNEL={kernel}"), ROOT / "build" / "fmu" / platform / kernel
     made = [
-        compiled([KERNELS[kernel]], arguments, optimisation, directory, (*flags, *FMU_KERNEL_FLAGS)),
+        compiled([*TICKS, KERNELS[kernel]], arguments, optimisation, directory, (*flags, *FMU_KERNEL_FLAGS)),
+        compiled(REGIMES, arguments, optimisation, directory, flags),
         compiled(FMU_SOURCES, arguments, "-Oz", directory, flags),
     ]
     unfinished = library.with_suffix(".unfinished")
@@ -206,14 +220,18 @@ def main() -> None:
     parser.add_argument("what", choices=("wasm", "page", "fmu"))
     parser.add_argument("to", type=Path)
     parser.add_argument("-O", dest="optimisation", default="3")
-    parser.add_argument("platforms", nargs="*", help=f"of an FMU: some of {', '.join(PLATFORMS)}; default all")
+    parser.add_argument(
+        "which",
+        nargs="*",
+        help=f"of a page: some of {', '.join(KERNELS)}; of an FMU: some of {', '.join(PLATFORMS)}; default all",
+    )
     given = parser.parse_args()
     if given.what == "wasm":
         print(wasm(given.to, f"-O{given.optimisation}"))
     elif given.what == "page":
-        page(given.to, f"-O{given.optimisation}")
+        page(given.to, f"-O{given.optimisation}", given.which or tuple(KERNELS))
     else:
-        fmu(given.to, f"-O{given.optimisation}", given.platforms or tuple(PLATFORMS))
+        fmu(given.to, f"-O{given.optimisation}", given.which or tuple(PLATFORMS))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@
 #include <string>
 #include <utility>
 
-#include "kernels/kernels.hpp"
 #include "lostmotion/scenario/simulation.hpp"
 #include "train.hpp"
 

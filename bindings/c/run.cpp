@@ -103,7 +103,7 @@ int lm_run(lm_simulation* simulation, const lm_signal* inputs, const double* sta
     const auto [x, memory] = run.in_layout(simulation->simulation.train_start(given, held));
     const lm::Variables& all = simulation->simulation.variables();
     std::vector<double> values(all.size() * samples);
-    const lm::TrainReport report = run.run(signals, x, memory, options, values.data());
+    const lm::TrainReport report = run.run_exactly(signals, x, memory, options, values.data());
     for (std::size_t k = 0; k < samples; ++k) all.derive(values.data(), samples, k);
     std::copy(values.begin(), values.end(), variables);
     return simulation->failed(lm::error_text(report, run.assembly()), static_cast<int>(report.status));

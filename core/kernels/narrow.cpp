@@ -1,5 +1,8 @@
-#include "kernels.hpp"
+#include "lostmotion/simulation/hybrid.hpp"
+#include "lostmotion/simulation/train_solving.hpp"
+#include "lostmotion/simulation/train_stepping.hpp"
 
 namespace lostmotion {
-LOSTMOTION_TRAIN_KERNEL(template, model::Narrow)
+LOSTMOTION_TRAIN_RUNS(template, model::Narrow)
+LOSTMOTION_TRAIN_STEPPING(template, model::Narrow)
 }  // namespace lostmotion

@@ -3,8 +3,6 @@
 
 namespace lostmotion {
 
-template class SimulationOf<SwitchedDrive>;
-
 Samples run(const Drive& drive, const Signals& signals, double duration, double interval, const Start& start,
             double adaptive_tolerance) {
     Samples s;
@@ -28,7 +26,7 @@ Splitting split_run(const Drive& drive, const Signals& signals, double duration,
     if (out.status != Status::done) return out;
     const SwitchedDrive system(drive);
     ExactSolver<SwitchedDrive> solver(system, signals, interval, drive.balanced_scale());
-    NoObserver nothing;
+    Observer<SwitchedDrive> nothing;
     out.split = solver.begin(0.0, {}, {});
     if (out.split == Status::done) out.split = solver.advance(at, nothing);
     if (out.split == Status::done) out.split = solver.inputs_changed();

@@ -7,8 +7,6 @@
 
 namespace lostmotion {
 
-extern template class SimulationOf<SwitchedDrive>;
-
 struct Samples {
     RunReport report;
     std::size_t count = 0;

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <string>
 
-#include "kernels/kernels.hpp"
+#include "lostmotion/simulation/train_run.hpp"
 #include "random_trains.hpp"
 #include "train_steps.hpp"
 

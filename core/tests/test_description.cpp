@@ -6,7 +6,6 @@
 #include <random>
 
 #include "drive_runs.hpp"
-#include "kernels/kernels.hpp"
 #include "lostmotion/scenario/simulation.hpp"
 #include "random_trains.hpp"
 

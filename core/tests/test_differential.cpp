@@ -33,9 +33,9 @@ TEST_SUITE("differential") {
     // The adaptive solver is run at two tolerances. How far its two results lie apart shows how much this motion
     // amplifies errors (a turning point missed by a hair sets the hysteresis anew): the exact result must lie as near
     // to the finer one as that explains. Most motions are well conditioned; their gap must be small outright.
-    TEST_CASE("exact and adaptive solver agree on 700 random drives") {
+    TEST_CASE("exact and adaptive solver agree on random drives") {
         constexpr double duration = 0.5;
-        constexpr int drives = 700;
+        const int drives = cases(700);
         RandomDrives random(20260101);
         int compared = 0, refused = 0;
         double worst_energy = 0.0;
@@ -64,7 +64,7 @@ TEST_SUITE("differential") {
             worst_energy = std::fmax(worst_energy, balance);
             ++compared;
         }
-        CHECK(compared >= 500);
+        CHECK(compared >= share(500));
         std::sort(gaps.begin(), gaps.end());
         CHECK(gaps[gaps.size() * 95 / 100] < 1e-7);
         std::printf("differential: %d drives (%d jamming ones refused), median gap %.1e, largest %.1e, energy %.1e\n",

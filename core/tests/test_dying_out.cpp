@@ -90,10 +90,10 @@ TEST_SUITE("dying_out") {
             CHECK(s.report.x[load_angle] == Approx(1e9 * s.report.x[load_speed]).epsilon(1e-6));
         }
     }
-    TEST_CASE("splitting a run of 2000 random drives at a random instant changes nothing beyond rounding") {
+    TEST_CASE("splitting a run of random drives at a random instant changes nothing beyond rounding") {
         RandomDrives random(20261122);
         double worst = 0.0;
-        for (int n = 0; n < 2000; ++n) {
+        for (int n = 0; n < cases(2000); ++n) {
             const Drive drive = random.drive();
             const int kind = n % 4;
             const double duration = kind < 2 ? 0.25 : 2.0, at = duration * random.uniform(0.02, 0.98);
@@ -106,7 +106,7 @@ TEST_SUITE("dying_out") {
                           static_cast<int>(s.split), ", gap ", s.gap, ", amplification ", s.amplification);
             worst = std::fmax(worst, s.amplification > 1e-10 ? 0.0 : s.gap);
         }
-        std::printf("dying out: 2000 random drives split, largest gap of a motion that amplifies nothing %.1e\n",
+        std::printf("dying out: random drives split, largest gap of a motion that amplifies nothing %.1e\n",
                     worst);
     }
     TEST_CASE("stick-slip that dies out, and ringing about zero torque, go on as long as there is anything left") {
@@ -128,7 +128,7 @@ TEST_SUITE("dying_out") {
     TEST_CASE("self-locking gears whose load reverses stay stuck or go on, but do not jam") {
         for (const bool hysteresis : {false, true}) {
             SelfLockingDrives random(7, hysteresis);
-            for (int n = 0; n < 2000; ++n) {
+            for (int n = 0; n < cases(2000); ++n) {
                 const Drive drive = random.drive();
                 const Signals signals = random.reversing(drive);
                 const Samples s = run(drive, signals, 0.5, 0.05);
@@ -143,7 +143,7 @@ TEST_SUITE("dying_out") {
     TEST_CASE("drives that nothing holds start from rest as with a friction of 1e-12 of the rated torque") {
         UnloadedDrives random(7);
         double worst = 0.0;
-        for (int n = 0; n < 2000; ++n) {
+        for (int n = 0; n < cases(2000); ++n) {
             const Drive drive = random.drive();
             const Signals signals = random.from_zero(drive);
             Drive held = drive;
@@ -217,7 +217,7 @@ TEST_SUITE("dying_out") {
     }
     TEST_CASE("the ledger closes however fast the motor's torque follows its voltage") {
         RandomDrives random(23);
-        for (int n = 0; n < 120; ++n) {
+        for (int n = 0; n < cases(120); ++n) {
             Drive d = random.drive();
             if (d.rigid() && d.min_rigid_inertia() <= 0.0) continue;
             d.motor.electrical_time_constant = std::pow(10.0, -4 - n % 7);

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "drive_runs.hpp"
+#include "lostmotion/solver/adaptive_solver.hpp"
 
 using namespace lostmotion;
 using doctest::Approx;
@@ -163,10 +164,10 @@ TEST_SUITE("events") {
         const BouncingBall ball;
         const Signals none;
         ExactSolver<BouncingBall> solver(ball, none, 1e-3, {1, 1, 1, 1, 1});
-        struct {
+        struct : Observer<BouncingBall> {
             int count = 0;
-            bool segment(const Segment<BouncingBall>&) { return true; }
-            void switching(const Switching&) { ++count; }
+            bool wants_switching() const override { return true; }
+            void switching(const SwitchingOf<BouncingBall>&) override { ++count; }
         } counter;
         State x{};
         x[twist] = 1.0;
@@ -202,9 +203,7 @@ TEST_SUITE("events") {
         State x{};
         x[load_angle] = 1.0;
         REQUIRE(solver.begin(0.0, x, {}) == Status::done);
-        struct {
-            void step(const Regime&, const Memory&, const DenseStepOf<DriveDims>&, bool) {}
-        } nothing;
+        Observer<SwitchedDrive> nothing;
         const double period = 4.0 * std::comp_ellint_1(std::sin(0.5)) / std::sqrt(25.0 / 1.001);
         REQUIRE(solver.advance(period, nothing) == Status::done);
         CHECK(solver.state()[load_angle] == Approx(1.0).epsilon(1e-8));

@@ -347,7 +347,7 @@ TEST_SUITE("long_runs") {
     TEST_CASE("300 random linear drives for up to a billion seconds") {
         RandomDrives random(20261122);
         double worst = 0.0;
-        for (int n = 0; n < 300; ++n) {
+        for (int n = 0; n < cases(300); ++n) {
             Drive d = random.drive();
             d.motor.kind = Motor::dc;
             d.motor.friction_torque = d.load.friction_torque = 0.0;

@@ -5,6 +5,7 @@
 
 #include "drive_runs.hpp"
 #include "lostmotion/analysis/reduction.hpp"
+#include "lostmotion/solver/adaptive_solver.hpp"
 
 using namespace lostmotion;
 using doctest::Approx;

@@ -7,32 +7,32 @@ TEST_SUITE_BEGIN("random_trains");
 
 namespace lostmotion::model {
 
-TEST_CASE("exact and adaptive solver agree on a thousand random trains of all elements") {
+TEST_CASE("exact and adaptive solver agree on random trains of all elements") {
     RandomTrains random(33);
     SolverTally tally;
-    for (int n = 0; n < 1000; ++n) {
+    for (int n = 0; n < cases(1000); ++n) {
         CAPTURE(n);
         compare_solvers(random, 6, 0.5, tally);
     }
     MESSAGE(tally.compared << " trains compared, largest difference " << tally.worst << "; " << tally.undecided
                            << " that the adaptive solver does not settle, " << tally.jammed << " that jam");
-    CHECK(tally.compared > 990);
+    CHECK(tally.compared > share(990));
     CHECK(tally.wrong == 0);
     CHECK(tally.jammed == 0);
 }
 
-TEST_CASE("the laws that every run obeys hold on a thousand random trains of all elements") {
+TEST_CASE("the laws that every run obeys hold on random trains of all elements") {
     RandomTrains random(34);
     LawTally tally;
-    for (int n = 0; n < 1000; ++n) {
+    for (int n = 0; n < cases(1000); ++n) {
         CAPTURE(n);
         check_laws(random, 6, 0.4, tally);
     }
     MESSAGE(tally.runs << " trains; energies balance to " << tally.residual << " of what is turned over");
-    CHECK(tally.runs > 980);
+    CHECK(tally.runs > share(980));
     CHECK(tally.residual < 1e-9);
     CHECK(tally.gained == 0);
-    CHECK(tally.mirrored > 400);
+    CHECK(tally.mirrored > share(400));
     CHECK(tally.unlike_mirror == 0);
     CHECK(tally.unlike_sampled == 0);
     CHECK(tally.unlike_split == 0);
@@ -48,16 +48,16 @@ SensitivityTally compare_random(unsigned seed, int trains, bool closed_loop) {
 
 }  // namespace
 
-TEST_CASE("derivatives of 300 random trains are those of differences of their runs") {
-    const SensitivityTally open = compare_random(5000, 200, false), closed = compare_random(7000, 100, true);
+TEST_CASE("derivatives of random trains are those of differences of their runs") {
+    const SensitivityTally open = compare_random(5000, cases(200), false), closed = compare_random(7000, cases(100), true);
     const long compared = open.compared + closed.compared, switchings = open.switchings + closed.switchings;
     const double worst = std::fmax(open.worst, closed.worst);
     MESSAGE(compared << " numbers compared, " << switchings << " switchings, largest difference " << worst);
     CHECK(open.failed_runs + closed.failed_runs == 0);
     CHECK(open.wrong + closed.wrong == 0);
     CHECK(open.ended + closed.ended < 10);
-    CHECK(open.compared > 10000);
-    CHECK(closed.compared > 5000);
+    CHECK(open.compared > share(10000));
+    CHECK(closed.compared > share(5000));
 }
 
 }  // namespace lostmotion::model

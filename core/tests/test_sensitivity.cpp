@@ -1,6 +1,7 @@
 // Derivatives of runs with respect to parameters, through switchings and under controllers.
 #include <doctest/doctest.h>
 
+#include "lostmotion/analysis/tangent_propagator.hpp"
 #include "random_sensitivities.hpp"
 
 TEST_SUITE_BEGIN("sensitivity");

@@ -56,14 +56,14 @@ TEST_CASE("the classic drive as a train has the same equations and guards, to th
     RandomDrives drives(2);
     RoundDrives round(3);
     int compared = 0;
-    for (int n = 0; n < 300; ++n) compared += compare_all(drives.drive(), random);
-    for (int n = 0; n < 300; ++n) compared += compare_all(round.next(1.0).drive, random);
-    CHECK(compared > 3000);
+    for (int n = 0; n < cases(300); ++n) compared += compare_all(drives.drive(), random);
+    for (int n = 0; n < cases(300); ++n) compared += compare_all(round.next(1.0).drive, random);
+    CHECK(compared > share(3000));
 }
 
 TEST_CASE("the classic drive as a train has the same natural sizes, to the last bit") {
     RandomDrives drives(4);
-    for (int n = 0; n < 200; ++n) {
+    for (int n = 0; n < cases(200); ++n) {
         const Drive d = drives.drive();
         const Assembly a(train_of(d));
         std::array<double, 5> balanced{}, rated{};
@@ -145,7 +145,7 @@ TEST_CASE("what is wrong with a train is said in one line with the names of its 
 
 TEST_CASE("a packed regime has the same coefficients in the kernel's order, and zeros elsewhere") {
     RandomTrains random(31);
-    for (int n = 0; n < 100; ++n) {
+    for (int n = 0; n < cases(100); ++n) {
         const Assembly a(random.train(random.pick(2, 6), true));
         const Layout& at = a.layout();
         REQUIRE(fits<WidestTest>(a.train(), at));

@@ -100,19 +100,12 @@ struct Shadowed {
     mutable long events = 0, differing = 0;
 };
 
-struct Nothing {
-    template <class Segment>
-    bool segment(const Segment&) {
-        return true;
-    }
-};
-
 struct Count {
     long events = 0, differing = 0;
     void run(const Drive& d, const Signals& signals, const Start& start, double duration) {
         const Shadowed system(d);
         ExactSolver<Shadowed> solver(system, signals, 1e-3, d.balanced_scale());
-        Nothing nothing;
+        Observer<Shadowed> nothing;
         if (solver.begin(0.0, start.x, start.memory) == Status::done) solver.advance(duration, nothing);
         events += system.events;
         differing += system.differing;
@@ -124,12 +117,12 @@ struct Count {
 TEST_CASE("at every event of random classic drives the train's search finds what the drive's does") {
     Count count;
     RandomDrives random(11);
-    for (int n = 0; n < 150; ++n) {
+    for (int n = 0; n < cases(150); ++n) {
         const Drive d = random.drive();
         count.run(d, random.signals(d, 0.5), {}, 0.5);
     }
     RoundDrives round(12);
-    for (int n = 0; n < 300; ++n) {
+    for (int n = 0; n < cases(300); ++n) {
         const RoundDrives::Run r = round.next(2.0);
         count.run(r.drive, r.signals, r.start, 2.0);
     }
@@ -138,14 +131,14 @@ TEST_CASE("at every event of random classic drives the train's search finds what
         const Drive d = locking.drive();
         count.run(d, locking.reversing(d), {}, 0.5);
     }
-    CHECK(count.events > 5000);
+    CHECK(count.events > share(5000));
     CHECK(count.differing == 0);
 }
 
 TEST_CASE("accelerations of random trains are those of the principle of least constraint") {
     RandomTrains random(21);
     int compared = 0, at_rest = 0;
-    for (int n = 0; n < 1500; ++n) {
+    for (int n = 0; n < cases(1500); ++n) {
         Train t = random.train(random.pick(2, 6), false);
         for (Shaft& s : t.shafts) s.friction.breakaway_torque = 0.0;  // the principle needs one capacity
         const Assembly a(t);
@@ -167,15 +160,15 @@ TEST_CASE("accelerations of random trains are those of the principle of least co
             CHECK(evaluate(a.layout(), g.form, now) >= -rounding * magnitude(a.layout(), g.form, now));
         ++compared;
     }
-    CHECK(compared == 1500);
-    CHECK(at_rest > 500);
+    CHECK(compared == cases(1500));
+    CHECK(at_rest > share(500));
 }
 
 TEST_CASE("pivoting and trying all combinations find the same accelerations, with losses") {
     RandomTrains random(23);
     int compared = 0;
     long worst = 0;
-    for (int n = 0; n < 500; ++n) {
+    for (int n = 0; n < cases(500); ++n) {
         const Assembly a(random.train(random.pick(2, 5), true));
         SwitchedTrain<> all(a), pivoting(a);
         all.few = 1e9;
@@ -205,14 +198,14 @@ TEST_CASE("pivoting and trying all combinations find the same accelerations, wit
             CHECK(evaluate(a.layout(), cache.regime(key).rate[s.speed], now) ==
                   doctest::Approx(evaluate(a.layout(), cache.regime(other_key).rate[s.speed], other)).epsilon(1e-9));
     }
-    CHECK(compared > 200);
+    CHECK(compared > share(200));
     CHECK(worst < 1000);  // of a self-locking train, all ways of searching together
 }
 
 TEST_CASE("a jump that starts a chain with all its contacts at rest is found in few trials") {
     RandomTrains random(22);
     long worst = 0, contacts = 0;
-    for (int n = 0; n < 400; ++n) {
+    for (int n = 0; n < cases(400); ++n) {
         Train t;
         t.shafts.resize(7);
         for (Shaft& s : t.shafts) {
@@ -268,7 +261,7 @@ TEST_CASE("the search works on packed regimes and the kernel's own instant as on
         }
     };
     RandomTrains random(24);
-    for (int n = 0; n < 200; ++n) {
+    for (int n = 0; n < cases(200); ++n) {
         const Assembly a(random.train(random.pick(2, 4), true));
         const SwitchedTrain<> plain(a);
         const SwitchedTrain<WidestTest> packed(a, WidestTest{});

@@ -11,7 +11,7 @@ namespace lostmotion::model {
 TEST_CASE("the classic drive as a train has the same samples, to the last bit") {
     RandomDrives random(31);
     int compared = 0;
-    for (int n = 0; n < 200; ++n) {
+    for (int n = 0; n < cases(200); ++n) {
         const Drive d = random.drive();
         const Signals signals = random.signals(d, 0.3);
         const Samples classic = lostmotion::run(d, signals, 0.3);
@@ -33,23 +33,23 @@ TEST_CASE("the classic drive as a train has the same samples, to the last bit") 
         same(ch_motor_torque, "motor_torque");
         if (!d.rigid()) same(ch_twist, "gearbox_twist");
     }
-    CHECK(compared > 150);
+    CHECK(compared > share(150));
 }
 
 TEST_CASE("solvers agree and the laws that every run obeys hold on random trains with dampers") {
     RandomTrains random(35, false, true);
     SolverTally solvers;
     LawTally laws;
-    for (int n = 0; n < 300; ++n) {
+    for (int n = 0; n < cases(300); ++n) {
         CAPTURE(n);
         compare_solvers(random, 6, 0.5, solvers);
         check_laws(random, 6, 0.4, laws);
     }
     MESSAGE(solvers.compared << " trains compared, largest difference " << solvers.worst << "; " << solvers.undecided
                              << " that the adaptive solver does not settle");
-    CHECK(solvers.compared > 290);
+    CHECK(solvers.compared > share(290));
     CHECK(solvers.failed() == 0);
-    CHECK(laws.runs > 290);
+    CHECK(laws.runs > share(290));
     CHECK(laws.residual < 1e-9);
     CHECK(laws.failed() == 0);
 }
@@ -59,11 +59,11 @@ TEST_CASE("solvers agree and the laws that every run obeys hold on random trains
 TEST_CASE("the laws hold where contacts at their limits hold more than they take while they slip") {
     RandomTrains random(2004);
     LawTally tally;
-    for (int n = 0; n < 100; ++n) {
+    for (int n = 0; n < cases(100); ++n) {
         CAPTURE(n);
         check_laws(random, 6, 0.4, tally);
     }
-    CHECK(tally.runs > 95);
+    CHECK(tally.runs > share(95));
     CHECK(tally.failed() == 0);
 }
 

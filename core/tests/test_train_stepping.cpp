@@ -4,8 +4,8 @@
 #include <cstring>
 
 #include "drive_runs.hpp"
-#include "kernels/kernels.hpp"
 #include "lostmotion/analysis/train_explain.hpp"
+#include "lostmotion/simulation/train_stepping.hpp"
 #include "random_trains.hpp"
 
 TEST_SUITE_BEGIN("train_stepping");
@@ -89,7 +89,7 @@ TEST_CASE("random trains stepped with intervals split at random follow the run i
     constexpr double h = 0.02;
     constexpr std::size_t steps = 60;
     int compared = 0, sensitive = 0;
-    for (int n = 0; n < 150; ++n) {
+    for (int n = 0; n < cases(150); ++n) {
         const lostmotion::TrainRun run(random.train(random.pick(2, 6), true));
         REQUIRE(run.error() == "");
         const Assembly& a = run.assembly();
@@ -132,7 +132,7 @@ TEST_CASE("random trains stepped with intervals split at random follow the run i
         CHECK(off < 10.0 * amplified);
     }
     MESSAGE(compared << " trains compared, " << sensitive << " that rounding may change");
-    CHECK(compared > 140);
+    CHECK(compared > share(140));
     CHECK(sensitive < 3);
 }
 
@@ -168,7 +168,7 @@ TEST_CASE("a restored simulation of a train continues bit for bit") {
 TEST_CASE("what a contact at rest can hold is its guard's margin and what it holds; sliding it takes its capacity") {
     RandomTrains random(54);
     int stuck = 0, sliding = 0;
-    for (int n = 0; n < 200; ++n) {
+    for (int n = 0; n < cases(200); ++n) {
         TrainSimulation s(random.train(random.pick(2, 6), true), 1e-2);
         const Assembly& a = s.assembly();
         const auto levels = random_levels(random, 40, a.layout().inputs);
@@ -197,14 +197,14 @@ TEST_CASE("what a contact at rest can hold is its guard's margin and what it hol
         }
     }
     MESSAGE(stuck << " margins, " << sliding << " sliding contacts");
-    CHECK(stuck > 1000);
-    CHECK(sliding > 1000);
+    CHECK(stuck > share(1000));
+    CHECK(sliding > share(1000));
 }
 
 TEST_CASE("the smallest command of a classic drive is that of the train") {
     RandomDrives random(55);
     int compared = 0;
-    for (int n = 0; n < 100; ++n) {
+    for (int n = 0; n < cases(100); ++n) {
         const Drive d = random.drive();
         if (d.rigid() && d.min_rigid_inertia() <= 0.0) continue;
         TrainSimulation s(train_of(d), 1e-3);
@@ -222,7 +222,7 @@ TEST_CASE("the smallest command of a classic drive is that of the train") {
             ++compared;
         }
     }
-    CHECK(compared > 500);
+    CHECK(compared > share(500));
 }
 
 // A motor of ratio 1 on a shaft, and what it has to turn.

@@ -4,7 +4,8 @@
 #include "../drive/components.hpp"
 #include "../simulation/result_names.hpp"
 #include "../simulation/sampler.hpp"
-#include "../simulation/workspace.hpp"
+#include "../simulation/run.hpp"
+#include "../simulation/stepping.hpp"
 #include "response.hpp"
 
 namespace lostmotion {

@@ -91,8 +91,7 @@ class ShootingOf {
     }
 
     // Runs through one period from a station.
-    template <class Observer>
-    Status run(const HybridState& start, Observer& observer) {
+    Status run(const HybridState& start, Observer<System>& observer) {
         const Status status = enter(start);
         return status == Status::done ? solver_.advance(period_, observer) : status;
     }

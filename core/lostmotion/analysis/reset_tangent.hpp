@@ -23,34 +23,18 @@ class FormTangent {
 
     int parameters() const { return inputs_.parameters(); }
 
-    double value(const model::Row& f, const double* w) const {
-        double sum = 0.0;
-        inputs_.each_term([&](int at, int term) { sum += f.c[static_cast<std::size_t>(term)] * w[at]; });
-        return sum;
-    }
+    double value(const model::Row& f, const double* w) const;
     // to[p] += factor * (df/dp as far as the form itself changes)
-    void add_own(const Varied& forms, int row, const double* w, double factor, double* to) const {
-        inputs_.each_term([&](int at, int term) {
-            if (w[at] != 0.0) add_scaled(to, factor * w[at], forms.at(row, term), inputs_.parameters());
-        });
-    }
+    void add_own(const Varied& forms, int row, const double* w, double factor, double* to) const;
     // to[p] += factor * (df/dp as far as what it depends on changes)
     void add_motion(const model::Row& f, const double* derivative, double factor, double* to) const {
         inputs_.each_term([&](int at, int term) { add_term(f, at, term, derivative, factor, to); });
     }
     // The same of the inputs alone.
-    void add_inputs(const model::Row& f, const double* derivative, double factor, double* to) const {
-        inputs_.each_term([&](int at, int term) {
-            if (term >= n_.first_input) add_term(f, at, term, derivative, factor, to);
-        });
-    }
+    void add_inputs(const model::Row& f, const double* derivative, double factor, double* to) const;
 
  private:
-    void add_term(const model::Row& f, int at, int term, const double* derivative, double factor, double* to) const {
-        const int P = inputs_.parameters();
-        if (const double c = f.c[static_cast<std::size_t>(term)]; c != 0.0)
-            add_scaled(to, factor * c, derivative + at * P, P);
-    }
+    void add_term(const model::Row& f, int at, int term, const double* derivative, double factor, double* to) const;
 
     const model::Layout& n_;
     const InputTangents& inputs_;
@@ -64,75 +48,21 @@ class ResetTangent {
         : trains_(trains), form_(form), parameters_(parameters) {}
 
     // Speeds that the contacts at rest tie to others. x: of before.
-    void tied_speeds(const std::int8_t* modes, const double* x, double* to) const {
-        const model::Assembly& a = trains_.base();
-        const model::Ties ties = tie(a, modes);
-        for (const VariedTrain::Beside& b : trains_.beside()) {
-            if (!b.other_ratios) continue;
-            const model::Ties other = tie(b.assembly(), modes);
-            for (std::size_t s = 0; s < a.train().shafts.size(); ++s) {
-                if (!ties.follows(static_cast<int>(s)) || ties.free[s] != other.free[s]) continue;
-                double& sum = to[a.places().shafts[s].speed * parameters_ + b.parameter];
-                ties.each_share(static_cast<int>(s), [&](int k, double share) {
-                    sum += b.weight * (other.share[s][static_cast<std::size_t>(k)] - share) *
-                           x[a.places().shafts[static_cast<std::size_t>(k)].speed];
-                });
-            }
-        }
-    }
+    void tied_speeds(const std::int8_t* modes, const double* x, double* to) const;
     // At a turning point of the twist of a gear.
-    void capacity(std::size_t gear, double twist, double* to) const {
-        const model::Assembly& a = trains_.base();
-        const int row = a.layout().first_memory + a.places().gears[gear].hysteresis;
-        const double own = a.train().gears[gear].law.hysteresis_capacity(twist);
-        for (const VariedTrain::Beside& b : trains_.beside())
-            to[row * parameters_ + b.parameter] +=
-                b.weight * (b.assembly().train().gears[gear].law.hysteresis_capacity(twist) - own);
-    }
+    void capacity(std::size_t gear, double twist, double* to) const;
     // Where an angle begins another turn.
-    void turn(const RegimeTangent& before, std::size_t guard, double* to) const {
-        const model::Guard& g = before.regime.guards[guard];
-        if (g.memory == model::nowhere) return;
-        const int row = trains_.base().layout().first_memory + g.memory;
-        add_scaled(to + row * parameters_, 1.0, before.shift.at(static_cast<int>(guard), 0), parameters_);
-    }
+    void turn(const RegimeTangent& before, std::size_t guard, double* to) const;
     // A locked torque that a regime gives: of what is set anew beside it, `to` has the derivatives already.
-    void given(const VariedForm& torque, const double* w, const double* derivative, int memory, double* to) const {
-        std::vector<double> sum(static_cast<std::size_t>(parameters_));
-        add_now(torque, w, derivative, 1.0, to, sum.data());
-        std::copy(sum.begin(), sum.end(), to + (trains_.base().layout().first_memory + memory) * parameters_);
-    }
+    void given(const VariedForm& torque, const double* w, const double* derivative, int memory, double* to) const;
     // A locked torque, number k of a regime, at a bound: of what is set anew beside it, `to` has the derivatives
     // already. torques: those of other stuck contacts, and their derivatives.
     void at_bound(const RegimeTangent& after, std::size_t k, model::Bound bound, const double* w,
-                  const double* derivative, const double* torques, const double* torque_derivatives, double* to) const {
-        const model::Layout& n = trains_.base().layout();
-        const model::LockedTorque<model::Row>& l = after.regime.locked[k];
-        std::vector<double> sum(static_cast<std::size_t>(parameters_));
-        const auto forms = locked_forms(l);
-        const bool with_torques = l.each_form(bound, [&](const model::Row& form, double factor) {
-            const auto number = static_cast<std::size_t>(std::find(forms.begin(), forms.end(), &form) - forms.begin());
-            add_now({form, after.locked, static_cast<int>(k * n_locked_forms + number)}, w, derivative, factor, to,
-                    sum.data());
-        });
-        if (with_torques)
-            for (int c = 0; c < n.contacts; ++c) {
-                add_scaled(sum.data(), torques[c], after.needs_torque.at(static_cast<int>(k), c), parameters_);
-                add_scaled(sum.data(), l.needs_torque[static_cast<std::size_t>(c)],
-                           torque_derivatives + c * parameters_, parameters_);
-            }
-        std::copy(sum.begin(), sum.end(), to + (n.first_memory + l.memory) * parameters_);
-    }
+                  const double* derivative, const double* torques, const double* torque_derivatives, double* to) const;
 
  private:
     void add_now(const VariedForm& f, const double* w, const double* derivative, double factor, const double* to,
-                 double* sum) const {
-        form_.add_own(f.varied, f.row, w, factor, sum);
-        form_.add_inputs(f.form, derivative, factor, sum);
-        for (int j = 0; j < trains_.base().layout().first_input; ++j)
-            if (const double c = f.form.c[static_cast<std::size_t>(j)]; c != 0.0)
-                add_scaled(sum, factor * c, to + j * parameters_, parameters_);
-    }
+                 double* sum) const;
     static model::Ties tie(const model::Assembly& a, const std::int8_t* modes) {
         return model::tie(a.places().contacts, static_cast<int>(a.train().shafts.size()), modes);
     }

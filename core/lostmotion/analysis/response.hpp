@@ -16,6 +16,7 @@
 
 #include "harmonics.hpp"
 #include "periodic.hpp"
+#include "respond.hpp"
 #include "workers.hpp"
 
 namespace lostmotion {
@@ -33,15 +34,6 @@ struct ResponsePointOf {
     SignalsOf<D> signals;  // constant, or of this period
     double period = 1.0;   // [s] of the motion that is looked for
     StartOf<D> start;
-};
-
-struct ResponseSpec {
-    std::size_t samples = 2048;  // a period
-    int harmonics = 8;           // coefficients 0 (mean) to this
-    int max_periods = 20000;
-    double tolerance = 1e-10;
-    bool keep_table = false;   // of the samples, with each result
-    bool limit_cycle = false;  // the inputs are constant, and the periods of the points are first estimates
 };
 
 // Channels whose products are powers.
@@ -146,6 +138,57 @@ std::vector<ResponseResultOf<System>> respond_all(Plant& plant, const std::vecto
         plant.give_back(std::move(workspace));
     });
     return results;
+}
+
+// The results as a table. start(named): what it is in the kernel's dimensions.
+template <class Plant, class MakeStart, class System = typename Plant::System>
+ResponseTable respond_by_name(Plant& plant, const std::vector<ResponseRequest>& asked, const MakeStart& start,
+                              const ResponseSpec& spec, unsigned threads, const Waiting& waiting) {
+    using D = typename System::Dims;
+    using Result = ResponseResultOf<System>;
+    std::vector<ResponsePointOf<System>> points;
+    for (const ResponseRequest& r : asked) {
+        points.emplace_back();
+        std::copy(r.inputs.begin(), r.inputs.end(), points.back().signals.begin());
+        points.back().period = r.period;
+        points.back().start = start(r.start);
+    }
+    const std::vector<NamedComponent> components = plant.components();
+    ResponseTable out;
+    out.channels = plant.channels();
+    for (const NamedComponent& c : components) {
+        out.components.push_back(c.name);
+        out.neutral.push_back(c.neutral);
+    }
+    const std::size_t harmonics = out.channels * (static_cast<std::size_t>(spec.harmonics) + 1) * 2;
+    for (const Result& r : respond_all(plant, points, spec, threads, waiting)) {
+        const PeriodicMotionOf<System>& m = r.motion;
+        out.error.push_back(plant.error(r));
+        out.converged.push_back(m.converged);
+        out.smooth.push_back(m.smooth);
+        out.periods.push_back(m.periods);
+        out.newton_steps.push_back(m.newton_steps);
+        out.period.push_back(m.period);
+        out.residual.push_back(m.residual);
+        out.motor_power.push_back(r.motor_power);
+        out.load_power.push_back(r.load_power);
+        out.gear_loss.push_back(r.gear_loss);
+        for (const NamedComponent& c : components) {
+            const bool is_state = c.place < D::states;
+            out.advance.push_back(is_state ? m.advance[c.place] : 0.0);
+            out.start.push_back(is_state ? m.start.x[c.place]
+                                         : m.start.memory[static_cast<std::size_t>(c.place - D::states)]);
+            for (const NamedComponent& by : components) out.jacobian.push_back(m.jacobian.row[c.place][by.place]);
+        }
+        const auto add = [](std::vector<double>& to, const std::vector<double>& values, std::size_t count) {
+            to.insert(to.end(), values.begin(), values.end());
+            to.resize(to.size() + count - values.size(), 0.0);
+        };
+        add(out.harmonics, r.harmonic, harmonics);
+        add(out.mean_square, r.mean_square, out.channels);
+        if (spec.keep_table) add(out.table, r.table, out.channels * spec.samples);
+    }
+    return out;
 }
 
 }  // namespace lostmotion

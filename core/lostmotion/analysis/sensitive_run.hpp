@@ -1,48 +1,18 @@
-// Runs of trains with their derivatives.
+// Runs of trains with their derivatives, one or many, on several threads. A run does not know of the others.
 #pragma once
 
+#include <atomic>
+#include <functional>
 #include <limits>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "train_sensitivity.hpp"
+#include "variation.hpp"
+#include "workers.hpp"
 
 namespace lostmotion {
-
-// Ticks, delays and schedules that differ beside the value of a parameter have no derivative.
-inline bool acts_at_the_same_instants(const Control& a, const Control& b) {
-    const auto same = [](const control::Schedule& s, const control::Schedule& t) {
-        return s.every == t.every && s.phase == t.phase;
-    };
-    if (a.tick != b.tick || a.axes.size() != b.axes.size()) return false;
-    const std::vector<control::Axis> one = a.laws(), other = b.laws();
-    for (std::size_t k = 0; k < one.size(); ++k) {
-        const control::Axis &s = one[k], &t = other[k];
-        if (s.slots() != t.slots() || s.delay.ticks != t.delay.ticks || !same(s.speed_schedule, t.speed_schedule) ||
-            !same(s.position_schedule, t.position_schedule) || !same(s.current_schedule, t.current_schedule))
-            return false;
-    }
-    return true;
-}
-
-// Why the controllers of a run have no derivatives, or empty.
-inline std::string check_derivatives(const Control& control, const std::vector<Variation>& variations) {
-    for (const ControlledAxis& axis : control.axes) {
-        if (axis.law.field_orientation)
-            return "field-oriented control has no derivatives here; take a current loop of kind \"pi\"";
-        if (axis.law.camera.present && axis.law.camera.step > 0.0)
-            return "a camera of finite resolution has no derivative; leave its pixels out";
-        for (const auto* encoder : {&axis.law.speed_sensor.encoder, &axis.law.position_sensor.encoder})
-            if (encoder->resolution > 0.0 && encoder->error > 0.0)
-                return "an encoder with a resolution and an interpolation error has no derivatives here; leave one of "
-                       "them out";
-    }
-    for (const Variation& v : variations)
-        for (const Neighbour& n : v.neighbours)
-            if (n.control && !acts_at_the_same_instants(control, *n.control))
-                return v.name + ": changes the instants at which a controller acts, which has no derivative";
-    return "";
-}
 
 struct SensitiveCase {
     std::shared_ptr<const TrainRun> run;
@@ -52,44 +22,58 @@ struct SensitiveCase {
     std::vector<Variation> variations;
 };
 
-// Runs of one train, each with its derivatives, by the exact solver. What their regimes are is found once for all.
-template <class D>
-class SensitiveRuns {
- public:
-    explicit SensitiveRuns(const typename TrainReader<D>::Model& model) : model_(model), workspace_(model.assembly) {}
+// What is asked for, and where it goes.
+struct SensitivityOutput {
+    SampleTimes times;
+    std::vector<int> channels;   // by their place among TrainRun::channels()
+    double* out = nullptr;       // parameters x channels x samples; NaN from where the motion is not smooth
+    double* axes_out = nullptr;  // parameters x (axes x signals) x samples, as TrainOptions::control_out
 
-    // out: values, as TrainRun::run; output: derivatives of the same channels and instants.
-    // The error of the variations in the message of the report.
-    TrainReport operator()(const SensitiveCase& c, const TrainOptions& options, double* out,
-                           SensitivityOutput& output) {
-        const auto [x, memory] = c.run->in_layout(c.start);
-        if (c.variations.empty())
-            return run_train_exactly_in<D>(model_, c.inputs, x, memory, options, out, nullptr, &workspace_);
-        TrainReport failed;
-        const auto trains = std::make_shared<const VariedTrain>(*c.run, c.variations);
-        const auto tangents = std::make_shared<const InputTangents>(c.run->assembly().layout(), c.inputs, c.variations);
-        for (const std::string& error :
-             {check_derivatives(options.control, c.variations), trains->error(), tangents->error()})
-            if (!error.empty()) failed.message = error;
-        if (!failed.message.empty()) return failed;
-        output.times = options.times();
-        if (!regimes_ || !regimes_->serve(*trains, *tangents, output.channels))
-            regimes_.emplace(trains, tangents, output.channels);
-        TrainSensitivity<D> watcher(*trains, *tangents, *regimes_, c.variations, c.start, options.control, output);
-        return run_train_exactly_in<D>(model_, c.inputs, x, memory, options, out, &watcher, &workspace_);
-    }
-
- private:
-    const typename TrainReader<D>::Model& model_;
-    TrainWorkspace<D> workspace_;
-    std::optional<RegimeTangents> regimes_;
+    double ends_at = std::numeric_limits<double>::infinity();  // [s] from where it is not, and why
+    std::string ends_by;
 };
 
-// One run by itself.
-inline TrainReport run_with_derivatives(const SensitiveCase& c, double* out, SensitivityOutput& output) {
-    return c.run->in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
-        return SensitiveRuns<D>(model)(c, c.options, out, output);
-    });
-}
+struct SensitiveRow {
+    std::string problem, error;                             // of what is asked for, of the motion, or empty
+    std::unique_ptr<double[]> values, derivatives;          // channels x samples; parameters x channels x samples
+    std::unique_ptr<double[]> signals, signal_derivatives;  // of the controllers: (axes x signals) x samples, as above
+    Named end_state;                                        // of a run that has ended well
+    double ends_at = std::numeric_limits<double>::infinity();  // [s] from where the derivatives do not exist, and why
+    std::string ends_by;
+};
+
+// These are compiled once for each kernel, by core/kernels.
+
+// By the exact solver. out: values, as TrainRun::run; output: derivatives of the same channels and instants.
+template <class D>
+TrainReport run_with_derivatives_in(const typename TrainReader<D>::Model& model, const SensitiveCase& c, double* out,
+                                    SensitivityOutput& output);
+// Cases of one train, each into its row. signals: also what the controllers show; then the instants must be multiples
+// of an interval.
+template <class D>
+void run_sensitive_in(const typename TrainReader<D>::Model& model, std::span<const SensitiveCase> cases,
+                      std::span<SensitiveRow> rows, const std::vector<std::string>& channels, bool signals,
+                      std::atomic<bool>& stop);
+
+TrainReport run_with_derivatives(const SensitiveCase& c, double* out, SensitivityOutput& output);
+
+// Up to this many runs of the same train come one after the other on a thread.
+inline constexpr std::size_t together = 8;
+
+// Where each of the pieces of work begins, and the end: runs of the same train that stand together. What they share
+// does not depend on the number of threads.
+std::vector<std::size_t> pieces_of_work(const std::vector<SensitiveCase>& cases);
+
+std::vector<SensitiveRow> run_sensitive(const std::vector<SensitiveCase>& cases,
+                                        const std::vector<std::string>& channels, bool signals, unsigned threads,
+                                        const std::function<bool(std::size_t)>& waiting);
+
+#define LOSTMOTION_SENSITIVITIES(TEMPLATE, D)                                                                    \
+    TEMPLATE TrainReport run_with_derivatives_in<D>(const TrainReader<D>::Model&, const SensitiveCase&, double*, \
+                                                    SensitivityOutput&);                                         \
+    TEMPLATE void run_sensitive_in<D>(const TrainReader<D>::Model&, std::span<const SensitiveCase>,              \
+                                      std::span<SensitiveRow>, const std::vector<std::string>&, bool,            \
+                                      std::atomic<bool>&);
+LOSTMOTION_EACH_KERNEL(LOSTMOTION_SENSITIVITIES, extern template)
 
 }  // namespace lostmotion

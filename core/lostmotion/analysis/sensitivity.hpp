@@ -14,7 +14,7 @@ namespace lostmotion {
 // t); a disturbance of y shifts the instant, too, so that it becomes (Leine and Nijmeijer 2004)
 //     (dR + (f_after - dR f_before - R_t) grad g / g') times itself.
 template <class System>
-class SensitivityOf {
+class SensitivityOf final : public Observer<System> {
  public:
     using D = typename System::Dims;
     using Regime = typename System::Regime;
@@ -28,7 +28,7 @@ class SensitivityOf {
     State magnitude{};   // largest magnitude of each state at the ends of the segments
     bool smooth = true;  // false: a switching by grazing, or with a rate that is lost in rounding
 
-    bool segment(const Segment<System>& s) {
+    bool segment(const Segment<System>& s) override {
         if (!input_) input_.emplace(s.at.input());
         for (int k = 0; k < D::states; ++k)
             magnitude[k] = std::fmax(magnitude[k], std::fmax(std::fabs(s.at.x()[k]), std::fabs(s.x_end[k])));
@@ -52,7 +52,8 @@ class SensitivityOf {
         return true;
     }
 
-    void switching(const SwitchingOf<System>& w) {
+    bool wants_switching() const override { return true; }
+    void switching(const SwitchingOf<System>& w) override {
         const Regime &old = *regime_, &next = cache_.regime(w.after);
         input_->anchor_left(w.time);
         const auto u = input_->template jet<2>();

@@ -16,29 +16,11 @@ namespace lostmotion {
 
 // df/dp from f at p - 2h, p - h, p, p + h, p + 2h; where one side is parted by a limit, from the other. False if both
 // are, by more than `noise`.
-inline bool difference_beside_limits(const std::array<double, 5>& f, double h, double noise, double& derivative) {
-    const double left = f[2] - 2.0 * f[1] + f[0], middle = f[3] - 2.0 * f[2] + f[1], right = f[4] - 2.0 * f[3] + f[2];
-    double size = 0.0, course = 0.0;
-    for (const double v : f) {
-        size = std::fmax(size, std::fabs(v));
-        course = std::fmax(course, std::fabs(v - f[2]));
-    }
-    const double alike = 1e-4 * course + 2e-13 * size + 1e-2 * std::fabs(middle);
-    if (std::fabs(middle - left) <= alike && std::fabs(right - middle) <= alike) {
-        derivative = (8.0 * (f[3] - f[1]) - (f[4] - f[0])) / (12.0 * h);
-        return true;
-    }
-    const bool to_left = std::fabs(left) < std::fabs(right);
-    derivative = to_left ? (3.0 * f[2] - 4.0 * f[1] + f[0]) / (2.0 * h) : (-3.0 * f[2] + 4.0 * f[3] - f[4]) / (2.0 * h);
-    return std::fmin(std::fabs(left), std::fabs(right)) <= 1e-2 * course + noise;
-}
+bool difference_beside_limits(const std::array<double, 5>& f, double h, double noise, double& derivative);
 
 // Whether three values at equal distances lie in a straight line, as far as rounding lets one see, or bend by a share
 // of their difference.
-inline bool alike_beside(double left, double here, double right, double bend) {
-    const double size = std::fmax(std::fabs(left), std::fmax(std::fabs(here), std::fabs(right)));
-    return std::fabs(right - 2.0 * here + left) <= bend * std::fabs(right - left) + 2e-13 * size;
-}
+bool alike_beside(double left, double here, double right, double bend);
 
 class TickTangent {
  public:
@@ -145,33 +127,8 @@ class TickTangent {
 
     // What an axis measures, and its derivatives.
     void measure(std::size_t a, const control::Axis& law, const FormTangent& form, const double* w,
-                 const double* derivative, double time) {
-        std::array<double, n_measured> y;
-        std::fill(measured_derivative_.begin(), measured_derivative_.end(), 0.0);
-        for (int k = 0; k < n_measured; ++k) {
-            const model::Row& f = forms_[a][static_cast<std::size_t>(k)];
-            y[static_cast<std::size_t>(k)] = form.value(f, w);
-            const control::Encoder& encoder =
-                k == 0 && law.two_encoders ? law.position_sensor.encoder : law.speed_sensor.encoder;
-            if (k < 2 && encoder.resolution > 0.0) continue;
-            double* to = &measured_derivative_[static_cast<std::size_t>(k * parameters_)];
-            form.add_motion(f, derivative, 1.0, to);
-            for (int p = 0; p < parameters_; ++p)
-                for (const Beside& b : beside_[static_cast<std::size_t>(p)])
-                    if (!b.forms.empty())
-                        to[p] += b.weight * (form.value(b.forms[a][static_cast<std::size_t>(k)], w) -
-                                             y[static_cast<std::size_t>(k)]);
-        }
-        measured_ = {y[0], y[1], y[2], y[3], y[4], y[5], y[6], time};
-    }
-    control::Sampled measured(int p, double offset) const {
-        const auto d = [&](int k) {
-            return offset * measured_derivative_[static_cast<std::size_t>(k * parameters_ + p)];
-        };
-        const control::Sampled& y = measured_;
-        return {y.position_angle + d(0), y.speed_angle + d(1), y.speed + d(2),       y.motor_torque + d(3),
-                y.rotor_angle + d(4),    y.rotor_speed + d(5), y.shaft_angle + d(6), y.time};
-    }
+                 const double* derivative, double time);
+    control::Sampled measured(int p, double offset) const;
 
     // Derivatives of what `act` makes of the numbers of an axis.
     template <class Act>
@@ -194,13 +151,7 @@ class TickTangent {
     }
     double& derivative(int p, int slot) { return slots_[static_cast<std::size_t>(slot * parameters_ + p)]; }
     // Whether anything that an axis remembers or measures changes with a parameter.
-    bool moves(int p, int first, int count) const {
-        for (int k = 0; k < count; ++k)
-            if (slots_[static_cast<std::size_t>((first + k) * parameters_ + p)] != 0.0) return true;
-        for (int k = 0; k < n_measured; ++k)
-            if (measured_derivative_[static_cast<std::size_t>(k * parameters_ + p)] != 0.0) return true;
-        return false;
-    }
+    bool moves(int p, int first, int count) const;
     // What `act` makes of numbers and measurements: values_[5 k + to].
     template <class Act>
     void put(int to, int count, const control::Axis& law, const control::Sampled& y, const Act& act) {
@@ -209,13 +160,7 @@ class TickTangent {
             values_[static_cast<std::size_t>(5 * k + to)] = at_[static_cast<std::size_t>(k)];
     }
     // The derivative of a number by what was put.
-    double taken(int k, double h, double noise) {
-        const double* f = &values_[static_cast<std::size_t>(5 * k)];
-        double out = 0.0;
-        if (!difference_beside_limits({f[0], f[1], now_[static_cast<std::size_t>(k)], f[3], f[4]}, h, noise, out))
-            error_ = "a limit of a controller that it only touches";
-        return out;
-    }
+    double taken(int k, double h, double noise);
     // As far as the law itself depends on the parameter. Where it does not, exactly 0.
     template <class Act>
     void vary_law(std::size_t a, int p, int count, const control::Axis& law, const double* slots, const Act& act,

@@ -19,68 +19,6 @@ struct LinearRegime {
     std::vector<std::vector<double>> rate, output;
 };
 
-inline LinearRegime linearize(const model::Assembly& a, const std::vector<TrainChannel>& channels,
-                              const TrainPoint& p) {
-    using Channel = TrainChannel;
-    const model::Layout& n = a.layout();
-    const model::Regime r = a.build(p.key);
-    const std::vector<bool> moves = model::moved_states(a);
-    const std::vector<std::string> names = model::state_names(a);
-    // The first of its name: an angle that something depends on is integrated once more beside the coupled states.
-    const auto first = [&](std::size_t k) {
-        return static_cast<std::size_t>(std::find(names.begin(), names.end(), names[k]) - names.begin());
-    };
-    const auto row = [&](const model::Row& f) {
-        std::vector<double> out;
-        for (int k = 0; k < n.states; ++k)
-            if (moves[static_cast<std::size_t>(k)]) out.push_back(f.c[k]);
-        for (int i = 0; i < n.inputs; ++i) out.push_back(f.c[n.first_input + i]);
-        double constant = f.c[n.one];
-        for (int m = 0; m < n.memory; ++m) constant += f.c[n.first_memory + m] * p.now.memory[m];
-        out.push_back(constant);
-        return out;
-    };
-    const auto input_torque = [&](std::size_t gear) {
-        std::vector<double> total = row(r.input_torque[gear]);
-        const auto value = [&](const model::Row& f) { return model::evaluate(n, f, p.now); };
-        const SharedTorque shared = shared_torque(a, r, gear, value);
-        if (shared.margin == nullptr) return total;
-        const auto add_tangent = [&](const model::Row& f, double derivative) {
-            const std::vector<double> part = row(f);
-            for (std::size_t k = 0; k < total.size(); ++k) total[k] += derivative * part[k];
-            total.back() -= derivative * value(f);
-        };
-        add_tangent(*shared.friction, shared.by_friction);
-        add_tangent(*shared.output, shared.by_output);
-        add_tangent(shared.margin->form, shared.by_margin);
-        total.back() += shared.value();
-        return total;
-    };
-    LinearRegime out;
-    for (std::size_t k = 0; k < names.size(); ++k) {
-        if (!moves[k]) continue;
-        out.states.push_back(names[k]);
-        out.state.push_back(p.now.x[k]);
-        out.rate.push_back(row(r.rate[k]));
-    }
-    const auto add = [&](const Channel& c, const model::Row& f) {
-        out.outputs.push_back(c.name);
-        out.output.push_back(row(f));
-    };
-    for (const Channel& c : channels) {
-        const auto k = static_cast<std::size_t>(c.index);
-        if (c.kind == Channel::state) add(c, model::Row::unit(static_cast<int>(first(k))));
-        if (c.kind == Channel::motor_torque) add(c, r.motor_torque[k]);
-        if (c.kind == Channel::output_torque) add(c, r.output_torque[k]);
-        if (c.kind == Channel::input_torque) {
-            out.outputs.push_back(c.name);
-            out.output.push_back(input_torque(k));
-        }
-        if (c.kind == Channel::contact_torque) add(c, r.contact_torque[k]);
-        if (c.kind == Channel::output) add(c, a.controller_command(c.index, p.key));
-        if (c.kind == Channel::error) add(c, a.controller_error(c.index));
-    }
-    return out;
-}
+LinearRegime linearize(const model::Assembly& a, const std::vector<TrainChannel>& channels, const TrainPoint& p);
 
 }  // namespace lostmotion

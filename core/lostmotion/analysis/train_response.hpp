@@ -33,28 +33,7 @@ std::vector<NamedComponent> train_components(const model::Assembly& a) {
     return out;
 }
 
-inline PowerChannels power_channels(const model::Assembly& a, const std::vector<TrainChannel>& channels) {
-    const model::Train& t = a.train();
-    const auto channel = [&](TrainChannel::Kind kind, int index) {
-        std::size_t k = 0;
-        while (channels[k].kind != kind || channels[k].index != index) ++k;
-        return static_cast<int>(k);
-    };
-    const auto speed = [&](int shaft) { return channel(TrainChannel::state, a.places().shafts[shaft].speed); };
-    PowerChannels out;
-    for (std::size_t m = 0; m < t.motors.size(); ++m)
-        out.motors.push_back({channel(TrainChannel::motor_torque, static_cast<int>(m)), speed(t.motors[m].shaft)});
-    for (std::size_t g = 0; g < t.gears.size(); ++g) {
-        const model::Gear& gear = t.gears[g];
-        const bool last = std::none_of(t.gears.begin(), t.gears.end(),
-                                       [&](const model::Gear& other) { return other.input == gear.output; });
-        out.gears.push_back({{channel(TrainChannel::input_torque, static_cast<int>(g)), speed(gear.input)},
-                             {channel(TrainChannel::output_torque, static_cast<int>(g)), speed(gear.output)},
-                             last,
-                             gear.housing == model::nowhere ? -1 : speed(gear.housing)});
-    }
-    return out;
-}
+PowerChannels power_channels(const model::Assembly& a, const std::vector<TrainChannel>& channels);
 
 template <class D>
 class TrainPlant {
@@ -92,5 +71,20 @@ class TrainPlant {
     const PowerChannels powers_;
     std::vector<int> numbers_;
 };
+
+template <class D>
+ResponseTable respond_train_in(const typename TrainReader<D>::Model& model, const std::vector<ResponseRequest>& points,
+                               const ResponseSpec& spec, unsigned threads, const Waiting& waiting) {
+    TrainPlant<D> plant(model);
+    const auto start = [&](const Named& named) {
+        StartOf<D> s;
+        for (const NamedComponent& c : plant.components())
+            if (const auto given = named.find(c.name); given != named.end())
+                (c.place < D::states ? s.x[c.place] : s.memory[static_cast<std::size_t>(c.place - D::states)]) =
+                    given->second;
+        return s;
+    };
+    return respond_by_name(plant, points, start, spec, threads, waiting);
+}
 
 }  // namespace lostmotion

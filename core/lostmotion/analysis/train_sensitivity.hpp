@@ -12,21 +12,11 @@
 
 #include "reset_tangent.hpp"
 #include "sample_tangent.hpp"
+#include "sensitive_run.hpp"
 #include "start_tangent.hpp"
 #include "tick_tangent.hpp"
 
 namespace lostmotion {
-
-// What is asked for, and where it goes.
-struct SensitivityOutput {
-    SampleTimes times;
-    std::vector<int> channels;   // by their place among TrainRun::channels()
-    double* out = nullptr;       // parameters x channels x samples; NaN from where the motion is not smooth
-    double* axes_out = nullptr;  // parameters x (axes x signals) x samples, as TrainOptions::control_out
-
-    double ends_at = std::numeric_limits<double>::infinity();  // [s] from where it is not, and why
-    std::string ends_by;
-};
 
 template <class D>
 class TrainSensitivity final : public TrainWatcher<D> {

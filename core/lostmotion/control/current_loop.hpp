@@ -19,14 +19,7 @@ struct CurrentLoop {
     double limit = std::numeric_limits<double>::infinity();  // of the command E
 
     void place(Slots& slots) { first_ = slots.take(1); }
-    double operator()(double reference, double torque, double speed, double* slot) const {
-        double& integral = slot[first_];
-        const double e = (reference - torque) / rated_torque;
-        const double wanted = gain * e + integral + back_emf * speed;
-        const double u = std::clamp(wanted, -limit, limit);
-        if (u == wanted) integral += integral_gain * e;
-        return u;
-    }
+    double operator()(double reference, double torque, double speed, double* slot) const;
 
  private:
     int first_ = 0;

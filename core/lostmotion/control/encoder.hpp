@@ -15,10 +15,7 @@ struct Encoder {
     TickDelay delay;
 
     void place(Slots& slots) { delay.place(slots); }
-    double reading(double angle) const {
-        const double read = resolution > 0.0 ? resolution * std::floor(angle / resolution + 0.5) : angle;
-        return error > 0.0 ? read + error * sine_cosine(periods * angle + phase).sin : read;
-    }
+    double reading(double angle) const;
     double operator()(double angle, std::int64_t tick, double* slot) const { return delay(reading(angle), tick, slot); }
     void start(double angle, double* slot) const { delay.fill(reading(angle), slot); }
 };

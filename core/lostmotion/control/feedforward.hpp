@@ -26,16 +26,7 @@ struct BacklashCompensation {
     double rate = 0.0;      // [rad/s] at which the offset passes from one side to the other
 
     void place(Slots& slots) { first_ = slots.take(backlash > 0.0 ? 1 : 0); }
-    double operator()(double reference_rate, double sample_time, double* slot) const {
-        if (backlash == 0.0) return 0.0;
-        double& offset = slot[first_];
-        const double way = sign_of(reference_rate);
-        if (way != 0.0) {
-            const double step = rate * sample_time, target = way * 0.5 * backlash;
-            offset += std::clamp(target - offset, -step, step);
-        }
-        return offset;
-    }
+    double operator()(double reference_rate, double sample_time, double* slot) const;
 
  private:
     int first_ = 0;

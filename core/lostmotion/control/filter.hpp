@@ -16,19 +16,7 @@ struct DiscreteSystem {
     static constexpr int max_order = 16;
     int order() const { return static_cast<int>(B.size()); }
     void place(Slots& slots) { first_ = slots.take(order()); }
-    double operator()(double u, double* slot) const {
-        double* z = slot + first_;
-        const std::size_t n = B.size();
-        double y = D * u;
-        std::array<double, max_order> next;
-        for (std::size_t i = 0; i < n; ++i) {
-            y += C[i] * z[i];
-            next[i] = B[i] * u;
-            for (std::size_t j = 0; j < n; ++j) next[i] += A[i * n + j] * z[j];
-        }
-        for (std::size_t i = 0; i < n; ++i) z[i] = next[i];
-        return y;
-    }
+    double operator()(double u, double* slot) const;
 
  private:
     int first_ = 0;

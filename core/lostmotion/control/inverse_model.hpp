@@ -41,11 +41,7 @@ struct InverseModel {
     double twist_rate = std::numeric_limits<double>::infinity();  // [rad/s]
 
     void place(Slots& slots) { first_ = slots.take(present ? 4 : 0); }
-    void start(double* slot) const {
-        if (!present) return;
-        slot[first_] = loss_factor;
-        slot[first_ + 1] = friction_torque;
-    }
+    void start(double* slot) const;
     double loss_factor_now(const double* slot) const { return slot[first_]; }
     double friction_now(const double* slot) const { return slot[first_ + 1]; }
 
@@ -54,45 +50,17 @@ struct InverseModel {
     struct Ahead {
         double angle = 0.0, rate = 0.0;
     };
-    Ahead twist(double speed, double acceleration, double observed_load, double sample_time, double* slot) const {
-        if (!present || !through_gear) return {};
-        double &angle = slot[first_ + 2], &rate = slot[first_ + 3];
-        const double step = twist_rate * sample_time,
-                     target = inverse(output_torque(speed, acceleration, observed_load));
-        const double next = angle + std::clamp(target - angle, -step, step);
-        rate = (next - angle) / sample_time;
-        angle = next;
-        return {angle, rate};
-    }
+    Ahead twist(double speed, double acceleration, double observed_load, double sample_time, double* slot) const;
     // M_ff [N m] for phi*' and phi*'' of the reference's shaft. error: what the speed of the motor lacks [rad/s].
     double torque(double speed, double acceleration, double observed_load, double error, double sample_time,
-                  double* slot) const {
-        const double i = losses.ratio, s = sign_of(speed);
-        const double rate = through_gear ? slot[first_ + 3] : 0.0;
-        const double w = i * (speed + rate), T_2 = output_torque(speed, acceleration, observed_load);
-        const double Y = s * losses(T_2, s, w);
-        double &kappa = slot[first_], &T_10 = slot[first_ + 1];
-        const double out =
-            motor_inertia * i * acceleration + motor_viscous_friction * w + T_2 / i + s * T_10 + kappa * Y;
-        if (std::fabs(w) > min_speed) {
-            of_losses(kappa, error, Y, sample_time);
-            of_friction(T_10, error, s, sample_time);
-        }
-        return out;
-    }
+                  double* slot) const;
 
  private:
     double output_torque(double speed, double acceleration, double observed_load) const {
         return load_inertia * acceleration + load_viscous_friction * speed + load_torque + observed_load;
     }
     // P^-1; within a gap, which carries no torque, its middle.
-    double inverse(double torque) const {
-        const double T = std::fabs(torque);
-        if (T == 0.0) return 0.0;
-        int k = 0;
-        while (k < curve.outermost_piece() && curve.torque(curve.upper(k)) < T) ++k;
-        return std::copysign((T - curve.offset(k)) / curve.slope(k), torque);
-    }
+    double inverse(double torque) const;
 
     int first_ = 0;
 };

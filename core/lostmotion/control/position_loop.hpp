@@ -21,18 +21,7 @@ struct PositionLoop {
 
     void place(Slots& slots) { first_ = slots.take(2); }
     // e: phi* - phi [rad].
-    double operator()(double e, double reference_rate, double sample_time, double* slot) const {
-        double &integral = slot[first_], &held = slot[first_ + 1];
-        const double wanted = gain * e + integral + speed_feedforward * reference_rate;
-        const double speed = std::clamp(wanted, -speed_limit, speed_limit);
-        if (reference_rate != 0.0 || std::fabs(e) > outer)
-            held = 0.0;
-        else if (std::fabs(e) < inner)
-            held = 1.0;
-        const bool winds_up = speed != wanted && e * wanted > 0.0;
-        if (held == 0.0 && !winds_up) integral += sample_time * integral_gain * e;
-        return speed;
-    }
+    double operator()(double e, double reference_rate, double sample_time, double* slot) const;
 
  private:
     int first_ = 0;

@@ -9,11 +9,7 @@ namespace lostmotion::control {
 // Gives each block its place in the row.
 class Slots {
  public:
-    int take(int count) {
-        const int first = count_;
-        count_ += count;
-        return first;
-    }
+    int take(int count);
     int count() const { return count_; }
 
  private:
@@ -26,13 +22,7 @@ struct TickDelay {
     int first = 0;  // slot
 
     void place(Slots& slots) { first = slots.take(ticks); }
-    double operator()(double in, std::int64_t tick, double* slot) const {
-        if (ticks == 0) return in;
-        double& kept = slot[first + tick % ticks];
-        const double out = kept;
-        kept = in;
-        return out;
-    }
+    double operator()(double in, std::int64_t tick, double* slot) const;
     void fill(double value, double* slot) const {
         for (int k = 0; k < ticks; ++k) slot[first + k] = value;
     }

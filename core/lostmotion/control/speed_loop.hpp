@@ -18,13 +18,7 @@ struct SpeedLoop {
     void place(Slots& slots) { first_ = slots.take(1); }
     // limit: of the torque, if it cannot be as large as torque_limit.
     double operator()(double reference, double speed, double feedforward, double limit, double sample_time,
-                      double* slot) const {
-        double& integral = slot[first_];
-        const double v = integral - (gain - reference_gain) * speed + feedforward;
-        const double torque = std::clamp(reference_gain * (reference - speed) + v, -limit, limit);
-        if (integral_gain != 0.0) integral += sample_time * (integral_gain / reference_gain) * (torque - v);
-        return torque;
-    }
+                      double* slot) const;
 
  private:
     int first_ = 0;

@@ -33,22 +33,13 @@ class AngleTorqueOnShaft final : public ShaftElement {
     bool drives() const override { return true; }
     const char* source() const override { return "torque over angle"; }
 
-    Row torque(const Site& on, const Key& key) const override {
-        const int k = piece(key);
-        Row T = on.terms.one(curve_.at_zero(k)) + on.angle(curve_.slope(k)) - on.terms.memory(turn, curve_.slope(k));
-        if (remainder != nowhere) T += on.terms.input(remainder);
-        return T;
-    }
+    Row torque(const Site& on, const Key& key) const override;
     double torque(const ShaftInstant& now) const override { return curve_(now.angle); }
     int locate(const ShaftInstant& now) const override { return curve_.piece(now.angle - now.turn); }
     void add_guards(const Site& on, const Key& key, bool turns, std::vector<Guard>& guards) const override {
         if (turns) add_piece_guards(on.terms, on.angle(), curve_, turn, branch, key, guards);
     }
-    Remainder remainder_at(const ShaftInstant& now, int k) const override {
-        const double smooth = curve_.smooth(now.angle);
-        return {smooth - curve_.at_zero(k) - curve_.slope(k) * (now.angle - now.turn),
-                (curve_.smooth_slope(now.angle) - curve_.slope(k)) * now.speed, std::fabs(smooth)};
-    }
+    Remainder remainder_at(const ShaftInstant& now, int k) const override;
 
  private:
     PeriodicCurve curve_;

@@ -45,10 +45,7 @@ class BrakeOnShaft final : public ShaftElement {
     }
     int locate(const ShaftInstant& now) const override { return side_of(now.command, 0.0, 1.0); }
     int locate_steady(double) const override { return -1; }
-    void add_guards(const Site& on, const Key& key, bool, std::vector<Guard>& guards) const override {
-        add_limit_guards(on.terms, on.terms.input(command), 0.0, 1.0, key,
-                         {.kind = Guard::input_limit, .contact = on.shaft.contact, .branch = branch}, guards);
-    }
+    void add_guards(const Site& on, const Key& key, bool, std::vector<Guard>& guards) const override;
 
  private:
     Brake law_;

@@ -40,19 +40,12 @@ class ClutchBetweenShafts final : public CouplingElement {
 
     bool is_dry() const override { return true; }
     bool holds_more() const override { return law_.holding() > law_.torque; }
-    Row capacity(const Between& shafts, const Key& key, bool at_rest) const override {
-        const double most = at_rest ? law_.holding() : law_.torque;
-        return has_command() ? commanded(shafts.terms, most, command, piece(key)) : shafts.terms.one(most);
-    }
+    Row capacity(const Between& shafts, const Key& key, bool at_rest) const override;
     double capacity(int, const CouplingInstant& now, bool at_rest) const override {
         return (at_rest ? law_.holding() : law_.torque) * (has_command() ? std::clamp(now.command, 0.0, 1.0) : 1.0);
     }
     int locate(const CouplingInstant& now) const override { return side_of(now.command, 0.0, 1.0); }
-    void add_guards(const Between& shafts, const Key& key, bool, std::vector<Guard>& guards) const override {
-        if (has_command())
-            add_limit_guards(shafts.terms, shafts.terms.input(command), 0.0, 1.0, key,
-                             {.kind = Guard::input_limit, .contact = contact, .branch = branch}, guards);
-    }
+    void add_guards(const Between& shafts, const Key& key, bool, std::vector<Guard>& guards) const override;
 
  private:
     Clutch law_;

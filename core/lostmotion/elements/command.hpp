@@ -11,17 +11,8 @@ namespace lostmotion::model {
 inline int side_of(double u, double low, double high) { return u > high ? +1 : u < low ? -1 : 0; }
 
 // Where u reaches a limit or comes back from it.
-inline void add_limit_guards(const Terms& terms, const Row& u, double low, double high, const Key& key, Guard guard,
-                             std::vector<Guard>& guards) {
-    const int at = key.branch[guard.branch];
-    const auto add = [&](const Row& form, int neighbour) {
-        guard.form = form;
-        guard.neighbour = neighbour;
-        guards.push_back(guard);
-    };
-    if (at <= 0) add(terms.one(at == 0 ? high : low) - u, at + 1);
-    if (at >= 0) add(u - terms.one(at == 0 ? low : high), at - 1);
-}
+void add_limit_guards(const Terms& terms, const Row& u, double low, double high, const Key& key, Guard guard,
+                      std::vector<Guard>& guards);
 
 // A torque in proportion to a command between 0 and 1.
 inline Row commanded(const Terms& terms, double torque, int input, int at) {

@@ -19,15 +19,7 @@ struct Key {
     std::array<std::int16_t, max_branches> branch{};
 
     friend bool operator==(const Key&, const Key&) = default;
-    std::size_t hash() const {
-        // A sum of products that do not wait for one another, each with another odd number.
-        std::uint64_t h = 0, factor = 0x9e3779b97f4a7c15u;
-        for (const std::uint64_t word : std::bit_cast<std::array<std::uint64_t, sizeof(Key) / 8>>(*this)) {
-            h += (word ^ (word >> 29)) * factor;
-            factor += 0xc2b2ae3d27d4eb4eu;
-        }
-        return static_cast<std::size_t>(h ^ (h >> 32));
-    }
+    std::size_t hash() const;
 };
 struct KeyHash {
     std::size_t operator()(const Key& k) const { return k.hash(); }

@@ -14,36 +14,17 @@ struct Layout {
     int coupled = 0, angles = 0, inputs = 0, memory = 0, contacts = 0, branches = 0;
     int states = 0, one = 0, first_memory = 0, first_input = 0, terms = 0;
 
-    void arrange() {
-        states = coupled + angles;
-        one = states;
-        first_memory = one + 1;
-        first_input = first_memory + memory;
-        terms = first_input + inputs;
-    }
+    void arrange();
 };
 
 // sum_k c[k] * term[k]
 struct Row {
     std::array<double, max_columns> c{};
 
-    static Row unit(int term, double factor = 1.0) {
-        Row f;
-        f.c[term] = factor;
-        return f;
-    }
-    Row& operator+=(const Row& o) {
-        for (int k = 0; k < max_columns; ++k) c[k] += o.c[k];
-        return *this;
-    }
-    Row& operator-=(const Row& o) {
-        for (int k = 0; k < max_columns; ++k) c[k] -= o.c[k];
-        return *this;
-    }
-    Row& operator*=(double a) {
-        for (int k = 0; k < max_columns; ++k) c[k] *= a;
-        return *this;
-    }
+    static Row unit(int term, double factor = 1.0);
+    Row& operator+=(const Row& o);
+    Row& operator-=(const Row& o);
+    Row& operator*=(double a);
     friend Row operator+(Row a, const Row& b) { return a += b; }
     friend Row operator-(Row a, const Row& b) { return a -= b; }
     friend Row operator*(double a, Row f) { return f *= a; }

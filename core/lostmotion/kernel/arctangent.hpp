@@ -38,8 +38,8 @@ inline constexpr std::array<double, 9> low = {
     -0x1.8c34d25aadef6p-56,
     0x1.1a62633145c07p-55,
 };
-inline constexpr DoubleDouble half_pi{0x1.921fb54442d18p+0, 0x1.1a62633145c07p-54};
-inline constexpr DoubleDouble pi{0x1.921fb54442d18p+1, 0x1.1a62633145c07p-53};
+inline constexpr DoubleDouble exact_half_pi{0x1.921fb54442d18p+0, 0x1.1a62633145c07p-54};
+inline constexpr DoubleDouble exact_pi{0x1.921fb54442d18p+1, 0x1.1a62633145c07p-53};
 
 // atan(r) - r, |r| <= 1/16.
 inline double beyond_linear(double r) {
@@ -75,7 +75,7 @@ inline double arctangent(double y, double x) {
     }
     // So that no quotient and no rest of one is lost to the ends of the range.
     const double largest = std::fmax(a, b);
-    if (largest == 0.0) return std::copysign(std::signbit(x) ? pi.high : 0.0, y);
+    if (largest == 0.0) return std::copysign(std::signbit(x) ? exact_pi.high : 0.0, y);
     int exponent = 0;
     std::frexp(largest, &exponent);
     a = std::ldexp(a, -exponent);
@@ -83,9 +83,9 @@ inline double arctangent(double y, double x) {
     const bool steep = a > b, left = std::signbit(x);
     DoubleDouble angle = steep ? up_to_one(b, a) : up_to_one(a, b);
     if (steep)
-        angle = half_pi + (left ? angle : -angle);
+        angle = exact_half_pi + (left ? angle : -angle);
     else if (left)
-        angle = pi + -angle;
+        angle = exact_pi + -angle;
     return std::copysign(angle.high + angle.low, y);
 }
 

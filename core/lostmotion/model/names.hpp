@@ -9,102 +9,17 @@
 namespace lostmotion::model {
 
 // Of the coupled states, then the angles.
-inline std::vector<std::string> state_names(const Assembly& a) {
-    const Train& t = a.train();
-    const Places& p = a.places();
-    std::vector<std::string> names(static_cast<std::size_t>(a.layout().states));
-    const auto set = [&names](int state, const std::string& name) {
-        if (state != nowhere) names[static_cast<std::size_t>(state)] = name;
-    };
-    for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].torque, t.motors[k].name + "_torque");
-    for (std::size_t k = 0; k < t.shafts.size(); ++k) {
-        set(p.shafts[k].speed, t.shafts[k].name + "_speed");
-        set(p.shafts[k].angle, t.shafts[k].name + "_angle");
-    }
-    for (std::size_t k = 0; k < t.gears.size(); ++k) set(p.gears[k].twist, t.gears[k].name + "_twist");
-    for (std::size_t k = 0; k < t.controllers.size(); ++k)
-        for (std::size_t j = 0; j < t.controllers[k].states.size(); ++j)
-            set(p.controllers[k].first_state + static_cast<int>(j),
-                t.controllers[k].name + "_" + t.controllers[k].states[j]);
-    for (int part = 0; part < a.layout().angles; ++part) {
-        const auto last = static_cast<std::size_t>(p.last_shaft[static_cast<std::size_t>(part)]);
-        set(a.layout().coupled + part, t.shafts[last].name + "_angle");
-    }
-    return names;
-}
+std::vector<std::string> state_names(const Assembly& a);
 
 // Which of the states the train moves: a torque source and a rigid gear may have a place in the kernel, but no state,
 // and the angle of a shaft that something depends on is a coupled state.
-inline std::vector<bool> moved_states(const Assembly& a) {
-    std::vector<bool> moves(static_cast<std::size_t>(a.layout().states), true);
-    for (std::size_t m = 0; m < a.train().motors.size(); ++m)
-        if (const int k = a.places().motors[m].torque; k != nowhere)
-            moves[static_cast<std::size_t>(k)] = a.train().motors[m].law.kind == Motor::dc;
-    for (std::size_t g = 0; g < a.train().gears.size(); ++g)
-        if (const int k = a.places().gears[g].twist; k != nowhere)
-            moves[static_cast<std::size_t>(k)] = !a.train().gears[g].rigid();
-    for (std::size_t part = 0; part < a.places().last_shaft.size(); ++part)
-        moves[static_cast<std::size_t>(a.layout().coupled) + part] =
-            a.places().shafts[static_cast<std::size_t>(a.places().last_shaft[part])].angle == nowhere;
-    return moves;
-}
+std::vector<bool> moved_states(const Assembly& a);
 
-inline std::vector<std::string> input_names(const Assembly& a) {
-    const Train& t = a.train();
-    const Places& p = a.places();
-    std::vector<std::string> names(static_cast<std::size_t>(a.layout().inputs));
-    const auto set = [&names](int input, const std::string& name) {
-        if (input != nowhere) names[static_cast<std::size_t>(input)] = name;
-    };
-    for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].command, t.motors[k].name + "_command");
-    for (std::size_t k = 0; k < t.shafts.size(); ++k) set(p.shafts[k].load, t.shafts[k].name + "_load_torque");
-    for (const auto& e : p.acting) set(e->command, e->name + "_command");
-    for (const auto& c : p.couplings) set(c->command, c->name + "_command");
-    for (std::size_t k = 0; k < t.controllers.size(); ++k) {
-        set(p.controllers[k].reference, t.controllers[k].name + "_reference");
-        set(p.controllers[k].reference_rate, t.controllers[k].name + "_reference_rate");
-    }
-    return names;
-}
+std::vector<std::string> input_names(const Assembly& a);
 
-inline std::string contact_name(const Assembly& a, int contact) {
-    const ContactPlace& c = a.places().contacts[static_cast<std::size_t>(contact)];
-    const auto k = static_cast<std::size_t>(c.element);
-    switch (c.kind) {
-        case ContactPlace::shaft: return a.train().shafts[k].name + "_contact";
-        case ContactPlace::gear: return a.train().gears[k].name + "_twist_contact";
-        default: return a.places().couplings[k]->name + "_contact";
-    }
-}
+std::string contact_name(const Assembly& a, int contact);
 
 // The piecewise laws, by their place in a key.
-inline std::vector<std::string> branch_names(const Assembly& a) {
-    const Train& t = a.train();
-    const Places& p = a.places();
-    std::vector<std::string> names(static_cast<std::size_t>(a.layout().branches));
-    const auto set = [&names](int branch, const std::string& name) {
-        if (branch != nowhere) names[static_cast<std::size_t>(branch)] = name;
-    };
-    for (std::size_t k = 0; k < t.motors.size(); ++k)
-        set(p.motors[k].branch, t.motors[k].name + ": limit of the command");
-    for (std::size_t k = 0; k < t.shafts.size(); ++k)
-        set(p.shafts[k].friction_piece, t.shafts[k].name + ": piece of the friction curve");
-    for (std::size_t k = 0; k < t.gears.size(); ++k) {
-        const std::string& name = t.gears[k].name;
-        set(p.gears[k].piece, name + ": piece of the torsion curve");
-        set(p.gears[k].cell, name + ": cell of the losses");
-        set(p.gears[k].cell_back, name + ": cell of the losses backward");
-        set(p.gears[k].parted, name + ": flanks parted");
-        set(p.gears[k].error_piece, name + ": piece of the transmission error");
-        set(p.gears[k].error_corner, name + ": rest on a corner of the transmission error");
-    }
-    for (const auto& c : p.couplings)
-        if (c->branch != nowhere) set(c->branch, c->name + ": " + c->piecewise_law());
-    for (const auto& e : p.acting)
-        if (e->branch != nowhere) set(e->branch, e->name + ": " + e->piecewise_law());
-    for (std::size_t k = 0; k < t.controllers.size(); ++k)
-        set(p.controllers[k].branch, t.controllers[k].name + ": limit of the controller");
-    return names;
-}
+std::vector<std::string> branch_names(const Assembly& a);
 
 }  // namespace lostmotion::model

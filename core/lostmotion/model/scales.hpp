@@ -8,23 +8,9 @@
 namespace lostmotion::model {
 
 // Speed that a shaft has at the ratings of what is on it [rad/s].
-inline double rated_speed(const Train& train, int shaft) {
-    for (const Gear& g : train.gears)
-        if (g.input == shaft) return g.law.rated_input_speed;
-    for (const Gear& g : train.gears)
-        if (g.output == shaft) return g.law.rated_input_speed / g.law.ratio;
-    for (const ShaftMotor& m : train.motors)
-        if (m.shaft == shaft) return m.law.rated_speed;
-    return 1.0;
-}
+double rated_speed(const Train& train, int shaft);
 // Torque on a shaft at those ratings [N m].
-inline double rated_torque(const Train& train, int shaft) {
-    for (const Gear& g : train.gears)
-        if (g.output == shaft) return g.law.rated_output_torque;
-    for (const ShaftMotor& m : train.motors)
-        if (m.shaft == shaft) return m.law.rated_torque;
-    return 1.0;
-}
+double rated_torque(const Train& train, int shaft);
 
 // Sizes of the states of a controller, in those of what it takes and gives: the geometric mean of what drives a state
 // and of what it takes to move the output by `of_output`.

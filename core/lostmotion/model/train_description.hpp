@@ -22,22 +22,9 @@ class TrainDescription {
     // efficiencies: driving and overrunning, in place of the losses of the law.
     void add_gear(const std::string& name, const std::string& input, const std::string& output, const Gearbox& law,
                   const std::optional<std::pair<double, double>>& efficiencies, double mesh_damping,
-                  const PeriodicCurve* transmission_error) {
-        Gear g;
-        g.name = name;
-        g.input = place_of(input);
-        g.output = place_of(output);
-        g.law = law;
-        if (efficiencies) g.efficiencies.emplace(efficiencies->first, efficiencies->second);
-        g.mesh_damping = mesh_damping;
-        if (transmission_error != nullptr) g.transmission_error = *transmission_error;
-        train.gears.push_back(std::move(g));
-    }
+                  const PeriodicCurve* transmission_error);
     // Puts the housing of a gear, by default on the frame, on a shaft.
-    void set_housing(const std::string& gear, const std::string& shaft) {
-        for (Gear& g : train.gears)
-            if (g.name == gear) g.housing = place_of(shaft);
-    }
+    void set_housing(const std::string& gear, const std::string& shaft);
     // What acts on one shaft.
     template <class Element>
     void add(Element element, const std::string& shaft) {
@@ -57,22 +44,12 @@ class TrainDescription {
                 elements.push_back(std::move(element));
         });
     }
-    void add_controller(LinearController c, const std::string& motor) {
-        c.motor = -1;
-        for (std::size_t k = 0; k < train.motors.size(); ++k)
-            if (train.motors[k].name == motor) c.motor = static_cast<int>(k);
-        c.name = motor;
-        train.controllers.push_back(std::move(c));
-    }
+    void add_controller(LinearController c, const std::string& motor);
     int shaft_number(const std::string& name) const { return place_of(name); }
 
  private:
     // -1 if there is none of that name, which the check of the train finds.
-    int place_of(const std::string& shaft) const {
-        for (std::size_t k = 0; k < train.shafts.size(); ++k)
-            if (train.shafts[k].name == shaft) return static_cast<int>(k);
-        return -1;
-    }
+    int place_of(const std::string& shaft) const;
 };
 
 }  // namespace lostmotion::model

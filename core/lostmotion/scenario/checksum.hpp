@@ -14,11 +14,7 @@ class Checksum {
  public:
     void add(unsigned char byte) { rest_ = table[(rest_ ^ byte) & 0xffu] ^ (rest_ >> 8); }
     // As IEEE 754 doubles, lowest byte first, on every machine.
-    void add(std::span<const double> numbers) {
-        for (const double v : numbers)
-            for (auto bits = std::bit_cast<std::uint64_t>(v), k = std::uint64_t{0}; k < 8; ++k, bits >>= 8)
-                add(static_cast<unsigned char>(bits & 0xffu));
-    }
+    void add(std::span<const double> numbers);
     void add(std::string_view text) {
         for (const char c : text) add(static_cast<unsigned char>(c));
     }

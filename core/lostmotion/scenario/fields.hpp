@@ -27,31 +27,8 @@ enum class Range {
     bound,  // any, or infinite
 };
 
-inline bool within(Range range, double v) {
-    const bool finite = std::isfinite(v);
-    switch (range) {
-        case Range::any: return finite;
-        case Range::positive: return finite && v > 0.0;
-        case Range::not_negative: return finite && v >= 0.0;
-        case Range::up_to_one: return v > 0.0 && v <= 1.0;
-        case Range::limit: return v > 0.0;
-        case Range::limit_or_zero: return v >= 0.0;
-        case Range::bound: return !std::isnan(v);
-    }
-    return false;
-}
-inline const char* range_text(Range range) {
-    switch (range) {
-        case Range::any: return "finite";
-        case Range::positive: return "finite and > 0";
-        case Range::not_negative: return "finite and >= 0";
-        case Range::up_to_one: return "> 0 and <= 1";
-        case Range::limit: return "> 0";
-        case Range::limit_or_zero: return ">= 0";
-        case Range::bound: return "a number";
-    }
-    return "";
-}
+bool within(Range range, double v);
+const char* range_text(Range range);
 
 // Where in a description something stands, such as "gears[0].ratio".
 class FieldPath {
@@ -66,11 +43,7 @@ class FieldPath {
      private:
         FieldPath& path_;
     };
-    std::string to(const std::string& name) const {
-        std::string all;
-        for (const std::string& n : names_) all += (all.empty() || n[0] == '[' ? "" : ".") + n;
-        return all + (all.empty() || name.empty() || name[0] == '[' ? "" : ".") + name;
-    }
+    std::string to(const std::string& name) const;
 
  private:
     std::vector<std::string> names_;
@@ -96,14 +69,8 @@ class FieldWriter {
         numbers.push_back(static_cast<double>(static_cast<int>(v)));
     }
     void flag(const char*, bool v) { numbers.push_back(v ? 1.0 : 0.0); }
-    void text(const char*, const std::string& v) {
-        numbers.push_back(static_cast<double>(v.size()));
-        for (const char c : v) numbers.push_back(static_cast<double>(static_cast<unsigned char>(c)));
-    }
-    void list(const char*, const std::vector<double>& v, Range = Range::any) {
-        numbers.push_back(static_cast<double>(v.size()));
-        numbers.insert(numbers.end(), v.begin(), v.end());
-    }
+    void text(const char*, const std::string& v);
+    void list(const char*, const std::vector<double>& v, Range = Range::any);
     template <class T, class Use>
     void each(const char*, std::vector<T>& v, Use&& use) {
         numbers.push_back(static_cast<double>(v.size()));
@@ -140,12 +107,7 @@ class FieldReader {
         if (well()) error_ = path_.to(name) + ' ' + how;
     }
 
-    void number(const char* name, double& v, Range range = Range::any) {
-        const double given = take(name);
-        if (!well()) return;
-        if (!within(range, given)) return wrong(name, "is " + printed(given) + "; it must be " + range_text(range));
-        v = given;
-    }
+    void number(const char* name, double& v, Range range = Range::any);
     template <class Integer>
     void integer(const char* name, Integer& v, long long low, long long high) {
         const double given = take(name);
@@ -161,25 +123,9 @@ class FieldReader {
         integer(name, given, 0, count - 1);
         if (well()) v = static_cast<Enum>(given);
     }
-    void flag(const char* name, bool& v) {
-        int given = 0;
-        integer(name, given, 0, 1);
-        if (well()) v = given != 0;
-    }
-    void text(const char* name, std::string& v) {
-        const std::size_t n = length(name);
-        v.clear();
-        for (std::size_t k = 0; k < n && well(); ++k) {
-            int c = 0;
-            integer(name, c, 1, 255);
-            v += static_cast<char>(c);
-        }
-    }
-    void list(const char* name, std::vector<double>& v, Range range = Range::any) {
-        const std::size_t n = length(name);
-        v.assign(n, 0.0);
-        for (std::size_t k = 0; k < n && well(); ++k) number(name, v[k], range);
-    }
+    void flag(const char* name, bool& v);
+    void text(const char* name, std::string& v);
+    void list(const char* name, std::vector<double>& v, Range range = Range::any);
     template <class T, class Use>
     void each(const char* name, std::vector<T>& v, Use&& use) {
         const std::size_t n = length(name);
@@ -212,21 +158,10 @@ class FieldReader {
     }
 
  private:
-    static std::string printed(double v) {
-        char text[32];
-        std::snprintf(text, sizeof text, "%.10g", v);
-        return text;
-    }
-    double take(const char* name) {
-        if (well() && left() == 0) wrong(name, "is missing: the description ends before it");
-        return well() ? numbers_[next_++] : 0.0;
-    }
+    static std::string printed(double v);
+    double take(const char* name);
     // Of a text or a list, each entry of which takes a number at least.
-    std::size_t length(const char* name) {
-        long n = 0;
-        integer(name, n, 0, static_cast<long>(left()));
-        return well() ? static_cast<std::size_t>(n) : 0;
-    }
+    std::size_t length(const char* name);
 
     std::span<const double> numbers_;
     std::size_t next_ = 0;

@@ -10,11 +10,7 @@ namespace lostmotion {
 
 using model::max_pieces;
 
-inline bool rising(const std::vector<double>& v) {
-    for (std::size_t k = 1; k < v.size(); ++k)
-        if (!(v[k] > v[k - 1])) return false;
-    return true;
-}
+bool rising(const std::vector<double>& v);
 
 template <class F>
 void describe(F& f, TorsionCurve& curve) {

@@ -55,16 +55,7 @@ void each_number_of_snapshot(Snapshot& s, int slots, Use&& use) {
 class ScenarioSimulation {
  public:
     // The scenario has passed its check. It begins at its start.
-    ScenarioSimulation(const Scenario& scenario, double step) : control_(scenario.control), variables_(scenario) {
-        if (scenario.is_of_drive()) {
-            if constexpr (holds(Kernel::drive)) drive_ = std::make_unique<Simulation>(scenario.drive, step, control_);
-        } else if constexpr (holds_trains) {
-            train_ = std::make_unique<TrainSimulation>(scenario.train, step, control_);
-        }
-        laws_ = control_.laws();
-        name_all(scenario);
-        reset(scenario.start, scenario.hysteresis_capacities);
-    }
+    ScenarioSimulation(const Scenario& scenario, double step);
     // A train that has passed its check, from rest.
     ScenarioSimulation(const model::Train& train, double step) : ScenarioSimulation(of_train(train), step) {}
 
@@ -100,57 +91,18 @@ class ScenarioSimulation {
         return with([](const auto& s) { return s.time(); });
     }
     // Why a status is what it is, in words; empty if all is well.
-    std::string text(Status status) const {
-        return with([&]<class S>(const S& s) {
-            if constexpr (std::is_same_v<S, Simulation>)
-                return status_text(status, s.time(), s.stopped_at());
-            else
-                return train_status_text(train_->assembly(), status, s.time(), s.stopped_at(), s.too_many_guards());
-        });
-    }
+    std::string text(Status status) const;
 
     // To t = 0, with the contacts still to be found. Returns what is wrong with the start, or nothing.
-    std::string reset(std::span<const double> states, std::span<const double> capacities) {
-        return with([&]<class S>(S& s) -> std::string {
-            if constexpr (std::is_same_v<S, Simulation>) {
-                Simulation::Snapshot start;
-                std::copy(states.begin(), states.end(), start.x.begin());
-                start.memory = {capacities[0], 0.0};
-                s.restore(start);
-                return "";
-            } else {
-                return train_->reset(train_start(states, capacities));
-            }
-        });
-    }
+    std::string reset(std::span<const double> states, std::span<const double> capacities);
     TrainStart train_start(std::span<const double> states, std::span<const double> capacities) const {
         return lostmotion::train_start(train_->assembly(), states, capacities);
     }
 
     // Each input of names().inputs runs in a straight line from its first to its second value.
-    Status advance(double interval, std::span<const double> begin, std::span<const double> end) {
-        for (std::size_t k = 0; k < free_.size(); ++k) {
-            begin_[free_[k]] = begin[k];
-            end_[free_[k]] = end[k];
-        }
-        set_references(begin, end, interval);
-        return with([&]<class S>(S& s) {
-            InputsOf<typename S::D> first{}, last{};
-            std::copy(begin_.begin(), begin_.end(), first.begin());
-            std::copy(end_.begin(), end_.end(), last.begin());
-            return s.advance(interval, first, last);
-        });
-    }
+    Status advance(double interval, std::span<const double> begin, std::span<const double> end);
     // What acts at t = 0, for what is read before the first step.
-    void hold(std::span<const double> inputs) {
-        with([&](auto& s) {
-            if (s.snapshot().started) return;
-            auto snapshot = s.snapshot();
-            for (std::size_t k = 0; k < free_.size(); ++k) snapshot.input[free_[k]] = inputs[k];
-            s.restore(snapshot);
-        });
-        set_references(inputs, inputs, 1.0);
-    }
+    void hold(std::span<const double> inputs);
 
     // --- as a hybrid system, which an integrator of the caller's own solves ---
 
@@ -159,41 +111,14 @@ class ScenarioSimulation {
         return std::any_of(laws_.begin(), laws_.end(), [](const control::Axis& a) { return !!a.field_orientation; });
     }
     // At a time, with states by names().states and inputs by names().inputs, in the regime that it is in.
-    void place(double time, std::span<const double> states, std::span<const double> inputs) {
-        with([&]<class S>(S& s) {
-            auto x = s.snapshot().x;
-            auto u = s.snapshot().input;
-            for (std::size_t k = 0; k < states.size(); ++k) x[place_of<typename S::D>(k)] = states[first_[k]];
-            for (std::size_t k = 0; k < free_.size(); ++k) u[free_[k]] = inputs[k];
-            s.place(time, x, u);
-        });
-        set_references(inputs, inputs, 1.0);
-    }
-    void states(double* out) const {
-        with([&]<class S>(const S& s) {
-            for (std::size_t k = 0; k < names_.states.size(); ++k) out[k] = s.snapshot().x[place_of<typename S::D>(k)];
-        });
-    }
+    void place(double time, std::span<const double> states, std::span<const double> inputs);
+    void states(double* out) const;
     // Of the states.
-    Status rates(double* out) {
-        return with([&]<class S>(S& s) {
-            const Status status = s.find_regime();
-            if (status != Status::done) return status;
-            const auto rates = s.rates();
-            for (std::size_t k = 0; k < names_.states.size(); ++k) out[k] = rates[place_of<typename S::D>(k)];
-            return status;
-        });
-    }
+    Status rates(double* out);
     std::size_t guard_count() const {
         return with([]<class S>(const S&) { return static_cast<std::size_t>(S::n_guards); });
     }
-    Status guards(double* out) {
-        return with([&](auto& s) {
-            const Status status = s.find_regime();
-            if (status == Status::done) std::ranges::copy(s.guards(), out);
-            return status;
-        });
-    }
+    Status guards(double* out);
     Status settle() {
         return with([](auto& s) { return s.settle(); });
     }
@@ -205,126 +130,24 @@ class ScenarioSimulation {
     }
 
     // All variables at the present instant, with the inputs at their last values.
-    Status read(double* out) {
-        const Status status = with([](auto& s) { return s.find_regime(); });
-        if (status != Status::done) return status;
-        with([&]<class S>(S& s) {
-            if constexpr (std::is_same_v<S, Simulation>)
-                std::ranges::copy(s.reading().value, out);
-            else
-                std::ranges::copy(s.values(), out);
-        });
-        if (!laws_.empty()) with([&](const auto& in) { read_controllers(in.snapshot(), out); });
-        variables_.derive(out, 1, 0);
-        return status;
-    }
+    Status read(double* out);
 
     // Another scenario of the same elements, at the present state: the contacts are found anew.
-    void go_on_from(const ScenarioSimulation& before) {
-        with([&]<class S>(S& to) {
-            before.with([&]<class From>(const From& from) {
-                if constexpr (std::is_same_v<S, From>) {
-                    auto snapshot = from.snapshot();
-                    snapshot.started = false;
-                    to.restore(snapshot);
-                }
-            });
-        });
-    }
+    void go_on_from(const ScenarioSimulation& before);
 
     // The whole state as numbers, with one that tells whether they belong to this simulation and are whole.
-    std::size_t state_size() const {
-        std::size_t n = 1;
-        with([&](const auto& s) {
-            each_number_of_snapshot(s.snapshot(), s.control_slots(), [&](const auto&) { ++n; });
-        });
-        return n;
-    }
-    void get_state(double* to) const {
-        double* const first = to;
-        with([&](const auto& s) {
-            each_number_of_snapshot(s.snapshot(), s.control_slots(),
-                                    [&](const auto& number) { *to++ = static_cast<double>(number); });
-        });
-        *to = sum(first, to);
-    }
+    std::size_t state_size() const;
+    void get_state(double* to) const;
     // False: the numbers are not those of a state of such a simulation.
-    bool set_state(const double* from) {
-        const std::size_t n = state_size();
-        if (from[n - 1] != sum(from, from + n - 1)) return false;
-        with([&](auto& s) {
-            auto snapshot = s.snapshot();
-            each_number_of_snapshot(snapshot, s.control_slots(), [&](auto& number) {
-                number = static_cast<std::remove_reference_t<decltype(number)>>(*from++);
-            });
-            if (!snapshot.started && snapshot.control.next == 0) snapshot.control.slots.clear();
-            s.restore(snapshot);
-        });
-        return true;
-    }
+    bool set_state(const double* from);
 
  private:
-    static Scenario of_train(const model::Train& train) {
-        Scenario s;
-        s.form = Scenario::of_train;
-        s.train = train;
-        const model::Assembly a(train);
-        s.start.resize(static_cast<std::size_t>(a.layout().states));
-        s.hysteresis_capacities.resize(train.gears.size());
-        return s;
-    }
-    void name_all(const Scenario& scenario) {
-        if (drive_) {
-            for (const StateName& s : state_names) names_.states.emplace_back(s.name);
-            names_.capacities.emplace_back("gearbox");
-        } else {
-            names_.states = model::state_names(train_->assembly());
-            for (const model::Gear& g : scenario.train.gears) names_.capacities.push_back(g.name);
-        }
-        for (const std::string& name : names_.states)
-            first_.push_back(static_cast<std::size_t>(std::find(names_.states.begin(), names_.states.end(), name) -
-                                                      names_.states.begin()));
-        for (const FreeInput& i : lostmotion::free_inputs(scenario)) {
-            free_.push_back(i.number);
-            names_.inputs.push_back(i.name);
-            at_start_.push_back(i.number < scenario.inputs.size() ? value_at_start(scenario.inputs[i.number]) : 0.0);
-        }
-        for (std::size_t a = 0; a < control_.axes.size() && scenario.references_given; ++a)
-            name_reference(scenario, control_.axes[a]);
-        begin_.resize(scenario.is_of_drive() ? std::size_t{n_inputs}
-                                             : static_cast<std::size_t>(train_->assembly().layout().inputs));
-        end_ = begin_;
-        for (const ControlledAxis& axis : control_.axes) {
-            const auto m = static_cast<std::size_t>(axis.motor);
-            const std::string motor = scenario.is_of_drive() ? "motor" : scenario.train.motors[m].name;
-            torques_.push_back(static_cast<std::size_t>(variables_.place(motor + "_torque")));
-        }
-        identity_ = 0xcbf29ce484222325u;
-        for (const auto* list : {&names_.states, &names_.inputs})
-            for (const std::string& name : *list) mix(identity_, name.data(), name.size());
-    }
+    static Scenario of_train(const model::Train& train);
+    void name_all(const Scenario& scenario);
 
-    void name_reference(const Scenario& scenario, const ControlledAxis& axis) {
-        const auto m = static_cast<std::size_t>(axis.motor);
-        const std::string of = scenario.is_of_drive() ? "" : scenario.train.motors[m].name + "_";
-        const control::Axis::Mode mode = axis.law.mode;
-        names_.references.push_back({of + "reference",
-                                     mode == control::Axis::position_mode ? "rad"
-                                     : mode == control::Axis::speed_mode  ? "rad/s"
-                                                                          : "N*m",
-                                     mode == control::Axis::position_mode ? "angle that the controller is to follow"
-                                     : mode == control::Axis::speed_mode  ? "speed that the controller is to follow"
-                                                                          : "torque of the motor that is to act"});
-        names_.inputs.push_back(names_.references.back().name);
-        at_start_.push_back(axis.law.reference.at(0.0).value);
-    }
+    void name_reference(const Scenario& scenario, const ControlledAxis& axis);
     // The last inputs, each in a straight line from its first to its second value.
-    void set_references(std::span<const double> begin, std::span<const double> end, double interval) {
-        for (std::size_t a = 0; a < names_.references.size(); ++a) {
-            const std::size_t k = free_.size() + a;
-            with([&](auto& s) { s.set_reference(a, begin[k], (end[k] - begin[k]) / interval); });
-        }
-    }
+    void set_references(std::span<const double> begin, std::span<const double> end, double interval);
     // Of a state, by its number among the names, that in the kernel.
     template <class D>
     std::size_t place_of(std::size_t k) const {
@@ -333,10 +156,7 @@ class ScenarioSimulation {
         return k < coupled ? k : k - coupled + static_cast<std::size_t>(D::coupled);
     }
 
-    static void mix(std::uint64_t& hash, const void* bytes, std::size_t n) {
-        for (std::size_t k = 0; k < n; ++k)
-            hash = (hash ^ static_cast<const unsigned char*>(bytes)[k]) * 0x100000001b3u;
-    }
+    static void mix(std::uint64_t& hash, const void* bytes, std::size_t n);
     // What the controllers show. A motor with a winding has the torque of its currents, in the place of the straight
     // line that drives the mechanics.
     template <class Snapshot>
@@ -359,11 +179,7 @@ class ScenarioSimulation {
     }
 
     // Of the bits of numbers, as a number without a fraction.
-    double sum(const double* first, const double* end) const {
-        std::uint64_t hash = identity_;
-        mix(hash, first, sizeof(double) * static_cast<std::size_t>(end - first));
-        return static_cast<double>(hash >> 12);
-    }
+    double sum(const double* first, const double* end) const;
 
     std::unique_ptr<Simulation> drive_;
     std::unique_ptr<TrainSimulation> train_;

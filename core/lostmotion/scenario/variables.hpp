@@ -19,46 +19,18 @@ struct Variable {
 class Variables {
  public:
     // The scenario has passed its check.
-    explicit Variables(const Scenario& s) {
-        if (s.is_of_drive())
-            add_drive(s.drive);
-        else
-            add_train(s.train);
-        for (std::size_t a = 0; a < s.control.axes.size(); ++a) {
-            const control::Axis& law = s.control.axes[a].law;
-            const auto motor = static_cast<std::size_t>(s.control.axes[a].motor);
-            const std::string prefix = s.is_of_drive() ? "" : s.train.motors[motor].name + "_";
-            const auto add = [&](int signal, const control::AxisSignalName& named) {
-                shown_.push_back({static_cast<int>(a), signal});
-                all_.push_back({prefix + named.name, named.unit, named.meaning});
-            };
-            for (int k = 0; k < control::n_axis_signals; ++k)
-                if (shows(law, k)) add(k, control::axis_signal_names[static_cast<std::size_t>(k)]);
-            for (int k = 0; k < control::n_winding_signals && law.field_orientation; ++k)
-                add(control::n_axis_signals + k, control::winding_signal_names[static_cast<std::size_t>(k)]);
-        }
-    }
+    explicit Variables(const Scenario& s);
 
     const std::vector<Variable>& all() const { return all_; }
     std::size_t size() const { return all_.size(); }
     // How many the solver reads: the first ones.
     std::size_t channels() const { return channels_; }
     // -1: there is none of this name.
-    int place(const std::string& name) const {
-        for (std::size_t k = 0; k < all_.size(); ++k)
-            if (all_[k].name == name) return static_cast<int>(k);
-        return -1;
-    }
-    std::string unit(const std::string& name) const {
-        const int k = place(name);
-        return k < 0 ? "" : all_[static_cast<std::size_t>(k)].unit;
-    }
+    int place(const std::string& name) const;
+    std::string unit(const std::string& name) const;
 
     // Variable v of instant k stands at data[v * stride + k]: those that follow, from those that the solver has read.
-    void derive(double* data, std::size_t stride, std::size_t k) const {
-        const auto at = [&](int v) { return data[static_cast<std::size_t>(v) * stride + k]; };
-        for (std::size_t d = 0; d < derived_.size(); ++d) data[(channels_ + d) * stride + k] = value(derived_[d], at);
-    }
+    void derive(double* data, std::size_t stride, std::size_t k) const;
     // The same of a change of the variables: rates[v], from the values at which it begins.
     void derive_rates(const double* values, double* rates) const {
         for (std::size_t d = 0; d < derived_.size(); ++d) rates[channels_ + d] = rate(derived_[d], values, rates);
@@ -77,64 +49,12 @@ class Variables {
         int gear = -1;
     };
 
-    static bool shows(const control::Axis& a, int signal) {
-        switch (signal) {
-            case control::position_reference:
-            case control::measured_position: return a.mode == control::Axis::position_mode;
-            case control::speed_reference:
-            case control::measured_speed: return a.mode != control::Axis::torque_mode;
-            case control::torque_reference: return true;
-            case control::target_direction:
-            case control::target_seen: return a.camera.present;
-            case control::load_torque: return a.load_observer.present;
-            default: return a.inverse_model.present;
-        }
-    }
+    static bool shows(const control::Axis& a, int signal);
 
-    void add_drive(const Drive& drive) {
-        ratio_ = drive.gearbox.ratio;
-        for (const ChannelName& c : channel_names) all_.push_back({c.name, c.unit, c.meaning});
-        channels_ = all_.size();
-        derived_.push_back({Derived::efficiency, place("output_torque"), place("motor_speed"), place("input_torque")});
-        all_.push_back({"efficiency", "1", "useful torque / torque fed in, undefined at standstill"});
-        derived_.push_back({Derived::product, place("motor_torque"), place("motor_speed")});
-        all_.push_back({"motor_power", "W", "mechanical power of the motor"});
-    }
-    void add_train(const model::Train& train) {
-        train_ = train;
-        for (const TrainChannel& c : train_channels(model::Assembly(train)))
-            all_.push_back({c.name, c.unit.empty() ? "1" : c.unit, c.meaning});
-        channels_ = all_.size();
-        for (const model::Gear& g : train.gears)
-            if (place(g.name + "_twist") < 0) {
-                derived_.push_back({Derived::nothing});
-                all_.push_back({g.name + "_twist", "rad", "angle of input/ratio less that of output"});
-            }
-        add_angles();
-    }
+    void add_drive(const Drive& drive);
+    void add_train(const model::Train& train);
     // Angles that the solver does not integrate follow through gears whose housing stands.
-    void add_angles() {
-        std::vector<std::size_t> waiting;
-        const auto name = [&](int shaft) { return train_.shafts[static_cast<std::size_t>(shaft)].name; };
-        for (std::size_t s = 0; s < train_.shafts.size(); ++s)
-            if (place(train_.shafts[s].name + "_angle") >= 0) waiting.push_back(s);
-        while (!waiting.empty()) {
-            const int shaft = static_cast<int>(waiting.back());
-            waiting.pop_back();
-            for (std::size_t g = 0; g < train_.gears.size(); ++g) {
-                const model::Gear& gear = train_.gears[g];
-                if (gear.housing >= 0 || (gear.input != shaft && gear.output != shaft)) continue;
-                const bool forward = gear.input == shaft;
-                const int other = forward ? gear.output : gear.input;
-                if (place(name(other) + "_angle") >= 0) continue;
-                derived_.push_back({forward ? Derived::angle_of_output : Derived::angle_of_input,
-                                    place(name(shaft) + "_angle"), place(gear.name + "_twist"), -1,
-                                    static_cast<int>(g)});
-                all_.push_back({name(other) + "_angle", "rad", "angle of the shaft"});
-                waiting.push_back(static_cast<std::size_t>(other));
-            }
-        }
-    }
+    void add_angles();
 
     template <class At>
     double value(const Derived& d, At&& at) const {
@@ -149,31 +69,9 @@ class Variables {
         const double error = gear.transmission_error.present() ? gear.transmission_error(at(d.a)) : 0.0;
         return at(d.a) / gear.law.ratio - at(d.b) - error;
     }
-    double rate(const Derived& d, const double* x, const double* dx) const {
-        switch (d.kind) {
-            case Derived::nothing: return 0.0;
-            case Derived::product: return dx[d.a] * x[d.b] + x[d.a] * dx[d.b];
-            case Derived::efficiency: {
-                const double eta = efficiency(x[d.a], x[d.b], x[d.c]);
-                if (eta == 0.0) return 0.0;
-                const double relative = dx[d.a] / x[d.a] - dx[d.c] / x[d.c];
-                return x[d.a] * x[d.b] >= 0.0 ? eta * relative : -eta * relative;
-            }
-            default: break;
-        }
-        const model::Gear& gear = train_.gears[static_cast<std::size_t>(d.gear)];
-        if (d.kind == Derived::angle_of_input) return gear.law.ratio * (dx[d.a] + dx[d.b]);
-        const model::PeriodicCurve& e = gear.transmission_error;
-        const double slope = e.present() ? e.slope(e.piece(x[d.a] - e.turn(x[d.a]))) : 0.0;
-        return dx[d.a] / gear.law.ratio - dx[d.b] - slope * dx[d.a];
-    }
+    double rate(const Derived& d, const double* x, const double* dx) const;
     // Driving (T_2 has the sign of w_M) it is T_2/(i T_1), overrunning i T_1/T_2; 0 where both sides feed the losses.
-    double efficiency(double T_2, double w_M, double T_1) const {
-        if (w_M == 0.0) return std::numeric_limits<double>::quiet_NaN();
-        const double s = w_M > 0.0 ? 1.0 : -1.0, driving = T_2 * s, fed_in = ratio_ * T_1 * s;
-        if (driving >= 0.0) return driving / fed_in;
-        return fed_in < 0.0 ? fed_in / driving : 0.0;
-    }
+    double efficiency(double T_2, double w_M, double T_1) const;
 
     std::vector<Variable> all_;
     std::size_t channels_ = 0;

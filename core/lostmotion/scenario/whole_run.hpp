@@ -50,10 +50,7 @@ Options options_of(const Scenario& s, const WholeRunOptions& given, std::vector<
     return o;
 }
 
-inline void add(std::vector<std::string>& names, std::vector<double>& values, const std::string& name, double value) {
-    names.push_back(name);
-    values.push_back(value);
-}
+void add(std::vector<std::string>& names, std::vector<double>& values, const std::string& name, double value);
 
 // solve(drive, signals, start, options, samples): by one of the solvers.
 template <class Solve>
@@ -108,28 +105,7 @@ void of_train(const Scenario& s, const WholeRunOptions& given, std::vector<doubl
 
 // Signals of the controllers into the rows of the variables. A motor with a winding shows the torque of its currents,
 // in the place of the straight lines that the mechanics were driven by.
-inline void add_signals(const Scenario& s, const Variables& variables, const std::vector<double>& control,
-                        WholeRun& out) {
-    const std::size_t n = out.samples, signals = static_cast<std::size_t>(s.control.signals());
-    const auto recorded = [&](std::size_t axis, std::size_t signal) {
-        return control.data() + (axis * signals + signal) * n;
-    };
-    double* to = out.values.data() + variables.first_shown() * n;
-    for (const Variables::Shown& shown : variables.shown())
-        to = std::copy_n(recorded(static_cast<std::size_t>(shown.axis), static_cast<std::size_t>(shown.signal)), n, to);
-    for (std::size_t a = 0; a < s.control.axes.size(); ++a) {
-        const ControlledAxis& axis = s.control.axes[a];
-        if (!axis.law.field_orientation) continue;
-        const std::string motor = s.is_of_drive() ? "motor" : s.train.motors[static_cast<std::size_t>(axis.motor)].name;
-        const int place = variables.place(motor + "_torque");
-        const std::size_t first = control::n_axis_signals;
-        const double *i_d = recorded(a, first + control::direct_current),
-                     *i_q = recorded(a, first + control::quadrature_current);
-        for (std::size_t k = 0; k < n; ++k)
-            out.values[static_cast<std::size_t>(place) * n + k] =
-                axis.law.field_orientation->winding.torque(i_d[k], i_q[k]);
-    }
-}
+void add_signals(const Scenario& s, const Variables& variables, const std::vector<double>& control, WholeRun& out);
 
 template <class OfDrive, class OfTrain>
 WholeRun run(const Scenario& s, const WholeRunOptions& options, OfDrive&& solve_drive, OfTrain&& solve_train) {
@@ -151,15 +127,6 @@ WholeRun run(const Scenario& s, const WholeRunOptions& options, OfDrive&& solve_
 }  // namespace whole_run
 
 // By the exact solver. The scenario has passed its check.
-inline WholeRun run_whole(const Scenario& s, const WholeRunOptions& options = {}) {
-    return whole_run::run(
-        s, options,
-        [](const Drive& drive, const Signals& signals, const Start& start, const RunOptions& o, double* out) {
-            return run_exact(drive, signals, start, o, out);
-        },
-        [](const TrainRun& run, const std::vector<Signal>& signals, const std::vector<double>& x,
-           const std::vector<double>& memory, const TrainOptions& o,
-           double* out) { return run.run_exactly(signals, x, memory, o, out); });
-}
+WholeRun run_whole(const Scenario& s, const WholeRunOptions& options = {});
 
 }  // namespace lostmotion

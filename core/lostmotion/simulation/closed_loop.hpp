@@ -27,21 +27,9 @@ struct Control {
 
     bool present() const { return !axes.empty(); }
     // How many of them each axis shows: those of a winding too if there is one.
-    int signals() const {
-        int n = control::n_axis_signals;
-        for (const ControlledAxis& axis : axes)
-            if (axis.law.field_orientation) n = int{control::n_axis_signals} + int{control::n_winding_signals};
-        return n;
-    }
+    int signals() const;
     // The controllers, ready to run.
-    std::vector<control::Axis> laws() const {
-        std::vector<control::Axis> out;
-        for (const ControlledAxis& axis : axes) {
-            out.push_back(axis.law);
-            out.back().place();
-        }
-        return out;
-    }
+    std::vector<control::Axis> laws() const;
 };
 
 // When the controllers run. An instant that only rounding parts from a tick is that of the tick.
@@ -49,12 +37,7 @@ struct Ticks {
     double length = 1e-3;          // [s]
     double sample_interval = 0.0;  // [s] of a run's record, whose instants are ticks where both fall together; 0: none
 
-    double time(std::int64_t tick) const {
-        const double t = static_cast<double>(tick) * length;
-        if (sample_interval == 0.0) return t;
-        const double sample = std::round(t / sample_interval) * sample_interval;
-        return std::fabs(sample - t) < rounding() ? sample : t;
-    }
+    double time(std::int64_t tick) const;
     // Of two times: whether the first lies before the second by more than rounding.
     bool before(double first, double second) const { return first < second - rounding(); }
 
@@ -132,6 +115,8 @@ template <class Solver>
 class ClosedLoopRun {
  public:
     using D = typename Solver::D;
+    using System = typename Solver::System;
+    using Observer = typename Solver::Observer;
 
     ClosedLoopRun(Solver& solver, const ClosedLoop<D>& loop)
         : solver_(solver), loop_(loop), windings_(solver, loop.ticks.length, loop.axes, loop.places) {}
@@ -161,7 +146,6 @@ class ClosedLoopRun {
     }
 
     // The controllers at the start, with the drive at a state, and their first tick.
-    template <class Observer>
     Status begin(const StateOf<D>& x, const typename D::Memory& memory, Observer& observer) {
         course_.next = 0;
         course_.slots.assign(static_cast<std::size_t>(loop_.slots()), 0.0);
@@ -178,89 +162,74 @@ class ClosedLoopRun {
     }
     // The next tick, at the state that the solver has.
     bool tick() {
-        struct {
-        } nobody;
+        Observer nobody;
         return run_tick(solver_.state(), solver_.memory(), nobody);
     }
-    // To t_end, the ticks up to it included unless they fall on it. record(t): what the controllers show holds until t.
-    template <class Observer, class Record>
-    Status advance(double t_end, Observer& observer, Record&& record) {
+    // To t_end, the ticks up to it included unless they fall on it. record: gets what the controllers show, or nullptr.
+    Status advance(double t_end, Observer& observer, ControlRecord* record) {
         while (true) {
             const double tick = loop_.ticks.time(course_.next);
             const bool last = !loop_.ticks.before(tick, t_end);
-            if (!windings_.present()) record(last ? t_end : tick);
+            if (!windings_.present()) hold_until(last ? t_end : tick, record);
             if (last || tick > solver_.time()) {
-                Passing<Observer> passing{observer, last};
+                Passing passing(observer, last);
                 const Status status = windings_.present() ? advance_windings(tick, t_end, last, observer, record)
                                                           : solver_.advance(last ? t_end : tick, passing);
                 if (status != Status::done || last) return status;
             }
-            if (!flushed(observer)) return Status::interrupted;
+            if (!observer.flush()) return Status::interrupted;
             if (!run_tick(solver_.state(), solver_.memory(), observer)) return Status::controller;
             if (changed_)
                 if (const Status found = solver_.inputs_changed(observer); found != Status::done) return found;
         }
     }
     // At the end of a run: the tick that falls on it, for what the controllers show there.
-    template <class Observer>
     Status show_end(Observer& observer) {
         if (loop_.ticks.before(solver_.time(), loop_.ticks.time(course_.next))) return Status::done;
-        if (!flushed(observer)) return Status::interrupted;
+        if (!observer.flush()) return Status::interrupted;
         return run_tick(solver_.state(), solver_.memory(), observer) ? Status::done : Status::controller;
     }
 
  private:
     // Hands on what a solver shows, and says of no stretch but the last of all that it is the last.
-    template <class Observer>
-    struct Passing {
-        Observer& observer;
-        bool last;
-
-        template <class Segment>
-        bool segment(const Segment& s) {
-            if (last || !s.last) return observer.segment(s);
-            Segment inner = s;
+    class Passing final : public Observer {
+     public:
+        Passing(Observer& to, bool last) : to_(to), last_(last) {}
+        bool segment(const Segment<System>& s) override {
+            if (last_ || !s.last) return to_.segment(s);
+            Segment<System> inner = s;
             inner.last = false;
-            return observer.segment(inner);
+            return to_.segment(inner);
         }
-        template <class Regime, class Memory, class Dense>
-            requires requires(Observer o, Regime r, Memory m, Dense d) { o.step(r, m, d, true); }
-        void step(const Regime& r, const Memory& m, const Dense& dense, bool at_end) {
-            observer.step(r, m, dense, at_end && last);
+        void step(const typename System::Regime& r, const typename D::Memory& m, const DenseStepOf<D>& dense,
+                  bool at_end) override {
+            to_.step(r, m, dense, at_end && last_);
         }
-        template <class Switching>
-            requires requires(Observer o, Switching s) { o.switching(s); }
-        void switching(const Switching& s) {
-            observer.switching(s);
-        }
-        bool wants_switching() const
-            requires requires(const Observer o) { o.wants_switching(); }
-        {
-            return observer.wants_switching();
-        }
+        bool wants_switching() const override { return to_.wants_switching(); }
+        void switching(const SwitchingOf<System>& s) override { to_.switching(s); }
+
+     private:
+        Observer& to_;
+        bool last_;
     };
 
-    // What the observer has seen but not yet read must be read before the inputs change.
-    template <class Observer>
-    static bool flushed(Observer& observer) {
-        if constexpr (requires { observer.flush(); }) return observer.flush();
-        return true;
+    void hold_until(double end, ControlRecord* record) const {
+        if (record != nullptr) record->hold_until(end, loop_, course_);
     }
     // With windings, by the parts of a tick.
-    template <class Observer, class Record>
-    Status advance_windings(double tick, double t_end, bool last_tick, Observer& observer, Record& record) {
+    Status advance_windings(double tick, double t_end, bool last_tick, Observer& observer, ControlRecord* record) {
         const double to = last_tick ? t_end : tick;
         while (true) {
             if (const double now = solver_.time();
                 !loop_.ticks.before(now, windings_.end(course_.slots)) && loop_.ticks.before(now, to)) {
-                if (!flushed(observer)) return Status::interrupted;
+                if (!observer.flush()) return Status::interrupted;
                 if (const Status s = windings_.plan(tick, course_.slots, observer); s != Status::done) return s;
             }
             double end = windings_.end(course_.slots);
             if (!loop_.ticks.before(end, to)) end = to;
             const bool last = last_tick && !(end < t_end);
-            record(end);
-            Passing<Observer> passing{observer, last};
+            hold_until(end, record);
+            Passing passing(observer, last);
             if (const Status s = solver_.advance(end, passing); s != Status::done) return s;
             if (!(end < to)) return Status::done;
         }
@@ -288,9 +257,8 @@ class ClosedLoopRun {
         return true;
     }
     // All axes sample the same instant before any of them acts.
-    template <class Observer>
     bool run_tick(const StateOf<D>& x, const typename D::Memory& memory, Observer& observer) {
-        if constexpr (requires { observer.tick(loop_, course_, x, memory); }) observer.tick(loop_, course_, x, memory);
+        observer.tick(loop_, course_, x, memory);
         changed_ = course_.next == 0;
         const bool well = each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
             const double before =
@@ -312,30 +280,42 @@ class ClosedLoopRun {
     bool changed_ = false;
 };
 
-// From a start to options.duration, open loop or under the controllers of options. make_loop(laws): these in the
+// What every run is asked for.
+struct RunRequest {
+    double duration = 1.0;          // [s]
+    double sample_interval = 1e-3;  // [s]
+    std::size_t samples = 0;        // instants k * sample_interval to record, from k = 0
+    bool energy = true;
+    std::size_t max_switchings = 100000;  // kept; all are counted
+    bool (*interrupted)(void*) = nullptr;
+    void* interrupted_context = nullptr;
+    Control control;                // nothing: the inputs alone act
+    double* control_out = nullptr;  // (axes x signals) x samples, as ControlRecord
+};
+
+// From a start to the end of the run, open loop or under the controllers of the request. make_loop(laws): these in the
 // system.
-template <class Solver, class Options, class Observer, class MakeLoop>
-Status run_recorded(Solver& solver, const StartOf<typename Solver::D>& start, const Options& options,
-                    Observer& observer, MakeLoop&& make_loop) {
-    solver.interrupted = options.interrupted;
-    solver.interrupted_context = options.interrupted_context;
-    if (!options.control.present()) {
+template <class Solver, class MakeLoop>
+Status run_recorded(Solver& solver, const StartOf<typename Solver::D>& start, const RunRequest& request,
+                    typename Solver::Observer& observer, MakeLoop&& make_loop) {
+    solver.interrupted = request.interrupted;
+    solver.interrupted_context = request.interrupted_context;
+    if (!request.control.present()) {
         const Status begun = solver.begin(0.0, start.x, start.memory);
-        return begun == Status::done && options.duration > 0.0 ? solver.advance(options.duration, observer) : begun;
+        return begun == Status::done && request.duration > 0.0 ? solver.advance(request.duration, observer) : begun;
     }
-    const std::vector<control::Axis> laws = options.control.laws();
+    const std::vector<control::Axis> laws = request.control.laws();
     auto loop = make_loop(laws);
-    loop.ticks.sample_interval = options.sample_interval;
+    loop.ticks.sample_interval = request.sample_interval;
     ClosedLoopRun<Solver> run(solver, loop);
-    ControlRecord record(options.sample_interval, options.control_out == nullptr ? 0 : options.samples,
-                         options.control.signals(), options.control_out);
+    ControlRecord record(request.sample_interval, request.control_out == nullptr ? 0 : request.samples,
+                         request.control.signals(), request.control_out);
     const Status begun = run.begin(start.x, start.memory, observer);
     if (begun != Status::done) return begun;
-    const auto hold_until = [&](double end) { record.hold_until(end, loop, run.course()); };
-    if (const Status s = run.advance(options.duration, observer, hold_until); s != Status::done) return s;
+    if (const Status s = run.advance(request.duration, observer, &record); s != Status::done) return s;
     const Status ended = run.show_end(observer);
-    if constexpr (requires { observer.finish(loop); }) observer.finish(loop);
-    if (ended == Status::done) hold_until(std::numeric_limits<double>::infinity());
+    observer.finish(loop);
+    if (ended == Status::done) record.hold_until(std::numeric_limits<double>::infinity(), loop, run.course());
     return ended;
 }
 

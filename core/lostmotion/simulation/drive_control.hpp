@@ -12,19 +12,7 @@ namespace lostmotion {
 inline constexpr auto only_motor = [](int) { return command - first_input; };
 
 // Those of a drive, whose shafts are 0, the motor's, and 1, the load's. The laws must stay.
-inline ClosedLoop<DriveDims> closed_loop_of(const Drive& drive, const Control& control,
-                                            const std::vector<control::Axis>& laws) {
-    const double i = drive.gearbox.ratio;
-    const LinearForm of_motor = LinearForm::unit(load_angle, i) + LinearForm::unit(twist, i),
-                     of_load = LinearForm::unit(load_angle);
-    ClosedLoop<DriveDims> loop{{control.tick}, laws, {}};
-    for (const ControlledAxis& axis : control.axes)
-        loop.places.push_back({only_motor(axis.motor), axis.position_shaft == 0 ? of_motor : of_load,
-                               axis.speed_shaft == 0 ? of_motor : of_load,
-                               LinearForm::unit(axis.speed_shaft == 0 ? motor_speed : load_speed),
-                               drive.motor.torque<LinearForm>({motor_torque, motor_speed, command, one}), of_motor,
-                               LinearForm::unit(motor_speed), axis.reference_shaft == 0 ? of_motor : of_load});
-    return loop;
-}
+ClosedLoop<DriveDims> closed_loop_of(const Drive& drive, const Control& control,
+                                     const std::vector<control::Axis>& laws);
 
 }  // namespace lostmotion

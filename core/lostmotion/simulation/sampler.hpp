@@ -21,7 +21,7 @@ namespace lostmotion {
 // out[c * count + k] is that of channels[c].
 // Reader(model, regime, memory) reads them.
 template <class System, class Reader, class Model>
-class SamplerOf {
+class SamplerOf : public Observer<System> {
  public:
     using D = typename System::Dims;
     using Instants = InstantsOf<D>;
@@ -41,7 +41,7 @@ class SamplerOf {
 
     double left_data_at = std::numeric_limits<double>::infinity();  // first instant outside the loss map's data [s]
 
-    bool segment(const Segment<System>& s) {
+    bool segment(const Segment<System>& s) final {
         if (!s.entry.regime.in_data) left_data_at = std::fmin(left_data_at, s.begin);
         const std::size_t end = due(s);
         if (next_ < end) {

@@ -12,13 +12,6 @@
 
 namespace lostmotion {
 
-struct NoObserver {
-    template <class Segment>
-    bool segment(const Segment&) {
-        return true;
-    }
-};
-
 template <class System>
 class SimulationOf {
  public:
@@ -57,16 +50,7 @@ class SimulationOf {
     // How many numbers the controllers remember.
     int control_slots() const { return loop_.slots(); }
     // What the controllers show at the present instant, axis by axis, each with its winding's signals behind.
-    std::vector<double> control_signals() const {
-        std::vector<double> out;
-        const double* slot = now_.control.slots.data();
-        for (const control::Axis& a : laws_) {
-            for (int s = 0; s < control::n_axis_signals; ++s) out.push_back(a.signal(s, slot));
-            for (const double v : winding_signals_of(a, now_.time, slot)) out.push_back(v);
-            slot += a.slots();
-        }
-        return out;
-    }
+    std::vector<double> control_signals() const;
 
     double time() const { return now_.time; }
     typename D::Contact stopped_at() const { return solver_.stopped_at(); }
@@ -129,6 +113,18 @@ SimulationOf<System>::SimulationOf(const System& system, const StateOf<D>& scale
     : system_(system), solver_(system, ramped_inputs<D>(inputs, sines), step, scale), inputs_(inputs), sines_(sines) {}
 
 template <class System>
+std::vector<double> SimulationOf<System>::control_signals() const {
+    std::vector<double> out;
+    const double* slot = now_.control.slots.data();
+    for (const control::Axis& a : laws_) {
+        for (int s = 0; s < control::n_axis_signals; ++s) out.push_back(a.signal(s, slot));
+        for (const double v : winding_signals_of(a, now_.time, slot)) out.push_back(v);
+        slot += a.slots();
+    }
+    return out;
+}
+
+template <class System>
 auto SimulationOf<System>::inputs() const -> Inputs {
     Inputs u = now_.input;
     for (const auto& [input, sine] : sines_) u[static_cast<std::size_t>(input)] += sine.at(now_.time);
@@ -139,7 +135,7 @@ template <class System>
 Status SimulationOf<System>::advance(double interval, Inputs begin, Inputs end) {
     resume(begin, end, interval);
     const bool steady = begin == end && sines_.empty(), unchanged = now_.steady && steady && begin == now_.input;
-    NoObserver nothing;
+    Observer<System> nothing;
     Status status = Status::done;
     if (!now_.started)
         status = begin_motion();
@@ -149,7 +145,7 @@ Status SimulationOf<System>::advance(double interval, Inputs begin, Inputs end) 
     }
     const double to = now_.time + interval;
     if (status == Status::done)
-        status = controllers_ ? controllers_->advance(to, nothing, [](double) {}) : solver_.advance(to, nothing);
+        status = controllers_ ? controllers_->advance(to, nothing, nullptr) : solver_.advance(to, nothing);
     if (status == Status::done) keep(end, steady);
     return status;
 }
@@ -177,7 +173,7 @@ void SimulationOf<System>::resume(Inputs& begin, Inputs& end, double interval) {
 template <class System>
 Status SimulationOf<System>::begin_motion() {
     // Controllers that have begun go on.
-    NoObserver nobody;
+    Observer<System> nobody;
     return controllers_ && now_.control.slots.empty() ? controllers_->begin(now_.x, now_.memory, nobody)
                                                       : solver_.begin(now_.time, now_.x, now_.memory);
 }
@@ -211,12 +207,7 @@ struct OwnDrive {
 
 class Simulation : private OwnDrive, public SimulationOf<SwitchedDrive> {
  public:
-    Simulation(const Drive& drive, double step, const Control& control = {}, const InputSines& sines = {})
-        : OwnDrive(drive),
-          SimulationOf(own_system, own_drive.balanced_scale(), step, SwitchedDrive::Dims::inputs, sines) {
-        if (control.present())
-            close_loop(control, [&](const auto& laws) { return closed_loop_of(own_drive, control, laws); });
-    }
+    Simulation(const Drive& drive, double step, const Control& control = {}, const InputSines& sines = {});
 
     const Drive& drive() const { return own_drive; }
     using SimulationOf::advance;
@@ -229,5 +220,9 @@ class Simulation : private OwnDrive, public SimulationOf<SwitchedDrive> {
         return Reader(drive(), r, snapshot().memory)(snapshot().x, inputs());
     }
 };
+
+// Compiled once, by core/kernels/drive.cpp.
+extern template class ExactSolver<SwitchedDrive>;
+extern template class SimulationOf<SwitchedDrive>;
 
 }  // namespace lostmotion

@@ -12,33 +12,7 @@
 namespace lostmotion {
 
 // What is wrong with the controllers of a train, or empty.
-inline std::string check_control(const model::Assembly& a, const Control& control) {
-    const auto told = [&](int shaft, const char* has, const char* remedy) -> std::string {
-        if (model::shaft_angle(a, shaft)) return "";
-        return "shaft '" + a.train().shafts[static_cast<std::size_t>(shaft)].name + "' " + has +
-               ", but its angle does not follow from that of the load: a clutch or a transmission error lies "
-               "between; " +
-               remedy;
-    };
-    for (const ControlledAxis& axis : control.axes) {
-        for (const int shaft : {axis.position_shaft, axis.speed_shaft})
-            if (const std::string error = told(shaft, "carries an encoder", "put the encoder on another shaft");
-                !error.empty())
-                return error;
-        if (axis.law.camera.present)
-            if (const std::string error =
-                    told(axis.reference_shaft, "carries a camera", "put the camera on another shaft");
-                !error.empty())
-                return error;
-        if (!axis.law.field_orientation) continue;
-        const int rotor = a.train().motors[static_cast<std::size_t>(axis.motor)].shaft;
-        if (const std::string error =
-                told(rotor, "is that of a motor under field-oriented control", "take a current loop of kind \"pi\"");
-            !error.empty())
-            return error;
-    }
-    return "";
-}
+std::string check_control(const model::Assembly& a, const Control& control);
 
 // The same in a kernel. The laws are those of `laws`, which must stay.
 template <class D>

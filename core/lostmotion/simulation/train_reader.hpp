@@ -30,71 +30,11 @@ struct TrainChannel {
 };
 
 // The inputs from this one on are those of the controllers.
-inline std::size_t first_reference(const model::Assembly& a) {
-    const auto& all = a.places().controllers;
-    return static_cast<std::size_t>(all.empty() ? a.layout().inputs : all[0].reference);
-}
+std::size_t first_reference(const model::Assembly& a);
 
-inline void add_controller_channels(const model::Assembly& a, int controller, std::vector<TrainChannel>& out) {
-    using C = TrainChannel;
-    const auto k = static_cast<std::size_t>(controller);
-    const model::LinearController& c = a.train().controllers[k];
-    const model::ControllerPlace& p = a.places().controllers[k];
-    const std::string unit = c.compared.kind == model::LinearController::Signal::angle ? "rad" : "rad/s";
-    out.push_back({C::output, controller, c.name + "_command", "", "command that the controller gives"});
-    out.push_back({C::input, p.reference, c.name + "_reference", unit, "reference of the controller"});
-    out.push_back({C::error, controller, c.name + "_error", unit, "reference less what is measured"});
-    if (p.reference_rate != model::nowhere)
-        out.push_back({C::input, p.reference_rate, c.name + "_reference_rate", unit + (unit == "rad" ? "/s" : "^2"),
-                       "rate of the reference"});
-    for (std::size_t j = 0; j < c.states.size(); ++j)
-        out.push_back(
-            {C::state, p.first_state + static_cast<int>(j), c.name + "_" + c.states[j], "", "state of the controller"});
-}
+void add_controller_channels(const model::Assembly& a, int controller, std::vector<TrainChannel>& out);
 
-inline std::vector<TrainChannel> train_channels(const model::Assembly& a) {
-    using C = TrainChannel;
-    const model::Train& t = a.train();
-    const model::Places& p = a.places();
-    std::vector<C> out;
-    const auto inputs = model::input_names(a);
-    for (std::size_t k = 0; k < inputs.size(); ++k) {
-        if (k >= first_reference(a)) break;
-        const bool load = inputs[k].ends_with("_load_torque");
-        out.push_back({C::input, static_cast<int>(k), inputs[k], load ? "N*m" : "",
-                       load ? "torque against the shaft" : "command"});
-    }
-    for (std::size_t k = 0; k < t.controllers.size(); ++k) add_controller_channels(a, static_cast<int>(k), out);
-    for (std::size_t k = 0; k < t.motors.size(); ++k)
-        out.push_back(
-            {C::motor_torque, static_cast<int>(k), t.motors[k].name + "_torque", "N*m", "torque of the motor"});
-    for (std::size_t k = 0; k < t.shafts.size(); ++k)
-        out.push_back({C::state, p.shafts[k].speed, t.shafts[k].name + "_speed", "rad/s", "speed of the shaft"});
-    for (std::size_t k = 0; k < t.shafts.size(); ++k)
-        if (p.shafts[k].angle != model::nowhere)
-            out.push_back({C::state, p.shafts[k].angle, t.shafts[k].name + "_angle", "rad", "angle of the shaft"});
-    for (int part = 0; part < a.layout().angles; ++part) {
-        const auto last = static_cast<std::size_t>(p.last_shaft[static_cast<std::size_t>(part)]);
-        if (p.shafts[last].angle == model::nowhere)
-            out.push_back(
-                {C::state, a.layout().coupled + part, t.shafts[last].name + "_angle", "rad", "angle of the shaft"});
-    }
-    for (std::size_t k = 0; k < t.gears.size(); ++k) {
-        const int gear = static_cast<int>(k);
-        const std::string& name = t.gears[k].name;
-        if (!t.gears[k].rigid())
-            out.push_back(
-                {C::state, p.gears[k].twist, name + "_twist", "rad", "angle of input/ratio less that of output"});
-        out.push_back({C::output_torque, gear, name + "_output_torque", "N*m", "torque on the output shaft"});
-        out.push_back({C::input_torque, gear, name + "_input_torque", "N*m", "torque taken from the input shaft"});
-    }
-    for (int c = 0; c < a.layout().contacts; ++c) {
-        const std::string name = model::contact_name(a, c);
-        out.push_back({C::contact_torque, c, name + "_torque", "N*m", "what the dry contact takes"});
-        out.push_back({C::contact_mode, c, name, "", "slips forward (+1) or backward (-1), or is stuck (0)"});
-    }
-    return out;
-}
+std::vector<TrainChannel> train_channels(const model::Assembly& a);
 
 // Reads the channels in one regime, as many instants at once as the instruction set holds numbers.
 template <class D>

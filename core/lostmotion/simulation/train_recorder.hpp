@@ -73,7 +73,7 @@ class TrainWatcher {
 };
 
 template <class D>
-class TrainRecorder {
+class TrainRecorder final : public Observer<model::TrainSystem<D>> {
  public:
     using System = model::TrainSystem<D>;
     using Model = typename TrainReader<D>::Model;
@@ -93,21 +93,21 @@ class TrainRecorder {
         sampler_.interrupted_context = options.interrupted_context;
     }
 
-    bool segment(const Segment<System>& s) {
+    bool segment(const Segment<System>& s) override {
         if (watcher_ != nullptr) watcher_->segment(s);
         if (options_.energy) meter_.segment(s);
         return sampler_.segment(s);
     }
-    bool flush() { return sampler_.write(); }
-    bool wants_switching() const { return watcher_ != nullptr || keeps_switching(); }
+    bool flush() override { return sampler_.write(); }
+    bool wants_switching() const override { return watcher_ != nullptr || keeps_switching(); }
     void tick(const ClosedLoop<D>& loop, const ControlCourse& course, const StateOf<D>& x,
-              const typename D::Memory& memory) {
+              const typename D::Memory& memory) override {
         if (watcher_ != nullptr) watcher_->tick(loop, course, x, memory);
     }
-    void finish(const ClosedLoop<D>& loop) {
+    void finish(const ClosedLoop<D>& loop) override {
         if (watcher_ != nullptr) watcher_->finish(loop);
     }
-    void switching(const SwitchingOf<System>& s) {
+    void switching(const SwitchingOf<System>& s) override {
         if (watcher_ != nullptr) watcher_->switching(s);
         if (!keeps_switching()) return;
         int branch = -1;

@@ -19,29 +19,17 @@ namespace lostmotion {
 // By name; what is left out is 0.
 using Named = std::map<std::string, double>;
 
-inline double value_of(const Named& values, const std::string& name) {
-    const auto found = values.find(name);
-    return found == values.end() ? 0.0 : found->second;
-}
+double value_of(const Named& values, const std::string& name);
 
 struct TrainStart {
     Named states;
     Named hysteresis_capacities;  // of gears [N m]
 };
 
-struct TrainOptions {
-    double duration = 1.0;                     // [s]
-    double sample_interval = 1e-3;             // [s]
-    std::size_t samples = 0;                   // instants k * sample_interval to record, from k = 0
-    std::vector<double> instants;              // these instead [s], ascending; exact solver, without control_out
+struct TrainOptions : RunRequest {
+    std::vector<double> instants;              // to record [s], ascending; exact solver, without control_out
     std::optional<std::vector<int>> channels;  // to record, by their place among TrainRun::channels(); left out, all
-    bool energy = true;
-    std::size_t max_switchings = 100000;  // kept; all are counted
-    double tolerance = 0.0;               // relative, of the adaptive solver; 0: the exact one
-    bool (*interrupted)(void*) = nullptr;
-    void* interrupted_context = nullptr;
-    Control control;                // nothing: the inputs alone act
-    double* control_out = nullptr;  // (axes x signals) x samples, as ControlRecord
+    double tolerance = 0.0;                    // relative, of the adaptive solver; 0: the exact one
 
     SampleTimes times() const { return {sample_interval, instants.empty() ? samples : instants.size(), instants}; }
 };
@@ -55,12 +43,7 @@ struct TrainSwitching {
 };
 
 // Time, cause, the modes of all contacts before and after.
-inline double* write_switching(const TrainSwitching& s, int contacts, double* to) {
-    *to++ = s.time;
-    *to++ = s.input_jump ? input_changed : static_cast<int>(s.kind);
-    to = std::copy_n(s.before.modes.begin(), contacts, to);
-    return std::copy_n(s.after.modes.begin(), contacts, to);
-}
+double* write_switching(const TrainSwitching& s, int contacts, double* to);
 
 struct TrainEnergy {
     std::string name;
@@ -110,44 +93,17 @@ struct TrainReport {
         }
     }
     // What the balance fails by [J].
-    double residual() const {
-        double sum = stored_begin - stored_end;
-        for (const TrainEnergy& e : energy) sum += e.kind == model::PowerFlow::source ? e.energy : -e.energy;
-        return sum;
-    }
+    double residual() const;
 };
 
 // Why a run has not ended well, or empty.
-inline std::string error_text(const TrainReport& report, const model::Assembly& a) {
-    if (!report.message.empty()) return report.message;
-    return train_status_text(a, report.status, report.time, report.contact, report.too_many_guards);
-}
+std::string error_text(const TrainReport& report, const model::Assembly& a);
 
 // The energy ledger by name [J], also of flows that there have not been.
-inline std::vector<std::string> ledger_names(const model::Assembly& a) {
-    std::vector<std::string> names = model::flow_names(a);
-    for (const char* name : {"stored_change", "residual", "turned_over"}) names.emplace_back(name);
-    return names;
-}
-inline Named named_ledger(const TrainReport& report, const model::Assembly& a) {
-    Named ledger;
-    for (const std::string& name : ledger_names(a)) ledger[name] = 0.0;
-    for (const TrainEnergy& e : report.energy) ledger.at(e.name) = e.energy;
-    ledger["stored_change"] = report.stored_end - report.stored_begin;
-    ledger["residual"] = report.residual();
-    ledger["turned_over"] = report.turned_over;
-    return ledger;
-}
+std::vector<std::string> ledger_names(const model::Assembly& a);
+Named named_ledger(const TrainReport& report, const model::Assembly& a);
 
 // States, and capacities of the hysteresis of gears [N m].
-inline Named named_end(const TrainReport& report, const model::Assembly& a) {
-    Named end;
-    const std::vector<std::string> states = model::state_names(a);
-    for (std::size_t k = 0; k < states.size(); ++k) end[states[k]] = report.x[k];
-    for (std::size_t g = 0; g < a.train().gears.size(); ++g)
-        if (const int h = a.places().gears[g].hysteresis; h != model::nowhere)
-            end[a.train().gears[g].name + "_hysteresis_capacity"] = report.memory[static_cast<std::size_t>(h)];
-    return end;
-}
+Named named_end(const TrainReport& report, const model::Assembly& a);
 
 }  // namespace lostmotion

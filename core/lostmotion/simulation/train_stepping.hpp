@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "stepping.hpp"
 #include "train_run.hpp"
 
 namespace lostmotion {
@@ -58,12 +59,7 @@ std::vector<double> TrainSimulationIn<D>::values() {
 class TrainSimulation {
  public:
     // The train must have passed the check, and its controllers theirs.
-    TrainSimulation(const model::Train& train, double step, const Control& control = {}, const InputSines& sines = {})
-        : run_(train) {
-        run_.in_kernel([&]<class D>(const typename TrainReader<D>::Model&) {
-            in_ = std::make_unique<TrainSimulationIn<D>>(run_, step, control, sines);
-        });
-    }
+    TrainSimulation(const model::Train& train, double step, const Control& control = {}, const InputSines& sines = {});
     const model::Assembly& assembly() const { return run_.assembly(); }
     const std::vector<TrainChannel>& channels() const { return run_.channels(); }
 
@@ -81,27 +77,9 @@ class TrainSimulation {
         return with([](const auto& s) { return s.time(); });
     }
     // Each input runs in a straight line from its first to its second value.
-    Status advance(double interval, std::span<const double> begin, std::span<const double> end) {
-        return with([&]<class D>(TrainSimulationIn<D>& s) {
-            InputsOf<D> first{}, last{};
-            std::copy(begin.begin(), begin.end(), first.begin());
-            std::copy(end.begin(), end.end(), last.begin());
-            return s.advance(interval, first, last);
-        });
-    }
+    Status advance(double interval, std::span<const double> begin, std::span<const double> end);
     // To t = 0, with the contacts still to be found. Returns what is wrong with the start, or nothing.
-    std::string reset(const TrainStart& start) {
-        const auto [x, memory] = run_.in_layout(start);
-        if (std::string error = check_start(assembly(), x); !error.empty()) return error;
-        with([&, &x = x, &memory = memory]<class D>(TrainSimulationIn<D>& s) {
-            const auto begin = model::packed_start<D>(assembly().layout(), x, memory);
-            typename TrainSimulationIn<D>::Snapshot to;
-            to.x = begin.x;
-            to.memory = begin.memory;
-            s.restore(to);
-        });
-        return "";
-    }
+    std::string reset(const TrainStart& start);
 
  private:
     template <class... D>
@@ -110,5 +88,17 @@ class TrainSimulation {
     TrainRun run_;
     std::conditional_t<built == Kernel::all, In<model::Narrow, model::Middle, model::Wide>, In<model::Widest>> in_;
 };
+
+// Compiled once for each kernel, by core/kernels.
+#define LOSTMOTION_TRAIN_STEPPING(TEMPLATE, D)          \
+    TEMPLATE class Propagator<D>;                       \
+    TEMPLATE class Taylor<D>;                           \
+    TEMPLATE class Cursor<D>;                           \
+    TEMPLATE class LongStep<D>;                         \
+    TEMPLATE class Stride<D>;                           \
+    TEMPLATE class ExactSolver<model::TrainSystem<D>>;  \
+    TEMPLATE class SimulationOf<model::TrainSystem<D>>; \
+    TEMPLATE class TrainSimulationIn<D>;
+LOSTMOTION_EACH_KERNEL(LOSTMOTION_TRAIN_STEPPING, extern template)
 
 }  // namespace lostmotion

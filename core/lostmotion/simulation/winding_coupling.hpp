@@ -52,8 +52,7 @@ class WindingCoupling {
     }
 
     // From the solver's state on as far as to a part of a tick's end, at most to that of the tick. Sets the inputs.
-    template <class Observer>
-    Status plan(double tick_end, std::span<double> slots, Observer& observer) {
+    Status plan(double tick_end, std::span<double> slots, typename Solver::Observer& observer) {
         const double now = solver_.time();
         for (Motor& m : motors_) m.next = from_now(m, slots);
         double end = first_end(tick_end);
@@ -97,15 +96,6 @@ class WindingCoupling {
             return 1.5 * w.pole_pairs * most;
         }
     };
-    struct Nobody {
-        template <class... Any>
-        bool segment(const Any&...) {
-            return true;
-        }
-        template <class... Any>
-        void step(const Any&...) {}
-    };
-
     static double value(const LinearFormOf<D>& form, const Solver& solver) {
         return evaluate<D>(form, solver.state(), solver.memory(), InputsOf<D>{});
     }
@@ -158,7 +148,7 @@ class WindingCoupling {
             probe_->follow(solver_);
             for (Motor& m : motors_) set_torque(*probe_, m);
             const std::size_t switchings = probe_->switchings();
-            Nobody nobody;
+            typename Solver::Observer nobody;
             if (probe_->inputs_changed(nobody) != Status::done || probe_->advance(end, nobody) != Status::done)
                 return true;  // the run will see for itself
             double change = 0.0;

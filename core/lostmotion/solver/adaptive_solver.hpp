@@ -75,9 +75,10 @@ struct DenseStepOf {
     }
 };
 
-template <class System, class Remainder = NoRemainder>
+template <class System_, class Remainder = NoRemainder>
 class AdaptiveSolver {
  public:
+    using System = System_;
     using D = typename System::Dims;
     using Cache = RegimeCache<System>;
     using Regime = typename System::Regime;
@@ -91,6 +92,7 @@ class AdaptiveSolver {
     using Signals = SignalsOf<D>;
     using Inputs = InputsOf<D>;
     using DenseStep = DenseStepOf<D>;
+    using Observer = lostmotion::Observer<System>;
 
     AdaptiveSolver(const System& system, const Signals& signals, double relative_tolerance, const State& scale,
                    Remainder remainder = {})
@@ -152,7 +154,6 @@ class AdaptiveSolver {
         if (!left_) left_ = input_before(time_, now_.x);
         signals_[input].breakpoints[0] = {time_, value, slope};
     }
-    template <class Observer>
     Status inputs_changed(Observer& observer) {
         input_.anchor(time_);
         see_inputs(system_, input_, time_, now_);
@@ -163,9 +164,7 @@ class AdaptiveSolver {
         return status;
     }
 
-    // observer.step(regime, memory, dense step, whether it is the last), observer.switching(...); the inputs at any
-    // time through `input_at`. A step holds up to its end, the last one there, too.
-    template <class Observer>
+    // The observer finds the inputs at any time through `input_at`.
     Status advance(double t_end, Observer& observer) {
         t_end_ = t_end;
         while (time_ < t_end) {
@@ -202,7 +201,6 @@ class AdaptiveSolver {
         return u;
     }
 
-    template <class Observer>
     Status change_regime(const Guard* fired, Observer& observer) {
         if (fired != nullptr) input_.anchor(time_);
         const Status status = switch_regime(system_, cache_, input_, time_, fired, now_, key_, observer);
@@ -230,7 +228,6 @@ class AdaptiveSolver {
         double limit;
     };
 
-    template <class Observer>
     Status run_regime(double limit, const Guard*& fired, Observer& observer) {
         const auto& entry = cache_.entry(key_);
         Motion motion{entry, entry.rates.constant(now_.memory), {}, limit};

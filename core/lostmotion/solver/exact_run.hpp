@@ -26,9 +26,10 @@ struct Segment {
     StateOf<typename System::Dims> x_end;      // at end, before any stop there
 };
 
-template <class System>
+template <class System_>
 class ExactSolver {
  public:
+    using System = System_;
     using Cache = RegimeCache<System>;
     using Entry = typename Cache::Entry;
     using D = typename System::Dims;
@@ -50,20 +51,12 @@ class ExactSolver {
     using InputState = lostmotion::InputState<D>;
     using Propagator = lostmotion::Propagator<D>;
     using Expansion = lostmotion::Expansion<D>;
+    using Observer = lostmotion::Observer<System>;
 
     // unit: a length of time [s] that is to be a power-of-two multiple of the elementary steps, such as the
     // sampling interval. scale: natural magnitudes of the states.
     // shared: regimes of the same system that an earlier solver has left, if any.
-    ExactSolver(const System& system, const Signals& signals, double unit, const State& scale, Cache* shared = nullptr)
-        : system_(system),
-          signals_(without_idle_sines(signals)),
-          own_(shared == nullptr ? std::make_unique<Cache>(system) : nullptr),
-          cache_(shared == nullptr ? *own_ : *shared),
-          scale_(scale),
-          unit_(elementary(unit)),
-          rotations_(cache_.serve(unit_, input_basis(signals_))),
-          cursors_{start(), start(), start(), start()},
-          input_bound_(begin_->input().fourth_derivative_bound()) {}
+    ExactSolver(const System& system, const Signals& signals, double unit, const State& scale, Cache* shared = nullptr);
     ExactSolver(const ExactSolver&) = delete;
     ExactSolver& operator=(const ExactSolver&) = delete;
 
@@ -86,16 +79,7 @@ class ExactSolver {
     std::size_t switchings() const { return switchings_; }
 
     // Sets the state and finds the regime it is in.
-    Status begin(double time, const State& x, const Memory& memory) {
-        set_time(time);
-        course_ = {};
-        switchings_ = 0;
-        now_.x = x;
-        now_.memory = memory;
-        anchor_inputs();
-        course_.input = now_.input[0];
-        return status_of(system_.start(cache_, now_, key_));
-    }
+    Status begin(double time, const State& x, const Memory& memory);
     // Continues from a state with a known regime.
     void resume(double time, const State& x, const Memory& memory, const Key& key, const Course& course = {}) {
         set_time(time);
@@ -108,84 +92,20 @@ class ExactSolver {
     // From now on the input is value + slope * (t - now). Only for signals made with ramped_inputs().
     void set_ramp(int input, double value, double slope) { signals_[input].breakpoints[0] = {time_, value, slope}; }
     // Another solver of the same system, inputs and regimes. Made before a run begins.
-    std::unique_ptr<ExactSolver> twin() const {
-        return std::make_unique<ExactSolver>(system_, signals_, unit_, scale_, &cache_);
-    }
+    std::unique_ptr<ExactSolver> twin() const;
     // To where another is, with the same inputs. What follows is inputs_changed().
-    void follow(const ExactSolver& o) {
-        resume(o.time_, o.now_.x, o.now_.memory, o.key_, o.course_);
-        for (int i = 0; i < D::inputs; ++i)
-            if (signals_[i].breakpoints.size() == 1) signals_[i].breakpoints[0] = o.signals_[i].breakpoints[0];
-    }
+    void follow(const ExactSolver& o);
     // Of the inputs, the left limit.
-    InputsOf<D> input_before(double t, const State&) const {
-        InputState input(signals_, rotations_.basis());
-        input.anchor_left(t);
-        return input.values();
-    }
+    InputsOf<D> input_before(double t, const State&) const;
     // The inputs have changed at this instant: finds the regime anew.
-    template <class Observer>
-    Status inputs_changed(Observer& observer) {
-        const Key before = key_;
-        anchor_inputs();
-        bool changed = false;
-        const Status status =
-            follow_change<System, Cache, D>(system_, cache_, course_.input, now_, key_, observer, changed);
-        switchings_ += changed;
-        follow_inputs(before);
-        return status;
-    }
-
+    Status inputs_changed(Observer& observer);
     Status inputs_changed() {
-        struct {
-        } nobody;
+        Observer nobody;
         return inputs_changed(nobody);
     }
 
     // Runs to t_end. The observer gets every segment as it comes and, if it wants them, the switchings between.
-    template <class Observer>
-    Status advance(double t_end, Observer& observer) {
-        begin_->inputs().anchor(time_);
-        crossings_ = 0;  // so that what follows depends on the state alone
-        if (jump_pending_) {
-            jump_pending_ = false;
-            const Status status = change_regime(nullptr, observer);
-            if (status != Status::done) return status;
-        }
-        while (true) {
-            Entry& entry = cache_.entry(key_);
-            if (!entry.propagator.ready()) entry.prepare(rotations_, scale_);
-            Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
-                                    now_.x};
-            begin_->place(entry.propagator, segment.constant, now_.x, course_.rate_known ? &course_.rate : nullptr);
-            if (begin_->constant_inputs()) {
-                if (has_settled(entry.regime, begin_->rate())) begin_->settle();
-            } else if (rest_unforced(entry, begin_->rate())) {
-                segment.x_end = now_.x;
-                begin_->place(entry.propagator, segment.constant, now_.x);
-            }
-            if (!(time_ < breakpoint_)) breakpoint_ = next_breakpoint(signals_, time_);
-            double limit = std::min(t_end, breakpoint_);
-            if (const Regime& r = entry.regime; r.driving_input >= 0) [[unlikely]]
-                limit = begin_->input().turning(r.driving_input, r.driving_way, limit);
-            else if (follows_inputs(r)) [[unlikely]]
-                limit = first_turn(entry, limit);
-            const Guard* fired = nullptr;
-            const Status status = run_regime(segment, limit, fired);
-            if (status != Status::done) return status;
-            segment.end = time_;
-            segment.x_end = now_.x;
-            segment.last = fired == nullptr && time_ >= t_end;
-            if (!observer.segment(segment)) return Status::interrupted;
-            if (segment.last) {
-                jump_pending_ = breakpoint_ == t_end;  // it belongs to what comes after
-                return Status::done;
-            }
-            if (fired == nullptr && time_ < limit) continue;  // the motion has settled
-            const Status switched = change_regime(fired, observer);
-            if (switched != Status::done) return switched;
-        }
-    }
+    Status advance(double t_end, Observer& observer);
 
  private:
     static constexpr double converging = 1e-7;  // the next correction is less than the square of the last
@@ -212,23 +132,7 @@ class ExactSolver {
         see_inputs(begin_->input(), time_, now_);
     }
 
-    template <class Observer>
-    Status change_regime(const Guard* fired, Observer& observer) {
-        if (fired != nullptr) {
-            std::swap(begin_, there_);
-            if (++crossings_ % 8 == 0) begin_->inputs().anchor(time_);
-        }
-        const Key before = key_;
-        const Status status = switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, observer);
-        if (fired != nullptr) stopped_at_ = fired->contact;
-        if (status != Status::done) return status;
-        if (fired == nullptr)
-            follow_inputs(before);
-        else
-            course_.forget();
-        ++switchings_;
-        return accumulation_.add(time_, unit_) ? Status::zeno : Status::done;
-    }
+    Status change_regime(const Guard* fired, Observer& observer);
 
     enum class Verdict { clear, crossing, uncertain };
 
@@ -322,5 +226,123 @@ class ExactSolver {
     bool jump_pending_ = false;
     Contact stopped_at_{};
 };
+
+template <class System>
+ExactSolver<System>::ExactSolver(const System& system, const Signals& signals, double unit, const State& scale,
+                                 Cache* shared)
+    : system_(system),
+      signals_(without_idle_sines(signals)),
+      own_(shared == nullptr ? std::make_unique<Cache>(system) : nullptr),
+      cache_(shared == nullptr ? *own_ : *shared),
+      scale_(scale),
+      unit_(elementary(unit)),
+      rotations_(cache_.serve(unit_, input_basis(signals_))),
+      cursors_{start(), start(), start(), start()},
+      input_bound_(begin_->input().fourth_derivative_bound()) {}
+
+template <class System>
+Status ExactSolver<System>::begin(double time, const State& x, const Memory& memory) {
+    set_time(time);
+    course_ = {};
+    switchings_ = 0;
+    now_.x = x;
+    now_.memory = memory;
+    anchor_inputs();
+    course_.input = now_.input[0];
+    return status_of(system_.start(cache_, now_, key_));
+}
+
+template <class System>
+std::unique_ptr<ExactSolver<System>> ExactSolver<System>::twin() const {
+    return std::make_unique<ExactSolver>(system_, signals_, unit_, scale_, &cache_);
+}
+
+template <class System>
+void ExactSolver<System>::follow(const ExactSolver& o) {
+    resume(o.time_, o.now_.x, o.now_.memory, o.key_, o.course_);
+    for (int i = 0; i < D::inputs; ++i)
+        if (signals_[i].breakpoints.size() == 1) signals_[i].breakpoints[0] = o.signals_[i].breakpoints[0];
+}
+
+template <class System>
+InputsOf<typename System::Dims> ExactSolver<System>::input_before(double t, const State&) const {
+    InputState input(signals_, rotations_.basis());
+    input.anchor_left(t);
+    return input.values();
+}
+
+template <class System>
+Status ExactSolver<System>::inputs_changed(Observer& observer) {
+    const Key before = key_;
+    anchor_inputs();
+    bool changed = false;
+    const Status status =
+        follow_change<System, Cache, D>(system_, cache_, course_.input, now_, key_, observer, changed);
+    switchings_ += changed;
+    follow_inputs(before);
+    return status;
+}
+
+template <class System>
+Status ExactSolver<System>::advance(double t_end, Observer& observer) {
+    begin_->inputs().anchor(time_);
+    crossings_ = 0;  // so that what follows depends on the state alone
+    if (jump_pending_) {
+        jump_pending_ = false;
+        const Status status = change_regime(nullptr, observer);
+        if (status != Status::done) return status;
+    }
+    while (true) {
+        Entry& entry = cache_.entry(key_);
+        if (!entry.propagator.ready()) entry.prepare(rotations_, scale_);
+        Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
+                                now_.x};
+        begin_->place(entry.propagator, segment.constant, now_.x, course_.rate_known ? &course_.rate : nullptr);
+        if (begin_->constant_inputs()) {
+            if (has_settled(entry.regime, begin_->rate())) begin_->settle();
+        } else if (rest_unforced(entry, begin_->rate())) {
+            segment.x_end = now_.x;
+            begin_->place(entry.propagator, segment.constant, now_.x);
+        }
+        if (!(time_ < breakpoint_)) breakpoint_ = next_breakpoint(signals_, time_);
+        double limit = std::min(t_end, breakpoint_);
+        if (const Regime& r = entry.regime; r.driving_input >= 0) [[unlikely]]
+            limit = begin_->input().turning(r.driving_input, r.driving_way, limit);
+        else if (follows_inputs(r)) [[unlikely]]
+            limit = first_turn(entry, limit);
+        const Guard* fired = nullptr;
+        const Status status = run_regime(segment, limit, fired);
+        if (status != Status::done) return status;
+        segment.end = time_;
+        segment.x_end = now_.x;
+        segment.last = fired == nullptr && time_ >= t_end;
+        if (!observer.segment(segment)) return Status::interrupted;
+        if (segment.last) {
+            jump_pending_ = breakpoint_ == t_end;  // it belongs to what comes after
+            return Status::done;
+        }
+        if (fired == nullptr && time_ < limit) continue;  // the motion has settled
+        const Status switched = change_regime(fired, observer);
+        if (switched != Status::done) return switched;
+    }
+}
+
+template <class System>
+Status ExactSolver<System>::change_regime(const Guard* fired, Observer& observer) {
+    if (fired != nullptr) {
+        std::swap(begin_, there_);
+        if (++crossings_ % 8 == 0) begin_->inputs().anchor(time_);
+    }
+    const Key before = key_;
+    const Status status = switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, observer);
+    if (fired != nullptr) stopped_at_ = fired->contact;
+    if (status != Status::done) return status;
+    if (fired == nullptr)
+        follow_inputs(before);
+    else
+        course_.forget();
+    ++switchings_;
+    return accumulation_.add(time_, unit_) ? Status::zeno : Status::done;
+}
 
 }  // namespace lostmotion

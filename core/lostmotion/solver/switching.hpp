@@ -5,6 +5,7 @@
 
 #include "../kernel/flow.hpp"
 #include "../kernel/inputs.hpp"
+#include "observer.hpp"
 #include "status.hpp"
 
 namespace lostmotion {
@@ -41,18 +42,6 @@ void see_inputs(const System& system, const InputState<D>& input, double time, I
     if constexpr (requires { system.set_remainders(now); }) system.set_remainders(now);
 }
 
-// Whether an observer of a run wants to see the next switching: if it has switching(), and wants_switching() does not
-// say otherwise.
-template <class System, class Observer>
-bool wants_switching(const Observer& observer) {
-    if constexpr (!requires(Observer o, SwitchingOf<System> s) { o.switching(s); })
-        return false;
-    else if constexpr (requires { observer.wants_switching(); })
-        return observer.wants_switching();
-    else
-        return true;
-}
-
 // Does an input take the torque of a contact at its limit along in this regime?
 template <class Regime>
 bool follows_inputs(const Regime& r) {
@@ -63,27 +52,25 @@ bool follows_inputs(const Regime& r) {
 }
 
 // Completes a switching with what there is after it, and shows it.
-template <class System, class Cache, class D, class Observer>
+template <class System, class Cache, class D>
 void show_switching(const System& system, Cache& cache, const InstantOf<D>& now, const typename System::Key& key,
-                    SwitchingOf<System>& s, Observer& observer) {
-    if constexpr (requires { observer.switching(s); }) {
-        s.after = key;
-        s.x = now.x;
-        s.memory = now.memory;
-        s.torque_after = evaluate<D>(system.torque_at_load(cache.regime(key)), now.x, now.memory, now.input[0]);
-        observer.switching(s);
-    }
+                    SwitchingOf<System>& s, Observer<System>& observer) {
+    s.after = key;
+    s.x = now.x;
+    s.memory = now.memory;
+    s.torque_after = evaluate<D>(system.torque_at_load(cache.regime(key)), now.x, now.memory, now.input[0]);
+    observer.switching(s);
 }
 
 // Finds the regime that follows after `fired` has reached zero, with the inputs of that instant, or, if it is nullptr,
 // after an input has jumped. Shows the switching to the observer, if it wants to see it.
-template <class System, class Cache, class D, class Observer>
+template <class System, class Cache, class D>
 Status switch_regime(const System& system, Cache& cache, InputState<D>& input, double time,
                      const typename System::Guard* fired, InstantOf<D>& now, typename System::Key& key,
-                     Observer& observer) {
+                     Observer<System>& observer) {
     using Guard = typename System::Guard;
     if (fired != nullptr && fired->kind == Guard::outside) return Status::outside;
-    const bool wanted = wants_switching<System>(observer);
+    const bool wanted = observer.wants_switching();
     SwitchingOf<System> s;
     if (wanted) {
         const auto& old = cache.regime(key);
@@ -123,10 +110,10 @@ Status switch_regime(const System& system, Cache& cache, InputState<D>& input, d
 
 // Finds the regime anew where the inputs have changed, from what they were up to here. Shows the switching to the
 // observer, if there is one and it wants to see it. changed: whether there is.
-template <class System, class Cache, class D, class Observer>
+template <class System, class Cache, class D>
 Status follow_change(const System& system, Cache& cache, const InputsOf<D>& left, InstantOf<D>& now,
-                     typename System::Key& key, Observer& observer, bool& changed) {
-    const bool wanted = wants_switching<System>(observer);
+                     typename System::Key& key, Observer<System>& observer, bool& changed) {
+    const bool wanted = observer.wants_switching();
     SwitchingOf<System> s;
     s.before = key;
     if (wanted) s.torque_before = evaluate<D>(system.torque_at_load(cache.regime(key)), now.x, now.memory, left);

@@ -5,10 +5,12 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+import shutil
 from pathlib import Path
 
 from ..atomic_writer import write_bytes
 from ..errors import InputError
+from ..portable.checkout import made_here
 from ..portable.description import kernel_of
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
@@ -38,6 +40,12 @@ def page(scenario: Scenario | TrainScenario, name: str = "drive") -> str:
         A controller has a law of your own, which only Python can call; in a checkout, the page has not been built.
     """
     core = core_of(scenario)
+    if shutil.which("npm") is not None:
+        made_here(
+            f"page-{kernel_of(scenario)}",
+            [core] if TEMPLATE.is_file() and core.is_file() else [],
+            "the core of the live page",
+        )
     for part in (TEMPLATE, core):
         if not part.is_file():
             raise InputError(f"{part}: is missing, since the live page is not built; run `make page`, which needs node")

@@ -26,6 +26,7 @@ from ..simulation.train_scenario import TrainScenario
 from ..simulation.train_variables import axis_variables, train_variables
 from ..simulation.variables import VARIABLES
 from . import fmi2, fmi3
+from .checkout import made_here
 from .description import kernel_of, numbers_of, written
 from .fmu_model import Declared, Model, page
 from .parameters import Parameter, parameters_of
@@ -51,7 +52,7 @@ PLATFORMS: Mapping[int, Mapping[str, str]] = {
         **_OTHERS,
     },
 }
-LIBRARIES = files("lostmotion") / "fmu_libraries"
+LIBRARIES = Path(__file__).parents[1] / "fmu_libraries"
 # How many guards the kernels of the core have room for; event indicators beyond those of a regime are 1.
 GUARDS = {Scenario: 16, TrainScenario: 64}
 
@@ -107,6 +108,8 @@ def export_fmu(
         scenario = without_controllers(scenario)
     if references:
         _check_references(scenario)
+    if libraries is None:
+        made_here("fmu-library", LIBRARIES.glob("*/all.*"), "the library of FMUs for this platform")
     directory = LIBRARIES if libraries is None else Path(libraries)
     binaries = _libraries(directory, PLATFORMS[fmi], kernel_of(scenario))
     parameters = tuple(
@@ -151,7 +154,7 @@ def _libraries(directory: Any, places: Mapping[str, str], kernel: str) -> dict[s
             found[place] = library.read_bytes()
     if not found:
         raise InputError(
-            f"{directory}: has no library of an FMU; build them by `make fmu`, or install a wheel that has them"
+            f"{directory}: has no library of an FMU; install a wheel, or build it in a checkout by `make fmu-library`"
         )
     return found
 

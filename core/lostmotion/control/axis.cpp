@@ -1,0 +1,217 @@
+#include "axis.hpp"
+
+namespace lostmotion::control {
+
+void Axis::place() {
+    Slots slots;
+    slots.take(n_own_slots);
+    delay.place(slots);
+    speed_sensor.encoder.place(slots);
+    if (two_encoders) position_sensor.encoder.place(slots);
+    estimate.place(slots);
+    position_loop.place(slots);
+    speed_loop.place(slots);
+    if (current_loop) current_loop->place(slots);
+    if (field_orientation) {
+        field_orientation->place(slots);
+        course_ = slots.take(sizeof(WindingCourse) / sizeof(double));
+        energy_ = slots.take(2);
+    }
+    backlash.place(slots);
+    inverse_model.place(slots);
+    load_observer.place(slots);
+    for (auto* filters : {&speed_filters, &torque_filters})
+        for (DiscreteSystem& f : *filters) f.place(slots);
+    own_law.place(slots);
+    camera.place(slots);
+    if (camera.present) tracker.place(slots);
+    slots_ = slots.count();
+}
+
+std::vector<int> Axis::running_slots() const {
+    if (!field_orientation) return {};
+    static_assert(offsetof(WindingCourse, begin) == 0 && offsetof(WindingCourse, end) == sizeof(double));
+    return {course_, course_ + 1, energy_, energy_ + 1};
+}
+
+void Axis::start(const Sampled& y, double tick_length, double* slot) const {
+    std::fill_n(slot, slots_, 0.0);
+    speed_sensor.encoder.start(y.speed_angle, slot);
+    if (two_encoders) position_sensor.encoder.start(y.position_angle, slot);
+    const double angle = speed_sensor.scale * speed_sensor.encoder.reading(y.speed_angle);
+    estimate.start(angle, speed_sensor.scale * y.speed, tick_length * speed_schedule.every, slot);
+    inverse_model.start(slot);
+    load_observer.start(speed_sensor.scale * y.speed, inverse_model, slot);
+    show_model(slot);
+    if (two_encoders)
+        slot[blended] = position_sensor.scale * position_sensor.encoder.reading(y.position_angle) - angle / ratio;
+    if (camera.present) {
+        slot[position_angle] =
+            two_encoders ? position_sensor.scale * position_sensor.encoder.reading(y.position_angle) : 0.0;
+        tracker.start(slot[target_direction] = line_of_sight(angle, slot), speed_sensor.scale * y.speed / ratio, slot);
+    }
+    if (field_orientation) {
+        field_orientation->start(y.rotor_angle, y.rotor_speed, slot);
+        set_course(WindingCourse::at(field_orientation->winding, y.time, {}, {}, y.rotor_speed), slot);
+    }
+}
+
+bool Axis::step(std::int64_t tick, double tick_length, const Sampled& y, double* slot) const {
+    const double time = static_cast<double>(tick) * tick_length;
+    double command = slot[computed_command];
+    slot[speed_angle] = speed_sensor.scale * speed_sensor.encoder(y.speed_angle, tick, slot);
+    if (two_encoders)
+        slot[position_angle] = position_sensor.scale * position_sensor.encoder(y.position_angle, tick, slot);
+    if (camera.present) watch(tick, tick_length, y, slot);
+    if (speed_schedule.due(tick)) {
+        const double T = tick_length * speed_schedule.every;
+        slot[measured_speed] = estimate(slot[speed_angle], speed_sensor.scale * y.speed, slot[torque_reference],
+                                        speed_schedule.sample(tick), T, slot);
+        if (load_observer.present) load_observer.observe(y.motor_torque, slot[measured_speed], inverse_model, slot);
+    }
+    if (own_law.present()) {
+        if (!run_own_law(time, y, command, slot)) return false;
+    } else {
+        if (mode == position_mode && position_schedule.due(tick))
+            run_position_loop(time, tick_length * position_schedule.every, slot);
+        if (mode != torque_mode && speed_schedule.due(tick))
+            run_speed_loop(time, tick_length * speed_schedule.every, slot);
+        if (mode == torque_mode) slot[torque_reference] = reference.at(time).value;
+        if (field_orientation) {
+            if (current_schedule.due(tick)) field_orientation->control(slot[torque_reference], reading(y, slot), slot);
+        } else if (!current_loop) {
+            command = slot[torque_reference] / rated_torque;
+        } else if (current_schedule.due(tick)) {
+            command = (*current_loop)(slot[torque_reference], y.motor_torque, slot[measured_speed], slot);
+        }
+    }
+    if (field_orientation) {
+        if (!field_orientation->finite(slot)) return false;
+        field_orientation->act(tick, slot);
+        return true;
+    }
+    if (!std::isfinite(command)) return false;
+    slot[computed_command] = command;
+    slot[acting_command] = delay(command, tick, slot);
+    return true;
+}
+
+auto Axis::course(const double* slot) const -> WindingCourse {
+    static_assert(std::is_trivially_copyable_v<WindingCourse>);
+    WindingCourse c;
+    std::memcpy(static_cast<void*>(&c), slot + course_, sizeof c);
+    return c;
+}
+
+void Axis::set_course(const WindingCourse& next, double* slot) const {
+    const auto [electrical, heat] = energy(next.begin, course(slot), slot);
+    slot[energy_] = electrical;
+    slot[energy_ + 1] = heat;
+    std::memcpy(slot + course_, &next, sizeof next);
+}
+
+auto Axis::torque_command(double time, const double* slot) const -> Ramp {
+    const WindingCourse c = course(slot);
+    return {(c.torque.value + c.torque.slope * (time - c.begin)) / rated_torque, c.torque.slope / rated_torque};
+}
+
+double Axis::winding_torque(double time, const double* slot) const {
+    const DirectQuadrature i = course(slot).current(time);
+    return field_orientation->winding.torque(i.d, i.q);
+}
+
+std::array<double, n_winding_signals> Axis::winding_signals(double time, const double* slot) const {
+    const WindingCourse c = course(slot);
+    const DirectQuadrature i = c.current(time), u = c.voltage(time);
+    const auto [electrical, heat] = energy(time, c, slot);
+    return {i.d, i.q, u.d, u.q, electrical, heat};
+}
+
+void Axis::watch(std::int64_t tick, double tick_length, const Sampled& y, double* slot) const {
+    const double time = static_cast<double>(tick) * tick_length;
+    camera.expose(tick, reference.at(time).value - y.shaft_angle, line_of_sight(slot[speed_angle], slot), slot);
+    if (!camera.arrives(tick)) return;
+    const Camera::Frame frame = camera.arrived(tick, slot);
+    slot[target_seen] = frame.seen ? 1.0 : 0.0;
+    if (!frame.seen) return;
+    slot[target_direction] = frame.direction;
+    tracker(frame.direction, static_cast<double>(tick - camera.latency) * tick_length, slot);
+}
+
+void Axis::run_position_loop(double time, double T, double* slot) const {
+    const ReferencePoint ahead = wanted(time, slot);
+    slot[position_reference] = reference_delay == 0.0 ? ahead.value : wanted(time - reference_delay, slot).value;
+    slot[measured_position] = position(slot);
+    const InverseModel::Ahead twist = inverse_model.twist(ahead.rate, ahead.second, load_observer.load(slot), T, slot);
+    const double e = slot[position_reference] + backlash(ahead.rate, T, slot) + twist.angle - slot[measured_position];
+    slot[speed_reference] = ratio * position_loop(e, ahead.rate + twist.rate, T, slot);
+}
+
+void Axis::run_speed_loop(double time, double T, double* slot) const {
+    const ReferencePoint r = wanted(time, slot);
+    if (mode == speed_mode) slot[speed_reference] = ratio * r.value;
+    const double speed_ahead = mode == speed_mode ? r.value : r.rate,
+                 gain_ahead = mode == speed_mode ? r.rate : r.second;
+    double speed = slot[speed_reference];
+    for (const DiscreteSystem& f : speed_filters) speed = f(speed, slot);
+    const double known = inverse_model.present ? inverse_model.torque(speed_ahead, gain_ahead, load_observer.load(slot),
+                                                                      speed - slot[measured_speed], T, slot)
+                                               : feedforward(ratio * speed_ahead, ratio * gain_ahead);
+    const double limit = field_orientation
+                             ? std::fmin(speed_loop.torque_limit, field_orientation->available_torque(slot))
+                             : speed_loop.torque_limit;
+    double M =
+        load_observer.schedule(speed_loop, inverse_model, slot)(speed, slot[measured_speed], known, limit, T, slot);
+    show_model(slot);
+    for (const DiscreteSystem& f : torque_filters) M = f(M, slot);
+    slot[torque_reference] = std::clamp(M, -limit, limit);
+}
+
+auto Axis::reading(const Sampled& y, const double* slot) const -> FieldOrientation::Reading {
+    return {commutates_by_encoder ? slot[speed_angle] : y.rotor_angle, slot[measured_speed], y.rotor_angle,
+            course(slot).current(y.time)};
+}
+
+auto Axis::energy(double time, const WindingCourse& c, const double* slot) const -> WindingCourse::Energy {
+    const auto [electrical, heat] = c.energy(field_orientation->winding, c.begin, time);
+    return {slot[energy_] + electrical, slot[energy_ + 1] + heat};
+}
+
+void Axis::show_model(double* slot) const {
+    if (!inverse_model.present) return;
+    slot[loss_factor] = inverse_model.loss_factor_now(slot);
+    slot[friction_torque] = inverse_model.friction_now(slot);
+    slot[load_torque] = load_observer.load(slot);
+}
+
+bool Axis::run_own_law(double time, const Sampled& y, double& command, double* slot) const {
+    slot[measured_position] = position(slot);
+    const ReferencePoint r = wanted(time, slot);
+    slot[mode == position_mode ? position_reference
+         : mode == speed_mode  ? speed_reference
+                               : torque_reference] = mode == speed_mode ? ratio * r.value : r.value;
+    std::array<double, 5> measured{slot[measured_position], slot[measured_speed], y.motor_torque};
+    const std::array<double, 4> asked{r.value, r.rate, r.second, r.third};
+    std::array<double, 2> given{command};
+    if (field_orientation) {
+        const FieldOrientation::Reading seen = reading(y, slot);
+        const DirectQuadrature i = field_orientation->measured(seen);
+        measured[3] = i.d;
+        measured[4] = i.q;
+        if (own_law(time, measured.data(), asked.data(), given.data(), slot) != 0) return false;
+        field_orientation->command({given[0], given[1]}, seen, slot);
+        return true;
+    }
+    if (own_law(time, measured.data(), asked.data(), given.data(), slot) != 0) return false;
+    command = given[0];
+    return true;
+}
+
+double Axis::position(double* slot) const {
+    const double by_motor = slot[speed_angle] / ratio;
+    if (!two_encoders) return by_motor;
+    slot[blended] += position_share * (slot[position_angle] - by_motor - slot[blended]);
+    return by_motor + slot[blended];
+}
+
+}  // namespace lostmotion::control

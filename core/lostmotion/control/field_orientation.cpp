@@ -1,0 +1,117 @@
+#include "field_orientation.hpp"
+
+namespace lostmotion::control {
+
+void FieldOrientation::place(Slots& slots) {
+    first_ = slots.take(n_own);
+    steepest_ = circle_i_d();
+    for (TickDelay* d : {&delay_d_, &delay_q_, &delay_angle_}) {
+        *d = delay;
+        d->place(slots);
+    }
+}
+
+void FieldOrientation::start(double angle, double speed, double* slot) const {
+    const double w_e = winding.pole_pairs * speed;
+    slot[first_ + u_q] = std::clamp(w_e * winding.flux_linkage, -voltage_limit, voltage_limit);
+    slot[first_ + stator_angle] = winding.pole_pairs * (angle + 0.5 * speed * delay_time);
+    delay_d_.fill(0.0, slot);
+    delay_q_.fill(slot[first_ + u_q], slot);
+    delay_angle_.fill(slot[first_ + stator_angle], slot);
+    slot[first_ + available] = largest_torque(0.0, w_e);
+}
+
+void FieldOrientation::control(double torque, const Reading& y, double* slot) const {
+    double* own = slot + first_;
+    const double w_e = winding.pole_pairs * y.speed;
+    const DirectQuadrature wanted = currents(torque, w_e, own);
+    const DirectQuadrature i = measured(y);
+    const double e_d = wanted.d - i.d, e_q = wanted.q - i.q;
+    const double v_d = gain_d * e_d + own[integral_d] - decoupling * w_e * winding.inductance_q * i.q;
+    const double v_q = gain_q * e_q + own[integral_q] + decoupling * w_e * winding.inductance_d * i.d +
+                       back_emf * w_e * winding.flux_linkage;
+    own[wanted_square] = v_d * v_d + v_q * v_q;
+    const double share = std::fmin(1.0, voltage_limit / std::sqrt(own[wanted_square]));
+    own[integral_d] += integral_gain * (e_d + (share - 1.0) * v_d / gain_d);
+    own[integral_q] += integral_gain * (e_q + (share - 1.0) * v_q / gain_q);
+    command({share * v_d, share * v_q}, y, slot);
+}
+
+void FieldOrientation::command(DirectQuadrature voltage, const Reading& y, double* slot) const {
+    double* own = slot + first_;
+    own[u_d] = voltage.d;
+    own[u_q] = voltage.q;
+    own[stator_angle] = winding.pole_pairs * (y.angle + y.speed * (delay_time + 0.5 * sample_time));
+}
+
+bool FieldOrientation::finite(const double* slot) const {
+    return std::isfinite(slot[first_ + u_d]) && std::isfinite(slot[first_ + u_q]) &&
+           std::isfinite(slot[first_ + stator_angle]);
+}
+
+void FieldOrientation::act(std::int64_t tick, double* slot) const {
+    double* own = slot + first_;
+    own[acting_d] = delay_d_(own[u_d], tick, slot);
+    own[acting_q] = delay_q_(own[u_q], tick, slot);
+    own[acting_angle] = delay_angle_(own[stator_angle], tick, slot);
+}
+
+auto FieldOrientation::voltage(double angle, const double* slot) const -> DirectQuadrature {
+    const double* own = slot + first_;
+    return turned({own[acting_d], own[acting_q]}, own[acting_angle] - winding.pole_pairs * angle);
+}
+
+auto FieldOrientation::least_current(double torque) const -> DirectQuadrature {
+    const double linear = 1.5 * winding.pole_pairs * winding.flux_linkage, most = std::fabs(torque) / linear;
+    if (winding.saliency() == 0.0 || torque == 0.0) return {0.0, torque / linear};
+    const double D = -winding.flux_linkage / (2.0 * winding.saliency());
+    double i_q = most, i_d = 0.0;
+    for (int round = 0; round < 50; ++round) {
+        const double root = std::copysign(std::sqrt(D * D + i_q * i_q), D);
+        i_d = -i_q * i_q / (D + root);
+        const double slope =
+            1.5 * winding.pole_pairs * (winding.flux_linkage + winding.saliency() * (i_d - i_q * i_q / root));
+        const double step = (winding.torque(i_d, i_q) - std::fabs(torque)) / slope;
+        i_q -= step;
+        if (!(step > 1e-15 * most)) break;
+    }
+    return {i_d, std::copysign(i_q, torque)};
+}
+
+auto FieldOrientation::turned(DirectQuadrature v, double angle) -> DirectQuadrature {
+    const auto [sine, cosine] = sine_cosine(angle);
+    return {cosine * v.d - sine * v.q, sine * v.d + cosine * v.q};
+}
+
+double FieldOrientation::circle_i_d() const {
+    const double S = winding.saliency(), psi = winding.flux_linkage;
+    if (S == 0.0) return 0.0;
+    return 2.0 * S * current_limit * current_limit /
+           (psi + std::sqrt(psi * psi + 8.0 * S * S * current_limit * current_limit));
+}
+
+double FieldOrientation::most_i_q(double i_d, double w_e) const {
+    const double most = std::sqrt(current_limit * current_limit - i_d * i_d);
+    if (i_d > least_i_d() || i_d <= -current_limit) return most;
+    return std::fmin(most, voltage_limit / (std::fabs(w_e) * winding.inductance_q));
+}
+
+double FieldOrientation::largest_torque(double weakened, double w_e) const {
+    const double i_d = std::clamp(steepest_ + weakened, least_i_d(), current_limit);
+    return std::fabs(winding.torque(i_d, most_i_q(i_d, w_e)));
+}
+
+auto FieldOrientation::currents(double torque, double w_e, double* own) const -> DirectQuadrature {
+    const double psi = winding.flux_linkage;
+    const double w_b = std::fmax(std::fabs(w_e), voltage_limit / psi);
+    const double spare = weakening_voltage * weakening_voltage - own[wanted_square];
+    own[weakening] = std::clamp(
+        own[weakening] + field_weakening * spare / (2.0 * w_b * w_b * winding.inductance_d * psi), -current_limit, 0.0);
+    own[available] = largest_torque(own[weakening], w_e);
+    const double M = std::clamp(torque, -own[available], own[available]);
+    const double i_d = std::clamp(least_current(M).d + own[weakening], least_i_d(), current_limit);
+    const double i_q = M / (1.5 * winding.pole_pairs * (psi + winding.saliency() * i_d)), most = most_i_q(i_d, w_e);
+    return {i_d, std::clamp(i_q, -most, most)};
+}
+
+}  // namespace lostmotion::control

@@ -1,0 +1,45 @@
+#include "inverse_model.hpp"
+
+namespace lostmotion::control {
+
+void InverseModel::start(double* slot) const {
+    if (!present) return;
+    slot[first_] = loss_factor;
+    slot[first_ + 1] = friction_torque;
+}
+
+auto InverseModel::twist(double speed, double acceleration, double observed_load, double sample_time,
+                         double* slot) const -> Ahead {
+    if (!present || !through_gear) return {};
+    double &angle = slot[first_ + 2], &rate = slot[first_ + 3];
+    const double step = twist_rate * sample_time, target = inverse(output_torque(speed, acceleration, observed_load));
+    const double next = angle + std::clamp(target - angle, -step, step);
+    rate = (next - angle) / sample_time;
+    angle = next;
+    return {angle, rate};
+}
+
+double InverseModel::torque(double speed, double acceleration, double observed_load, double error, double sample_time,
+                            double* slot) const {
+    const double i = losses.ratio, s = sign_of(speed);
+    const double rate = through_gear ? slot[first_ + 3] : 0.0;
+    const double w = i * (speed + rate), T_2 = output_torque(speed, acceleration, observed_load);
+    const double Y = s * losses(T_2, s, w);
+    double &kappa = slot[first_], &T_10 = slot[first_ + 1];
+    const double out = motor_inertia * i * acceleration + motor_viscous_friction * w + T_2 / i + s * T_10 + kappa * Y;
+    if (std::fabs(w) > min_speed) {
+        of_losses(kappa, error, Y, sample_time);
+        of_friction(T_10, error, s, sample_time);
+    }
+    return out;
+}
+
+double InverseModel::inverse(double torque) const {
+    const double T = std::fabs(torque);
+    if (T == 0.0) return 0.0;
+    int k = 0;
+    while (k < curve.outermost_piece() && curve.torque(curve.upper(k)) < T) ++k;
+    return std::copysign((T - curve.offset(k)) / curve.slope(k), torque);
+}
+
+}  // namespace lostmotion::control

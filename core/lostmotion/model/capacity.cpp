@@ -1,0 +1,53 @@
+#include "capacity.hpp"
+
+namespace lostmotion::model {
+
+std::vector<CapacityShare> shaft_capacity(const Assembly& a, int shaft, double w, const Instant& now,
+                                          const double* T_2) {
+    const Train& train = a.train();
+    std::vector<CapacityShare> shares;
+    if (const double T_f = train.shafts[shaft].friction.capacity(w); T_f > 0.0)
+        shares.push_back({train.shafts[shaft].name, T_f, T_f});
+    for (const ShaftMotor& m : train.motors)
+        if (m.shaft == shaft && m.law.friction_torque > 0.0)
+            shares.push_back({m.name, m.law.friction_torque, m.law.friction_torque});
+    for (const auto& e : a.places().acting)
+        if (e->is_dry() && e->shaft == shaft) {
+            const double T = e->friction(a.places().instant_of(*e, now), w == 0.0);
+            shares.push_back({e->name, T, T});
+        }
+    for (std::size_t g = 0; g < train.gears.size() && T_2 != nullptr; ++g)
+        if (const Gear& gear = train.gears[g]; gear.input == shaft && gear.has_dry_losses())
+            shares.push_back({gear.name, gear.loss(T_2[g], w).torque / gear.law.ratio,
+                              gear.loss(-T_2[g], w).torque / gear.law.ratio});
+    return shares;
+}
+
+std::vector<CapacityShare> contact_capacity(const Assembly& a, int contact, const Regime& r, const Instant& now,
+                                            const double* T_2) {
+    const ContactPlace& c = a.places().contacts[contact];
+    const auto k = static_cast<std::size_t>(c.element);
+    if (c.kind == ContactPlace::shaft) {
+        std::vector<CapacityShare> shares =
+            shaft_capacity(a, c.a, r.at_rest[contact] ? 0.0 : now.x[a.places().shafts[k].speed], now, T_2);
+        for (std::size_t g = 0; g < a.train().gears.size(); ++g) {
+            const int corner = a.places().gears[g].error_corner;
+            const int side = corner == nowhere || a.train().gears[g].input != c.a ? 0 : r.key.branch[corner];
+            if (side == 0 || r.key.modes[contact] != 0) continue;
+            const double more =
+                side * evaluate(a.layout(), a.beyond_corner(static_cast<int>(g), r.key, r.output_torque[g]), now);
+            shares.push_back({a.train().gears[g].name, side > 0 ? more : 0.0, side < 0 ? more : 0.0});
+        }
+        return shares;
+    }
+    if (c.kind == ContactPlace::gear) {
+        const double h =
+            c.bilateral ? std::numeric_limits<double>::infinity() : now.memory[a.places().gears[k].hysteresis];
+        return {{a.train().gears[k].name, h, h}};
+    }
+    const CouplingElement& law = *a.places().couplings[k];
+    const CouplingInstant here = a.places().instant_of(law, now);
+    return {{law.name, law.capacity(+1, here, r.at_rest[contact]), law.capacity(-1, here, r.at_rest[contact])}};
+}
+
+}  // namespace lostmotion::model

@@ -1,0 +1,255 @@
+#include "check.hpp"
+
+namespace lostmotion::model {
+
+std::string TrainCheck::operator()() const {
+    for (const auto check : {&TrainCheck::shafts_exist, &TrainCheck::controllers, &TrainCheck::elements,
+                             &TrainCheck::inertias, &TrainCheck::rigid_loops, &TrainCheck::turned, &TrainCheck::sizes})
+        if (std::string error = (this->*check)(); !error.empty()) return error;
+    return {};
+}
+
+std::string TrainCheck::shafts_exist() const {
+    if (train_.shafts.empty()) return "the train has no shaft";
+    if (std::string error = too_many("shafts", train_.shafts.size(), max_shafts); !error.empty()) return error;
+    std::size_t contacts = train_.shafts.size() + train_.gears.size();
+    for (const auto& c : coupling_elements(train_)) contacts += c->is_dry();
+    if (std::string error = too_many("shafts, gears and couplings", contacts, max_contacts); !error.empty())
+        return error;
+    const auto missing = [](const std::string& what, int s) {
+        return what + " names shaft number " + std::to_string(s) + ", which the train does not have";
+    };
+    const auto one = [&](const char* kind, const auto& elements) -> std::string {
+        for (std::size_t k = 0; k < elements.size(); ++k)
+            if (!exists(elements[k].shaft)) return missing(named(kind, elements[k].name, k), elements[k].shaft);
+        return {};
+    };
+    const auto two = [&](const char* kind, const auto& elements) -> std::string {
+        for (std::size_t k = 0; k < elements.size(); ++k) {
+            const auto& e = elements[k];
+            if (!exists(e.input)) return missing(named(kind, e.name, k), e.input);
+            if (!exists(e.output)) return missing(named(kind, e.name, k), e.output);
+            if (e.input == e.output)
+                return named(kind, e.name, k) + " joins " + shaft(e.input) + " with itself; give it another output";
+        }
+        return {};
+    };
+    for (std::string error : {one("motor", train_.motors), two("gear", train_.gears), housings()})
+        if (!error.empty()) return error;
+    std::string error;
+    Train::each_coupling_kind(train_, [&](const char*, const char* kind, const auto& elements) {
+        if (error.empty()) error = two(kind, elements);
+    });
+    Train::each_kind(train_, [&](const char*, const char* kind, const auto& elements) {
+        if (error.empty()) error = one(kind, elements);
+    });
+    return error;
+}
+
+std::string TrainCheck::housings() const {
+    for (std::size_t k = 0; k < train_.gears.size(); ++k) {
+        const Gear& g = train_.gears[k];
+        if (g.housing == nowhere) continue;
+        const std::string name = named("gear", g.name, k);
+        if (!exists(g.housing))
+            return name + " names shaft number " + std::to_string(g.housing) +
+                   " as its housing, which the train does not have";
+        if (g.housing == g.input || g.housing == g.output)
+            return name + " has its housing on " + shaft(g.housing) +
+                   ", which it joins as well; give the housing a shaft of its own";
+        if (g.has_dry_losses())
+            return name + " has a housing that turns and losses that depend on the direction of its motion, which " +
+                   "are solved against the frame only; leave one of them out";
+    }
+    return {};
+}
+
+std::string TrainCheck::controllers() const {
+    std::vector<bool> controlled(train_.motors.size());
+    for (std::size_t k = 0; k < train_.controllers.size(); ++k) {
+        const LinearController& c = train_.controllers[k];
+        const std::string name = named("controller", c.name, k);
+        if (c.motor < 0 || c.motor >= static_cast<int>(controlled.size()))
+            return name + " turns a motor that the train does not have";
+        if (controlled[static_cast<std::size_t>(c.motor)]) return name + " turns a motor that another one turns";
+        controlled[static_cast<std::size_t>(c.motor)] = true;
+        const std::size_t n = c.states.size(), m = c.signals.size();
+        const auto wide = [](const auto& rows, std::size_t w) {
+            return std::all_of(rows.begin(), rows.end(), [w](const auto& row) { return row.size() == w; });
+        };
+        if (c.A.size() != n || c.B.size() != n || !wide(c.A, n) || !wide(c.B, m) || c.C.size() != n ||
+            c.D.size() != m || c.back_calculation.size() != n)
+            return name + " has matrices that do not fit its states and signals";
+        if (!(c.limit > 0.0)) return name + " has a limit that is not above 0";
+        for (const LinearController::Signal& s : c.signals)
+            if (!exists(s.shaft)) return name + " takes the angle or speed of a shaft that the train does not have";
+        if (!exists(c.compared.shaft)) return name + " compares with a shaft that the train does not have";
+    }
+    return {};
+}
+
+std::string TrainCheck::elements() const {
+    for (std::size_t k = 0; k < train_.gears.size(); ++k) {
+        const Gear& g = train_.gears[k];
+        const std::string name = named("gear", g.name, k);
+        if (!(g.law.ratio > 0.0)) return name + " has the ratio " + std::to_string(g.law.ratio) + "; it must be > 0";
+        if (g.efficiencies && !(g.efficiencies->driving() > 0.0))
+            return name + " has a drive efficiency of " + std::to_string(g.efficiencies->driving()) +
+                   "; it must be > 0: no torque would turn it";
+        if (g.mesh_damping > 0.0 && g.rigid()) return name + " is rigid and has mesh damping; give it a stiffness";
+        if (g.parts_flanks() && g.law.has_hysteresis())
+            return name + " has backlash with both mesh damping and hysteresis; take one of them";
+        if (g.transmission_error.present() && (g.rigid() || g.law.has_hysteresis()))
+            return name + " has a transmission error; it needs a stiffness, without hysteresis";
+        if (std::string error = too_fine(name + " with its transmission error", g.transmission_error.pieces());
+            !error.empty())
+            return error;
+        if (g.law.losses == Gearbox::loss_map)
+            if (const std::size_t cells = 2 * g.law.map.speeds().size() * g.law.map.loads().size();
+                cells > static_cast<std::size_t>(max_pieces))
+                return name + " has a loss map of some " + std::to_string(cells) + " triangles; at most " +
+                       std::to_string(max_pieces) + " are possible: leave out speeds or loads";
+    }
+    std::string error;
+    Train::each_kind(train_, [&](const char*, const char* kind, const auto& elements) {
+        for (std::size_t k = 0; k < elements.size() && error.empty(); ++k)
+            error = too_fine(named(kind, elements[k].name, k), on_shaft(elements[k])->pieces());
+    });
+    Train::each_coupling_kind(train_, [&](const char*, const char* kind, const auto& elements) {
+        for (std::size_t k = 0; k < elements.size() && error.empty(); ++k)
+            error = too_fine(named(kind, elements[k].name, k), between_shafts(elements[k])->pieces());
+    });
+    if (!error.empty()) return error;
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
+        const DryFriction& f = train_.shafts[s].friction;
+        const int drag = 2 * train_.shafts[s].drag.outermost_piece() + 1;
+        for (const auto& [what, pieces] : {std::pair{" with its friction", f.pieces()}, {" with its drag", drag}})
+            if (std::string fine = too_fine(shaft(static_cast<int>(s)) + what, pieces); !fine.empty()) return fine;
+        if (f.speeds.size() != f.torques.size() || (!f.speeds.empty() && f.speeds[0] != 0.0))
+            return shaft(static_cast<int>(s)) + " has a friction curve that does not begin at speed 0";
+        for (std::size_t k = 1; k < f.speeds.size(); ++k)
+            if (!(f.speeds[k] > f.speeds[k - 1]))
+                return shaft(static_cast<int>(s)) + " has a friction curve whose speeds do not rise";
+    }
+    return {};
+}
+
+std::string TrainCheck::inertias() const {
+    const Places places(train_);
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s)
+        if (!(places.shafts[s].inertia > 0.0))
+            return shaft(static_cast<int>(s)) + " has no inertia; give it one, or that of a motor or gear on it";
+    return {};
+}
+
+std::string TrainCheck::rigid_loops() const {
+    std::vector<ContactPlace> rigid;
+    for (std::size_t k = 0; k < train_.gears.size(); ++k)
+        if (train_.gears[k].rigid()) rigid.push_back(twist_place(train_.gears[k], static_cast<int>(k)));
+    const int shafts = static_cast<int>(train_.shafts.size());
+    std::vector<std::int8_t> modes(rigid.size(), 1);
+    for (std::size_t k = 0; k < rigid.size(); ++k) {
+        modes[k] = 0;
+        const Ties ties = tie(rigid, shafts, modes.data());
+        if (!ties.redundant[k] && !ties.at_rest[rigid[k].a]) continue;
+        const auto gear = static_cast<std::size_t>(rigid[k].element);
+        return named("gear", train_.gears[gear].name, gear) + " closes a loop of rigid gears with " +
+               (ties.redundant[k] ? "the same ratio: its torque would not be determined"
+                                  : "another ratio: nothing could turn") +
+               "; give it a stiffness or leave it out";
+    }
+    return {};
+}
+
+std::string TrainCheck::turned() const {
+    std::vector<int> part(train_.shafts.size());
+    for (std::size_t s = 0; s < part.size(); ++s) part[s] = static_cast<int>(s);
+    const auto join = [&](int a, int b) {
+        const int from = part[static_cast<std::size_t>(a)], to = part[static_cast<std::size_t>(b)];
+        std::replace(part.begin(), part.end(), from, to);
+    };
+    for (const Gear& g : train_.gears) {
+        join(g.input, g.output);
+        if (g.housing != nowhere) join(g.input, g.housing);
+    }
+    for (const auto& c : coupling_elements(train_)) join(c->input, c->output);
+    std::vector<bool> acted_on(part.size());
+    for (const ShaftMotor& m : train_.motors) acted_on[static_cast<std::size_t>(part[m.shaft])] = true;
+    for (const auto& e : shaft_elements(train_))
+        if (e->drives()) acted_on[static_cast<std::size_t>(part[static_cast<std::size_t>(e->shaft)])] = true;
+    for (std::size_t s = 0; s < part.size(); ++s)
+        if (train_.shafts[s].loaded) acted_on[static_cast<std::size_t>(part[s])] = true;
+    for (std::size_t s = 0; s < part.size(); ++s)
+        if (!acted_on[static_cast<std::size_t>(part[s])])
+            return shaft(static_cast<int>(s)) +
+                   " is turned by nothing: no motor, gear or load torque acts on it; join it to the train";
+    return {};
+}
+
+std::string TrainCheck::sizes() const {
+    const Layout n = Places(train_).layout;
+    const std::pair<const char*, std::pair<int, int>> counts[] = {{"states", {n.states, max_states}},
+                                                                  {"inputs", {n.inputs, max_inputs}},
+                                                                  {"memories", {n.memory, max_memory}},
+                                                                  {"terms", {n.terms, max_terms}},
+                                                                  {"piecewise laws", {n.branches, max_branches}}};
+    for (const auto& [what, count] : counts)
+        if (std::string error = too_many(what, static_cast<std::size_t>(count.first), count.second); !error.empty())
+            return error;
+    return {};
+}
+
+std::string TrainCheck::too_fine(const std::string& what, int pieces) {
+    if (pieces <= max_pieces) return {};
+    return what + " would take " + std::to_string(pieces) + " straight lines; at most " + std::to_string(max_pieces) +
+           " are possible: allow a larger error";
+}
+
+std::string TrainCheck::too_many(const char* what, std::size_t n, int most) {
+    if (n <= static_cast<std::size_t>(most)) return {};
+    return "the train has " + std::to_string(n) + ' ' + what + "; at most " + std::to_string(most) + " are possible";
+}
+
+std::string check_start(const Train& train, const std::vector<double>& speed) {
+    const auto number = [](double v) {
+        char text[32];
+        std::snprintf(text, sizeof text, "%.10g", v);
+        return std::string(text);
+    };
+    const auto both = [&](int a, int b) {
+        const auto one = [&](int s) {
+            return train.shafts[static_cast<std::size_t>(s)].name + " = " + number(speed[static_cast<std::size_t>(s)]) +
+                   " rad/s";
+        };
+        return one(a) + " and " + one(b);
+    };
+    constexpr double rounding = 1e-12;  // of speeds that were converted from other units
+    for (const Gear& g : train.gears) {
+        const double in = speed[static_cast<std::size_t>(g.input)] / g.law.ratio,
+                     out = speed[static_cast<std::size_t>(g.output)],
+                     housing =
+                         g.housing == nowhere ? 0.0 : g.per_housing() * speed[static_cast<std::size_t>(g.housing)];
+        const double size = std::fmax(std::fmax(std::fabs(in), std::fabs(out)), std::fabs(housing));
+        if (!g.rigid() || std::fabs(in - out + housing) <= rounding * size) continue;
+        if (g.housing != nowhere)
+            return both(g.input, g.output) + " do not fit the rigid gear " + g.name + " on the housing " +
+                   train.shafts[static_cast<std::size_t>(g.housing)].name + " = " +
+                   number(speed[static_cast<std::size_t>(g.housing)]) +
+                   " rad/s; relative to it their quotient must be its ratio, " + number(g.law.ratio);
+        return both(g.input, g.output) + " do not fit the rigid gear " + g.name +
+               "; their quotient must be its ratio, " + number(g.law.ratio) + ", to twelve digits";
+    }
+    std::string error;
+    Train::each_coupling_kind(train, [&](const char*, const char* kind, const auto& elements) {
+        for (const auto& e : elements) {
+            const double in = speed[static_cast<std::size_t>(e.input)], out = speed[static_cast<std::size_t>(e.output)];
+            const bool ahead = in - out > rounding * std::fmax(std::fabs(in), std::fabs(out));
+            if (error.empty() && ahead && between_shafts(e)->is_one_way())
+                error = both(e.input, e.output) + " do not fit the " + kind + ' ' + e.name +
+                        ", whose input cannot be faster than its output; give both the same speed";
+        }
+    });
+    return error;
+}
+
+}  // namespace lostmotion::model

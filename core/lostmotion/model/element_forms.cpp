@@ -1,0 +1,145 @@
+#include "element_forms.hpp"
+
+namespace lostmotion::model {
+
+double ElementForms::per_input(int gear, const Key& key) const {
+    const Gear& g = train_.gears[gear];
+    const int k = places_.gears[gear].error_piece;
+    return k == nowhere ? 1.0 / g.law.ratio : 1.0 / g.law.ratio - g.transmission_error.slope(key.branch[k]);
+}
+
+auto ElementForms::error_angle(int gear) const -> Row {
+    const Gear& g = train_.gears[gear];
+    Row angle = terms_.state(places_.shafts[g.input].angle);
+    if (g.housing != nowhere) angle -= terms_.state(places_.shafts[g.housing].angle);
+    return angle;
+}
+
+auto ElementForms::beyond_corner(int gear, const Key& key, const Row& T_2) const -> Row {
+    const Gear& g = train_.gears[gear];
+    const GearPlace& p = places_.gears[gear];
+    const PeriodicCurve& e = g.transmission_error;
+    const int k = key.branch[p.error_piece], n = e.pieces();
+    const double more = e.slope(k) - e.slope((k + key.branch[p.error_corner] + n) % n);
+    return more / (g.law.losses == Gearbox::constant_efficiency ? g.law.efficiency : 1.0) * T_2;
+}
+
+auto ElementForms::contact_speed(int contact) const -> Row {
+    const ContactPlace& c = places_.contacts[contact];
+    Row f;
+    c.each_shaft([&](int s, double per) { f.c[places_.shafts[s].speed] += per; });
+    return f;
+}
+
+auto ElementForms::twist_rate(int gear, const Key& key) const -> Row {
+    const Gear& g = train_.gears[gear];
+    Row rate = terms_.state(places_.shafts[g.input].speed, per_input(gear, key)) -
+               terms_.state(places_.shafts[g.output].speed);
+    if (g.housing != nowhere) rate += terms_.state(places_.shafts[g.housing].speed, per_housing(gear, key));
+    return rate;
+}
+
+auto ElementForms::spring_torque(int gear, const Key& key) const -> Row {
+    const Gear& g = train_.gears[gear];
+    if (g.rigid()) return Row{};
+    const int piece = key.branch[places_.gears[gear].piece];
+    return terms_.state(places_.gears[gear].twist, g.law.curve.slope(piece)) + terms_.one(g.law.curve.offset(piece));
+}
+
+auto ElementForms::motor_terms(int motor) const -> Motor::Terms {
+    const MotorPlace& p = places_.motors[motor];
+    const int command = p.command == nowhere ? layout().one : layout().first_input + p.command;
+    return {p.torque, places_.shafts[train_.motors[motor].shaft].speed, command, layout().one};
+}
+
+auto ElementForms::losses(int gear, const Row& T_2) const -> LossTerms<Row> {
+    const Gear& g = train_.gears[gear];
+    return g.loss_terms(layout().one, places_.shafts[g.input].speed, T_2);
+}
+
+auto ElementForms::housing_friction(int gear, const Regime& r) const -> Row {
+    const Gear& g = train_.gears[gear];
+    if (g.housing == nowhere) return Row{};
+    return g.law.viscous_friction * (shaft_speed(g.input, r) - shaft_speed(g.housing, r));
+}
+
+auto ElementForms::shaft_speed(int shaft, const Regime& r) const -> Row {
+    Row f;
+    r.ties.each_share(shaft, [&](int k, double share) { f.c[places_.shafts[k].speed] = share; });
+    return f;
+}
+
+auto ElementForms::sliding_friction(int shaft, const Key& key) const -> Row {
+    const ShaftPlace& p = places_.shafts[shaft];
+    const DryFriction& friction = train_.shafts[shaft].friction;
+    const int piece = p.friction_piece == nowhere ? 0 : key.branch[p.friction_piece];
+    return terms_.one(mode(key, p.contact) * (p.motor_friction + friction.at_zero(piece))) +
+           terms_.state(p.speed, friction.per_speed(piece));
+}
+
+auto ElementForms::held_friction(int shaft, const Key& key) const -> Row {
+    Row F = terms_.one(places_.shafts[shaft].motor_friction + train_.shafts[shaft].friction.holding());
+    for (const auto& e : places_.acting)
+        if (e->is_dry() && e->shaft == shaft) F += e->friction(site(shaft), key, true);
+    return F;
+}
+
+auto ElementForms::between(const CouplingElement& c, const Ties& ties) const -> Between {
+    Between shafts{terms_, {}};
+    std::array<double, max_shafts> slip;
+    for (unsigned left = tied_speed(coupling_place(c, nowhere), ties, slip); left != 0; left &= left - 1) {
+        const int k = std::countr_zero(left);
+        shafts.slip.c[places_.shafts[k].speed] = slip[k];
+    }
+    return shafts;
+}
+
+auto ElementForms::coupling_torque(const CouplingElement& c, const Regime& r) const -> Row {
+    const Row torque = c.torque(between(c, r.ties), r.key);
+    return c.contact == nowhere ? torque : r.contact_torque[c.contact] + torque;
+}
+
+bool ElementForms::twist_rests(int gear, const Regime& r) const {
+    const Gear& g = train_.gears[gear];
+    if (g.rigid()) return true;
+    if (r.ties.at_rest[g.input] && r.ties.at_rest[g.output] && g.housing == nowhere) return true;
+    return !g.transmission_error.present() && kept_at_rest(twist_place(g, gear), r.ties);
+}
+
+auto ElementForms::controller_signal(int k, const LinearController::Signal& signal) const -> Row {
+    const ControllerPlace& p = places_.controllers[k];
+    switch (signal.kind) {
+        case LinearController::Signal::reference: return terms_.input(p.reference);
+        case LinearController::Signal::reference_rate: return terms_.input(p.reference_rate);
+        case LinearController::Signal::angle: return terms_.state(places_.shafts[signal.shaft].angle);
+        default: return terms_.state(places_.shafts[signal.shaft].speed);
+    }
+}
+
+auto ElementForms::controller_output(int k) const -> Row {
+    const LinearController& c = train_.controllers[k];
+    Row v;
+    for (std::size_t j = 0; j < c.states.size(); ++j)
+        v += terms_.state(places_.controllers[k].first_state + static_cast<int>(j), c.C[j]);
+    for (std::size_t j = 0; j < c.signals.size(); ++j) v += c.D[j] * controller_signal(k, c.signals[j]);
+    return v;
+}
+
+auto ElementForms::controller_command(int k, const Key& key) const -> Row {
+    const int branch = places_.controllers[k].branch;
+    const int at = branch == nowhere ? 0 : key.branch[branch];
+    return at == 0 ? controller_output(k) : terms_.one(at * train_.controllers[k].limit);
+}
+
+auto ElementForms::controller_rate(int k, std::size_t state, const Key& key) const -> Row {
+    const LinearController& c = train_.controllers[k];
+    Row rate;
+    for (std::size_t j = 0; j < c.states.size(); ++j)
+        rate += terms_.state(places_.controllers[k].first_state + static_cast<int>(j), c.A[state][j]);
+    for (std::size_t j = 0; j < c.signals.size(); ++j) rate += c.B[state][j] * controller_signal(k, c.signals[j]);
+    if (const double back = c.back_calculation[state]; back != 0.0)
+        rate += back * (controller_command(k, key) - controller_output(k));
+    return rate;
+}
+
+}  // namespace lostmotion::model

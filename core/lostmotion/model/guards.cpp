@@ -1,0 +1,259 @@
+#include "guards.hpp"
+
+namespace lostmotion::model {
+
+auto RegimeGuards::add(const Row& form, Guard::Kind kind, int contact, int branch, int neighbour) -> Guard& {
+    regime_.guards.push_back(Guard{form, kind, contact, branch, neighbour});
+    return regime_.guards.back();
+}
+
+void RegimeGuards::add_all() {
+    add_speed_guards();
+    add_gear_capacities();
+    add_coupling_capacities();
+    for (int s = static_cast<int>(train_.shafts.size()) - 1; s >= 0; --s) add_shaft_guards(s);
+    add_turning();
+    for (std::size_t g = 0; g < train_.gears.size(); ++g) add_twist_pieces(static_cast<int>(g));
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s) add_speed_pieces(static_cast<int>(s));
+    add_input_limits();
+    add_coupling_pieces();
+    add_output_limits();
+    for (std::size_t g = 0; g < train_.gears.size(); ++g) {
+        const GearPlace& p = places_.gears[g];
+        if (p.error_piece != nowhere && turns(train_.gears[g].input, train_.gears[g].housing))
+            add_piece_guards(terms_, forms_.error_angle(static_cast<int>(g)), train_.gears[g].transmission_error,
+                             p.error_turn, p.error_piece, regime_.key, regime_.guards);
+    }
+    for (const auto& e : places_.acting)
+        e->add_guards(forms_.site(e->shaft), regime_.key, turns(e->shaft, nowhere), regime_.guards);
+}
+
+void RegimeGuards::add_speed_guards() {
+    for (int c = 0; c < layout_.contacts; ++c) {
+        const int mode = regime_.key.modes[c];
+        if (mode == 0 || held_in_motion(c)) continue;
+        // (16) sets the hysteresis anew whenever the twist rate reaches zero, whether it then changes sign or not.
+        add(static_cast<double>(mode) * forms_.contact_speed(c), Guard::speed, c, nowhere, 0).by_grazing =
+            places_.contacts[c].kind == ContactPlace::gear;
+    }
+}
+
+void RegimeGuards::add_gear_capacities() {
+    for (std::size_t g = 0; g < train_.gears.size(); ++g) {
+        const GearPlace& p = places_.gears[g];
+        if (p.contact == nowhere || train_.gears[g].rigid() || regime_.key.modes[p.contact] != 0) continue;
+        const Row h = terms_.memory(p.hysteresis), &H = regime_.gear_hysteresis[g];
+        add(h - H, Guard::capacity, p.contact, nowhere, +1);
+        add(h + H, Guard::capacity, p.contact, nowhere, -1);
+    }
+}
+
+void RegimeGuards::add_coupling_capacities() {
+    for (const auto& c : places_.couplings) {
+        if (!c->is_dry() || regime_.key.modes[c->contact] != 0) continue;
+        const Row& torque = regime_.contact_torque[c->contact];
+        const Row capacity = forms_.coupling_capacity(*c, regime_, true);
+        if (!c->is_one_way()) add(capacity - torque, Guard::capacity, c->contact, nowhere, +1);
+        add(capacity + torque, Guard::capacity, c->contact, nowhere, -1);
+    }
+}
+
+// Capacity of the contact of a shaft while it is stuck, edges of the cells of its gears while it slips.
+void RegimeGuards::add_shaft_guards(int shaft) {
+    const ShaftPlace& p = places_.shafts[shaft];
+    if (p.contact == nowhere) return;
+    const auto each_gear = [&](auto&& use) {
+        for (std::size_t g = 0; g < train_.gears.size(); ++g)
+            if (train_.gears[g].input == shaft && train_.gears[g].has_dry_losses()) use(static_cast<int>(g));
+    };
+    if (regime_.key.modes[p.contact] != 0) {
+        each_gear([&](int g) { add_loss_edges(g); });
+        return;
+    }
+    for (const int s : {+1, -1}) {
+        Row F = forms_.held_friction(shaft, regime_.key);
+        each_gear([&](int g) { add_loss_cells(g, s, F); });
+        for (std::size_t g = 0; g < train_.gears.size(); ++g)
+            if (const int corner = places_.gears[g].error_corner;
+                corner != nowhere && train_.gears[g].input == shaft && regime_.key.branch[corner] == s)
+                F += static_cast<double>(s) *
+                     forms_.beyond_corner(static_cast<int>(g), regime_.key, regime_.output_torque[g]);
+        add(F - static_cast<double>(s) * regime_.contact_torque[p.contact], Guard::capacity, p.contact, nowhere, s);
+    }
+}
+
+void RegimeGuards::add_loss_cells(int gear, int s, Row& capacity) {
+    const Gear& g = train_.gears[gear];
+    const GearPlace& p = places_.gears[gear];
+    const int contact = places_.shafts[g.input].contact, branch = s > 0 ? p.cell : p.cell_back;
+    const int j = regime_.key.branch[branch];
+    const LossTerms<Row> losses = forms_.losses(gear, regime_.output_torque[gear]);
+    const Row mu = losses.load(s);
+    capacity += losses.at_rest(g.loss_at_standstill(j), s);
+    const double low = g.load_lower(j), high = g.load_upper(j);
+    const bool bounded = std::isfinite(low) && std::isfinite(high);
+    const double scale = bounded ? 1.0 / (high - low) : 1.0;
+    const auto edge = [&](const Row& form, int neighbour) {
+        const bool end = neighbour < 0 || neighbour >= g.load_intervals();
+        add(scale * form, end ? Guard::outside : Guard::edge, contact, branch, neighbour);
+    };
+    if (std::isfinite(high)) edge(terms_.one(high) - mu, j + 1);
+    if (std::isfinite(low)) edge(mu - terms_.one(low), j - 1);
+    regime_.in_data = regime_.in_data && g.load_interval_in_data(j);
+}
+
+void RegimeGuards::add_loss_edges(int gear) {
+    const Gear& g = train_.gears[gear];
+    const GearPlace& p = places_.gears[gear];
+    const int contact = places_.shafts[g.input].contact;
+    const double s = regime_.key.modes[contact];
+    const LossTerms<Row> losses = forms_.losses(gear, regime_.output_torque[gear]);
+    Edge edges[3];
+    const int n = g.loss_edges(regime_.key.branch[p.cell], edges);
+    for (int k = 0; k < n; ++k)
+        add(losses.edge(edges[k].inside, s), edges[k].neighbour < 0 ? Guard::outside : Guard::edge, contact, p.cell,
+            edges[k].neighbour);
+    regime_.in_data = regime_.in_data && g.in_data(regime_.key.branch[p.cell]);
+}
+
+// The contact of a shaft that "slips" but is kept at rest by others is at its limit: one torque that rest leaves open
+// goes along with that limit, as a play does. Were the contact stuck, that torque would stay, and the contact be
+// overcome as long as the torque that holds it moves away from it; once that turns back, it stays.
+void RegimeGuards::add_turning() {
+    for (int c = 0; c < layout_.contacts; ++c)
+        if (places_.contacts[c].kind == ContactPlace::shaft && regime_.key.modes[c] != 0 && regime_.at_rest[c])
+            add_driver(c);
+    regime_.driving_input = nowhere;
+    if (regime_.drivers.size() != 1) return;
+    const Driver<Row>& only = regime_.drivers[0];
+    const auto is_zero = [](double v) { return v == 0.0; };
+    if (!std::all_of(only.rate.c.begin(), only.rate.c.end(), is_zero)) return;
+    const auto inputs = only.torque.c.begin() + layout_.first_input;
+    if (std::count_if(inputs, inputs + layout_.inputs, is_zero) != layout_.inputs - 1) return;
+    const auto input = std::find_if_not(inputs, inputs + layout_.inputs, is_zero);
+    regime_.driving_input = static_cast<int>(input - inputs);
+    regime_.driving_way = *input > 0.0 ? 1.0 : -1.0;
+}
+
+void RegimeGuards::add_driver(int contact) {
+    Regime stuck;
+    stuck.key = regime_.key;
+    stuck.key.modes[contact] = 0;
+    stuck.ties = tie(places_.contacts, static_cast<int>(train_.shafts.size()), stuck.key.modes.data());
+    std::vector<Row> acceleration(train_.shafts.size());
+    equations_.compose(stuck.key, stuck, acceleration);
+    Row& overcome = stuck.contact_torque[contact];
+    if (!solve_reactions(places_.contacts, layout_, stuck.key, stuck.ties, acceleration, {&overcome})) return;
+    // The torque that its rest leaves open in addition.
+    int open = 0;
+    while (open < layout_.contacts && (!stuck.ties.redundant[open] || regime_.ties.redundant[open])) ++open;
+    if (open == layout_.contacts) return;
+    const ContactPlace& place = places_.contacts[open];
+    const double overcomes = regime_.key.modes[contact] * overcome.c[layout_.first_memory + place.locked];
+    if (overcomes == 0.0) return;
+    const Row& torque = place.kind == ContactPlace::gear
+                            ? regime_.output_torque[static_cast<std::size_t>(place.element)]
+                            : regime_.contact_torque[static_cast<std::size_t>(open)];
+    Driver<Row> driver{contact};
+    // What an elimination leaves of a term that cancels is none.
+    const double scale = std::copysign(largest_share(torque), -overcomes);
+    const auto share = [&](int term) {
+        const double s = torque.c[term] / scale;
+        return std::fabs(s) > 1e-14 ? s : 0.0;
+    };
+    bool by_states = false, by_inputs = false;
+    for (int k = 0; k < layout_.states; ++k)
+        if (driver.torque.c[k] = moves(k) ? share(k) : 0.0; driver.torque.c[k] != 0.0) {
+            driver.rate += driver.torque.c[k] * regime_.rate[k];
+            by_states = true;
+        }
+    for (int i = layout_.first_input; i < layout_.first_input + layout_.inputs; ++i) {
+        driver.torque.c[i] = share(i);
+        by_inputs = by_inputs || driver.torque.c[i] != 0.0;
+    }
+    if (by_inputs)
+        regime_.drivers.push_back(driver);
+    else if (by_states)
+        add(driver.rate, Guard::turning, contact, nowhere, 0);
+}
+
+// Of the terms that may change while the regime lasts.
+double RegimeGuards::largest_share(const Row& torque) const {
+    double largest = 0.0;
+    for (int k = 0; k < layout_.states; ++k)
+        if (moves(k)) largest = std::max(largest, std::fabs(torque.c[k]));
+    for (int i = 0; i < layout_.inputs; ++i) largest = std::max(largest, std::fabs(torque.c[layout_.first_input + i]));
+    return largest > 0.0 ? largest : 1.0;
+}
+
+bool RegimeGuards::moves(int state) const {
+    const Row& rate = regime_.rate[static_cast<std::size_t>(state)];
+    return std::any_of(rate.c.begin(), rate.c.end(), [](double v) { return v != 0.0; });
+}
+
+// Pieces of the torsion curve, and where the flanks part and touch again.
+void RegimeGuards::add_twist_pieces(int gear) {
+    const Gear& g = train_.gears[gear];
+    const GearPlace& p = places_.gears[gear];
+    if (forms_.twist_rests(gear, regime_)) return;
+    const TorsionCurve& curve = g.law.curve;
+    const int piece = regime_.key.branch[p.piece];
+    const int slip = p.contact == nowhere ? 0 : regime_.key.modes[p.contact];
+    if (piece < curve.outermost_piece())
+        add(terms_.one(curve.upper(piece)) - terms_.state(p.twist), Guard::edge, p.contact, p.piece, piece + 1).behind =
+            slip < 0;
+    if (piece > -curve.outermost_piece())
+        add(terms_.state(p.twist) - terms_.one(curve.lower(piece)), Guard::edge, p.contact, p.piece, piece - 1).behind =
+            slip > 0;
+    if (p.parted == nowhere || piece == 0) return;
+    const bool parted = regime_.key.branch[p.parted] != 0;
+    const Row pressed = terms_.state(p.twist, curve.slope(piece)) + terms_.one(curve.offset(piece)) +
+                        g.mesh_damping * forms_.twist_rate(gear, regime_.key);
+    add(((piece > 0) != parted ? 1.0 : -1.0) * pressed, Guard::edge, p.contact, p.parted, parted ? 0 : 1);
+}
+
+void RegimeGuards::add_speed_pieces(int shaft) {
+    const ShaftPlace& p = places_.shafts[shaft];
+    const Shaft& law = train_.shafts[shaft];
+    if (regime_.ties.at_rest[shaft]) return;
+    const Row w = terms_.state(p.speed);
+    if (p.friction_piece != nowhere && regime_.key.modes[p.contact] != 0) {
+        const double s = regime_.key.modes[p.contact];
+        const int k = regime_.key.branch[p.friction_piece];
+        if (k + 1 < law.friction.pieces())
+            add(terms_.one(law.friction.speeds[k + 1]) - s * w, Guard::edge, p.contact, p.friction_piece, k + 1);
+        if (k > 0) add(s * w - terms_.one(law.friction.speeds[k]), Guard::edge, p.contact, p.friction_piece, k - 1);
+    }
+}
+
+void RegimeGuards::add_input_limits() {
+    for (std::size_t m = 0; m < train_.motors.size(); ++m)
+        if (const MotorPlace& p = places_.motors[m]; p.branch != nowhere) {
+            const double most = train_.motors[m].command_limit();
+            const int contact = places_.shafts[train_.motors[m].shaft].contact;
+            add_limit_guards(terms_, terms_.input(p.command), -most, most, regime_.key,
+                             {.kind = Guard::input_limit, .contact = contact, .branch = p.branch}, regime_.guards);
+        }
+}
+
+// Limits of their commands, pieces of their laws over the slip.
+void RegimeGuards::add_coupling_pieces() {
+    for (const auto& c : places_.couplings) {
+        const Between shafts = forms_.between(*c, regime_.ties);
+        const bool slips = std::any_of(shafts.slip.c.begin(), shafts.slip.c.end(), [](double v) { return v != 0.0; });
+        c->add_guards(shafts, regime_.key, slips, regime_.guards);
+    }
+}
+
+// Where the output of a controller reaches its limit, or comes back from it.
+void RegimeGuards::add_output_limits() {
+    for (std::size_t k = 0; k < train_.controllers.size(); ++k) {
+        const int branch = places_.controllers[k].branch;
+        if (branch == nowhere) continue;
+        const double most = train_.controllers[k].limit;
+        add_limit_guards(terms_, forms_.controller_output(static_cast<int>(k)), -most, most, regime_.key,
+                         {.kind = Guard::edge, .branch = branch}, regime_.guards);
+    }
+}
+
+}  // namespace lostmotion::model

@@ -1,0 +1,63 @@
+#include "ties.hpp"
+
+namespace lostmotion::model {
+
+unsigned tied_speed(const ContactPlace& c, const Ties& t, std::array<double, max_shafts>& speed) {
+    unsigned all = 0;
+    c.each_shaft([&](int s, double) { all |= t.free[s]; });
+    unsigned moves = 0;
+    for (unsigned left = all; left != 0; left &= left - 1) {
+        const int k = std::countr_zero(left);
+        double sum = 0.0, size = 0.0;
+        c.each_shaft([&](int s, double per) {
+            const double part = t.free[s] >> k & 1 ? per * t.share[s][k] : 0.0;
+            sum += part;
+            size += std::fabs(part);
+        });
+        speed[k] = sum;
+        if (std::fabs(sum) > loop_rounding * size) moves |= 1u << k;
+    }
+    return moves;
+}
+
+bool stop_contact(const ContactPlace& c, int shafts, Ties& t) {
+    std::array<double, max_shafts> speed;
+    const unsigned moves = tied_speed(c, t, speed);
+    if (moves == 0) return false;
+    const int last = std::bit_width(moves) - 1;
+    for (int s = 0; s < shafts; ++s) {
+        if ((t.free[s] >> last & 1) == 0) continue;
+        t.free[s] ^= static_cast<std::uint16_t>(1u << last);
+        for (unsigned left = moves ^ 1u << last; left != 0; left &= left - 1) {
+            const int k = std::countr_zero(left);
+            const auto bit = static_cast<std::uint16_t>(1u << k);
+            const double change = t.share[s][last] * (-speed[k] / speed[last]),
+                         sum = (t.free[s] & bit) != 0 ? t.share[s][k] + change : change;
+            t.share[s][k] = sum;
+            t.free[s] |= bit;
+            if (!(std::fabs(sum) > loop_rounding * std::fabs(change))) t.free[s] ^= bit;
+        }
+    }
+    return true;
+}
+
+Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes) {
+    Ties t;
+    for (int s = 0; s < shafts; ++s) {
+        t.free[s] = static_cast<std::uint16_t>(1u << s);
+        t.share[s][s] = 1.0;
+    }
+    for (const bool frame : {true, false})
+        for (std::size_t k = 0; k < contacts.size(); ++k)
+            if (modes[k] == 0 && (contacts[k].b == nowhere) == frame)
+                t.redundant[k] = !stop_contact(contacts[k], shafts, t);
+    for (int s = 0; s < shafts; ++s) t.at_rest[s] = t.free[s] == 0;
+    return t;
+}
+
+bool kept_at_rest(const ContactPlace& c, const Ties& t) {
+    std::array<double, max_shafts> speed;
+    return tied_speed(c, t, speed) == 0;
+}
+
+}  // namespace lostmotion::model

@@ -1,0 +1,38 @@
+#include "train_description.hpp"
+
+namespace lostmotion::model {
+
+void TrainDescription::add_gear(const std::string& name, const std::string& input, const std::string& output,
+                                const Gearbox& law, const std::optional<std::pair<double, double>>& efficiencies,
+                                double mesh_damping, const PeriodicCurve* transmission_error) {
+    Gear g;
+    g.name = name;
+    g.input = place_of(input);
+    g.output = place_of(output);
+    g.law = law;
+    if (efficiencies) g.efficiencies.emplace(efficiencies->first, efficiencies->second);
+    g.mesh_damping = mesh_damping;
+    if (transmission_error != nullptr) g.transmission_error = *transmission_error;
+    train.gears.push_back(std::move(g));
+}
+
+void TrainDescription::set_housing(const std::string& gear, const std::string& shaft) {
+    for (Gear& g : train.gears)
+        if (g.name == gear) g.housing = place_of(shaft);
+}
+
+void TrainDescription::add_controller(LinearController c, const std::string& motor) {
+    c.motor = -1;
+    for (std::size_t k = 0; k < train.motors.size(); ++k)
+        if (train.motors[k].name == motor) c.motor = static_cast<int>(k);
+    c.name = motor;
+    train.controllers.push_back(std::move(c));
+}
+
+int TrainDescription::place_of(const std::string& shaft) const {
+    for (std::size_t k = 0; k < train.shafts.size(); ++k)
+        if (train.shafts[k].name == shaft) return static_cast<int>(k);
+    return -1;
+}
+
+}  // namespace lostmotion::model

@@ -1,0 +1,45 @@
+#include "result_names.hpp"
+
+namespace lostmotion {
+
+const std::vector<SwitchingColumn>& switching_columns() {
+    static const std::vector<SwitchingColumn> columns = [] {
+        std::vector<SwitchingColumn> all{
+            {"instant", [](const Switching& s) { return s.time; }},
+            {"cause", [](const Switching& s) { return double(s.input_jump ? input_changed : int(s.kind)); }},
+        };
+        for (const auto& [when, key] : {std::pair{"_before", &Switching::before}, {"_after", &Switching::after}})
+            for (const ContactName& c : contact_names)
+                all.push_back({c.name + std::string(when),
+                               [c, key](const Switching& s) { return double((s.*key).modes[c.value]); }});
+        all.push_back({"output_torque_before", [](const Switching& s) { return s.torque_before; }});
+        all.push_back({"output_torque_after", [](const Switching& s) { return s.torque_after; }});
+        return all;
+    }();
+    return columns;
+}
+
+std::string status_text(Status status, double time, const std::string& contact) {
+    const std::string at = "at t = " + std::to_string(time) + " s";
+    switch (status) {
+        case Status::done: return "";
+        case Status::interrupted: return "interrupted";
+        case Status::jammed:
+            return "no combination of sticking and slipping contacts is consistent " + at +
+                   ": the friction jams. Give the gearbox a compliance, or lower its losses.";
+        case Status::outside:
+            return "the state left the range that can be computed " + at +
+                   ": 1000 times the data of a loss map, or what numbers resolve. "
+                   "The drive is unstable, or its data or inputs, such as a stiffness, have a wrong unit.";
+        case Status::zeno:
+            return "switching instants of the contact '" + contact + "' accumulate " + at +
+                   ": infinitely many in finite time. The model ends here.";
+        case Status::controller: return "the controller failed " + at + ", or its command is no finite number";
+        case Status::unseen:
+            return "the drive has dry contacts, which do not feel a nonlinear torque. Take them out, or make the "
+                   "torque piecewise linear.";
+    }
+    return "";
+}
+
+}  // namespace lostmotion

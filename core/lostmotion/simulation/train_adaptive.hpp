@@ -1,0 +1,47 @@
+// Runs of a train in one kernel by the adaptive solver. Only core/kernels takes it.
+#pragma once
+
+#include "../solver/adaptive_solver.hpp"
+#include "train_solving.hpp"
+
+namespace lostmotion {
+
+template <class D>
+class AdaptiveTrainObserver final : public Observer<model::TrainSystem<D>> {
+ public:
+    using System = model::TrainSystem<D>;
+
+    AdaptiveTrainObserver(TrainRecorder<D>& recorder, AdaptiveSolver<System>& solver)
+        : recorder_(recorder), solver_(solver) {}
+    void step(const typename System::Regime& r, const typename D::Memory& m, const DenseStepOf<D>& dense,
+              bool last) override {
+        recorder_.sample(solver_, r, m, dense, last);
+    }
+    bool wants_switching() const override { return recorder_.wants_switching(); }
+    void switching(const SwitchingOf<System>& s) override { recorder_.switching(s); }
+
+ private:
+    TrainRecorder<D>& recorder_;
+    AdaptiveSolver<System>& solver_;
+};
+
+template <class D>
+TrainReport run_train_adaptively_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
+                                    std::span<const double> start, std::span<const double> memory,
+                                    const TrainOptions& options, double* out) {
+    using System = model::TrainSystem<D>;
+    TrainReport report;
+    report.message = check_run(model.assembly, start, options.control);
+    if (!report.message.empty()) return report;
+    const PackedRun<D> c(model.assembly, inputs, start, memory, options);
+    TrainRecorder<D> recorder(model, options, out, report, nullptr);
+    const System system(model.assembly);
+    AdaptiveSolver<System> solver(system, c.signals, options.tolerance, system.rated_scale());
+    AdaptiveTrainObserver<D> observer(recorder, solver);
+    report.status = run_recorded(solver, c.start, options, observer, c.in_train());
+    report.steps = solver.steps();
+    c.end(report, system, solver);
+    return report;
+}
+
+}  // namespace lostmotion

@@ -1,0 +1,30 @@
+#include "train_run.hpp"
+
+namespace lostmotion {
+
+std::string check_start(const model::Assembly& a, std::span<const double> start) {
+    std::vector<double> speeds;
+    for (const model::ShaftPlace& s : a.places().shafts)
+        speeds.push_back(start.empty() ? 0.0 : start[static_cast<std::size_t>(s.speed)]);
+    return model::check_start(a.train(), speeds);
+}
+
+std::string check_run(const model::Assembly& a, std::span<const double> start, const Control& control) {
+    std::string wrong = check_start(a, start);
+    return wrong.empty() ? check_control(a, control) : wrong;
+}
+
+TrainRun::TrainRun(const model::Train& train) : error_(model::check(train)) {
+    if (!error_.empty()) return;
+    assembly_ = std::make_unique<model::Assembly>(train);
+    channels_ = train_channels(*assembly_);
+    error_ = too_large(train, model::Places(train, true).layout);
+}
+
+const char* TrainRun::kernel() const {
+    const model::Train& train = assembly_->train();
+    const model::Layout& n = assembly_->layout();
+    return model::fits<model::Narrow>(train, n) ? "narrow" : model::fits<model::Middle>(train, n) ? "middle" : "wide";
+}
+
+}  // namespace lostmotion
