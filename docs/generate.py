@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import control_figures
@@ -30,6 +31,17 @@ from lostmotion.simulation.variables import VARIABLES
 from lostmotion.units.grammar import PREFIXED, SPELLINGS
 
 OUT = Path(__file__).parent / "_generated"
+WRITERS = (
+    reference_figures,
+    self_locking_figures,
+    servo_figures,
+    tracking_figures,
+    two_motors_figures,
+    motors_figures,
+    control_figures,
+    limit_cycles_figures,
+    identification_figures,
+)
 
 
 def purpose_of(table: Mapping[str, Any]) -> str:
@@ -254,8 +266,10 @@ def _command_section(name: str, command: Any) -> list[str]:
     return [*lines, ""]
 
 
-def gallery(pictures: Path) -> str:
-    """A page with a figure of every shipped scenario; the figures go into the directory `pictures`."""
+def gallery(out: Path) -> str:
+    """A page with a figure of every shipped scenario; the figures go into the directory `gallery` of `out`."""
+    pictures = out / "gallery"
+    pictures.mkdir(exist_ok=True)
     lines = [
         "# Gallery of scenarios",
         "",
@@ -271,7 +285,7 @@ def gallery(pictures: Path) -> str:
             "",
             f"**{scenario.title}.** {introduction(path)}",
             "",
-            f"![{scenario.title}]({name}.png)",
+            f"![{scenario.title}](gallery/{name}.png)",
             "",
         ]
         lines += ["```sh", f"lostmotion run {name} --plot {name}.png", "```", ""]
@@ -297,6 +311,21 @@ def introduction(path: Path) -> str:
     return " ".join(block)
 
 
+def collect(writers: Iterable[Any], out: Path) -> None:
+    """The files that modules write, in one directory; two modules with the same file name end in an error."""
+    made: dict[str, str] = {}
+    for writer in writers:
+        with TemporaryDirectory(dir=out) as own:
+            writer.write(Path(own))
+            for path in sorted(Path(own).iterdir()):
+                if path.name in made:
+                    raise FileExistsError(
+                        f"{path.name}: written by {made[path.name]} and by {writer.__name__}; rename one"
+                    )
+                made[path.name] = writer.__name__
+                path.replace(out / path.name)
+
+
 def generate(out: Path = OUT) -> None:
     """All pages into a directory, made if missing."""
     out.mkdir(exist_ok=True)
@@ -307,15 +336,7 @@ def generate(out: Path = OUT) -> None:
         "commands": commands(),
         "gallery": gallery(out),
     }
-    reference_figures.write(out)
-    self_locking_figures.write(out)
-    servo_figures.write(out)
-    tracking_figures.write(out)
-    two_motors_figures.write(out)
-    motors_figures.write(out)
-    control_figures.write(out)
-    limit_cycles_figures.write(out)
-    identification_figures.write(out)
+    collect(WRITERS, out)
     live_pages.write(out / "extra" / "live")
     for name, text in pages.items():
         (out / f"{name}.md").write_text(text, encoding="utf-8")

@@ -1,11 +1,14 @@
 """What README and documentation show is true."""
 
+import importlib
 import re
 import shlex
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -130,12 +133,32 @@ def test_the_glossary_has_the_terms_that_the_pages_use() -> None:
         assert term in terms
 
 
-def test_generated_pages_name_every_key_and_variable() -> None:
-    sys.path.insert(0, str(ROOT / "docs"))
-    try:
-        import generate
-    finally:
-        sys.path.pop(0)
+@pytest.fixture
+def generate(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    return importlib.import_module("generate")
+
+
+def test_figures_of_pages_leave_the_gallery_alone_and_are_written_once(
+    generate: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A figure of a page may have the name of a scenario, as `tracking-camera` has; two modules may not share a name."""
+
+    def writer(name: str) -> Any:
+        return SimpleNamespace(__name__=name, write=lambda out: (out / "worm-lowering.png").write_text(name))
+
+    shipped = {"worm-lowering": lm.shipped_scenarios()["worm-lowering"]}
+    monkeypatch.setattr(lm, "shipped_scenarios", lambda: shipped)
+    page = generate.gallery(tmp_path)
+    generate.collect([writer("one")], tmp_path)
+    (picture,) = re.findall(r"!\[.*\]\((.*)\)", page)
+    assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "worm-lowering.png").read_text() == "one"
+    with pytest.raises(FileExistsError, match=r"worm-lowering\.png: written by one and by other"):
+        generate.collect([writer("one"), writer("other")], tmp_path)
+
+
+def test_generated_pages_name_every_key_and_variable(generate: Any) -> None:
     commands = generate.commands()
     for name, command in generate._commands_of(generate.get_command(lm_app), "lostmotion"):
         assert f"## `{name}`" in commands
