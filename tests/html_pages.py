@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 VOID = {"meta", "img", "br"}
 IN_PARAGRAPHS = {"a", "b", "br", "code", "i", "img", "span", "sub", "sup"}
 ATTRIBUTES = {"charset", "class", "content", "id", "lang", "name"}
-OF_TAG = {"img": {"alt", "src"}}
+OF_TAG = {"img": {"alt", "src"}, "td": {"colspan"}, "th": {"colspan", "rowspan"}}
 
 
 class Page(HTMLParser):

@@ -7,6 +7,7 @@ from pathlib import Path
 import lostmotion as lm
 from lostmotion.data_sheets.records import find
 from lostmotion.paper import AMPLITUDES, MODELS, paper_scenario
+from lostmotion.paper.runs import stuck_intervals
 from lostmotion.reports import plots
 from lostmotion.reports.panels import STYLES, Curve, Panel
 from lostmotion.reports.rig import panels
@@ -21,14 +22,13 @@ HERE = Path(__file__).parent
 def why() -> None:
     drawn = []
     for amplitude, value in AMPLITUDES.items():
-        curves = []
-        for model in MODELS:
-            run = lm.simulate(paper_scenario(model, amplitude))
-            curves.append(Curve(model, run["time"].values, run["load_speed"].values, STYLES[model]))
+        runs = {model: lm.simulate(paper_scenario(model, amplitude)) for model in MODELS}
+        curves = [Curve(m, run["time"].values, run["motor_speed"].values, STYLES[m]) for m, run in runs.items()]
         title = "at rated voltage" if value > 1 else "at a fortieth of it"
-        drawn.append(Panel(title, "time [s]", "load speed [rad/s]", tuple(curves)))
-    figure = plots.draw(drawn, 2, (9.5, 3.3), note="Loss table of 2-DOF-NL: a stand-in.")
-    figure.savefig(HERE / "why.png", dpi=120, metadata={"Software": None})
+        shaded = stuck_intervals(runs["2-DOF-NL"])
+        drawn.append(Panel(title, "time [s]", "motor speed [rad/s]", tuple(curves), shaded=shaded))
+    note = "Shaded: the motor shaft of 2-DOF-NL is stuck. Loss table of 2-DOF-NL: a stand-in."
+    plots.draw(drawn, 2, (9.5, 3.3), note=note).savefig(HERE / "why.png", dpi=120, metadata={"Software": None})
 
 
 def tutorial() -> None:

@@ -18,8 +18,7 @@ def reproduce(
 ) -> None:
     """Reproduce the paper "Simplified dynamic model of the transmission": figures, data and a report.
 
-    Writes PNG, SVG and CSV for each of the figures 5 and 9 to 18, the constants as constants.csv, and report.html, a single
-    self-contained page.
+    Writes PNG, SVG and CSV of its figures, the constants as constants.csv, and report.html, a single self-contained page.
     """
     from ..errors import need
 

@@ -8,6 +8,7 @@ Jevický (2005). Equations and figures are numbered as there. docs/citing.md say
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..errors import InputError
@@ -20,6 +21,7 @@ AMPLITUDES = {"large": 1.0275, "small": 0.025}
 
 PRINTED_MOTOR_TIME_CONSTANT = 2.31e-3  # t_m0 [s]
 PRINTED_TIME_CONSTANT = 0.2334  # T_RC [s]
+DOES_NOT = "the printed value does not follow from the printed"
 
 
 def paper_scenario(model: str, amplitude: str) -> Scenario:
@@ -52,52 +54,37 @@ class Constant:
 def constants() -> list[Constant]:
     """The constants that the paper prints, recomputed."""
     rigid = paper_scenario("1-DOF-L", "large").drive()
+    new = rigid_constants(rigid)
+    old = rigid_constants(rigid, motor_time_constant=PRINTED_MOTOR_TIME_CONSTANT, time_constant=PRINTED_TIME_CONSTANT)
     g = paper_scenario("2-DOF-L", "large").drive().gearbox
     stiffness = g.stiffness.stiffness  # type: ignore[union-attr]
     efficiency = g.losses.efficiency  # type: ignore[union-attr]
-    J_MR = rigid.motor.rotor_inertia + g.inertia
-    omega_M2 = stiffness / (g.ratio**2 * efficiency * J_MR)
-    omega_Z2 = stiffness / rigid.load.inertia
-    new = rigid_constants(rigid)
-    old = rigid_constants(rigid, motor_time_constant=PRINTED_MOTOR_TIME_CONSTANT, time_constant=PRINTED_TIME_CONSTANT)
-    f_T0 = math.sqrt(omega_M2 + omega_Z2) / (2.0 * math.pi)
-    T_MR, T_ZR = J_MR / g.viscous_friction, rigid.load.inertia / rigid.load.viscous_friction
-    j_RC, beta_RC = new.inertia / rigid.motor.rotor_inertia, new.viscous_friction / g.viscous_friction
-
-    def both(value: RigidConstants, attribute: str) -> float:
-        return float(getattr(value, attribute))
-
-    def row(name: str, unit: str, printed: float, attribute: str, factor: float = 1.0, remark: str = "") -> Constant:
-        return Constant(name, unit, printed, factor * both(new, attribute), factor * both(old, attribute), remark)
-
-    not_from_data = "the printed value does not follow from the printed data"
-    per_turn = 0.5 / math.pi
-    return [
-        Constant("f_T0", "Hz", 65.5, f_T0, f_T0, "only with eta_C inside Omega_M"),
-        Constant("T_MR", "ms", 62.36, 1e3 * T_MR, 1e3 * T_MR),
-        Constant("T_ZR", "ms", 269.4, 1e3 * T_ZR, 1e3 * T_ZR),
-        Constant("j_RC", "1", 36.1, j_RC, j_RC),
-        Constant("beta_RC", "1", 5.32, beta_RC, beta_RC),
-        row(
-            "T_RC",
-            "ms",
-            233.4,
-            "time_constant",
-            1e3,
-            "the printed value does not follow from the printed j_RC and beta_RC",
-        ),
-        row("t_m0", "ms", 2.31, "motor_time_constant", 1e3, not_from_data),
-        row("T_mc", "ms", 61.48, "system_time_constant", 1e3, "follows from the printed t_m0 and T_RC"),
-        row("f_RC", "Hz", 56.6, "natural_frequency", per_turn, "likewise"),
-        row("xi_RC", "1", 10.9, "damping_ratio", 1.0, "likewise"),
-        row("omega_MRC", "rad/s", 374.8, "rated_speed", 1.0, "likewise"),
-        row("f_-3dB", "Hz", 2.6, "bandwidth", 1.0, "likewise"),
-        Constant(
-            "lambda_-3dB",
-            "1",
-            0.0458,
-            2.0 * math.pi * new.bandwidth / new.natural_frequency,
-            2.0 * math.pi * old.bandwidth / old.natural_frequency,
-            "likewise",
+    J_M, J_Z = rigid.motor.rotor_inertia, rigid.load.inertia
+    J_MR = J_M + g.inertia
+    f_T0 = math.sqrt(stiffness / (g.ratio**2 * efficiency * J_MR) + stiffness / J_Z) / (2.0 * math.pi)
+    # A disturbance M_Z lowers the motor's steady speed by T_MZ M_Z/J_Z.
+    reflection = g.ratio * efficiency / J_Z
+    follows = "the printed value follows from the printed t_m0 and T_RC"
+    rows: list[tuple[str, str, float, Callable[[RigidConstants], float], str]] = [
+        ("f_T0", "Hz", 65.5, lambda _: f_T0, "only with eta_C inside Omega_M"),
+        ("T_MR", "ms", 62.36, lambda _: 1e3 * J_MR / g.viscous_friction, ""),
+        ("T_ZR", "ms", 269.4, lambda _: 1e3 * J_Z / rigid.load.viscous_friction, ""),
+        ("j_RC", "1", 36.1, lambda c: c.inertia / J_M, ""),
+        ("beta_RC", "1", 5.32, lambda c: c.viscous_friction / g.viscous_friction, ""),
+        ("T_RC", "ms", 233.4, lambda c: 1e3 * c.time_constant, f"{DOES_NOT} j_RC and beta_RC"),
+        ("t_m0", "ms", 2.31, lambda c: 1e3 * c.motor_time_constant, f"{DOES_NOT} data"),
+        ("T_mc", "ms", 61.48, lambda c: 1e3 * c.system_time_constant, follows),
+        ("f_RC", "Hz", 56.6, lambda c: c.natural_frequency / (2.0 * math.pi), follows),
+        ("xi_RC", "1", 10.9, lambda c: c.damping_ratio, follows),
+        ("omega_MRC", "rad/s", 374.8, lambda c: c.rated_speed, follows),
+        ("f_-3dB", "Hz", 2.6, lambda c: c.bandwidth, follows),
+        ("lambda_-3dB", "1", 0.0458, lambda c: 2.0 * math.pi * c.bandwidth / c.natural_frequency, follows),
+        (
+            "T_MZ",
+            "s",
+            5.17,
+            lambda c: c.system_time_constant / (c.inertia * reflection),
+            f"{DOES_NOT} data, nor from the printed t_m0 and T_RC",
         ),
     ]
+    return [Constant(name, unit, printed, of(new), of(old), remark) for name, unit, printed, of, remark in rows]

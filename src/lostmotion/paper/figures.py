@@ -1,9 +1,9 @@
-"""The paper's figures 5 and 9 to 18: what each shows, drawn from the runs, and its data."""
+"""The paper's figures: what each shows, drawn from the runs, and its data."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,16 +11,19 @@ import numpy as np
 from ..model.losses import LossMap
 from ..reports.pages import panels_csv, table_csv
 from ..reports.panels import COMMAND_STYLE, STYLES, Curve, Panel, scientific
+from ..response.bandwidth import THREE_DECIBELS
 from ..response.linear import rigid_constants
 from .drive import AMPLITUDES, MODELS, paper_scenario
-from .runs import FREQUENCIES, Results
+from .facts import Facts
+from .runs import FREQUENCIES, Results, stuck_intervals
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-FIGURES = 11
+FIGURES = 14
 STAND_IN = "Loss table: a stand-in. The paper prints its own only as a picture."
+SHADED = "Shaded: the motor shaft of 2-DOF-NL is stuck."
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,7 @@ class FigureSpec:
     columns: int = 2
     size: tuple[float, float] = (10.0, 6.4)
     stand_in: bool = True  # whether the loss table shows in it
+    heading: str = ""  # its numbers in the paper, if it is more than one
 
 
 def _pairs(
@@ -54,17 +58,32 @@ def _pairs(
             run = results.runs[model, amplitude]
             curves.append(Curve(model, x(run), y(run), STYLES[model]))
         title = f"{what}, " if what else ""
-        yield Panel(f"{title}$E_{{CA}}$ = {value:g}", x_label, y_label, tuple(curves), **options)
+        shaded = stuck_intervals(results.runs["2-DOF-NL", amplitude]) if x_label == "time [s]" else ()
+        yield Panel(f"{title}$E_{{CA}}$ = {value:g}", x_label, y_label, tuple(curves), shaded=shaded, **options)
 
 
+SCHEMATICS = FigureSpec(
+    "01",
+    "Schematics",
+    "The comparison (1), the drive in general (2), the two traditional models (3, 4), and the measurement of a gearbox (6).",
+    stand_in=False,
+    heading="Figures 1 to 4 and 6",
+)
 LOSS_MAP = FigureSpec(
     "05",
     "Loss coefficient over speed and load",
-    "Above, as a surface and as curves. Near zero load the loss does not vanish: that is what no constant "
-    "efficiency can say.",
-    size=(10.0, 4.2),
+    "Left, as a surface; right, as curves. The loss does not vanish at zero load, so no constant efficiency describes it.",
 )
 
+
+LOOP_STYLES: tuple[dict[str, Any], ...] = (
+    {"color": "#0b3c5d", "linewidth": 1.5},
+    {"color": "#3a7ca5", "linewidth": 1.3, "linestyle": "--"},
+    {"color": "#7fae3f", "linewidth": 1.3, "linestyle": "-."},
+)
+
+CLOSED_FORM: dict[str, Any] = {**STYLES["1-DOF-L"], "linestyle": (0, (1, 1)), "linewidth": 2.2}
+LEVEL: dict[str, Any] = {"color": "0.45", "linestyle": "-", "linewidth": 0.8}
 
 # What the panels show over time or over the twist; each normalised by the rated value of the paper's drive.
 
@@ -88,7 +107,7 @@ def _command_and_torque(results: Results, **options: Any) -> tuple[Panel, ...]:
         run = results.runs["2-DOF-NL", amplitude]
         command = Curve("$E_C$", run["time"].values, run["command"].values, COMMAND_STYLE)
         torque = tuple(Curve(f"$m_D$, {c.label}", c.x, c.y, c.style) for c in panel.curves)
-        panels.append(Panel(panel.title, panel.x_label, "$E_C$, $m_D$ [-]", (command, *torque), panel.x_range))
+        panels.append(replace(panel, y_label="$E_C$, $m_D$ [-]", curves=(command, *torque)))
     return tuple(panels)
 
 
@@ -98,16 +117,77 @@ def _speed_and_load(results: Results, **options: Any) -> tuple[Panel, ...]:
     return (*speed, *torque)
 
 
-def figure_specs(results: Results) -> list[FigureSpec]:
-    """Figures 5 and 9 to 18, with all their data."""
+def figure_specs(results: Results, facts: Facts) -> list[FigureSpec]:
+    """All figures in the order of the paper, with their data."""
     return [
+        SCHEMATICS,
         LOSS_MAP,
+        _stiffness_spec(results),
+        _hysteresis_spec(results),
         *_torque_specs(results),
-        *_motion_specs(results),
+        *_motion_specs(results, facts),
         *_gearbox_specs(results),
-        *_power_specs(results),
+        *_power_specs(results, facts),
         *_response_specs(results),
     ]
+
+
+def _stiffness_spec(results: Results) -> FigureSpec:
+    spring = paper_scenario("2-DOF-NL", "large").gearbox.stiffness
+    linear = paper_scenario("2-DOF-L", "large").gearbox.stiffness.stiffness  # type: ignore[union-attr]
+    breaks, slopes = map(np.array, spring.pieces())  # type: ignore[union-attr]
+    twist, torque = results.first_loading
+    chords = np.diff(torque) / np.diff(twist)
+    within, ends = twist[[0, -1]], np.array([spring.torque(d) for d in breaks])  # type: ignore[union-attr]
+    points = {"color": STYLES["2-DOF-NL"]["color"], "linestyle": "none", "marker": "o", "markersize": 5}
+    return FigureSpec(
+        "07",
+        "Torsional stiffness",
+        "Measured on the virtual test rig: the input is locked and the output is loaded slowly, from rest to 1.2 times rated "
+        "torque. Left, the torque and the two breakpoints of (14); right, its slope.",
+        (
+            Panel(
+                "torque",
+                "twist Δφ$_2$ [mrad]",
+                "output torque $T_2$ [N·m]",
+                (
+                    Curve("2-DOF-L", 1e3 * within, linear * within, STYLES["2-DOF-L"]),
+                    Curve("2-DOF-NL", 1e3 * twist, torque, STYLES["2-DOF-NL"]),
+                    Curve("breakpoints of (14)", 1e3 * breaks, ends, points),
+                ),
+            ),
+            Panel(
+                "stiffness",
+                "twist Δφ$_2$ [mrad]",
+                "$k_2$ / $k_{2max}$ [-]",
+                (
+                    Curve("2-DOF-L", 1e3 * within, np.full(2, linear / slopes[-1]), STYLES["2-DOF-L"]),
+                    Curve("2-DOF-NL", 5e2 * (twist[1:] + twist[:-1]), chords / slopes[-1], STYLES["2-DOF-NL"]),
+                ),
+                y_range=(0.0, 1.1),
+            ),
+        ),
+        size=(10.0, 3.8),
+        stand_in=False,
+    )
+
+
+def _hysteresis_spec(results: Results) -> FigureSpec:
+    rated = _rated_values()[1]
+    curves = tuple(
+        Curve(f"±{100.0 * loop.amplitude / rated:.0f} % of $T_{{2R}}$", 1e3 * loop.twist, loop.torque / rated, style)
+        for loop, style in zip(results.loops, LOOP_STYLES, strict=True)
+    )
+    axes = ("twist Δφ$_2$ [mrad]", "$t_2$ [-]")
+    return FigureSpec(
+        "08",
+        "Hysteresis loop",
+        "Measured on the virtual test rig with the input locked, at three amplitudes; right, the middle enlarged. Each turning "
+        "point sets the hysteresis anew, in proportion to the torque there (16).",
+        (Panel("loops", *axes, curves), Panel("detail", *axes, curves, x_range=(-1.0, 1.0))),
+        size=(10.0, 3.8),
+        stand_in=False,
+    )
 
 
 def _torque_specs(results: Results) -> Iterator[FigureSpec]:
@@ -121,24 +201,35 @@ def _torque_specs(results: Results) -> Iterator[FigureSpec]:
     yield FigureSpec(
         "10",
         "Command and motor torque, detail",
-        "A reversal of figure 9 enlarged. At the small amplitude the torque of the nonlinear drive is in proportion to "
-        "the command most of the way: the shaft is stuck, so there is no back e.m.f.; the kink is the break-away.",
+        "A reversal of figure 9 enlarged. While the motor shaft of 2-DOF-NL is stuck, there is no back e.m.f., so its torque is "
+        "in proportion to the command; the kink at the end of a shaded interval is the break-away.",
         _command_and_torque(results, x_range=(1.4, 1.7)),
         size=(10.0, 3.6),
     )
 
 
-def _motion_specs(results: Results) -> Iterator[FigureSpec]:
+def _motion_specs(results: Results, facts: Facts) -> Iterator[FigureSpec]:
+    case = "2-DOF-NL", "small"
+    rests = facts.load_rests[case]
+    load = (
+        f"for {100.0 * rests:.0f} % of the time after it first moves" if rests > 0.0 else "only before it first moves"
+    )
     yield FigureSpec(
         "11",
         "Load speed and output torque",
-        "Speed of the load and relative torque on it. At the small amplitude the load stops in every half period.",
+        f"Speed of the load and relative torque on it. At the small amplitude the motor shaft of 2-DOF-NL is stuck for "
+        f"{100.0 * facts.stuck[case]:.0f} % of the time (shaded). Its load is at rest {load}.",
         _speed_and_load(results),
     )
+    zone = paper_scenario("2-DOF-NL", "large").gearbox.stiffness.pieces()[0][0]  # type: ignore[union-attr]
+    run = results.runs[case]
+    largest = float(np.abs(run["twist"].values).max())
+    where = "within" if largest < zone else "beyond"
     yield FigureSpec(
         "12",
         "Load speed and output torque, detail",
-        "The reversal of figure 11 enlarged: the load swings on within the zone of low stiffness while the motor is at rest.",
+        f"A reversal of figure 11 enlarged. At the small amplitude the load of 2-DOF-NL swings on while the motor shaft is stuck. "
+        f"The twist is at most {1e3 * largest:.2f} mrad, {where} the segment of low stiffness, which ends at {1e3 * zone:g} mrad.",
         _speed_and_load(results, x_range=(1.4, 1.7)),
     )
 
@@ -147,10 +238,11 @@ def _gearbox_specs(results: Results) -> Iterator[FigureSpec]:
     spring = paper_scenario("2-DOF-NL", "large").gearbox.stiffness
     rated_twist = 3.0e-3
     assert abs(spring.torque(rated_twist) / _rated_values()[1] - 1.0) < 0.02  # type: ignore[union-attr]
+    least = min(float(results.runs["2-DOF-NL", amplitude]["loss_coefficient"].min()) for amplitude in AMPLITUDES)
     yield FigureSpec(
         "13",
         "Loss coefficient along the motion",
-        "m_2B at each instant. It never falls to zero; where the shaft is at rest it is the start-up value.",
+        f"m_2B at each instant. It is never less than {least:.3f}. Where the motor shaft is stuck, it is the start-up value at the load.",
         tuple(
             _pairs(
                 results,
@@ -165,8 +257,8 @@ def _gearbox_specs(results: Results) -> Iterator[FigureSpec]:
     yield FigureSpec(
         "14",
         "Normalised hysteresis loop",
-        "Relative torque over twist / 3 mrad, the twist at about rated torque. The zone of low stiffness in the middle, the "
-        "two branches apart by the hysteresis set at the last turning point.",
+        "Relative torque over twist / 3 mrad, the twist at about rated torque. The segment of low stiffness is in the middle. The "
+        "two branches are apart by the hysteresis that the last turning points set.",
         tuple(
             _pairs(
                 results,
@@ -181,7 +273,7 @@ def _gearbox_specs(results: Results) -> Iterator[FigureSpec]:
     )
 
 
-def _power_specs(results: Results) -> Iterator[FigureSpec]:
+def _power_specs(results: Results, facts: Facts) -> Iterator[FigureSpec]:
     M_DR, _, omega_DR = _rated_values()
     yield FigureSpec(
         "15",
@@ -193,8 +285,9 @@ def _power_specs(results: Results) -> Iterator[FigureSpec]:
     yield FigureSpec(
         "16",
         "Instantaneous efficiency of the gearbox",
-        "The traditional models hold 0.9, and 1/0.9 where the load drives: there they create energy. The nonlinear one "
-        "sweeps from zero at every reversal to its best and back.",
+        "2-DOF-L has 0.9 where the motor drives and 1/0.9 where the load drives: there it creates energy. 2-DOF-NL has at most "
+        f"{facts.best_efficiency['large']:.2f} at the large and {facts.best_efficiency['small']:.2f} at the small amplitude, "
+        "and 0 around each reversal of the torque.",
         tuple(
             _pairs(
                 results,
@@ -209,56 +302,45 @@ def _power_specs(results: Results) -> Iterator[FigureSpec]:
 
 
 def _response_specs(results: Results) -> Iterator[FigureSpec]:
-    constants_of_rigid = rigid_constants(paper_scenario("1-DOF-L", "large").drive())
-    ratio = paper_scenario("1-DOF-L", "large").gearbox.ratio
-    normal = ratio / constants_of_rigid.rated_speed
-    closed = constants_of_rigid.response(FREQUENCIES, ratio) * normal
-    small = {**STYLES["2-DOF-NL"], "linestyle": (0, (4, 1.5)), "marker": "o", "markersize": 2.5}
-    lines = [("1-DOF-L, closed form (10), (11)", closed, STYLES["1-DOF-L"])]
-    for amplitude, style in (("large", STYLES["2-DOF-NL"]), ("small", small)):
-        values = results.load_response(amplitude) * normal
-        lines.append((f"2-DOF-NL, $E_{{CA}}$ = {AMPLITUDES[amplitude]:g}", values, style))
-    assert results.response is not None
-    worst = float(results.response["residual"].max())
-    periodic = (
-        f"{len(FREQUENCIES)} frequencies; each first harmonic comes from a motion whose states repeat within "
-        f"{scientific(worst)} of their magnitude from one period to the next."
-    )
+    worst = max(float(response["residual"].max()) for response in results.responses.values())
     yield FigureSpec(
         "17",
         "Frequency response, magnitude",
-        f"g(f) = (i_C/ω_MRC) |F(ω)|/|F(E)|. {periodic}",
-        (
-            Panel(
-                "",
-                "frequency [Hz]",
-                "magnitude g [-]",
-                tuple(Curve(label, FREQUENCIES, np.abs(v), style) for label, v, style in lines),
-                log_x=True,
-                log_y=True,
-            ),
-        ),
-        columns=1,
-        size=(8.0, 4.4),
+        "g(f) = (i_C/ω_MRC) |F(ω)|/|F(E)|. The closed form (10) drops the friction of the motor bearings; 1-DOF-L beside it has "
+        "this friction, and so have the other two. The step from the closed form to 1-DOF-L is thus the bearing, from there "
+        "to 2-DOF-NL the gearbox. The line of -3 dB is that of the closed form, 1/√2. "
+        f"{len(FREQUENCIES)} frequencies; each first harmonic comes from a motion whose states repeat within "
+        f"{scientific(worst)} of their magnitude from one period to the next.",
+        tuple(_response_panels(results, "magnitude g [-]", np.abs, (2e-4, 1.5), log_y=True)),
+        size=(10.0, 4.6),
     )
     yield FigureSpec(
         "18",
         "Frequency response, phase",
-        "Phase of the first harmonic of the load speed.",
-        (
-            Panel(
-                "",
-                "frequency [Hz]",
-                "phase φ [°]",
-                tuple(
-                    Curve(label, FREQUENCIES, np.degrees(np.unwrap(np.angle(v))), style) for label, v, style in lines
-                ),
-                log_x=True,
-            ),
-        ),
-        columns=1,
-        size=(8.0, 4.4),
+        "Phase of the first harmonic of the load speed, of the same models.",
+        tuple(_response_panels(results, "phase φ [°]", lambda v: np.degrees(np.unwrap(np.angle(v))), (-260.0, 10.0))),
+        size=(10.0, 4.6),
     )
+
+
+def _response_panels(
+    results: Results, label: str, of: Callable[[Any], Any], y_range: tuple[float, float], **options: Any
+) -> Iterator[Panel]:
+    """The models at each amplitude, with the cutoff that the paper prints."""
+    rigid = paper_scenario("1-DOF-L", "large")
+    closed_form, ratio = rigid_constants(rigid), rigid.gearbox.ratio
+    closed = closed_form.response(FREQUENCIES, ratio)
+    normal = ratio / closed_form.rated_speed
+    ends = FREQUENCIES[[0, -1]]
+    level = [Curve("-3 dB", ends, np.full(2, 1.0 / THREE_DECIBELS), LEVEL)] if "log_y" in options else []
+    printed = Curve("2.6 Hz, printed", np.full(2, 2.6), np.array(y_range), COMMAND_STYLE)
+    for amplitude, value in AMPLITUDES.items():
+        curves = [Curve("1-DOF-L, closed form", FREQUENCIES, of(closed * normal), CLOSED_FORM)]
+        for model in MODELS:
+            response = results.load_response(model, amplitude) * normal
+            curves.append(Curve(model, FREQUENCIES, of(response), STYLES[model]))
+        title = f"$E_{{CA}}$ = {value:g}"
+        yield Panel(title, "frequency [Hz]", label, (*curves, *level, printed), y_range=y_range, log_x=True, **options)
 
 
 def _stand_in_table() -> tuple[Any, Any, Any]:
@@ -270,16 +352,22 @@ def _stand_in_table() -> tuple[Any, Any, Any]:
 def draw(spec: FigureSpec) -> Figure:
     """The figure of a spec."""
     from ..reports import plots
+    from . import schematics
 
-    note = STAND_IN if spec.stand_in else ""
-    if spec.number == "05":
+    shaded = any(panel.shaded for panel in spec.panels)
+    note = " ".join([SHADED] * shaded + [STAND_IN] * spec.stand_in)
+    if spec is SCHEMATICS:
+        return schematics.draw()
+    if spec is LOSS_MAP:
         return plots.loss_map(*_stand_in_table(), note=note)
     return plots.draw(spec.panels, spec.columns, spec.size, note=note)
 
 
-def figure_csv(spec: FigureSpec) -> str:
-    """The data of a figure: long form, one row a point."""
-    if spec.number != "05":
+def figure_csv(spec: FigureSpec) -> str | None:
+    """The data of a figure: long form, one row a point; none of the schematics."""
+    if spec is SCHEMATICS:
+        return None
+    if spec is not LOSS_MAP:
         return panels_csv(spec.panels)
     speeds, loads, values = _stand_in_table()
     rows = [

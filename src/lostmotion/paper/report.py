@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
-from typing import Any
 
 from ..reports.pages import embed, render_page
 from ..reports.panels import scientific
-from .drive import AMPLITUDES, Constant
+from .drive import AMPLITUDES, MODELS, Constant
+from .facts import Facts
 from .figures import FigureSpec
+from .runs import FREQUENCIES
 
 
-def render(specs: list[FigureSpec], images: dict[str, bytes], table: list[Constant], facts: dict[str, Any]) -> str:
+def render(specs: list[FigureSpec], images: dict[str, bytes], table: list[Constant], facts: Facts) -> str:
     """The page, with the figures inside."""
     from markupsafe import Markup, escape
 
@@ -20,8 +21,8 @@ def render(specs: list[FigureSpec], images: dict[str, bytes], table: list[Consta
     def figure(number: str) -> Markup:
         spec = by_number[number]
         mark = Markup('<span class="stand-in">stand-in loss table</span>') if spec.stand_in else ""
-        caption = Markup("<b>Figure {}. {}.</b> {} {}").format(
-            int(number), spec.title, Markup(_powers(str(escape(spec.caption)))), mark
+        caption = Markup("<b>{}. {}.</b> {} {}").format(
+            spec.heading or f"Figure {int(number)}", spec.title, Markup(_powers(str(escape(spec.caption)))), mark
         )
         return embed(images[number], spec.title, caption, f"figure-{number}")
 
@@ -30,8 +31,10 @@ def render(specs: list[FigureSpec], images: dict[str, bytes], table: list[Consta
         facts=facts,
         constants=table,
         amplitudes=AMPLITUDES,
+        models=MODELS,
+        lowest=FREQUENCIES[0],
         figure=figure,
-        differs=lambda c: abs(c.recomputed / c.printed - 1.0) > 0.004,
+        different=[c.name for c in table if abs(c.recomputed / c.printed - 1.0) > 0.004],
         sci=lambda value: Markup(_powers(scientific(value))),
     )
 

@@ -1,4 +1,4 @@
-"""The paper reproduced: its figures 5 and 9 to 18, their data, its constants, and a report."""
+"""The paper reproduced: its figures, their data, its constants, and a report."""
 
 from __future__ import annotations
 
@@ -33,15 +33,17 @@ def reproduce(directory: Path, progress: Callable[[], None] = lambda: None) -> P
     table = constants()
     write_text(directory / "constants.csv", constants_csv(table))
     images = {}
-    specs = figure_specs(results)
+    found = facts(results)
+    specs = figure_specs(results, found)
     for spec in specs:
         figure = draw(spec)
         name = f"figure-{spec.number}"
         images[spec.number] = save_figure(figure, directory, name)
-        write_text(directory / f"{name}.csv", figure_csv(spec))
+        if (data := figure_csv(spec)) is not None:
+            write_text(directory / f"{name}.csv", data)
         progress()
     report = directory / "report.html"
-    write_text(report, render(specs, images, table, facts(results)))
+    write_text(report, render(specs, images, table, found))
     return report
 
 

@@ -55,3 +55,4 @@ class Panel:
     y_range: tuple[float, float] | None = None
     log_x: bool = False
     log_y: bool = False
+    shaded: tuple[tuple[float, float], ...] = ()  # intervals of x

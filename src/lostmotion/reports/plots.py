@@ -85,6 +85,8 @@ def draw(panels: Iterable[Panel], columns: int, size: tuple[float, float], note:
     rows = -(-len(panels) // columns)
     for k, panel in enumerate(panels):
         axes = figure.add_subplot(rows, columns, k + 1)
+        for low, high in panel.shaded:
+            axes.axvspan(low, high, color="0.88", linewidth=0)
         for curve in panel.curves:
             axes.plot(*thinned(curve.x, curve.y), label=curve.shown, **curve.style)
         if panel.log_x:
@@ -101,7 +103,9 @@ def draw(panels: Iterable[Panel], columns: int, size: tuple[float, float], note:
             axes.set_ylim(*_range_within(panel.curves, panel.x_range))
     labels = [[c.shown for c in panel.curves] for panel in panels]
     if len(labels[0]) > 1 and all(names == labels[0] for names in labels):
-        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=8.5)
+        columns = len(labels[0]) if len(labels[0]) <= 4 else 3
+        handles = figure.axes[0].get_legend_handles_labels()
+        figure.legend(*handles, loc="outside upper center", ncols=columns, fontsize=8.5)
     else:
         for axes, names in zip(figure.axes, labels, strict=True):
             if len(names) > 1:
