@@ -17,6 +17,7 @@ import gradients
 import identification
 import live
 import one_run
+import quotes
 import studies
 import tasks
 import trains
@@ -99,6 +100,7 @@ def main() -> None:
     live.section(report)
     print(report.text())
     (ROOT / "benchmarks" / "RESULTS.md").write_text(report.text())
+    quotes.write()
 
 
 if __name__ == "__main__":

@@ -202,6 +202,47 @@ def test_generated_pages_name_every_key_and_variable(generate: Any) -> None:
         assert f"| `{variable.name}` |" in generate.variables()
 
 
+@pytest.fixture
+def quotes(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    return importlib.import_module("quotes")
+
+
+RESULTS = (ROOT / "benchmarks" / "RESULTS.md").read_text()
+
+
+def test_times_that_pages_quote_are_those_of_the_benchmark(quotes: Any) -> None:
+    pages = {quote.page for quote in quotes.QUOTES}
+    assert {"README.md", "docs/select.md", "docs/live.md"} <= pages
+    for page in pages:
+        text = (ROOT / page).read_text()
+        assert quotes.renewed(page, text, quotes.Results(RESULTS)) == text, "run python benchmarks/quotes.py"
+
+
+def test_a_new_benchmark_changes_the_quotes(quotes: Any) -> None:
+    def changed(what: str, into: str) -> str:
+        line = next(line for line in RESULTS.splitlines() if line.startswith(what))
+        renewed = RESULTS.replace(line, re.sub(r"[\d.]+(?= \|| *s\.$)", into, line, count=1))
+        assert renewed != RESULTS
+        return quotes.renewed("README.md", (ROOT / "README.md").read_text(), quotes.Results(renewed))
+
+    assert "takes 0.26 ms in the core" in changed("| C++: exact, same drive again, AVX2 ", "0.2551")
+    assert "480 of them in 0.99 s," in changed("| 480 points by shooting, 2 threads", "987")
+    assert "on disk after 77 s on two cores" in changed("100,000 runs of 1 s on 2 cores", "77.3")
+    with pytest.raises(ValueError, match="there must be one"):
+        quotes.renewed("README.md", "", quotes.Results(RESULTS))
+
+
+def test_the_readme_has_no_time_of_its_own(quotes: Any) -> None:
+    """Besides the quotes only the durations of what is simulated."""
+    text = " ".join((ROOT / "README.md").read_text().split())
+    for quote in (q for q in quotes.QUOTES if q.page == "README.md"):
+        pattern = r"[\d.,]*\d".join(map(re.escape, quote.sentence.split("{}")))
+        text, count = re.subn(pattern.replace(r"\ \ ", r"\ "), "", text)
+        assert count == 1, quote.sentence
+    assert set(re.findall(r"[\w.]+ (?:[nuµm]?s|(?:milli|micro)?seconds?)\b", text)) <= {"2 s", "1 s"}
+
+
 # Phrases of our own, and what is written in their place.
 PLAIN_WORDS = {
     r"go(es)? on where": "resume",
