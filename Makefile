@@ -8,7 +8,9 @@ SOURCES := $(CORE_SOURCES) $(wildcard bindings/*.[ch]pp) CMakeLists.txt
 # One build tree for the extension, the C library, the library of FMUs and the tests of the core.
 TREE := build/native
 PACKAGE := src/lostmotion
-CMAKE := $(BIN)/cmake
+# Two makes at once, or one with several jobs, wait for each other there.
+ONE_BY_ONE := $(if $(shell command -v flock),flock build/native.lock)
+CMAKE := $(ONE_BY_ONE) $(BIN)/cmake
 BUILD := $(CMAKE) --build $(TREE)
 NODE := command -v npm >/dev/null
 
@@ -18,10 +20,9 @@ NODE := command -v npm >/dev/null
 unexport MAKEFLAGS
 
 demo: $(VENV)/built
-	@! $(NODE) || $(MAKE) --no-print-directory demo-page
-	$(BIN)/lostmotion reproduce -o out
-	@if $(NODE); then $(BIN)/lostmotion live paper-2dof-nl-small -o out/live.html; \
+	@if $(NODE); then $(MAKE) --no-print-directory page-drive && mkdir -p out && $(BIN)/lostmotion live paper-2dof-nl-small -o out/live.html; \
 	else echo 'Without node the live page was not built; with it, make demo leaves it at out/live.html.'; fi
+	$(BIN)/lostmotion reproduce -o out
 	@echo
 	@echo 'Made: out/report.html, the reproduction of the paper, with its figures beside it.'
 	@! test -f out/live.html || echo 'Made: out/live.html, the drive of the paper to try out in a browser.'
@@ -110,10 +111,9 @@ LIVE := $(PACKAGE)/live_page
 KERNELS := drive narrow middle wide
 NEED_NODE := $(NODE) || (echo 'npm is missing: without node the live page is not built'; false)
 WASM_SOURCES := $(SOURCES) $(wildcard bindings/c/*) page/src/core.ts
-.PHONY: page demo-page $(KERNELS:%=page-%)
+.PHONY: page $(KERNELS:%=page-%)
 page: $(KERNELS:%=page-%)
 $(KERNELS:%=page-%): page-%: $(LIVE)/page.html $(LIVE)/%.wasm.gz
-demo-page: page-drive
 $(LIVE)/page.html: page/node_modules/installed $(wildcard page/*.ts page/*.html page/src/*)
 	cd page && npm run --silent build
 	cp build/page/index.html $@

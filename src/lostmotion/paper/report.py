@@ -12,7 +12,9 @@ from .figures import FigureSpec
 from .runs import FREQUENCIES
 
 
-def render(specs: list[FigureSpec], images: dict[str, bytes], table: list[Constant], facts: Facts) -> str:
+def render(
+    specs: list[FigureSpec], images: dict[str, bytes], table: list[Constant], facts: Facts, *, live: bool = False
+) -> str:
     """The page, with the figures inside."""
     from markupsafe import Markup, escape
 
@@ -36,6 +38,7 @@ def render(specs: list[FigureSpec], images: dict[str, bytes], table: list[Consta
         figure=figure,
         different=[c.name for c in table if abs(c.recomputed / c.printed - 1.0) > 0.004],
         sci=lambda value: Markup(_powers(scientific(value))),
+        live=live,
     )
 
 

@@ -26,7 +26,7 @@ def reproduce(directory: Path, progress: Callable[[], None] = lambda: None) -> P
     Returns
     -------
     Path
-        Of the report.
+        Of the report. It links to ``live.html`` where that lies in the directory.
     """
     directory.mkdir(parents=True, exist_ok=True)
     results = runs.compute(progress)
@@ -43,7 +43,7 @@ def reproduce(directory: Path, progress: Callable[[], None] = lambda: None) -> P
             write_text(directory / f"{name}.csv", data)
         progress()
     report = directory / "report.html"
-    write_text(report, render(specs, images, table, found))
+    write_text(report, render(specs, images, table, found, live=(directory / "live.html").is_file()))
     return report
 
 
