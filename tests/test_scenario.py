@@ -132,6 +132,7 @@ def test_a_sampled_series_is_read_from_a_file(small: Path, tmp_path: Path) -> No
         ('0,0\n"0,5",1\n', 'line 2: "0,5" has a decimal comma; write "0.5"'),
         ("0,0\n1_000,1\n", 'line 2: "1_000" has separators'),
         ("time [min],value\n# why\n0,0\n1,x\n", 'line 4: "x" is not one number'),
+        ("time,load [5]\n0,0\n", 'line 1: "load [5]" has no unit in its brackets; write [-] there, or leave them out'),
         ("time [rpm],value\n0,0\n", 'line 1: the unit of "time [rpm]" has the unit of something else'),
         ("0,0\n1,nan\n", "values[1]: nan must be a finite number"),
     ):
@@ -143,6 +144,16 @@ def test_a_sampled_series_is_read_from_a_file(small: Path, tmp_path: Path) -> No
     (tmp_path / "points.csv").write_text("\ufefftime [ms],command [%]\r\n0,0\r\n500,2\r\n")
     command = lm.load(path).command
     assert (command.samples.times, command.samples.values) == ((0.0, 0.5), (0.0, 0.02))
+    # What stands in parentheses is the unit, or the number of a channel.
+    for heading, second, percent in (
+        ("time (ms),command (%)", 1e-3, 1e-2),
+        ("pos (5),pos (3)", 1.0, 1.0),
+        ("time (ch 2),command (5)", 1.0, 1.0),
+        ("time [ms] (1),command (5) [%]", 1e-3, 1e-2),
+    ):
+        (tmp_path / "points.csv").write_text(f"{heading}\n0,0\n0.5,0.25\n")
+        samples = lm.load(path).command.samples
+        assert (samples.times, samples.values) == ((0.0, 0.5 * second), (0.0, 0.25 * percent)), heading
     (tmp_path / "points.csv").unlink()
     with pytest.raises(lm.InputError, match=r"points\.csv.*cannot be read"):
         lm.load(path)

@@ -10,10 +10,11 @@ from pathlib import Path
 from ..errors import InputError
 from ..inputs.validation import shown
 from ..units.conversion import to_si
+from ..units.grammar import UnknownUnitError, plain, read_unit
 
 
 def read_series(path: Path, unit: str) -> tuple[list[float], list[float]]:
-    """Times [s] and values [`unit`] of a CSV file. A heading may name the units of the columns in square brackets.
+    """Times [s] and values [`unit`] of a CSV file. A heading may name the units of the columns in brackets.
 
     Raises
     ------
@@ -38,14 +39,29 @@ def read_series(path: Path, unit: str) -> tuple[list[float], list[float]]:
 
 
 def _factor(cell: str, unit: str, where: str) -> float:
-    """One of the unit in the brackets of a heading, in SI; 1 without brackets."""
-    written = re.search(r"\[(.*)\]", cell)
+    """One of the unit in the brackets of a heading, in SI; 1 without brackets.
+
+    What stands in parentheses is a unit where it can be read as one: it may also be the number of a channel.
+    """
+    in_brackets, in_parentheses = re.search(r"\[(.*)\]", cell), re.search(r"\(([^()]*)\)\s*$", cell)
+    written = in_brackets or (in_parentheses if in_parentheses and _is_unit(in_parentheses[1]) else None)
     if written is None or written[1].strip() in ("", "-", "1"):
         return 1.0
+    if re.fullmatch(r"[-+.0-9\s]+", written[1]):
+        raise InputError(
+            f"{where}: {shown(cell)} has no unit in its brackets; write [{unit or '-'}] there, or leave them out"
+        )
     try:
         return to_si(f"1 {written[1]}", unit)
     except ValueError as error:
         raise InputError(f"{where}: the unit of {shown(cell)} {error}") from None
+
+
+def _is_unit(text: str) -> bool:
+    try:
+        return bool(read_unit(plain(text)))
+    except UnknownUnitError:
+        return False
 
 
 def _point(row: list[str], where: str) -> tuple[float, float]:
