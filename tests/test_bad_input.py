@@ -4,6 +4,7 @@ import math
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,8 +13,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import lostmotion as lm
+from lostmotion.inputs.validation import nearest
 from lostmotion.simulation.scenario import Scenario
-from refusals import assert_file_refused, assert_plain
+from refusals import assert_file_refused, assert_plain, refused
 
 GOOD = """
 [command]
@@ -254,8 +256,8 @@ FUNCTIONS = [
     (lambda s: lm.linearize(s, 5), "state: 5 must be a state, such as Initial(motor_speed=100)"),
     (lambda s: lm.linearize(s, lm.Initial(), command=math.nan), "command: nan must be a finite number"),
     (lambda s: lm.Simulation(s, step="1,5 ms"), 'step: "1,5 ms" has a decimal comma'),
-    (lambda s: lm.Simulation(s).advance("1 ms", 0.1), 'interval "1 ms", command 0.1 and'),
-    (lambda s: lm.gearbox(5), "gearbox: 5 must be the name of a record"),
+    (lambda s: lm.Simulation(s).advance("1 mm", 0.1), 'interval: "1 mm" has the unit of something else'),
+    (lambda s: lm.gearbox(5), "name: 5 must be the name of a record, or of a file with one"),
     (lambda s: lm.load(5), "5 must be the name of a scenario"),
     (lambda s: lm.Scenario.from_json("{"), "is not valid JSON"),
     (lambda s: lm.Scenario.from_json("[]"), "must be a table"),
@@ -285,6 +287,107 @@ def test_functions_refuse_bad_input_with_the_same_error(
         call(lm.load(large))
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+RECORD = {"gearbox.from": "schaeffler-rt1-h-20-100"}
+OTHER_PLACES = [
+    ({"gearbox.backlash": 1e-3}, "key gearbox.backlash: is not known here; it is written as gearbox.stiffness.backlash"),
+    (RECORD | {"gearbox.backlash": 1e-3}, "key gearbox.backlash: is not known here; it is written as gearbox.stiffness.backlash"),
+    (RECORD | {"gearbox.backlsh": 1e-3}, "did you mean gearbox.stiffness.backlash?"),
+    ({"gearbox.stiffness": {"kind": "linear", "stiffness": 1e4, "backlash": 1e-3}}, 'backlash: is a key of kind "curve", and this table'),
+    ({"motor.max_speed": 1.0}, "it is written as motor.limits.max_speed"),
+    ({"gearbox.efficiency": 0.9}, "it is written as gearbox.hysteresis.efficiency or gearbox.losses.efficiency"),
+    ({"load_inertia": 1.0}, "key load_inertia: is not known here; it is written as load.inertia"),
+    ({"motor.ratedSpeed": 1.0}, "did you mean rated_speed?"),
+    ({"motor.speed_rated": 1.0}, "did you mean rated_speed?"),
+    ({"motor.rotorinertia": 1.0}, "did you mean rotor_inertia?"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "sentence"), OTHER_PLACES, ids=[s for _, s in OTHER_PLACES])
+def test_a_key_of_another_table_is_told_where_it_is_written(large: Path, changes: dict, sentence: str) -> None:
+    with pytest.raises(lm.InputError) as caught:
+        lm.load(large, changes)
+    assert sentence in str(caught.value)
+    assert "added_backlash?" not in str(caught.value)
+
+
+def test_no_suggestion_leads_to_another_quantity() -> None:
+    """A key with another word in it, or with one more, is that of another quantity."""
+    known = {
+        "added_backlash",
+        "rated_torque",
+        "rated_speed",
+        "rotor_inertia",
+        "friction_torque",
+        "max_speed",
+        "begin_time",
+    }
+    for wrong in (
+        "backlash",
+        "rated_current",
+        "rated_input_speed",
+        "inertia",
+        "torque",
+        "min_speed",
+        "end_time",
+        "speed",
+    ):
+        assert nearest(wrong, known) == "", wrong
+    for misspelt in ("aded_backlash", "rated_torqe", "ratedspeed", "RotorInertia", "torque_friction", "max-speed"):
+        assert nearest(misspelt, known) in known, misspelt
+
+
+def test_very_many_unknown_keys_are_refused_in_seconds(tmp_path: Path) -> None:
+    path = tmp_path / "many.toml"
+    path.write_text("".join(f"k{k} = 1\n" for k in range(200_000)) + GOOD)
+    begin = time.process_time()
+    message = refused(lambda: lm.load(path))
+    assert time.process_time() - begin < 20.0  # 3 s; looking at each for all that precede it took 87 s
+    assert f"{path}: key k0: is not known" in message
+    assert message.endswith("; and 199995 more")
+
+
+def test_what_is_nested_too_deeply_is_refused_with_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "deep.toml"
+    for text in (
+        "x = " + "[" * 5000 + "]" * 5000,
+        "x = " + "{a = " * 900 + "1" + "}" * 900,
+        f"[{'.'.join('a' * 3000)}]",
+    ):
+        path.write_text(text)
+        assert refused(lambda: lm.load(path)).startswith(f"{path}: has more than 50 levels of tables and lists")
+    deep: object = 1
+    for _ in range(5000):
+        deep = [deep]
+    assert "is nested too deeply" in refused(lambda: lm.Load(inertia=deep))
+    path.write_text(GOOD)
+    assert "--set x: has too many levels" in refused(lambda: lm.load(path, [f"x={'[' * 5000}{']' * 5000}"]))
+    assert "has more than 50 levels" in refused(lambda: lm.load(path, {"a." * 5000: 1}))
+    for k in range(150):
+        (tmp_path / f"b{k}.toml").write_text(f'base = "{f"b{k - 1}" if k else "deep"}.toml"')
+    assert "key base: is the base of 100 files" in refused(lambda: lm.load(tmp_path / "b149.toml"))
+
+
+def test_files_that_cannot_be_named_are_refused_by_their_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for one, other in (("a", "b"), ("b", "a")):
+        Path(f"{one}.toml").symlink_to(f"{other}.toml")
+    for name in (
+        "n" * 5000,
+        "n" * 5000 + ".toml",
+        "n/" * 3000 + "x.toml",
+        "n" * 5000 + ".csv",
+        "a.toml",
+        "zero\0.toml",
+    ):
+        start = name[:20].replace("\0", r"\x00")
+        for call in (lm.load, lm.load_study, lm.load_task, lm.load_identification, lm.gearbox):
+            message = refused(lambda call=call, name=name: call(name))
+            assert start in message, message
+    for base in ("n" * 5000 + ".toml", "a.toml", r"zero\u0000.toml"):
+        Path("based.toml").write_text(f'base = "{base}"')
+        assert re.match(r"based\.toml: key base|a\.toml: cannot be read", refused(lambda: lm.load("based.toml")))
 
 
 def test_a_drive_that_cannot_be_says_so_once() -> None:

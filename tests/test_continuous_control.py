@@ -452,7 +452,7 @@ def test_systems_of_scipy_and_python_control_act_as_the_pid_that_they_equal() ->
 
 REFUSED = [
     ({"position": {"gian": 3.0}}, "gian: is not known; did you mean gain"),
-    ({"sample_time": 1e-3}, "sample_time: is not known"),
+    ({"sample_time": 1e-3}, 'sample_time: is a key of kind "sampled", and this table has another'),
     ({"shaft": "lod"}, r'shaft: "lod" is no shaft; did you mean load'),
     ({"reference": {"kind": "speed", "mean": 1.0}}, "give speed or state_space"),
     ({"current": {"kind": "voltage"}}, 'current.kind = "voltage", for which there is state_space alone'),

@@ -4,11 +4,13 @@ import copy
 import inspect
 import pickle
 import re
+import threading
 import timeit
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+import xarray as xr
 from pydantic import BaseModel
 
 import lostmotion as lm
@@ -258,6 +260,103 @@ def test_reset_gives_the_same_motion_again() -> None:
     assert motion() == first
     simulation.reset(lm.Initial(load_angle=2.0))
     assert simulation["load_angle"] == 2.0
+
+
+def test_threads_that_share_a_simulation_lose_no_step() -> None:
+    shared, alone = lm.Simulation(SMALL), lm.Simulation(SMALL)
+
+    def steps() -> None:
+        for _ in range(500):
+            shared.advance(1e-4, 0.1)
+
+    threads = [threading.Thread(target=steps) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for _ in range(2000):
+        alone.advance(1e-4, 0.1)
+    assert shared.time == alone.time == pytest.approx(0.2)
+    assert shared.state.values == alone.state.values
+
+
+def test_a_law_cannot_change_the_simulation_that_calls_it() -> None:
+    scenario = lm.load("speed-axis", {"controller.law": True, "controller.speed": None})
+    refused: list[str] = []
+
+    def law(time, measured, reference, state):
+        for use in (held[0].read, held[0].reset, lambda: held[0].advance(1e-3)):
+            with pytest.raises(lm.InputError) as caught:
+                use()
+            refused.append(str(caught.value))
+        return 0.1
+
+    held = [lm.Simulation(scenario, law=law)]
+    held[0].advance(1e-3)
+    assert held.pop().time == 1e-3  # the law must not keep what keeps it
+    assert refused
+    assert set(refused) == {"the simulation is within a step; a law has to take what it needs from its arguments"}
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "copied", [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))], ids=["copy", "deepcopy", "pickle"]
+)
+def test_a_copy_of_a_simulation_goes_on_by_itself(path, copied) -> None:
+    scenario = lm.load(path)
+    first = lm.Simulation(scenario)
+    inputs = {name: 0.1 for name in first.inputs if name.endswith("command")}
+    for _ in range(5):
+        first.advance(1e-3, **inputs)
+    second = copied(first)
+    assert second.drive == first.drive
+    for _ in range(5):
+        first.advance(1e-3, **inputs)
+    assert second.time == pytest.approx(5e-3)
+    for _ in range(5):
+        second.advance(1e-3, **inputs)
+    assert second.state.values == first.state.values  # bit for bit
+    second.reset()
+    assert (second.time, first.time) == (0.0, pytest.approx(0.01))
+
+
+def test_a_copy_keeps_its_law_its_start_its_error_bound_and_what_a_subclass_adds() -> None:
+    class Own(lm.Simulation):
+        notes: list[str]
+
+    own = Own(SMALL, initial=lm.Initial(load_angle=1.0))
+    own.notes = ["kept"]
+    own.advance(1e-3, 0.1)
+    shallow, deep = copy.copy(own), copy.deepcopy(own)
+    assert type(shallow) is type(deep) is Own
+    assert shallow.notes is own.notes
+    assert deep.notes == own.notes
+    assert deep.notes is not own.notes
+    deep.reset()
+    assert deep["load_angle"] == 1.0
+    bounded = lm.Simulation(lm.load("field-weakening"), error_bound=True)
+    bounded.advance(1e-3)
+    other = copy.copy(bounded)
+    assert other.error_bound == bounded.error_bound
+    bounded.advance(1e-3)
+    other.advance(1e-3)
+    assert other.error_bound == bounded.error_bound
+
+
+def test_numbers_of_any_library_advance_as_those_of_python() -> None:
+    result = lm.simulate(SMALL)
+    at = {name: result[name][700] for name in ("command", "load_torque")}
+    plain, other = lm.Simulation(SMALL), lm.Simulation(SMALL)
+    for made in (np.float64, np.array, xr.DataArray, lambda x: f"{x!r} N*m"):
+        plain.advance(1e-3, 0.1, (0.0, 0.25))
+        other.advance(xr.DataArray(1e-3), np.array(0.1), (np.float32(0.0), made(0.25)))
+    plain.advance(1e-3, float(at["command"]), float(at["load_torque"]))
+    other.advance("1 ms", **at)
+    assert other.state.values == plain.state.values
+    train = [lm.Simulation(lm.load("worm-lowering")) for _ in range(2)]
+    train[0].advance(1e-3, motor_command=0.1, drum_load_torque=(0.0, 2.0))
+    train[1].advance(1e-3, motor_command=np.array(0.1), drum_load_torque=(0, xr.DataArray(2)))
+    assert train[0].state.values == train[1].state.values
 
 
 # --- what is exported ---

@@ -164,7 +164,11 @@ def test_runs_that_fail_are_counted_on_the_command_line(tmp_path: Path):
             'key = "inertja"\nvalues = [20]',
             "varies inertja, which the base scenario does not know (there is no inertja)",
         ),
-        ('key = "motor.inertia"\nvalues = [20]', "did you mean "),
+        (
+            'key = "motor.inertia"\nvalues = [20]',
+            "does not know (there is no inertia)",
+        ),  # that of the load is another one
+        ('key = "gearbox.backlash"\nvalues = [0]', "did you mean gearbox.stiffness.backlash?"),
         ('key = "load.inertai"\nvalues = [20]', "did you mean load.inertia?"),
     ],
 )

@@ -3,13 +3,33 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
+from unicodedata import category
+
+
+def visible(text: str, kept: str = "") -> str:
+    """A text with escapes in the place of what a terminal would obey or not show.
+
+    Parameters
+    ----------
+    kept
+        Characters that stay, such as the end of a line.
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() or c in kept or category(c) == "Zs" else c.encode("unicode_escape").decode() for c in text
+    )
 
 
 class InputError(ValueError):
     """Input that cannot be used. Its text is one line: the file, the key, the value and the remedy."""
 
     def __init__(self, text: str = "") -> None:
-        super().__init__("".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(text)))
+        super().__init__(visible(str(text)))
+
+
+class ArgumentError(InputError, TypeError):
+    """A call with an argument that the function does not have, or without one that it needs."""
 
 
 class MissingLibraryError(ImportError):

@@ -9,6 +9,7 @@ from typing import Any
 
 from .. import _core
 from ..errors import InputError
+from ..inputs.arguments import checked
 from ..inputs.validation import shown
 
 C_FUNCTION: Any = ctypes.CFUNCTYPE(None).__mro__[1]
@@ -68,6 +69,9 @@ class Law:
             return ctypes.cast(self.function, ctypes.c_void_p).value
         address = getattr(self.function, "address", None)
         return address if isinstance(address, int) and not isinstance(address, bool) else None
+
+
+Law.__init__ = checked(Law.__init__)  # type: ignore[method-assign]
 
 
 def _address_of(data: Any) -> int:

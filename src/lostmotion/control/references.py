@@ -98,8 +98,10 @@ class Reference(TimeFunction[V], Generic[V]):
             A time is negative or no number.
         """
         try:
+            if np.iscomplexobj(time):
+                raise TypeError
             t = np.asarray(time, float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError(f"time: {shown(time)} must be a number of seconds, or an array of them") from None
         if not np.all((t >= 0.0) & np.isfinite(t)):
             raise InputError(f"time: {shown(time)} must be finite and not negative; a reference begins at 0")

@@ -7,9 +7,11 @@ from contextlib import suppress
 from typing import Annotated, Any
 
 from ..errors import InputError
+from ..inputs.arguments import RecordName, checked
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Number, Positive, Temperature, argument
-from ..inputs.validation import shown, unknown_key
+from ..inputs.schema import keys_within
+from ..inputs.validation import shortened, shown, unknown_key
 from ..model.gearbox import Gearbox
 from ..model.motor import DC_KEYS, Motor
 from ..model.torsion import LinearStiffness, TorsionCurve
@@ -46,7 +48,9 @@ def gearbox_table(
     known = {*Gearbox.model_fields, *Conditions.model_fields}
     for key in changes:
         if key not in known:
-            raise InputError(f"key {where}.{key}: {unknown_key(key, known)}")
+            schema = Gearbox.model_json_schema()
+            inner = [".".join((where, *path)) for path in keys_within(schema, [schema])]
+            raise InputError(f"key {where}.{shortened(key)}: {unknown_key(key, known, inner)}")
     record = find(reference, "gearbox")
     assert isinstance(record, GearboxSheet)
     scalars = {key: value for key, value in changes.items() if key in SCALARS}
@@ -147,8 +151,9 @@ def _wear(table: dict[str, Any], changes: Mapping[str, Any], conditions: Conditi
         )
 
 
+@checked
 def gearbox(
-    name: str, *, temperature: float | None = None, added_backlash: float = 0.0, loss_factor: float = 1.0
+    name: RecordName, *, temperature: float | None = None, added_backlash: float = 0.0, loss_factor: float = 1.0
 ) -> Gearbox:
     """The gearbox of a record.
 
@@ -175,7 +180,8 @@ def gearbox(
     return Gearbox(**table)
 
 
-def motor(name: str, *, voltage_limit: float | None = None) -> Motor:
+@checked
+def motor(name: RecordName, *, voltage_limit: float | None = None) -> Motor:
     """The motor of a record.
 
     Parameters

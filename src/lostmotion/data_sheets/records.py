@@ -11,7 +11,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..inputs.toml_files import read_toml
-from ..inputs.validation import did_you_mean, shown, unknown_key
+from ..inputs.validation import names_like, shown, unknown_key
 from .gearbox_sheet import GearboxSheet
 from .motor_sheet import MotorSheet
 from .sheet import in_current_words
@@ -110,7 +110,7 @@ def find(reference: str, table: str) -> GearboxSheet | MotorSheet:
     if isinstance(named.get(reference), kind):
         return named[reference]
     same = [r.name for r in catalogue() if isinstance(r, kind)]
-    hint = did_you_mean(reference, same, "`lostmotion catalogue` lists them", 3)
+    hint = names_like(reference, same, "`lostmotion catalogue` lists them")
     if reference in named:
         other = next(name for name, k in KINDS.items() if isinstance(named[reference], k))
         raise InputError(f"{reference} is a {other}; a {table} is wanted here; `lostmotion catalogue` lists them")

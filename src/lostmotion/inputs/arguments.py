@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import inspect
+import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, wraps
-from numbers import Integral, Real
-from typing import Any, ParamSpec, TypeVar, get_args
+from numbers import Integral
+from typing import Any, ParamSpec, TypeAlias, TypeVar, get_args
 
-from ..errors import InputError
+from ..errors import ArgumentError, InputError
 from ..units.conversion import Unit
+from ..units.scalars import is_number, is_several, objection, scalar
 from . import quantities
 from .quantities import argument
-from .validation import shown
+from .validation import did_you_mean, shown
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+RecordName: TypeAlias = str
+ScenarioName: TypeAlias = str
 
 # What is wanted, by the name in the annotation; of a class that is not listed its name.
 WANTED = {
@@ -24,8 +29,11 @@ WANTED = {
     "Path": "the name of a file or directory",
     "bool": "a Boolean",
     "Count": "a whole number above 0",
+    "int": "a whole number",
     "float": "a number, or text with a number and its unit",
     "SolverName": 'the name of a solver, "exact" or "dormand-prince"',
+    "RecordName": "the name of a record, or of a file with one",
+    "ScenarioName": "the name of a scenario, or of a file with a scenario or a result",
     "Callable": "a function",
     "Executor": "an executor, such as a ProcessPoolExecutor",
     "Mapping": "a mapping of names to values",
@@ -49,7 +57,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     """The function, with its arguments checked by their annotations before it runs.
 
     An annotation that is a quantity of `quantities`, such as ``Speed``, also reads text with a unit; a plain ``float`` leaves
-    that to the function. ``Any`` is not checked. A wrong number of arguments or an unknown name stays a `TypeError`.
+    that to the function. ``Any`` is not checked. A wrong number of arguments or an unknown name is an `ArgumentError`.
     """
     signature = inspect.signature(function)
     wanted = {p.name: str(p.annotation) for p in signature.parameters.values() if p.annotation is not p.empty}
@@ -61,7 +69,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         try:
             bound = signature.bind(*args, **kwargs)
         except TypeError as error:
-            raise TypeError(f"{function.__qualname__}() {error}") from None
+            raise misfit(function.__qualname__, signature.parameters, kwargs, str(error)) from None
         for name, annotation in wanted.items():
             if name in bound.arguments:
                 bound.arguments[name] = _read(name, bound.arguments[name], annotation, known)
@@ -70,13 +78,38 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     return call
 
 
+def misfit(function: str, parameters: Iterable[str], given: Iterable[str], problem: str) -> ArgumentError:
+    """What is wrong with the names or the number of the arguments of a call.
+
+    Parameters
+    ----------
+    parameters
+        Names of the arguments that the function has.
+    given
+        Names of those that it was given by name.
+    problem
+        What the language says of the call.
+    """
+    known = [name for name in parameters if name != "self"]
+    where = f"{function.removesuffix('.__init__')}()"
+    if unknown := [name for name in given if name not in known]:
+        meant = did_you_mean(unknown[0], known, f"its arguments are {', '.join(known)}" if known else "it has none")
+        return ArgumentError(f"{where} has no argument {unknown[0]}; {meant}")
+    if lacking := re.search(r"missing a required (?:keyword-only )?argument: '(\w+)'", problem):
+        return ArgumentError(f"{where} lacks the argument {lacking[1]}; add it")
+    return ArgumentError(f"{where} {problem}")
+
+
 def _read(name: str, value: Any, annotation: str, known: Mapping[str, Any]) -> Any:
     options = _options(annotation)
+    value = scalar(value)
     for option in options:
         if _fits(value, option, known):
             return _converted(name, value, option, known)
     refused = getattr(type(value), "refused_as", {})
     if reason := next((refused[option] for option in options if option in refused), None):
+        raise InputError(f"{name}: {shown(value)} {reason}")
+    if reason := objection(value):
         raise InputError(f"{name}: {shown(value)} {reason}")
     asked = dict.fromkeys(_wording(option) for option in options if option not in SILENT)
     raise InputError(f"{name}: {shown(value)} must be {', or '.join(asked)}")
@@ -108,17 +141,19 @@ def _several(option: str) -> str | None:
 
 def _fits(value: Any, option: str, known: Mapping[str, Any]) -> bool:
     if _several(option) is not None:
-        return isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping) and not _is_dataset(value)
+        return is_several(value) and not isinstance(value, Mapping) and not _is_dataset(value)
     if _unit(option) is not None or option == "float":
-        return isinstance(value, Real | str) and not isinstance(value, bool)
+        return is_number(value) or isinstance(value, str)
     match option.partition("[")[0]:
         case "None":
             return value is None
         case "xarray.Dataset":
             return _is_dataset(value)
         case "Count":
-            return isinstance(value, Integral) and not isinstance(value, bool) and 0 < int(value) < 2**31
-        case "str" | "SolverName":
+            return isinstance(value, Integral) and is_number(value) and 0 < int(value) < 2**31
+        case "int":
+            return isinstance(value, Integral) and is_number(value)
+        case "str" | "SolverName" | "RecordName" | "ScenarioName":
             return isinstance(value, str)
         case "bool":
             return isinstance(value, bool)
@@ -140,6 +175,8 @@ def _is_dataset(value: Any) -> bool:
 def _converted(name: str, value: Any, option: str, known: Mapping[str, Any]) -> Any:
     if (entry := _several(option)) is not None:
         return value if entry == "Any" else [_read(name, x, entry, known) for x in value]
+    if option == "float" and not isinstance(value, str):
+        return argument(name, value, "")
     unit = _unit(option)
     return value if unit is None else argument(name, value, unit)
 

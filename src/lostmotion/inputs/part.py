@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationErro
 from pydantic_core import CoreSchema
 
 from ..errors import InputError
+from ..units.scalars import plain
 from .display import abridged
 from .docstrings import docstring_of
 from .validation import describe, shown
@@ -53,7 +54,7 @@ class Part(BaseModel):
                 f"{self._subject()} takes its values by name, such as {first}=...; not {shown(nameless[0])}"
             )
         with self._one_error(values):
-            super().__init__(**values)
+            super().__init__(**plain(values))
 
     # Parts within parts are made by pydantic itself, so that it knows where in the whole a value stands.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
@@ -62,7 +63,7 @@ class Part(BaseModel):
     def model_validate(cls, obj: Any, **options: Any) -> Self:
         """As the constructor, from a mapping."""
         with cls._one_error(obj):
-            return super().model_validate(obj, **options)
+            return super().model_validate(plain(obj), **options)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with changes, which are checked as in the constructor."""
@@ -87,6 +88,10 @@ class Part(BaseModel):
     def _one_error(cls, given: Any = None) -> Iterator[None]:
         try:
             yield
+        except RecursionError:
+            raise InputError(
+                f"{cls._subject()} is nested too deeply; write it with fewer levels of tables and lists"
+            ) from None
         except ValidationError as error:
             raise InputError(describe(error, _description(cls), cls._subject(), given)) from None
 

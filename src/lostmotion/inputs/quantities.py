@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 
@@ -12,6 +11,7 @@ from pydantic_core import CoreSchema
 
 from ..errors import InputError
 from ..units.conversion import Unit
+from ..units.scalars import is_several
 from .validation import shown
 
 Count = Annotated[int, "above 0"]
@@ -101,5 +101,4 @@ def argument(name: str, value: Any, unit: str) -> float:
 
 def arguments(name: str, values: Any, unit: str) -> list[float]:
     """Several such numbers, or one alone."""
-    several = values if isinstance(values, Iterable) and not isinstance(values, str) else [values]
-    return [argument(name, value, unit) for value in several]
+    return [argument(name, value, unit) for value in (values if is_several(values) else [values])]

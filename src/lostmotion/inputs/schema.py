@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 
@@ -49,6 +49,20 @@ def _child(node: Mapping[str, Any], key: int | str) -> Any:
         return fixed[key] if key < len(fixed) else node.get("items")
     more = node.get("additionalProperties")
     return node.get("properties", {}).get(key, more if isinstance(more, Mapping) else None)
+
+
+def keys_within(
+    schema: Mapping[str, Any], nodes: Iterable[Mapping[str, Any]], levels: int = 2
+) -> Iterator[tuple[str, ...]]:
+    """Keys of the tables within the tables of some nodes, without lists and tables with names of their own."""
+    found: dict[tuple[str, ...], None] = {}
+    for node in nodes:
+        for table, child in node.get("properties", {}).items():
+            inside = list(options(schema, child))
+            found |= dict.fromkeys((table, key) for one in inside for key in one.get("properties", {}))
+            if levels > 1:
+                found |= dict.fromkeys((table, *path) for path in keys_within(schema, inside, levels - 1))
+    yield from found
 
 
 def unit_in_schema(node: Mapping[str, Any]) -> str | None:

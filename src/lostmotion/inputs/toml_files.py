@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,25 @@ from typing import Any
 from ..errors import InputError
 
 RESULTS = (".nc", ".csv", ".parquet")  # endings of saved results
+MAX_LEVELS = 50  # of tables and lists within each other
+MAX_NAME = 200  # characters of the name of a file that is shown
 
 
 def no_such_file(path: Path) -> InputError:
     """Says that there is no such file, and what may have been meant."""
-    near = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.toml")], n=1)
+    try:
+        beside = [p.name for p in path.parent.glob("*.toml")]
+    except (OSError, ValueError):  # of a name that is too long, or with a zero in it
+        beside = []
+    near = difflib.get_close_matches(path.name, beside, n=1)
     hint = f"; did you mean {path.parent / near[0]}?" if near else "; check the name"
-    return InputError(f"{path}: there is no such file{hint}")
+    return InputError(f"{in_short(path)}: there is no such file{hint}")
+
+
+def in_short(path: Path) -> str:
+    """The name of a file; of one that is too long for a message, its ends."""
+    name = str(path)
+    return name if len(name) <= MAX_NAME else f"{name[: MAX_NAME // 2]}...{name[-MAX_NAME // 2 :]}"
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
@@ -27,7 +40,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     InputError
         It cannot be read; the message says why, and what may have been meant.
     """
-    if path.suffix in RESULTS and path.is_file():
+    if path.suffix in RESULTS and os.path.isfile(path):
         raise InputError(f"{path}: has the ending of a saved result; {what} is a TOML file (.toml)")
     try:
         text = path.read_text(encoding="utf-8")
@@ -38,8 +51,31 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); {what} is a TOML file") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        raise InputError(f"{in_short(path)}: cannot be read: {error.strerror}") from None
+    except ValueError:
+        raise InputError(f"{in_short(path)}: is no name of a file; check it") from None
     try:
-        return tomllib.loads(text)
+        return shallow(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
+    except RecursionError:
+        raise InputError(
+            f"{path}: has more than {MAX_LEVELS} levels of tables and lists; write {what} with fewer"
+        ) from None
+
+
+def shallow(data: dict[str, Any]) -> dict[str, Any]:
+    """Tables that can be walked by functions that call themselves.
+
+    Raises
+    ------
+    RecursionError
+        They have too many levels.
+    """
+    level: list[Any] = [data]
+    for _ in range(MAX_LEVELS):
+        values = (value for entry in level for value in (entry.values() if isinstance(entry, dict) else entry))
+        level = [value for value in values if isinstance(value, dict | list)]
+        if not level:
+            return data
+    raise RecursionError

@@ -7,16 +7,25 @@ import difflib
 import json
 import re
 from collections.abc import Iterable, Mapping
+from decimal import Decimal
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from .schema import follow
+from ..units.scalars import scalar
+from .schema import follow, keys_within
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
 MAX_PROBLEMS = 5  # problems that one line names in full
+MAX_READ = 1000  # problems that are told apart; of more only the number is given
 MAX_LENGTH = 60  # characters of a value that is shown
+MAX_NAME = 100  # characters of a name that another one is looked for
+MAX_NEAR = 20  # places, or misspelt keys, that are looked at for what was meant
+MAX_MISSING = 20  # keys that are named as missing
+WORD_CUTOFF = 0.7  # likeness of two words of which one is taken for the other, misspelt
+JOINED_CUTOFF = 0.92  # of two names, where words run together or fall apart
 
 
 def describe(error: ValidationError, schema: Mapping[str, Any], subject: str, given: Any = None) -> str:
@@ -31,53 +40,111 @@ def describe(error: ValidationError, schema: Mapping[str, Any], subject: str, gi
     given
         What it was to be made of, so that a value is shown as it was written.
     """
-    problems = [_Problem(p, schema, given) for p in error.errors(include_url=False)]
+    found = error.errors(include_url=False)
+    problems = [_Problem(p, schema, given) for p in found[:MAX_READ]]
     # A list whose entries are refused is not also too short.
-    problems = [
-        p
-        for p in problems
-        if p.kind != "too_short" or not any(q is not p and q.keys[: len(p.keys)] == p.keys for q in problems)
-    ]
-    # Where a value may be of two types, it is refused by each of them.
-    problems = [p for n, p in enumerate(problems) if p.name not in {q.name for q in problems[:n]}]
+    inside = {p.keys[:n] for p in problems for n in range(len(p.keys))}
+    problems = [p for p in problems if p.kind != "too_short" or p.keys not in inside]
+    # Where a value may be of two types, it is refused by each of them; only what is wrong with it as the first is said.
+    problems = list({p.name: p for p in reversed(problems)}.values())[::-1]
     misspelt = [p for p in problems if p.kind == "extra_forbidden"]
-    meant = {(*p.keys[:-1], p.near()) for p in misspelt}
-    missing = [p.name for p in problems if p.kind == "missing" and p.keys not in meant]
-    # Of a value that may be one of two types only what is wrong with it as the first.
-    others = list({p.keys: p for p in reversed(problems) if p.kind not in ("extra_forbidden", "missing")}.values())[
-        ::-1
-    ]
-    texts = [p.sentence(subject) for p in misspelt]
+    missing = [p for p in problems if p.kind == "missing"]
     if missing:
+        meant = {(*p.keys[:-1], p.near()) for p in misspelt[:MAX_NEAR]}
+        missing = [p for p in missing if p.keys not in meant]
+    others = [p for p in problems if p.kind not in ("extra_forbidden", "missing")]
+    texts = [p.sentence(subject) for p in misspelt[:MAX_PROBLEMS]]
+    if missing:
+        names = [shortened(p.name) for p in missing[:MAX_MISSING]]
+        names += [f"{len(missing) - MAX_MISSING} more"] if len(missing) > MAX_MISSING else []
         texts.append(
-            f"key {missing[0]}: is missing; add it"
-            if len(missing) == 1
-            else f"keys {', '.join(missing)}: are missing; add them"
+            f"key {names[0]}: is missing; add it"
+            if len(names) == 1
+            else f"keys {', '.join(names)}: are missing; add them"
         )
-    texts += [p.sentence(subject) for p in others]
-    more = f"; and {len(texts) - MAX_PROBLEMS} more" if len(texts) > MAX_PROBLEMS else ""
+    texts += [p.sentence(subject) for p in others[:MAX_PROBLEMS]]
+    total = len(misspelt) + bool(missing) + len(others) + max(0, len(found) - MAX_READ)
+    more = f"; and {total - MAX_PROBLEMS} more" if total > MAX_PROBLEMS else ""
     return "; ".join(texts[:MAX_PROBLEMS]) + more
 
 
-def unknown_key(key: str, known: Iterable[str]) -> str:
-    """What is said of a key that is none of those that are known."""
-    known = sorted(known)
+def unknown_key(key: str, known: Iterable[str], inner: Iterable[str] = ()) -> str:
+    """What is said of a key that is none of those that are known.
+
+    Parameters
+    ----------
+    inner
+        Dotted keys of the tables within, where the key may belong.
+    """
+    known, inner = sorted(known), list(inner)
+    together = [path for path in inner if path.replace(".", "_") == key]
+    if same := together or [path for path in inner if path.rpartition(".")[2] == key]:
+        return f"is not known here; it is written as {' or '.join(same[:MAX_NEAR])}"
+    if not nearest(key, known):
+        last = {path.rpartition(".")[2]: path for path in reversed(inner)}
+        if near := nearest(key, last):
+            return f"is not known here; did you mean {last[near]}?"
     return "is not known; " + did_you_mean(key, known, f"known here: {', '.join(known)}")
 
 
-def did_you_mean(given: str, choices: Iterable[str], otherwise: str, count: int = 1) -> str:
-    """The choices, at most so many, that are spelled most like what was given; if none is near, what to say otherwise."""
-    near = difflib.get_close_matches(given, list(choices), n=count, cutoff=0.6 if count == 1 else 0.5)
+def did_you_mean(given: str, choices: Iterable[str], otherwise: str) -> str:
+    """The choice that was misspelt as what was given; if none was, what to say otherwise."""
+    near = nearest(given, choices)
+    return f"did you mean {near}?" if near else otherwise
+
+
+def names_like(given: str, names: Iterable[str], otherwise: str, count: int = 3) -> str:
+    """As `did_you_mean`, of names of files and records, of which a part may have been left out."""
+    near = difflib.get_close_matches(given[:MAX_NAME], list(names), n=count, cutoff=0.5)
     return f"did you mean {' or '.join(near)}?" if near else otherwise
+
+
+def nearest(given: str, choices: Iterable[str]) -> str:
+    """The choice that was misspelt as what was given; empty if none was.
+
+    A name with another word in it, or with one more, is that of another quantity: backlash is no added_backlash, and a
+    rated_current no rated_torque.
+    """
+    if len(given) > MAX_NAME:
+        return ""
+    wanted = _words(given)
+    likeness = {choice: _likeness(wanted, _words(choice)) for choice in choices if len(choice) <= MAX_NAME}
+    best = max(likeness, key=lambda choice: likeness[choice], default="")
+    return best if best and likeness[best] > 0.0 else ""
+
+
+def _words(name: str) -> list[str]:
+    """In lower case; they are parted by anything but letters and digits, or begin with a capital."""
+    parted = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name)
+    return re.split(r"[^a-z0-9]+", parted.lower())
+
+
+def _likeness(given: list[str], choice: list[str]) -> float:
+    """0 where they have other words; else that of all of them."""
+    joined = difflib.SequenceMatcher(None, "".join(given), "".join(choice))
+    if joined.real_quick_ratio() < WORD_CUTOFF:
+        return 0.0
+    if len(given) != len(choice):
+        return joined.ratio() if joined.ratio() >= JOINED_CUTOFF else 0.0
+    for a, b in ((given, choice), (sorted(given), sorted(choice))):
+        ratios = [difflib.SequenceMatcher(None, x, y).ratio() for x, y in zip(a, b, strict=True)]
+        if min(ratios) >= WORD_CUTOFF:
+            return sum(ratios) / len(ratios)
+    return 0.0
 
 
 def shown(value: Any) -> str:
     """A value as a TOML file has it, shortened if it is long."""
-    text = _toml(value)
+    return shortened(_toml(value))
+
+
+def shortened(text: str) -> str:
+    """A text that is not too long for a message."""
     return text if len(text) < MAX_LENGTH else text[: MAX_LENGTH - 3] + "..."
 
 
 def _toml(value: Any) -> str:
+    value = scalar(value)
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, bool):
@@ -90,8 +157,14 @@ def _toml(value: Any) -> str:
         return f"[{', '.join(map(_toml, value))}]"
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {_toml(x)}" for key, x in value.items()) + " }"
-    if hasattr(value, "tolist"):  # an array
-        return _toml(value.tolist())
+    if isinstance(value, Decimal | Fraction):
+        return str(value)
+    if getattr(value, "size", MAX_LENGTH) < MAX_LENGTH and hasattr(value, "dtype"):  # an array
+        array = value.to_numpy() if hasattr(value, "to_numpy") else value
+        listed = array.tolist() if hasattr(array, "tolist") else None
+        return _toml(listed) if isinstance(listed, list | int | float | complex) else "the given array"
+    if hasattr(value, "dtype"):
+        return f"the given array of {' x '.join(map(str, value.shape))} entries"
     text = repr(value)
     # What describes itself by its class, or in several lines, says nothing to a reader of one.
     return "the given object" if text.startswith("<") or "\n" in text or " at 0x" in text else text
@@ -106,6 +179,7 @@ class _Problem:
         self.keys, self.nodes = follow(schema, problem["loc"], self.kind == "extra_forbidden")
         written = _at(given, self.keys)
         self.value = written if isinstance(written, str) else problem["input"]
+        self.schema = schema
         self.name = re.sub(r"\.(\[)", r"\1", ".".join(f"[{k}]" if isinstance(k, int) else str(k) for k in self.keys))
 
     def known(self) -> list[str]:
@@ -113,18 +187,26 @@ class _Problem:
         return sorted({key for node in self.nodes for key in node.get("properties", {})})
 
     def near(self) -> str:
-        """The known key that is spelled most like this one; empty if none is."""
-        return next(iter(difflib.get_close_matches(str(self.keys[-1]), self.known(), n=1)), "")
+        """The known key that was misspelt as this one; empty if none was."""
+        return nearest(str(self.keys[-1]), self.known())
+
+    def inner(self) -> list[str]:
+        """Dotted keys of the tables within the table that the problem is about."""
+        table = [str(key) for key in self.keys[:-1]]
+        return [".".join((*table, *path)) for path in keys_within(self.schema, self.nodes)]
 
     def sentence(self, subject: str) -> str:
         text = self._text()
         if not self.keys:
             return text if isinstance(self.context.get("error"), InputError) else f"{subject} {text}"
-        return f"key {self.name}: {text}"
+        return f"key {shortened(self.name)}: {text}"
 
     def _text(self) -> str:
         if self.kind == "extra_forbidden":
-            return unknown_key(str(self.keys[-1]), self.known())
+            key = str(self.keys[-1])
+            if kinds := self._kinds(key):
+                return f"is a key of kind {' or '.join(map(shown, kinds))}, and this table has another; leave it out"
+            return unknown_key(key, self.known(), self.inner())
         if self.kind in ("value_error", "assertion_error"):
             text = str(self.context["error"])
             return (
@@ -138,12 +220,17 @@ class _Problem:
             return f"lacks kind, which says what it is; it must be {_one_of(self._kinds())}"
         return f"{shown(self.value)} {self._wanted()}"
 
-    def _kinds(self) -> list[str]:
-        kinds = [kind for node in self.nodes for kind in node.get("discriminator", {}).get("mapping", {})]
-        if not kinds:
-            said = [node.get("properties", {}).get("kind", {}).get("const") for node in self.nodes]
-            kinds = [kind for kind in said if kind is not None]
-        return list(dict.fromkeys(kinds))
+    def _kinds(self, key: str | None = None) -> list[str]:
+        """The kinds that the table may have, or those that have a key, whatever kind it is given."""
+        if key is None:
+            kinds = [kind for node in self.nodes for kind in node.get("discriminator", {}).get("mapping", {})]
+            if kinds:
+                return list(dict.fromkeys(kinds))
+        nodes = self.nodes if key is None else follow(self.schema, self.keys[:-1])[1]
+        said = [
+            p.get("kind", {}).get("const") for node in nodes if (p := node.get("properties", {})) and key in (None, *p)
+        ]
+        return list(dict.fromkeys(kind for kind in said if kind is not None))
 
     def _wanted(self) -> str:
         """What a value must be, by the kind of its problem."""

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import model_validator
 
 from ..errors import InputError
+from ..inputs.arguments import checked
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Current,
@@ -24,7 +25,6 @@ from ..inputs.quantities import (
     Torque,
     TorqueConstant,
     Voltage,
-    argument,
 )
 from ..reproducible import total
 from ..units.practical import practical
@@ -225,7 +225,8 @@ class Motor(Part):
             return None
         return self.voltage_limit / self.rated_voltage
 
-    def at_voltage(self, voltage: float) -> Self:
+    @checked
+    def at_voltage(self, voltage: Voltage) -> Self:
         """The same DC motor where command 1 is another voltage [V].
 
         Stall torque M_DR k_N and no-load speed omega_DR k_N/(k_N - 1) of (2) go with the voltage; the rated torque, which is
@@ -236,7 +237,6 @@ class Motor(Part):
         InputError
             The motor has no rated voltage, or at this voltage it does not reach its rated torque.
         """
-        voltage = argument("voltage", voltage, "V")
         if self.kind == "synchronous":
             raise InputError(
                 "a synchronous motor has its voltage from dc_voltage; change that, as with model_copy(update={'dc_voltage': 560})"

@@ -8,7 +8,6 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from functools import lru_cache
-from numbers import Real
 from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
@@ -18,6 +17,7 @@ from .. import _core
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Frequency, NotNegative, Number, Positive, Time, Torque, Whole
 from ..reproducible import sin, total
+from ..units.scalars import is_number, scalar
 from .wind import AnyWind
 
 V = TypeVar("V")  # the value of the signal, with its unit
@@ -134,8 +134,8 @@ class TimeFunction(Part, Generic[V]):
     @model_validator(mode="before")
     @classmethod
     def _from_constant(cls, data: Any) -> Any:
-        plain = isinstance(data, Real | str) and not isinstance(data, bool)
-        return {"mean": data} if plain else data
+        data = scalar(data)
+        return {"mean": data} if isinstance(data, str) or is_number(data) else data
 
     @model_validator(mode="after")
     def _amplitude_and_frequency(self) -> Self:

@@ -12,7 +12,7 @@ from ..data_sheets.gearbox_sheet import GearboxSheet
 from ..data_sheets.motor_sheet import MotorSheet
 from ..data_sheets.records import catalogue, find, read_sheets
 from ..errors import InputError
-from ..inputs.validation import did_you_mean
+from ..inputs.validation import names_like
 from ..units.conversion import si_value
 from ..units.practical import RPM
 from .sheet_rows import rows_of
@@ -114,7 +114,7 @@ def record_text(name: str) -> str:
     """
     kinds = {r.name: _table(r) for r in catalogue()}
     if not name.endswith(".toml") and name not in kinds:
-        hint = did_you_mean(name, kinds, "`lostmotion catalogue` lists them", 3)
+        hint = names_like(name, kinds, "`lostmotion catalogue` lists them")
         raise InputError(f"{name!r} is not in the catalogue; {hint}")
     table = kinds.get(name) or _table(read_sheets(Path(name))[0])
     record = find(name, table)

@@ -240,7 +240,8 @@ def _ramp(value: float, rate: float) -> _core.Signal:
 
 
 def _model_now(simulation: Simulation) -> LinearModel:
-    rows = simulation._core.linearize()
+    with simulation._turn:
+        rows = simulation._idle().linearize()
     if isinstance(simulation.drive, DriveTrain):
         return train_model(simulation.drive, simulation._core_train or simulation.drive.core(()), *rows)
     return _drive_model(*rows)

@@ -170,9 +170,11 @@ def explain(what: Scenario | Simulation | TrainScenario, time: Time | None = Non
     if isinstance(what, Simulation):
         if time is not None:
             raise InputError("a simulation is explained at its present time; leave time out")
+        with what._turn:
+            now, found = what.time, what._idle().explain()
         if isinstance(what.drive, DriveTrain):
-            return _of_train(what.drive, what._core_train or what.drive.core(()), what.time, *what._core.explain())
-        return _explanation(what.drive, what.time, *what._core.explain())
+            return _of_train(what.drive, what._core_train or what.drive.core(()), now, *found)
+        return _explanation(what.drive, now, *found)
     if time is None:
         raise InputError(f"time is missing; give one between 0 and the duration, {what.simulation.duration} s")
     if not 0.0 <= time <= what.simulation.duration:

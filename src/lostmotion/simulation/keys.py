@@ -10,7 +10,9 @@ from typing import Any
 from ..data_sheets.components import as_torque_source, at_voltage
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
-from ..inputs.validation import shown
+from ..inputs.toml_files import MAX_LEVELS, shallow
+from ..inputs.validation import shortened, shown
+from ..units.scalars import is_number, plain
 
 
 def parse_override(text: str) -> tuple[str, Any]:
@@ -24,7 +26,9 @@ def parse_override(text: str) -> tuple[str, Any]:
     if not equals or not key.strip():
         raise InputError(f"--set {text}: must be KEY=VALUE, such as --set command.amplitude=0.1")
     try:
-        parsed = tomllib.loads(f"value = {value}")
+        parsed = shallow(tomllib.loads(f"value = {value}"))
+    except RecursionError:
+        raise InputError(f"--set {key.strip()}: has too many levels of tables and lists; write it with fewer") from None
     except tomllib.TOMLDecodeError:
         return key.strip(), value.strip()
     return key.strip(), parsed["value"] if len(parsed) == 1 else value.strip()
@@ -47,7 +51,7 @@ _TRAIN_SIGNALS = re.compile(r"command\.[^.]+|shafts\.[^.]+\.torque")
 
 def set_values(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None:
     """Changes values by dotted key. What others depend on comes before them, in whatever order they are given."""
-    changes = list(changes)
+    changes = [(key, plain(value)) for key, value in changes]
     given = [key for key, _ in changes]
     signals = _TRAIN_SIGNALS if "shafts" in data else _SIGNALS
 
@@ -55,6 +59,8 @@ def set_values(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None
         return next((n for n, pattern in enumerate(_FIRST) if pattern.fullmatch(change[0])), len(_FIRST))
 
     for key, value in sorted(changes, key=rank):
+        if key.count(".") > MAX_LEVELS:
+            raise InputError(f"key {shortened(key)}: has more than {MAX_LEVELS} levels; no table is as deep")
         _change_what_follows(data, key, value, given)
         first, *rest = key.split(".")
         data[first] = _changed(data.get(first), rest, value, first, signals)
@@ -91,7 +97,7 @@ def _changed(node: Any, keys: list[str], value: Any, where: str, signals: re.Pat
         return {**without_record(table, node), keys[0]: value}
     if where in ("gearbox", "motor") and isinstance(node, str):
         node = {"from": node}
-    if signals.fullmatch(where) and isinstance(node, int | float | str):
+    if signals.fullmatch(where) and (isinstance(node, str) or is_number(node)):
         node = {"mean": node}
     key, *rest = keys
     inner = f"{where}.{key}"

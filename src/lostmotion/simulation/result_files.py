@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import io
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from ..atomic_writer import write_whole
 from ..errors import InputError, need
 from ..inputs.arguments import checked
+from ..inputs.toml_files import in_short
 from .results import labelled, recorded_variables
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import packed_again, switchings_of
@@ -34,10 +36,10 @@ def check_output(path: str | Path) -> Path:
     if path.suffix not in FORMATS:
         endings = ", ".join(f"{ending} ({name})" for ending, name in FORMATS.items())
         raise InputError(f"{path}: the ending {path.suffix or '(none)'} is not known; it must be one of {endings}")
-    if path.is_dir():
+    if os.path.isdir(path):
         raise InputError(f"{path}: is a directory; name a file")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: its directory does not exist; make it first")
+    if not os.path.isdir(path.parent):
+        raise InputError(f"{in_short(path)}: its directory does not exist; make it first")
     _need_library(path)
     return path
 
@@ -80,8 +82,8 @@ def open_result(path: str | Path) -> xarray.Dataset:
         raise InputError(
             f"{path}: the ending {path.suffix or '(none)'} is not known; it must be one of {', '.join(readers)}"
         )
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file; check the name")
+    if not os.path.isfile(path):
+        raise InputError(f"{in_short(path)}: there is no such file; check the name")
     _need_library(path)
     try:
         return readers[path.suffix](path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
@@ -12,14 +13,15 @@ from ..data_sheets.components import gearbox_table
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import follow, unit_in_schema
-from ..inputs.toml_files import RESULTS, no_such_file, read_toml
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.toml_files import RESULTS, in_short, no_such_file, read_toml
+from ..inputs.validation import names_like, shown
 from ..model.gearbox import Gearbox
 from .keys import parse_override, set_values
 from .scenario import Scenario, from_tables
 from .series_files import read_series
 from .train_scenario import TrainScenario, file_schema, in_long_form, is_train, train_from_tables
 
+MAX_BASES = 100  # files that are each the base of the one before
 MOTOR = "motor"  # its name in the long form of a drive
 
 
@@ -39,18 +41,18 @@ def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
     """
     path = directory / name
     shipped = shipped_scenarios() if len(Path(name).parts) == 1 else {}
-    if path.is_file() or not shipped:
+    if os.path.isfile(path) or not shipped:
         return path
     if str(name) in shipped:
         return shipped[str(name)]
-    if Path(name).stem in shipped and not path.exists():
+    if Path(name).stem in shipped and not os.path.lexists(path):
         raise InputError(
             f"{path}: there is no such file; the shipped scenario is called {Path(name).stem}, without ending"
         )
-    if path.suffix or path.exists():
+    if path.suffix or os.path.lexists(path):
         return path
-    hint = did_you_mean(str(name), shipped, f"the scenarios that come with the package are {', '.join(shipped)}")
-    raise InputError(f"{name}: there is no such file (.toml) and no such scenario; {hint}")
+    hint = names_like(str(name), shipped, f"the scenarios that come with the package are {', '.join(shipped)}", 1)
+    raise InputError(f"{in_short(Path(name))}: there is no such file (.toml) and no such scenario; {hint}")
 
 
 def find_base(base: str, path: Path) -> Path:
@@ -63,7 +65,7 @@ def find_base(base: str, path: Path) -> Path:
     """
     try:
         found = find_scenario(base, path.parent)
-        if not found.exists():
+        if not os.path.lexists(found):
             raise no_such_file(found)
     except InputError as error:
         raise InputError(f"{path}: key base: {error}") from None
@@ -164,9 +166,12 @@ def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str],
 
 
 def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
-    if path.resolve() in including:
-        raise InputError(f"{path}: key base: leads back to this file; break the circle")
     data = read_toml(path, "a scenario")
+    real = Path(os.path.realpath(path))
+    if real in including:
+        raise InputError(f"{path}: key base: leads back to this file; break the circle")
+    if len(including) > MAX_BASES:
+        raise InputError(f"{path}: key base: is the base of {MAX_BASES} files after one another; join some of them")
     _read_series(data, path, ())
     _find_records(data, path.parent)
     if "base" not in data:
@@ -179,7 +184,7 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
             f"{path}: key base: {shown(base)} has the ending of a saved result; name a scenario file (.toml), or change the result by "
             f"`lostmotion run {base} --set KEY=VALUE`"
         )
-    based = _read(find_base(base, path), (*including, path.resolve()))
+    based = _read(find_base(base, path), (*including, real))
     try:
         _change_voltages(based, data)
     except InputError as error:

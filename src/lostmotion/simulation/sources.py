@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..inputs.validation import shown
+from ..inputs.arguments import ScenarioName, checked
 from . import scenario_files
 from .result_files import FORMATS, open_result
 from .scenario import Scenario
@@ -16,7 +16,8 @@ from .scenario_files import changed, override
 from .train_scenario import TrainScenario
 
 
-def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario | TrainScenario:
+@checked
+def load(source: ScenarioName | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario | TrainScenario:
     """The scenario of a file, of a shipped example, or of a saved result.
 
     In the short form (tables `[motor] [gearbox] [load]`) it is a `Scenario`, in the long form (`[shafts.NAME]` ...) a
@@ -36,15 +37,16 @@ def load(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) 
     InputError
         With one line that names the file, the key, the value and the remedy.
     """
-    if not isinstance(source, str | Path):
-        raise InputError(f"{shown(source)} must be the name of a scenario, or of a file with a scenario or a result")
     path = Path(source)
     if path.suffix not in FORMATS:
         return scenario_files.load(source, overrides)
     result = open_result(path)
     if "scenario" not in result.attrs:
         raise InputError(f"{path}: is no result of a run; it carries no scenario that could be run again")
-    tables = json.loads(result.attrs["scenario"])
+    try:
+        tables = json.loads(result.attrs["scenario"])
+    except (ValueError, RecursionError):
+        raise InputError(f"{path}: the scenario within it is damaged; run the original one again") from None
     override(tables, overrides, path)
     return changed(tables, path)
 

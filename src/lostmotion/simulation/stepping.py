@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field
-from typing import Any, overload
+from typing import Any, Self, overload
 
 import numpy as np
 
@@ -15,8 +17,8 @@ from ..control.continuous import ContinuousController
 from ..control.controller import Controller
 from ..control.law import as_laws
 from ..errors import InputError
-from ..inputs.arguments import checked
-from ..inputs.quantities import Time
+from ..inputs.arguments import checked, misfit
+from ..inputs.quantities import Time, argument
 from ..inputs.validation import did_you_mean, shown
 from ..model.couplings import FULL_COMMAND
 from ..model.drive import Drive
@@ -45,7 +47,7 @@ MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 _GIVE: Any = object()  # in the place of what has no default
 _CHANNEL = {name: k for k, name in enumerate(CHANNEL_NAMES)}
 
-Ramp = float | tuple[float, float]
+Ramp = float | str | tuple[float | str, float | str]
 Derived = Callable[[list[float]], float]
 
 
@@ -92,6 +94,11 @@ class Simulation:
     >>> sim["load_speed", "twist"]                                    # doctest: +SKIP
     >>> ring = Simulation(train)                                      # doctest: +SKIP
     >>> ring.advance(1e-3, m1_command=0.4, m2_command=-0.4)           # doctest: +SKIP
+
+    Notes
+    -----
+    Threads may share a simulation: their steps are made one after the other. `copy.copy` gives a simulation of its own in the
+    same state.
     """
 
     _sines: Mapping[str, tuple[float, float]] = {}
@@ -108,6 +115,9 @@ class Simulation:
         law: Any = None,
         error_bound: bool = False,
     ) -> None:
+        self._made = {"drive": drive, "step": step, "loaded": loaded, "law": law, "error_bound": error_bound}
+        self._turn = threading.RLock()  # other threads wait
+        self._stepping = False
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
             raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
         self._drive: Drive | DriveTrain
@@ -193,11 +203,24 @@ class Simulation:
         self._loaded = tuple(shafts)
         given = {f"{name}_load_torque" for name in shafts} | self._controlled()
         self._required = {name for name in core.input_names() if name not in given}
+        units = {name: unit for name, unit, _ in core.channels()}
+        self._input_units = {name: units[name] for name in core.input_names()}
         self._shares = {f"{name}_command" for name in train.commanded() if name not in train.motors}
         self._variables = train_variables(train, core)
         self._channel = {name: k for k, (name, _, _) in enumerate(core.channels())}
         self._derived = self._derived_of(train)
         self._initial = what.begin() if isinstance(what, TrainScenario) else TrainInitial()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For copies, which go on by themselves from the present state, and for pickling."""
+        own = {name: value for name, value in vars(self).items() if not name.startswith("_")}  # of a subclass
+        return _remade, (type(self), self._made, self._sines, self._initial, self.state), own
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        _, made, own = self.__reduce__()
+        new = _remade(*made)  # a law, which may be compiled, is shared
+        vars(new).update(deepcopy(own, memo))
+        return new  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         return f"Simulation({self._drive!r}, at {self.time:.6g} s)"
@@ -216,7 +239,11 @@ class Simulation:
         InputError
             A train is given the state of a drive or the other way round, or a state that it cannot have.
         """
-        start = self._initial if initial is None else initial
+        with self._turn:
+            self._idle()
+            self._reset(self._initial if initial is None else initial)
+
+    def _reset(self, start: Initial | TrainInitial) -> None:
         if isinstance(self._core, _core.TrainSimulation):
             if not isinstance(start, TrainInitial) or not isinstance(self._drive, DriveTrain):
                 raise InputError("initial: is the state of a drive; that of a train is a TrainInitial")
@@ -274,13 +301,15 @@ class Simulation:
         """[s]"""
         return self._core.time()
 
-    def advance(self, interval: float, command: Ramp = _GIVE, load_torque: Ramp = 0.0, **inputs: Ramp) -> None:
+    def advance(self, interval: float | str, command: Ramp = _GIVE, load_torque: Ramp = 0.0, **inputs: Ramp) -> None:
         """Advance by an interval [s].
 
         Parameters
         ----------
+        interval
+            A number [s], or text with a unit; of NumPy and xarray too, as all numbers here.
         command, load_torque
-            Of a drive E_C [-] and M_Z [N·m]: one value, held over the interval, or two, between which it runs in a
+            Of a drive E_C [-] and M_Z [N·m]: one value, held over the interval, or a pair of values, between which it runs in a
             straight line.
         inputs
             Of a train the same by the names in `inputs`, among them the references of continuous controllers, such as ``servo_command=0.2`` and ``table_load_torque=(0.0, 5.0)``. All
@@ -301,54 +330,27 @@ class Simulation:
         elif self._controllers:
             raise InputError("command: the controller of the scenario turns the motor; leave it out")
         if inputs or command is _GIVE:
-            wrong = f"an unexpected keyword argument '{next(iter(inputs))}'" if inputs else None
-            raise TypeError(f"advance() got {wrong}" if wrong else "advance() missing a required argument: 'command'")
-        try:
-            c0, c1 = command if isinstance(command, tuple) else (command, command)
-            m0, m1 = load_torque if isinstance(load_torque, tuple) else (load_torque, load_torque)
-            within = MIN_INTERVAL <= interval <= MAX_INTERVAL
-            finite = c0 - c0 == 0.0 and c1 - c1 == 0.0 and m0 - m0 == 0.0 and m1 - m1 == 0.0
-        except (TypeError, ValueError):
-            raise InputError(
-                f"interval {shown(interval)}, command {shown(command)} and load_torque {shown(load_torque)} must be numbers (SI), the last two "
-                "also pairs of numbers"
-            ) from None
-        if not within or self.time + interval == self.time:
-            raise self._no_interval(interval)
-        if not finite:
-            raise InputError(
-                f"command {shown(command)} and load_torque {shown(load_torque)} must be finite numbers (SI)"
-            )
+            problem = "missing a required argument: 'command'"
+            raise misfit("Simulation.advance", ("interval", "command", "load_torque"), inputs, problem)
+        c0, c1 = _ramp("command", command, "")
+        m0, m1 = _ramp("load_torque", load_torque, "N*m")
         self._step(interval, c0, c1, m0, m1)
 
-    def _advance_train(self, interval: float, command: Any, load_torque: Any, inputs: dict[str, Ramp]) -> None:
+    def _advance_train(self, interval: float | str, command: Any, load_torque: Any, inputs: dict[str, Ramp]) -> None:
         places = self._input_places or {}
-        if command is not _GIVE or load_torque != 0.0:
+        if command is not _GIVE or _ramp("load_torque", load_torque, "N*m") != (0.0, 0.0):
             raise InputError(f"a train takes its inputs by name: {', '.join(places)}")
         begin, end = [0.0] * len(places), [0.0] * len(places)
         for name, value in inputs.items():
             if name in self._controlled():
                 raise InputError(f"{name}: a controller of the scenario turns this motor; leave it out")
-            try:
-                first, last = value if isinstance(value, tuple) else (value, value)
-                finite = first - first == 0.0 and last - last == 0.0
-                begin[places[name]], end[places[name]] = float(first), float(last)
-            except KeyError:
-                raise self._no_input(name) from None
-            except (TypeError, ValueError):
-                raise InputError(f"{name} {shown(value)} must be a number (SI), or a pair of numbers") from None
-            if not finite:
-                raise InputError(f"{name} {shown(value)} must be finite (SI)")
-            if name in self._shares and max(first, last) > FULL_COMMAND:
+            if name not in places:
+                raise self._no_input(name)
+            ramp = begin[places[name]], end[places[name]] = _ramp(name, value, self._input_units[name])
+            if name in self._shares and max(ramp) > FULL_COMMAND:
                 raise InputError(f"{name} {shown(value)} is a share, and 1 is the full torque; give at most that")
         if missing := self._required - inputs.keys():
             raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
-        try:
-            within = MIN_INTERVAL <= interval <= MAX_INTERVAL
-        except (TypeError, ValueError):
-            raise InputError(f"interval {shown(interval)} must be a number (SI)") from None
-        if not within or self.time + interval == self.time:
-            raise self._no_interval(interval)
         self._step(interval, begin, end)
 
     @staticmethod
@@ -360,20 +362,34 @@ class Simulation:
         """The sines by the numbers of their inputs, with a phase of 0."""
         return [(k, *self._sines[name], 0.0) for k, name in enumerate(names) if name in self._sines]
 
-    def _step(self, *values: Any) -> None:
-        before = None if self._bound is None else self._bound.coarse.state
-        try:
-            if self._bound is not None:
-                self._bound.coarse._core.advance(*values)
-            self._core.advance(*values)
+    def _step(self, interval: Any, *values: Any) -> None:
+        interval = interval if type(interval) is float else argument("interval", interval, "s")
+        with self._turn:
+            time = self._idle().time()
+            if not MIN_INTERVAL <= interval <= MAX_INTERVAL or time + interval == time:
+                raise self._no_interval(interval)
+            before = None if self._bound is None else self._bound.coarse.state
+            self._stepping = True
+            try:
+                if self._bound is not None:
+                    self._bound.coarse._core.advance(interval, *values)
+                self._core.advance(interval, *values)
+            except _core.SolverError:
+                if self._bound is not None and before is not None:
+                    self._bound.coarse.state = before
+                for axis, *_ in self._control[1]:
+                    axis.raise_again()  # what a law of your own has raised
+                raise
+            finally:
+                self._stepping = False
             if self._bound is not None:
                 self._bound.see(self)
-        except _core.SolverError:
-            if self._bound is not None and before is not None:
-                self._bound.coarse.state = before
-            for axis, *_ in self._control[1]:
-                axis.raise_again()  # what a law of your own has raised
-            raise
+
+    def _idle(self) -> Any:
+        """The core, which must not be read or changed by what it calls itself within a step."""
+        if self._stepping:
+            raise InputError("the simulation is within a step; a law has to take what it needs from its arguments")
+        return self._core
 
     def _no_interval(self, interval: float) -> InputError:
         if not MIN_INTERVAL <= interval <= MAX_INTERVAL:
@@ -403,10 +419,11 @@ class Simulation:
         InputError
             There is no such variable.
         """
-        values = self._core.read()
-        if isinstance(name, tuple | list):
-            return np.array([self._value(one, values) for one in name])
-        return self._value(name, values)
+        with self._turn:
+            values = self._idle().read()
+            if isinstance(name, tuple | list):
+                return np.array([self._value(one, values) for one in name])
+            return self._value(name, values)
 
     def _value(self, name: str, values: list[float]) -> float:
         try:
@@ -420,8 +437,9 @@ class Simulation:
 
     def read(self) -> dict[str, float]:
         """All result variables (SI), by name."""
-        values = self._core.read()
-        return {v.name: self._value(v.name, values) for v in self._variables}
+        with self._turn:
+            values = self._idle().read()
+            return {v.name: self._value(v.name, values) for v in self._variables}
 
     # The array functions of `results` take ten times as long for a single number.
 
@@ -458,8 +476,9 @@ class Simulation:
     @property
     def state(self) -> SimulationState:
         """The whole state; set it to return to it, or to continue it in another simulation of the same drive."""
-        time, *rest = self._core.get_state()
-        bound = None if self._bound is None else self._bound.state
+        with self._turn:
+            time, *rest = self._idle().get_state()
+            bound = None if self._bound is None else self._bound.state
         return SimulationState(time, tuple(rest), self._drive, self._all_controllers(), bound)
 
     @state.setter
@@ -470,13 +489,41 @@ class Simulation:
             if same and self._bound is not None and state.bound is None:
                 raise InputError("the state is of a simulation without error_bound=True; make that one with it too")
             if same:
-                self._core.set_state(state.time, *state.values)
-            if same and self._bound is not None:
-                self._bound.state = state.bound
+                with self._turn:
+                    self._idle().set_state(state.time, *state.values)
+                    if self._bound is not None:
+                        self._bound.state = state.bound
         except (AttributeError, TypeError):
             raise InputError(f"{shown(state)} is no state of a simulation; give what `state` returned") from None
         if not same:
             raise InputError(f"{shown(state)} is the state of another drive, with other parameters or controllers")
+
+
+def _remade(kind: Any, made: Mapping[str, Any], sines: Any, initial: Any, state: SimulationState) -> Any:
+    """A simulation made as another one, in its state."""
+    new = kind.__new__(kind)
+    new._sines = sines
+    Simulation.__init__(new, **made)
+    new._initial, new.state = initial, state
+    return new
+
+
+def _ramp(name: str, value: Any, unit: str) -> tuple[float, float]:
+    """The values of an input at the begin and the end of an interval.
+
+    Raises
+    ------
+    InputError
+        It is neither a number nor a pair of numbers.
+    """
+    if type(value) is float and value - value == 0.0:  # nearly always
+        return value, value
+    if not isinstance(value, tuple):
+        number = argument(name, value, unit)
+        return number, number
+    if len(value) != 2:
+        raise InputError(f"{name}: {shown(value)} must be a number, or a pair of numbers (begin, end)")
+    return argument(name, value[0], unit), argument(name, value[1], unit)
 
 
 class _Coarser(Simulation):

@@ -7,7 +7,6 @@ the listed ones is refused. Nothing of it is ever run as Python.
 from __future__ import annotations
 
 import ast
-import difflib
 import operator
 import warnings
 from collections.abc import Callable, Mapping
@@ -17,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..inputs.operators import ARITHMETIC, COMPARISONS
+from ..inputs.validation import nearest
 from ..simulation.variables import VARIABLES
 from .functions import BANDWIDTH, FUNCTIONS, METHODS, REDUCTIONS, Function, Parameter
 from .measures import Measure, measure, plain, power, product, text_of, total
@@ -114,8 +114,8 @@ def _unknown(name: str, text: str, vocabulary: Vocabulary) -> ValueError:
     if name in OF_THE_RUN:
         return ValueError(f"{name} in {text!r} is of a drive of one motor, gearbox and load, not of a drive train")
     choice = ", ".join((*FUNCTIONS, *vocabulary.of_the_run))
-    near = difflib.get_close_matches(name, [v for v, _ in vocabulary.variables], n=1)
-    hint = f"; did you mean {near[0]}?" if near else ""
+    near = nearest(name, [v for v, _ in vocabulary.variables])
+    hint = f"; did you mean {near}?" if near else ""
     return ValueError(f"{name!r} in {text!r} is neither a result variable nor one of {choice}{hint}")
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
 from ..inputs.part import Part
+from ..inputs.quantities import Whole
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, is_train
 from .axis import FEWEST, AxisTask, axis_scenario
@@ -36,7 +37,7 @@ class Trajectories(Part):
     """Samples to keep, beside the scalars."""
 
     variables: tuple[str, ...] = Field(min_length=1)
-    every: Annotated[int, Field(ge=1)] = 1
+    every: Annotated[Whole, Field(ge=1)] = 1
     """one of so many samples"""
 
 
@@ -50,9 +51,9 @@ class Study(Part):
     """the base as its file has it, with the names of records; empty if made in Python"""
     design: Literal["grid", "list", "latin_hypercube", "sobol", "random", "saltelli"] = "grid"
     """grid: every combination; list: the first value of each, then the second, ...; saltelli: for Sobol indices"""
-    runs: Annotated[int, Field(ge=1, le=MAX_RUNS)] | None = None
+    runs: Annotated[Whole, Field(ge=1, le=MAX_RUNS)] | None = None
     """of a random design; of saltelli the base samples, a power of two"""
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Annotated[Whole, Field(ge=0)] = 0
     vary: tuple[Vary, ...] = Field(min_length=1)
     keep: dict[str, str] = Field(default={})
     """column = expression of the result variables, such as peak(load_speed) or energy.gear_losses"""

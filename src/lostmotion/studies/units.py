@@ -12,6 +12,7 @@ from ..inputs.validation import shown
 from ..simulation.scenario import Scenario, json_schema
 from ..simulation.train_scenario import TrainScenario, train_schema
 from ..units.conversion import to_si
+from ..units.scalars import is_number, objection
 
 
 def unit_of_key(key: str) -> str | None:
@@ -62,12 +63,12 @@ def _made(schema: Callable[[], dict[str, Any]]) -> dict[str, Any]:
 
 
 def in_si(value: Any, unit: str | None) -> Any:
-    """Strings with a unit as numbers, in lists and tables too; anything else as it is.
+    """Strings with a unit as numbers, in lists and tables too; numbers as they are.
 
     Raises
     ------
     ValueError
-        A string is no number with a unit, or has the unit of something else; or a value is true or false.
+        A string is no number with a unit, or has the unit of something else; or a value is anything else.
     """
     if isinstance(value, bool):
         raise ValueError(f"{str(value).lower()} is no number")
@@ -78,4 +79,8 @@ def in_si(value: Any, unit: str | None) -> Any:
             raise ValueError(f"{shown(value)} {error}") from None
     if isinstance(value, list | tuple):
         return [in_si(x, unit) for x in value]
-    return {k: in_si(x, unit) for k, x in value.items()} if isinstance(value, dict) else value
+    if isinstance(value, dict):
+        return {k: in_si(x, unit) for k, x in value.items()}
+    if value is not None and not is_number(value):
+        raise ValueError(f"{shown(value)} {objection(value) or 'is no number'}")
+    return value

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..inputs.named import Named
 from ..inputs.part import Part
 from ..inputs.quantities import Switch
-from ..inputs.validation import shown
+from ..inputs.validation import nearest, shown
 from ..model.signals import Signal
 from ..reproducible import exp, log
 from ..simulation.keys import list_index
@@ -209,11 +209,12 @@ def _may_be_left_out(scenario: Scenario | TrainScenario, key: str) -> bool:
 
 
 def near_key(scenario: Scenario | TrainScenario, key: str) -> str:
-    """The key of a scenario that ends as this one, or is spelled most like it; empty if none is."""
+    """The key of a scenario of the same name in the same table or within it, or that was misspelt as this one; empty if none is."""
     known = [*_keys(scenario.model_dump(), ""), *record_keys(scenario)]
-    last = key.rpartition(".")[2]
-    same = [k for k in known if k.rpartition(".")[2] == last]
-    return next(iter(difflib.get_close_matches(key, same or known, n=1, cutoff=0.0 if same else 0.6)), "")
+    first, dot, _ = key.partition(".")
+    table = nearest(first, {k.split(".")[0] for k in known}) if dot else None  # left out, it may be any
+    same = [k for k in known if k.rpartition(".")[2] == key.rpartition(".")[2] and table in (None, k.split(".")[0])]
+    return next(iter(difflib.get_close_matches(key, same, n=1, cutoff=0.0)), nearest(key, known))
 
 
 def _keys(table: Mapping[str, Any], before: str) -> Iterator[str]:

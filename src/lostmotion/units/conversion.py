@@ -13,10 +13,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cache, lru_cache
-from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from .grammar import FORCE_OF, Product, UnknownUnitError, angle_of, near, plain, read_unit, written
+from .scalars import is_number, objection, scalar
 
 if TYPE_CHECKING:
     import pint
@@ -334,15 +334,16 @@ class Unit:
         """
         if type(value) is float:  # nearly always, and large tables are read often
             return value
+        value = scalar(value)
         if isinstance(value, str):
             return to_si(value, self.unit)
         if isinstance(value, bool):
             raise ValueError(f"is a Boolean; it must be {self._number()}")
-        if not isinstance(value, Real | Decimal):
-            raise ValueError(f"must be {self._number()}")
+        if not is_number(value):
+            raise ValueError(objection(value) or f"must be {self._number()}")
         try:
             return float(value)
-        except OverflowError:
+        except (OverflowError, ValueError):  # the latter of a signalling NaN
             raise ValueError("is beyond the range of numbers") from None
 
     def _number(self) -> str:
