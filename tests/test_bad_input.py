@@ -536,6 +536,21 @@ def test_bad_call_ends_in_one_line_and_exit_code_1(tmp_path: Path, arguments: li
     assert sorted(tmp_path.iterdir()) == before
 
 
+def test_titles_and_names_of_files_do_not_command_the_terminal(tmp_path: Path) -> None:
+    (tmp_path / "e\x1b[31m\x07.toml").write_text(f'title = "t\\u001b]0;x\\u0007\\u009b\\r"\n{GOOD}')
+    calls = [["run", "e\x1b[31m\x07.toml", "-o", "o\x1b\x07.csv"], ["run", "o\x1b\x07.csv"], ["run", "no\x1b\x07"]]
+    calls += [["drive", "check", "e\x1b[31m\x07.toml"], ["run", "e\x1b[31m\x07.toml", "--set", "load.inertia=\x1b\x07"]]
+    calls += [["study", "show", "\x1b\x07"], ["run", "--no\x1b\x07"]]
+    for arguments in calls:
+        done = subprocess.run(
+            [sys.executable, "-m", "lostmotion", *arguments], cwd=tmp_path, capture_output=True, check=False
+        )
+        shown = (done.stdout + done.stderr).decode()
+        assert r"\x1b" in shown, arguments
+        assert not re.search("[^\n\x20-\x7e\xa0-\U0010ffff]", shown), arguments
+    assert lm.simulate(lm.load(tmp_path / "e\x1b[31m\x07.toml")).lm.summary().startswith(r"t\x1b]0;x\x07\x9b\r")
+
+
 USAGE = [
     (["run"], ["Missing argument", "lostmotion run --help"]),
     (["rum", "good.toml"], ["rum", "lostmotion --help"]),

@@ -25,7 +25,7 @@ from . import (
     study,
     track,
 )
-from .terminal import fail
+from .terminal import fail, harmless_output
 
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # of the parser that typer brings along
 
@@ -42,7 +42,15 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point: known errors end in one line and exit code 1, Ctrl-C in 130."""
+    with harmless_output():
+        _run()
+
+
+def _run() -> NoReturn:
+    from pathlib import Path
+
     from ..errors import InputError, MissingLibraryError
+    from ..inputs.toml_files import in_short
 
     try:
         code = app(standalone_mode=False)
@@ -55,6 +63,9 @@ def main() -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except OSError as error:
+        what = f"{in_short(Path(str(error.filename)))}: " if error.filename is not None else ""
+        fail(f"{what}{error.strerror or error}")
     except (RuntimeError, ValueError) as error:
         # What a solver or a check of a whole scenario reports is a result for the user; anything else is our defect.
         fail(" ".join(str(error).split()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,7 +10,7 @@ import typer
 
 from .arguments import Overrides, SourceArgument, number
 from .targets import try_directory, writing
-from .terminal import busy, fail, progress
+from .terminal import busy, console, fail, progress
 
 if TYPE_CHECKING:
     from ..servo.commission import ServoReport
@@ -83,7 +84,6 @@ def servo(
 
 
 def _print_summary(title: str, report: ServoReport) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from ..reports.servo import loop_rows, step_rows
@@ -97,6 +97,6 @@ def _print_summary(title: str, report: ServoReport) -> None:
     for row in loop_rows(report):
         units = zip((3, 4, 6, 8, 9, 10), (" Hz", " Hz", " dB", "°", " Hz", ""), strict=True)
         table.add_row(*row[:3], *(f"{row[k]}{unit}" if row[k] else "-" for k, unit in units))
-    Console(width=120).print(table)
+    console(sys.stdout, 120).print(table)
     for what, value in [*step_rows(report), *report.motion_rows()]:
         print(f"  {what}: {value}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from ..atomic_writer import unwritable
 from ..errors import InputError
+from ..inputs.toml_files import in_short
 
 
 def try_file(path: Path) -> None:
@@ -18,9 +20,9 @@ def try_file(path: Path) -> None:
     ------
     InputError
     """
-    if path.is_dir():
+    if os.path.isdir(path):
         raise InputError(f"{path}: is a directory; name a file")
-    if path.exists() and not path.is_file():  # a device
+    if os.path.exists(path) and not os.path.isfile(path):  # a device
         return
     try:
         with tempfile.TemporaryFile(dir=path.parent):
@@ -36,17 +38,17 @@ def try_directory(path: Path) -> None:
     ------
     InputError
     """
-    if path.exists() and not path.is_dir():
+    if os.path.lexists(path) and not os.path.isdir(path):
         raise InputError(f"{path}: is a file; -o names a directory")
     made: list[Path] = []
     try:
-        for directory in reversed([p for p in (path, *path.parents) if not p.exists()]):
+        for directory in reversed([p for p in (path, *path.parents) if not os.path.exists(p)]):
             directory.mkdir()
             made.append(directory)
         with tempfile.TemporaryFile(dir=path):
             pass
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+        raise InputError(f"{in_short(path)}: cannot be written: {error.strerror}") from None
     finally:
         for directory in reversed(made):
             directory.rmdir()

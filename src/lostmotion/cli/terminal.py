@@ -5,8 +5,40 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import NoReturn, Protocol
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TextIO
+
+from ..errors import visible
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+class _Visible:
+    """A stream to which texts of files may be printed: what a terminal would obey becomes visible."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
+
+    def write(self, text: str) -> int:
+        return self.stream.write(visible(text, "\n\t"))
+
+
+@contextmanager
+def harmless_output() -> Iterator[None]:
+    """Titles, names and notes of files reach the terminal as text, whatever they contain."""
+    with redirect_stdout(_Visible(sys.stdout)), redirect_stderr(_Visible(sys.stderr)):
+        yield
+
+
+def console(stream: Any, width: int | None = None) -> Console:
+    """For tables and bars of our own, which command the terminal."""
+    from rich.console import Console
+
+    return Console(file=getattr(stream, "stream", stream), width=width)
 
 
 def fail(text: str, code: int = 1) -> NoReturn:
@@ -27,7 +59,6 @@ def progress(total: int, what: str) -> Iterator[Step]:
     if not sys.stderr.isatty():
         yield _unseen
         return
-    from rich.console import Console
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -43,7 +74,7 @@ def progress(total: int, what: str) -> Iterator[Step]:
             return f"{task.speed:.0f}/s" if task.speed else ""
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(*columns, console=console(sys.stderr), transient=True) as bar:
         task = bar.add_task(what, total=total)
 
         def step(done: int | None = None) -> None:
@@ -79,11 +110,10 @@ def busy(what: str) -> Iterator[Callable[[str], None]]:
         return
 
     def show() -> None:
-        from rich.console import Console
         from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
         columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        with Progress(*columns, console=console(sys.stderr), transient=True) as bar:
             task = bar.add_task(what, total=None)
             while not done.wait(REFRESH):
                 bar.update(task, description=words[0])

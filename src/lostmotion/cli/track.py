@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,7 +10,7 @@ import typer
 
 from .arguments import Overrides, SourceArgument, number
 from .targets import try_directory, writing
-from .terminal import busy, progress
+from .terminal import busy, console, progress
 
 if TYPE_CHECKING:
     from ..pointing.budget import PointingBudget
@@ -68,7 +69,6 @@ def track(
 
 
 def _print_summary(title: str, budget: PointingBudget) -> None:
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
@@ -80,6 +80,6 @@ def _print_summary(title: str, budget: PointingBudget) -> None:
         table.add_column(Text(name), justify="left" if k < 2 else "right")
     for row in budget_rows(budget):
         table.add_row(*map(Text, row))
-    Console(width=160).print(table)
+    console(sys.stdout, 160).print(table)
     if budget.view is not None:
         print(f"  {view_line(budget)}")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import visible
 from ..simulation.results import RawResult, energy_of, is_train_result
 from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.switchings import names_in, unpacked
@@ -29,7 +30,7 @@ def summary(result: xarray.Dataset | RawResult) -> str:
 
     stuck = float(np.mean(np.asarray(result["input_contact"]) == 0))
     lines = [
-        result.attrs["title"] or "(no title)",
+        visible(result.attrs["title"]) or "(no title)",
         f"  {last('time'):g} s, {result.attrs['switching_count']} events, solver {result.attrs['solver']}",
         f"  at the end: motor {last('motor_speed'):.6g} rad/s, load {last('load_speed'):.6g} rad/s "
         f"at {last('load_angle'):.6g} rad, twist {1e3 * last('twist'):.4g} mrad",
@@ -103,7 +104,7 @@ def train_summary(result: xarray.Dataset | RawResult) -> str:
 
     time = float(np.asarray(result["time"])[-1])
     lines = [
-        result.attrs["title"] or "(no title)",
+        visible(result.attrs["title"]) or "(no title)",
         f"  {time:g} s, {result.attrs['switching_count']} events, solver {result.attrs['solver']}; at the end:",
     ]
     for name in train.motors:
