@@ -331,7 +331,7 @@ def test_rates_and_guards_serve_an_integrator_of_the_caller_s_own(library: c.CDL
     described = Scenario(library, lm.description(scenario, parameters=False))
     exact, placed = described.simulation(1e-3), described.simulation(1e-3)
     n, guards = len(placed.names(STATES)), int(library.lm_guard_count(placed.handle))
-    library.lm_next_tick.restype = c.c_double
+    library.lm_next_event.restype = c.c_double
     inputs, out, z = doubles([0.3, 2.0]), (c.c_double * n)(), (c.c_double * guards)()
 
     def rates(time: float, x: np.ndarray) -> np.ndarray:
@@ -345,7 +345,7 @@ def test_rates_and_guards_serve_an_integrator_of_the_caller_s_own(library: c.CDL
     x, h = np.array(out), 5e-6
     assert library.lm_place(placed.handle, c.c_double(0.0), doubles(x), inputs) == OK
     assert library.lm_settle(placed.handle) == OK
-    assert library.lm_next_tick(placed.handle) == math.inf
+    assert library.lm_next_event(placed.handle) == math.inf
     for k in range(80):
         a = rates(k * h, x)
         b = rates((k + 0.5) * h, x + 0.5 * h * a)

@@ -28,7 +28,7 @@ extern "C" {
 #endif
 
 /* Rises with every change that a caller has to know of. */
-#define LM_INTERFACE_VERSION 3
+#define LM_INTERFACE_VERSION 4
 LM_API int lm_interface_version(void);
 
 enum {
@@ -89,6 +89,10 @@ LM_API double lm_scenario_input_at_start(const lm_scenario* scenario, size_t inp
 
 /* Whether sampled controllers follow inputs of a simulation, in the place of their references in the scenario. */
 LM_API int lm_scenario_give_references(lm_scenario* scenario, int given);
+
+/* Which inputs of a simulation follow the signals and references of the scenario in the place of what its calls give:
+ * played[n], of the first n inputs. It acts on simulations that are made, or go on, afterwards. */
+LM_API void lm_scenario_play(lm_scenario* scenario, const int* played, size_t n);
 
 /* A run in one go. energy: whether to keep the energies. Beyond max_switchings the switchings are only counted. NULL if
  * nothing could run (lm_scenario_error); a motion that has no continuation gives a result with a status and an error.
@@ -252,8 +256,8 @@ LM_API double lm_time(const lm_simulation* simulation);
 LM_API int lm_hold(lm_simulation* simulation, const double* inputs);
 /* Of an input of the simulation its number among those of the scenario, which has those of controllers too. */
 LM_API size_t lm_solver_input(const lm_simulation* simulation, size_t input);
-/* Of an input in the scenario, at t = 0. */
-LM_API double lm_input_at_start(const lm_simulation* simulation, size_t input);
+/* The present value of an input that follows its signal (lm_scenario_play); NaN of one that is given. */
+LM_API double lm_played_input(const lm_simulation* simulation, size_t input);
 /* All variables at the present instant, with the inputs at their last values. */
 LM_API int lm_read(lm_simulation* simulation, double* variables);
 
@@ -270,8 +274,9 @@ LM_API int lm_directional_derivative(lm_simulation* simulation, const double* st
 
 /* --- as a hybrid system, which an integrator of the caller's own solves --- */
 
-/* Between two events dx/dt is smooth. One happens where a guard falls below zero, where an input jumps, and at each
- * tick of sampled controllers: then lm_settle() finds the regime that follows. Not with field-oriented control inside.
+/* Between two events dx/dt is smooth. One happens where a guard falls below zero, where an input jumps, at each
+ * breakpoint of a signal that is followed, and at each tick of sampled controllers: then lm_settle() finds the regime
+ * that follows. Not with field-oriented control inside.
  *
  * At a time [s], with these states and inputs, in the regime that it is in. */
 LM_API int lm_place(lm_simulation* simulation, double time, const double* states, const double* inputs);
@@ -285,7 +290,8 @@ LM_API int lm_guards(lm_simulation* simulation, double* guards);
 /* Runs the ticks that are due and finds the regime that holds from here on; states may change by less than the shift,
  * to what they are at rest. */
 LM_API int lm_settle(lm_simulation* simulation);
-LM_API double lm_next_tick(const lm_simulation* simulation); /* [s], INFINITY without sampled controllers */
+/* The next tick of sampled controllers, or breakpoint of a signal that is followed [s], or INFINITY. */
+LM_API double lm_next_event(const lm_simulation* simulation);
 /* After each step of the integrator. 1: lm_settle() has to be called, since inputs take a torque at rest along. */
 LM_API int lm_accept(lm_simulation* simulation);
 

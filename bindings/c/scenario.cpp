@@ -84,6 +84,10 @@ int lm_scenario_give_references(lm_scenario* scenario, int given) {
     return scenario->changed(scenario->description.give_references(given != 0));
 }
 
+void lm_scenario_play(lm_scenario* scenario, const int* played, size_t n) {
+    scenario->description.play(std::vector<bool>(played, played + n));
+}
+
 size_t lm_scenario_parameter_count(const lm_scenario* scenario) { return scenario->description.parameters().size(); }
 static const lm::ScenarioParameter* parameter(const lm_scenario* scenario, size_t k) {
     const auto& all = scenario->description.parameters();

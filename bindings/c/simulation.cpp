@@ -129,9 +129,8 @@ size_t lm_solver_input(const lm_simulation* simulation, size_t input) {
     return input < simulation->simulation.free_inputs() ? simulation->simulation.solver_input(input)
                                                         : static_cast<size_t>(-1);
 }
-double lm_input_at_start(const lm_simulation* simulation, size_t input) {
-    return input < simulation->simulation.names().inputs.size() ? simulation->simulation.input_at_start(input)
-                                                                : std::nan("");
+double lm_played_input(const lm_simulation* simulation, size_t input) {
+    return simulation->simulation.played_input(input);
 }
 int lm_hold(lm_simulation* simulation, const double* inputs) {
     const std::size_t n = simulation->simulation.names().inputs.size();
@@ -165,7 +164,7 @@ int lm_guards(lm_simulation* simulation, double* guards) {
     return simulation->ended(simulation->simulation.guards(guards));
 }
 int lm_settle(lm_simulation* simulation) { return simulation->ended(simulation->simulation.settle()); }
-double lm_next_tick(const lm_simulation* simulation) { return simulation->simulation.next_tick(); }
+double lm_next_event(const lm_simulation* simulation) { return simulation->simulation.next_event(); }
 int lm_accept(lm_simulation* simulation) { return simulation->simulation.accept() ? 1 : 0; }
 
 size_t lm_state_size(const lm_simulation* simulation) { return simulation->simulation.state_size(); }

@@ -45,15 +45,27 @@ class Component {
         if (status != ok) log_(status, status == discard ? "logStatusDiscard" : "logStatusError", instance.sentence());
         return status;
     }
-    int failed(const char* sentence) { return ended(instance.failed(sentence)); }
-
-    int get_values(const unsigned* reference, std::size_t n, double* value) {
-        for (std::size_t k = 0; k < n; ++k)
-            if (const Ended e = instance.get(reference[k], value[k]); e != ok) return ended(e);
-        return ok;
+    int failed(const std::string& sentence) { return ended(instance.failed(sentence)); }
+    // A function that may be called in some modes: what acts on the instance, or changes nothing in others.
+    template <class Act>
+    int call(const char* function, unsigned modes, Act&& act) {
+        if ((instance.mode() & modes) != 0) return ended(act(instance));
+        return failed(std::string(function) + " cannot be called " + words_of(instance.mode()) + ", only " +
+                      words_of(modes));
     }
-    int set_values(const unsigned* reference, std::size_t n, const double* value) {
-        return ended(instance.set(reference, n, value));
+    int enter(const char* function, unsigned from, Mode to) {
+        return call(function, from, [to](Instance& i) { return i.enter(to); });
+    }
+
+    int get_values(const char* function, unsigned modes, const unsigned* reference, std::size_t n, double* value) {
+        return call(function, modes, [=](Instance& i) {
+            Ended e = ok;
+            for (std::size_t k = 0; k < n && e == ok; ++k) e = i.get(reference[k], value[k]);
+            return e;
+        });
+    }
+    int set_values(const char* function, const unsigned* reference, std::size_t n, const double* value) {
+        return call(function, before_termination, [=](Instance& i) { return i.set(reference, n, value); });
     }
     // Of a call for variables of a type that there is none of.
     int none(std::size_t n, const char* sentence) { return n == 0 ? int{ok} : failed(sentence); }
@@ -80,11 +92,13 @@ class Component {
     }
     static std::size_t size_of(const void* state) { return sizeof(double) * of(state).size(); }
 
-    int get_nominals(double* out, std::size_t n) {
-        const std::vector<double>& nominals = instance.nominals();
-        if (n != nominals.size()) return failed("the number of continuous states is another one");
-        std::copy(nominals.begin(), nominals.end(), out);
-        return ok;
+    int get_nominals(const char* function, double* out, std::size_t n) {
+        return call(function, instantiated | exchanged, [=](Instance& i) {
+            const std::vector<double>& nominals = i.nominals();
+            if (n != nominals.size()) return i.failed("the number of continuous states is another one");
+            std::copy(nominals.begin(), nominals.end(), out);
+            return ok;
+        });
     }
 
     Instance instance;

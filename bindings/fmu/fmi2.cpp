@@ -36,6 +36,7 @@ struct Logger {
     }
 };
 using Component = fmu::Component<Logger>;
+using fmu::Instance;
 Component& of(void* component) { return *static_cast<Component*>(component); }
 
 // Of fmi2NewDiscreteStates.
@@ -59,19 +60,22 @@ FMU_API void* fmi2Instantiate(const char* name, int type, const char* guid, cons
 FMU_API void fmi2FreeInstance(void* c) { delete static_cast<Component*>(c); }
 
 FMU_API int fmi2SetupExperiment(void* c, Boolean, double, double start, Boolean, double) {
-    of(c).instance.set_start_time(start);
-    return fmu::ok;
+    return of(c).call(__func__, fmu::instantiated, [=](Instance& i) { return i.set_start_time(start); });
 }
-FMU_API int fmi2EnterInitializationMode(void*) { return fmu::ok; }
-FMU_API int fmi2ExitInitializationMode(void* c) { return of(c).ended(of(c).instance.exit_initialization()); }
-FMU_API int fmi2Terminate(void*) { return fmu::ok; }
+FMU_API int fmi2EnterInitializationMode(void* c) {
+    return of(c).enter(__func__, fmu::instantiated, fmu::initialization);
+}
+FMU_API int fmi2ExitInitializationMode(void* c) {
+    return of(c).call(__func__, fmu::initialization, [](Instance& i) { return i.exit_initialization(); });
+}
+FMU_API int fmi2Terminate(void* c) { return of(c).enter(__func__, fmu::started, fmu::terminated); }
 FMU_API int fmi2Reset(void* c) { return of(c).ended(of(c).instance.reset()); }
 
 FMU_API int fmi2GetReal(void* c, const Reference* r, std::size_t n, double* value) {
-    return of(c).get_values(r, n, value);
+    return of(c).get_values(__func__, fmu::readable, r, n, value);
 }
 FMU_API int fmi2SetReal(void* c, const Reference* r, std::size_t n, const double* value) {
-    return of(c).set_values(r, n, value);
+    return of(c).set_values(__func__, r, n, value);
 }
 static int none(void* c, std::size_t n) { return of(c).none(n, "this FMU has variables of type Real alone"); }
 FMU_API int fmi2GetInteger(void* c, const Reference*, std::size_t n, int*) { return none(c, n); }
@@ -97,21 +101,24 @@ FMU_API int fmi2DeSerializeFMUstate(void* c, const char* bytes, std::size_t size
 
 FMU_API int fmi2GetDirectionalDerivative(void* c, const Reference* unknown, std::size_t n_unknown,
                                          const Reference* known, std::size_t n_known, const double* seed, double* out) {
-    return of(c).ended(of(c).instance.directional_derivative(unknown, n_unknown, known, seed, n_known, out));
+    return of(c).call(__func__, fmu::readable, [=](Instance& i) {
+        return i.directional_derivative(unknown, n_unknown, known, seed, n_known, out);
+    });
 }
 FMU_API int fmi2SetRealInputDerivatives(void* c, const Reference* r, std::size_t n, const int* order,
                                         const double* value) {
-    for (std::size_t k = 0; k < n; ++k)
-        if (const fmu::Ended e = of(c).instance.set_input_rate(r[k], order[k], value[k]); e != fmu::ok)
-            return of(c).ended(e);
-    return fmu::ok;
+    return of(c).call(__func__, fmu::instantiated | fmu::initialization | fmu::between_steps, [=](Instance& i) {
+        fmu::Ended e = fmu::ok;
+        for (std::size_t k = 0; k < n && e == fmu::ok; ++k) e = i.set_input_rate(r[k], order[k], value[k]);
+        return e;
+    });
 }
 FMU_API int fmi2GetRealOutputDerivatives(void* c, const Reference*, std::size_t n, const int*, double*) {
     return of(c).none(n, "derivatives of outputs are not given");
 }
 
 FMU_API int fmi2DoStep(void* c, double from, double interval, Boolean) {
-    return of(c).ended(of(c).instance.step(from, interval));
+    return of(c).call(__func__, fmu::between_steps, [=](Instance& i) { return i.step(from, interval); });
 }
 FMU_API int fmi2CancelStep(void* c) { return of(c).failed("no step is under way: steps are done when they return"); }
 FMU_API int fmi2GetStatus(void*, int, int*) { return fmu::discard; }
@@ -129,36 +136,38 @@ FMU_API int fmi2GetStringStatus(void*, int, const char**) { return fmu::discard;
 
 // --- Model Exchange ---
 
-FMU_API int fmi2EnterEventMode(void*) { return fmu::ok; }
+FMU_API int fmi2EnterEventMode(void* c) { return of(c).enter(__func__, fmu::event | fmu::continuous, fmu::event); }
 FMU_API int fmi2NewDiscreteStates(void* c, EventInfo* info) {
     fmu::Instance::Settled settled;
-    const fmu::Ended e = of(c).instance.settle(settled);
+    const int e = of(c).call(__func__, fmu::event, [&](Instance& i) { return i.settle(settled); });
     *info = {0, 0, 0, settled.states_changed, settled.has_next, settled.next};
-    return of(c).ended(e);
+    return e;
 }
-FMU_API int fmi2EnterContinuousTimeMode(void*) { return fmu::ok; }
+FMU_API int fmi2EnterContinuousTimeMode(void* c) { return of(c).enter(__func__, fmu::event, fmu::continuous); }
 FMU_API int fmi2CompletedIntegratorStep(void* c, Boolean, Boolean* enter_event_mode, Boolean* terminate) {
     bool event = false;
-    const fmu::Ended e = of(c).instance.accept(event);
+    const int e = of(c).call(__func__, fmu::continuous, [&](Instance& i) { return i.accept(event); });
     *enter_event_mode = event;
     *terminate = 0;
-    return of(c).ended(e);
+    return e;
 }
-FMU_API int fmi2SetTime(void* c, double time) { return of(c).ended(of(c).instance.set_time(time)); }
+FMU_API int fmi2SetTime(void* c, double time) {
+    return of(c).call(__func__, fmu::event | fmu::continuous, [=](Instance& i) { return i.set_time(time); });
+}
 FMU_API int fmi2SetContinuousStates(void* c, const double* x, std::size_t n) {
-    return of(c).ended(of(c).instance.set_states(x, n));
+    return of(c).call(__func__, fmu::continuous, [=](Instance& i) { return i.set_states(x, n); });
 }
 FMU_API int fmi2GetContinuousStates(void* c, double* x, std::size_t n) {
-    return of(c).ended(of(c).instance.get_states(x, n));
+    return of(c).call(__func__, fmu::exchanged, [=](Instance& i) { return i.get_states(x, n); });
 }
 FMU_API int fmi2GetDerivatives(void* c, double* out, std::size_t n) {
-    return of(c).ended(of(c).instance.get_derivatives(out, n));
+    return of(c).call(__func__, fmu::exchanged, [=](Instance& i) { return i.get_derivatives(out, n); });
 }
 FMU_API int fmi2GetEventIndicators(void* c, double* out, std::size_t n) {
-    return of(c).ended(of(c).instance.get_guards(out, n));
+    return of(c).call(__func__, fmu::exchanged, [=](Instance& i) { return i.get_guards(out, n); });
 }
 FMU_API int fmi2GetNominalsOfContinuousStates(void* c, double* out, std::size_t n) {
-    return of(c).get_nominals(out, n);
+    return of(c).get_nominals(__func__, out, n);
 }
 
 }  // namespace lostmotion::fmi2

@@ -20,6 +20,7 @@ struct Logger {
     }
 };
 using Component = fmu::Component<Logger>;
+using fmu::Instance;
 Component& of(void* component) { return *static_cast<Component*>(component); }
 
 void* instantiate(const char* token, const char* resources, void* environment, Log log, fmu::Kind kind) {
@@ -48,22 +49,27 @@ FMU_API void* fmi3InstantiateScheduledExecution(const char*, const char*, const 
 FMU_API void fmi3FreeInstance(void* c) { delete static_cast<Component*>(c); }
 
 FMU_API int fmi3EnterInitializationMode(void* c, bool, double, double start, bool, double) {
-    of(c).instance.set_start_time(start);
-    return fmu::ok;
+    return of(c).call(__func__, fmu::instantiated, [=](Instance& i) {
+        const fmu::Ended e = i.set_start_time(start);
+        return e == fmu::ok ? i.enter(fmu::initialization) : e;
+    });
 }
-FMU_API int fmi3ExitInitializationMode(void* c) { return of(c).ended(of(c).instance.exit_initialization()); }
-FMU_API int fmi3EnterEventMode(void*) { return fmu::ok; }
-FMU_API int fmi3EnterStepMode(void*) { return fmu::ok; }
-FMU_API int fmi3EnterConfigurationMode(void*) { return fmu::ok; }
-FMU_API int fmi3ExitConfigurationMode(void*) { return fmu::ok; }
-FMU_API int fmi3Terminate(void*) { return fmu::ok; }
+FMU_API int fmi3ExitInitializationMode(void* c) {
+    return of(c).call(__func__, fmu::initialization, [](Instance& i) { return i.exit_initialization(); });
+}
+FMU_API int fmi3EnterEventMode(void* c) { return of(c).enter(__func__, fmu::event | fmu::continuous, fmu::event); }
+FMU_API int fmi3EnterStepMode(void* c) { return of(c).failed("this FMU has no event mode in Co-Simulation"); }
+FMU_API int fmi3EnterConfigurationMode(void* c) { return of(c).failed("this FMU has no structural parameters"); }
+FMU_API int fmi3ExitConfigurationMode(void* c) { return of(c).failed("this FMU has no structural parameters"); }
+FMU_API int fmi3Terminate(void* c) { return of(c).enter(__func__, fmu::started, fmu::terminated); }
 FMU_API int fmi3Reset(void* c) { return of(c).ended(of(c).instance.reset()); }
 
 FMU_API int fmi3GetFloat64(void* c, const Reference* r, std::size_t n, double* value, std::size_t n_values) {
-    return n == n_values ? of(c).get_values(r, n, value) : of(c).failed("each variable has one value");
+    return n == n_values ? of(c).get_values(__func__, fmu::instantiated | fmu::readable, r, n, value)
+                         : of(c).failed("each variable has one value");
 }
 FMU_API int fmi3SetFloat64(void* c, const Reference* r, std::size_t n, const double* value, std::size_t n_values) {
-    return n == n_values ? of(c).set_values(r, n, value) : of(c).failed("each variable has one value");
+    return n == n_values ? of(c).set_values(__func__, r, n, value) : of(c).failed("each variable has one value");
 }
 static int none(void* c, std::size_t n) { return of(c).none(n, "this FMU has variables of type Float64 alone"); }
 #define OTHER_TYPE(NAME, TYPE)                                                                                     \
@@ -135,7 +141,9 @@ FMU_API int fmi3DeserializeFMUState(void* c, const std::uint8_t* bytes, std::siz
 FMU_API int fmi3GetDirectionalDerivative(void* c, const Reference* unknown, std::size_t n_unknown,
                                          const Reference* known, std::size_t n_known, const double* seed, std::size_t,
                                          double* out, std::size_t) {
-    return of(c).ended(of(c).instance.directional_derivative(unknown, n_unknown, known, seed, n_known, out));
+    return of(c).call(__func__, fmu::readable, [=](Instance& i) {
+        return i.directional_derivative(unknown, n_unknown, known, seed, n_known, out);
+    });
 }
 FMU_API int fmi3GetAdjointDerivative(void* c, const Reference*, std::size_t, const Reference*, std::size_t,
                                      const double*, std::size_t, double*, std::size_t) {
@@ -150,45 +158,49 @@ FMU_API int fmi3GetOutputDerivatives(void* c, const Reference*, std::size_t n, c
 
 FMU_API int fmi3DoStep(void* c, double from, double interval, bool, bool* event, bool* terminate, bool* early,
                        double* last) {
-    const fmu::Ended e = of(c).instance.step(from, interval);
+    const int e = of(c).call(__func__, fmu::between_steps, [=](Instance& i) { return i.step(from, interval); });
     *event = *terminate = *early = false;
     *last = of(c).instance.time();
-    return of(c).ended(e);
+    return e;
 }
 
 // --- Model Exchange ---
 
-FMU_API int fmi3EvaluateDiscreteStates(void*) { return fmu::ok; }
+FMU_API int fmi3EvaluateDiscreteStates(void* c) {
+    return of(c).call(__func__, fmu::initialization | fmu::event, [](Instance&) { return fmu::ok; });
+}
 FMU_API int fmi3UpdateDiscreteStates(void* c, bool* needed, bool* terminate, bool* nominals_changed,
                                      bool* states_changed, bool* next_defined, double* next) {
     fmu::Instance::Settled settled;
-    const fmu::Ended e = of(c).instance.settle(settled);
+    const int e = of(c).call(__func__, fmu::event, [&](Instance& i) { return i.settle(settled); });
     *needed = *terminate = *nominals_changed = false;
     *states_changed = settled.states_changed;
     *next_defined = settled.has_next;
     *next = settled.next;
-    return of(c).ended(e);
+    return e;
 }
-FMU_API int fmi3EnterContinuousTimeMode(void*) { return fmu::ok; }
+FMU_API int fmi3EnterContinuousTimeMode(void* c) { return of(c).enter(__func__, fmu::event, fmu::continuous); }
 FMU_API int fmi3CompletedIntegratorStep(void* c, bool, bool* enter_event_mode, bool* terminate) {
     *enter_event_mode = *terminate = false;
-    return of(c).ended(of(c).instance.accept(*enter_event_mode));
+    return of(c).call(__func__, fmu::continuous, [=](Instance& i) { return i.accept(*enter_event_mode); });
 }
-FMU_API int fmi3SetTime(void* c, double time) { return of(c).ended(of(c).instance.set_time(time)); }
+FMU_API int fmi3SetTime(void* c, double time) {
+    return of(c).call(__func__, fmu::event | fmu::continuous, [=](Instance& i) { return i.set_time(time); });
+}
 FMU_API int fmi3SetContinuousStates(void* c, const double* x, std::size_t n) {
-    return of(c).ended(of(c).instance.set_states(x, n));
+    return of(c).call(__func__, fmu::continuous, [=](Instance& i) { return i.set_states(x, n); });
 }
 FMU_API int fmi3GetContinuousStates(void* c, double* x, std::size_t n) {
-    return of(c).ended(of(c).instance.get_states(x, n));
+    return of(c).call(__func__, fmu::exchanged, [=](Instance& i) { return i.get_states(x, n); });
 }
 FMU_API int fmi3GetContinuousStateDerivatives(void* c, double* out, std::size_t n) {
-    return of(c).ended(of(c).instance.get_derivatives(out, n));
+    return of(c).call(__func__, fmu::exchanged, [=](Instance& i) { return i.get_derivatives(out, n); });
 }
 FMU_API int fmi3GetEventIndicators(void* c, double* out, std::size_t n) {
-    return of(c).ended(of(c).instance.get_guards(out, n));
+    return of(c).call(__func__, fmu::exchanged, [=](Instance& i) { return i.get_guards(out, n); });
 }
 FMU_API int fmi3GetNominalsOfContinuousStates(void* c, double* out, std::size_t n) {
-    return of(c).get_nominals(out, n);
+    return of(c).get_nominals(__func__, out, n);
 }
 FMU_API int fmi3GetNumberOfEventIndicators(void* c, std::size_t* n) {
     *n = of(c).instance.indicator_count();

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -19,6 +20,31 @@ namespace lostmotion::fmu {
 enum Ended : int { ok = 0, warning = 1, discard = 2, error = 3, fatal = 4 };
 
 enum class Kind { model_exchange, co_simulation };
+
+// What is under way, by which the standards say which functions may be called.
+enum Mode : unsigned {
+    instantiated = 1,
+    initialization = 2,
+    event = 4,
+    continuous = 8,
+    between_steps = 16,
+    terminated = 32,
+    exchanged = initialization | event | continuous | terminated,
+    started = event | continuous | between_steps,
+    running = started | terminated,
+    readable = initialization | running,
+    before_termination = instantiated | initialization | started
+};
+
+// Such as "in event mode, between steps".
+inline std::string words_of(unsigned modes) {
+    const char* const words[] = {"before initialization",   "in initialization mode", "in event mode",
+                                 "in continuous-time mode", "between steps",          "after termination"};
+    std::string text;
+    for (unsigned k = 0; k < 6; ++k)
+        if ((modes & 1u << k) != 0) text += (text.empty() ? "" : ", ") + std::string(words[k]);
+    return text;
+}
 
 struct Free {
     void operator()(lm_scenario* s) const { lm_scenario_free(s); }
@@ -40,18 +66,28 @@ class Instance {
     const std::string& problem() const { return problem_; }
     Kind kind() const { return kind_; }
 
+    Mode mode() const { return mode_; }
+    Ended enter(Mode mode) {
+        mode_ = mode;
+        return ok;
+    }
+
     // Back to the beginning, with the values of the parameters that the file has.
     Ended reset() {
         if (std::string wrong = read(); !wrong.empty()) return failed(wrong);
-        running_ = false;
+        mode_ = instantiated;
+        start_ = time_ = 0.0;
         begin();
         return ok;
     }
-    void set_start_time(double t) { start_ = time_ = t; }
-    Ended exit_initialization() {
-        if (const Ended e = apply(); e != ok) return e;
-        running_ = true;
+    Ended set_start_time(double t) {
+        if (!std::isfinite(t)) return failed("the start time is not finite");
+        start_ = time_ = t;
         return ok;
+    }
+    Ended exit_initialization() {
+        if (const Ended e = place(); e != ok) return e;
+        return enter(is_exchange() ? event : between_steps);
     }
     double time() const { return is_exchange() ? time_ : start_ + lm_time(simulation_.get()); }
 
@@ -61,7 +97,8 @@ class Instance {
         if (reference == time_reference) {
             value = time();
         } else if (const std::size_t* k = variables_.input(reference)) {
-            value = inputs_[*k];
+            if (const Ended e = place(); e != ok) return e;
+            value = given_[*k] ? inputs_[*k] : lm_played_input(simulation_.get(), *k);
         } else if (const std::size_t* rate = variables_.input_rate(reference)) {
             value = rates_[*rate];
         } else if (is_parameter(reference)) {
@@ -83,6 +120,8 @@ class Instance {
             if (is_parameter(reference)) {
                 if (wanted.empty()) wanted = values_of_parameters();
                 wanted[reference - first_parameter] = values[j];
+            } else if (const std::size_t* state = variables_.state(reference)) {
+                if (const Ended e = set_one_state(*state, values[j]); e != ok) return e;
             } else if (const Ended e = set_input(reference, values[j]); e != ok) {
                 return e;
             }
@@ -108,7 +147,10 @@ class Instance {
                 du[*input] += seed[k];
             else if (const std::size_t* state = variables_.state(knowns[k]))
                 dx[*state] += seed[k];
-            else if (variables_.input_rate(knowns[k]) == nullptr)
+            else if (is_parameter(knowns[k]))
+                return failed(std::string("derivatives are given by inputs and states alone, not by the parameter ") +
+                              lm_scenario_parameter_key(scenario_.get(), knowns[k] - first_parameter));
+            else if (knowns[k] == time_reference ? !all_given() : variables_.input_rate(knowns[k]) == nullptr)
                 return unknown(knowns[k]);
         }
         const Ended found = uncommitted([&] {
@@ -134,7 +176,6 @@ class Instance {
 
     // from: communication point; rounding apart it is where the last step has ended.
     Ended step(double from, double interval) {
-        if (is_exchange()) return failed("this instance is for Model Exchange");
         if (!(std::isfinite(interval) && interval >= 1e-12 && interval <= 1e12))
             return failed("the communication step must lie between 1e-12 s and 1e12 s");
         if (!(std::isfinite(from) && std::fabs(from - time()) <= 1e-3 * interval + 1e-9 * std::fabs(from)))
@@ -168,6 +209,7 @@ class Instance {
             if (!std::isfinite(x[k])) return failed("a continuous state is not finite", discard);
             states_[variables_.states[k]] = x[k];
         }
+        at_points_ = false;
         moved_ = true;
         read_ = false;
         return ok;
@@ -195,17 +237,16 @@ class Instance {
     }
     struct Settled {
         bool states_changed = false, has_next = false;
-        double next = 0.0;  // [s], of the next tick of the controllers
+        double next = 0.0;  // [s], of the next tick of the controllers or breakpoint of a signal
     };
-    // In event mode; of an instance for Co-Simulation nothing.
     Ended settle(Settled& out) {
-        if (!is_exchange()) return ok;
         if (const Ended e = place(); e != ok) return e;
+        at_points_ = false;
         const std::vector<double> before = states_;
         if (lm_settle(simulation_.get()) != LM_OK) return failed();
         lm_states(simulation_.get(), states_.data());
-        const double tick = lm_next_tick(simulation_.get());
-        out = {states_ != before, std::isfinite(tick), start_ + tick};
+        next_event_ = lm_next_event(simulation_.get());
+        out = {states_ != before, std::isfinite(next_event_), start_ + next_event_};
         read_ = false;
         return ok;
     }
@@ -216,17 +257,18 @@ class Instance {
         return ok;
     }
 
-    // --- the whole state: parameters, inputs, their derivatives and the simulation ---
+    // --- the whole state: mode, parameters, inputs, their derivatives, whether they are given, and the simulation ---
 
     std::size_t state_size() const {
-        return head + parameters() + 2 * inputs_.size() + lm_state_size(simulation_.get());
+        return head + parameters() + 3 * inputs_.size() + lm_state_size(simulation_.get());
     }
     Ended get_state(std::vector<double>& to) {
         if (const Ended e = is_exchange() ? place() : apply(); e != ok) return e;
-        to = {mark, static_cast<double>(state_size()), start_, running_ ? 1.0 : 0.0};
+        to = {mark, static_cast<double>(state_size()), start_, static_cast<double>(mode_)};
         for (std::size_t k = 0; k < parameters(); ++k) to.push_back(lm_scenario_get(scenario_.get(), k));
         to.insert(to.end(), inputs_.begin(), inputs_.end());
         to.insert(to.end(), rates_.begin(), rates_.end());
+        to.insert(to.end(), given_.begin(), given_.end());
         const std::size_t n = to.size();
         to.resize(state_size());
         lm_get_state(simulation_.get(), to.data() + n);
@@ -234,30 +276,38 @@ class Instance {
     }
     // If it is refused, all stays as it was.
     Ended set_state(const double* from, std::size_t n) {
-        const std::size_t numbers = head + parameters() + 2 * inputs_.size();
+        const std::size_t numbers = head + parameters() + 3 * inputs_.size();
         if (n <= numbers || from[0] != mark || from[1] != static_cast<double>(n) ||
-            !std::all_of(from, from + numbers, [](double number) { return std::isfinite(number); }))
+            !std::all_of(from, from + numbers, [](double number) { return std::isfinite(number); }) ||
+            !mode_of(from[3]))
             return failed("these bytes are no state of this FMU");
         const std::vector<double> before = values_of_parameters();
+        const std::vector<int> given_before = given_;
         const double* inputs = from + head + parameters();
         const double* rates = inputs + inputs_.size();
+        const double* given = rates + inputs_.size();
         if (lm_scenario_set_all(scenario_.get(), from + head) != LM_OK)
             return failed(lm_scenario_error(scenario_.get()));
+        given_.assign(given, given + inputs_.size());
         std::unique_ptr<lm_simulation, Free> other;
-        if (changed_ || values_of_parameters() != before) other = simulation_now();
+        if (changed_ || values_of_parameters() != before || given_ != given_before) other = simulation_now();
         lm_simulation* to = other ? other.get() : simulation_.get();
-        if (numbers + lm_state_size(to) != n || lm_set_state(to, rates + inputs_.size()) != LM_OK) {
+        if (numbers + lm_state_size(to) != n || lm_set_state(to, given + inputs_.size()) != LM_OK) {
             lm_scenario_set_all(scenario_.get(), before.data());
+            given_ = given_before;
             return failed("these bytes are no state of this FMU");
         }
         if (other) use(std::move(other));
         start_ = from[2];
-        running_ = from[3] != 0.0;
+        mode_ = static_cast<Mode>(mode_of(from[3]));
         inputs_.assign(inputs, rates);
         rates_.assign(rates, rates + inputs_.size());
         time_ = start_ + lm_time(simulation_.get());
         lm_states(simulation_.get(), states_.data());
-        changed_ = read_ = moved_ = committed_ = false;
+        next_event_ = lm_next_event(simulation_.get());
+        start_states_.clear();
+        unmoved_.clear();
+        changed_ = read_ = moved_ = committed_ = at_points_ = false;
         return ok;
     }
 
@@ -269,10 +319,18 @@ class Instance {
     }
 
  private:
-    static constexpr double mark = 19534.0;
+    static constexpr double mark = 19535.0;
     static constexpr std::size_t head = 4;
 
     bool is_exchange() const { return kind_ == Kind::model_exchange; }
+    bool is_running() const { return (mode_ & running) != 0; }
+    // The mode of this number, or 0 if an instance of this kind has none such.
+    unsigned mode_of(double number) const {
+        for (const Mode m : {instantiated, initialization, event, continuous, between_steps, terminated})
+            if (number == static_cast<double>(m) && (m & (is_exchange() ? between_steps : event | continuous)) == 0)
+                return m;
+        return 0;
+    }
     std::string read() {
         std::vector<double> numbers;
         std::FILE* file = std::fopen(path_.c_str(), "rb");
@@ -290,24 +348,41 @@ class Instance {
         return {};
     }
     void begin() {
+        given_.assign(variables_.input_names.size(), 0);
+        start_states_.clear();
         make_simulation();
-        lm_simulation* s = simulation_.get();
-        inputs_.assign(lm_count(s, LM_INPUTS), 0.0);
+        inputs_.assign(given_.size(), 0.0);
         rates_.assign(inputs_.size(), 0.0);
-        for (std::size_t k = 0; k < inputs_.size(); ++k) inputs_[k] = lm_input_at_start(s, k);
     }
     double usual_step() const { return lm_scenario_interval(scenario_.get()); }
-    // From its start, with the parameters as they are.
+    bool all_given() const {
+        return std::all_of(given_.begin(), given_.end(), [](int given) { return given != 0; });
+    }
+    // The scenario with the parameters as they are; inputs that the importer has not set follow its signals.
+    lm_scenario* scenario_now() const {
+        std::vector<int> played;
+        for (const int given : given_) played.push_back(given == 0);
+        lm_scenario_play(scenario_.get(), played.data(), played.size());
+        return scenario_.get();
+    }
+    // From its start.
     std::unique_ptr<lm_simulation, Free> simulation_now() const {
-        return std::unique_ptr<lm_simulation, Free>(lm_simulation_from(scenario_.get(), usual_step()));
+        return std::unique_ptr<lm_simulation, Free>(lm_simulation_from(scenario_now(), usual_step()));
     }
     void make_simulation() {
         use(simulation_now());
+        for (const auto& [state, value] : start_states_) states_[state] = value;
         changed_ = false;
+    }
+    static std::vector<double> numbers_of(const lm_simulation* simulation) {
+        std::vector<double> numbers(lm_state_size(simulation));
+        lm_get_state(simulation, numbers.data());
+        return numbers;
     }
     // Its variables may lie in other places than those of the one before: a dry contact has some.
     void use(std::unique_ptr<lm_simulation, Free> simulation) {
         simulation_ = std::move(simulation);
+        unmoved_.clear();
         variables_.find(simulation_.get(), "");
         values_.assign(lm_count(simulation_.get(), LM_VARIABLES), 0.0);
         states_.assign(lm_count(simulation_.get(), LM_STATES), 0.0);
@@ -322,11 +397,34 @@ class Instance {
             return variables_.input_rate(reference) != nullptr
                        ? set_input_rate(reference - first_input_rate + first_input, 1, value)
                        : unknown(reference);
-        if (inputs_[*k] == value) return ok;
+        if (given_[*k] && inputs_[*k] == value) return ok;
+        if (const Ended e = give(*k); e != ok) return e;
         inputs_[*k] = value;
         read_ = false;
         moved_ = true;
-        if (!running_) changed_ = true;
+        if (!is_running()) changed_ = true;
+        return ok;
+    }
+    // From now on an input is what the importer sets: the simulation goes on where it is, without the signal.
+    Ended give(std::size_t input) {
+        if (given_[input]) return ok;
+        if (const Ended e = apply(); e != ok) return e;
+        given_[input] = 1;
+        const std::vector<double> kept = numbers_of(simulation_.get());
+        simulation_ = simulation_now();
+        lm_set_state(simulation_.get(), kept.data());
+        return ok;
+    }
+    // In continuous-time mode: the importer asks for points of its choice, each of which has the regime that a start
+    // there has. Before: a value of the start.
+    Ended set_one_state(std::size_t state, double value) {
+        if (!is_exchange() && is_running())
+            return failed("states of an FMU for Co-Simulation are set before the first step alone");
+        if (!is_running()) start_states_[state] = value;
+        at_points_ = mode_ == continuous;
+        states_[state] = value;
+        moved_ = true;
+        read_ = false;
         return ok;
     }
     std::vector<double> values_of_parameters() const {
@@ -337,7 +435,7 @@ class Instance {
     Ended set_parameters(const std::vector<double>& wanted) {
         const std::vector<double> before = values_of_parameters();
         if (wanted == before) return ok;
-        for (std::size_t k = 0; k < wanted.size() && running_; ++k) {
+        for (std::size_t k = 0; k < wanted.size() && is_running(); ++k) {
             const std::string key = lm_scenario_parameter_key(scenario_.get(), k);
             if (wanted[k] != before[k] && key.starts_with("initial."))
                 return failed("parameter " + key + " is of the start; set it before the first step", discard);
@@ -349,8 +447,7 @@ class Instance {
             lm_scenario_set_all(scenario_.get(), before.data());
             return failed(wrong, discard);
         }
-        if (!running_) use(std::move(next));
-        changed_ = changed_ || running_;
+        changed_ = true;
         read_ = false;
         return ok;
     }
@@ -359,26 +456,33 @@ class Instance {
         Variables found = variables_;
         const std::string wrong = found.find(next, "with these values of the parameters");
         if (!wrong.empty()) return wrong + ", which this FMU has; take a small friction in place of 0";
-        if (running_ && lm_count(next, LM_VARIABLES) != values_.size())
+        if (is_running() && lm_count(next, LM_VARIABLES) != values_.size())
             return "with these values of the parameters there is a dry contact more; set them before the first step";
         return {};
     }
     // The parameters as they are set into the simulation.
     Ended apply() {
         if (!changed_) return ok;
-        if (running_) {
-            if (lm_go_on_with(simulation_.get(), scenario_.get(), usual_step()) != LM_OK) return failed();
+        if (is_running()) {
+            if (lm_go_on_with(simulation_.get(), scenario_now(), usual_step()) != LM_OK) return failed();
+            unmoved_.clear();
             changed_ = committed_ = false;
+            moved_ = true;
         } else {
             make_simulation();
         }
         return ok;
     }
-    // In Model Exchange: where the importer's integrator is.
+    // In Model Exchange: where the importer's integrator is. In Co-Simulation: at a start that the importer has set.
     Ended place() {
         if (const Ended e = apply(); e != ok) return e;
-        if (!moved_ || !is_exchange()) return ok;
-        if (lm_place(simulation_.get(), time_ - start_, states_.data(), inputs_.data()) != LM_OK) return failed();
+        if (!moved_ || !(is_exchange() || (!is_running() && !start_states_.empty()))) return ok;
+        if (at_points_) {
+            if (unmoved_.empty()) unmoved_ = numbers_of(simulation_now().get());
+            lm_set_state(simulation_.get(), unmoved_.data());
+        }
+        const double time = time_ == start_ + next_event_ ? next_event_ : time_ - start_;
+        if (lm_place(simulation_.get(), time, states_.data(), inputs_.data()) != LM_OK) return failed();
         moved_ = false;
         return ok;
     }
@@ -387,9 +491,8 @@ class Instance {
     template <class Read>
     Ended uncommitted(Read&& reads) {
         if (const Ended e = place(); e != ok) return e;
-        if (is_exchange() ? running_ : committed_) return reads();
-        std::vector<double> kept(lm_state_size(simulation_.get()));
-        lm_get_state(simulation_.get(), kept.data());
+        if (is_exchange() ? is_running() : committed_) return reads();
+        const std::vector<double> kept = numbers_of(simulation_.get());
         const Ended e = reads();
         lm_set_state(simulation_.get(), kept.data());
         moved_ = true;
@@ -443,8 +546,13 @@ class Instance {
     std::unique_ptr<lm_simulation, Free> simulation_;
     std::vector<double> inputs_, rates_, end_, values_, states_;  // by their numbers in the simulation
     std::vector<double> scratch_;
-    double start_ = 0.0, time_ = 0.0;  // [s]; time_: of the importer's integrator
-    bool running_ = false;
+    std::vector<int> given_;                      // whether the importer has set an input
+    std::map<std::size_t, double> start_states_;  // that the importer has set
+    std::vector<double> unmoved_;                 // the simulation at its start, if it has been asked for
+    double start_ = 0.0, time_ = 0.0;             // [s]; time_: of the importer's integrator
+    double next_event_ = 0.0;                     // [s] since the start
+    Mode mode_ = instantiated;
+    bool at_points_ = false;  // states are set one by one, not by an integrator
     bool changed_ = false;    // parameters, since the simulation was made, or inputs before it runs
     bool moved_ = true;       // the importer's integrator, or an input, since it was placed
     bool read_ = false;       // the variables are those of this instant

@@ -98,6 +98,11 @@ std::string ScenarioDescription::give_references(bool given) {
     return {};
 }
 
+void ScenarioDescription::play(std::vector<bool> played) {
+    played_ = std::move(played);
+    use_given();
+}
+
 std::string ScenarioDescription::read(std::span<const double> numbers) {
     if (numbers.size() < head || numbers[0] != mark) return "these numbers are no description of a scenario";
     if (numbers[1] != version) return "the description is of another version; write it anew";
@@ -137,6 +142,7 @@ void ScenarioDescription::use_given() {
     for (const auto& [k, signal] : inputs_) scenario_.inputs[k] = signal;
     for (const auto& [k, reference] : references_) scenario_.control.axes[k].law.reference = reference;
     scenario_.references_given = references_given_;
+    scenario_.played = played_;
 }
 
 std::string ScenarioDescription::apply() {

@@ -77,6 +77,8 @@ class ScenarioDescription {
     // Of a sampled controller, counted as the axes of the scenario.
     std::string set_reference(std::size_t axis, control::Reference reference);
     std::string give_references(bool given);
+    // Of the inputs of a simulation.
+    void play(std::vector<bool> played);
 
  private:
     template <class F>
@@ -111,6 +113,7 @@ class ScenarioDescription {
     std::string error_;
     Scenario scenario_;
     bool references_given_ = false;
+    std::vector<bool> played_;
     std::vector<double> body_;  // as it was given
     std::vector<ScenarioParameter> parameters_;
     std::vector<double> initial_;  // values of the parameters that belong to it

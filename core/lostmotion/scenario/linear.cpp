@@ -27,7 +27,7 @@ void of_drive(Simulation& s, const double* states, const double* inputs, double*
     if (gearbox.losses == Gearbox::loss_map && r.key.modes[input_contact] == 0) {
         // At rest the contact holds F, of which the gear takes F l/C (Reader).
         const auto value = [&](const LinearForm& f) {
-            return evaluate(f, s.snapshot().x, s.snapshot().memory, s.snapshot().input);
+            return evaluate(f, s.snapshot().x, s.snapshot().memory, s.inputs());
         };
         const double F = value(r.input_friction), T_2 = value(r.output_torque), i = gearbox.ratio;
         const int way = F >= 0.0 ? 1 : -1;

@@ -19,7 +19,10 @@ struct Scenario {
     std::vector<double> start;                  // states, in their order
     std::vector<double> hysteresis_capacities;  // of each gear [N m]
     Control control;
-    bool references_given = false;  // step by step, in the place of those of the controllers; not in descriptions
+    // Step by step, and not in descriptions: whether the references of the controllers are inputs, and which inputs,
+    // free ones before references, follow the signals of the scenario in the place of what is given.
+    bool references_given = false;
+    std::vector<bool> played;
     double duration = 1.0, sample_interval = 1e-3;  // [s]
 
     // Known beforehand in a build for one form alone, once it has passed `check_build`.

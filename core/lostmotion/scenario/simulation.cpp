@@ -5,13 +5,27 @@ namespace lostmotion {
 ScenarioSimulation::ScenarioSimulation(const Scenario& scenario, double step)
     : control_(scenario.control), variables_(scenario) {
     if (scenario.is_of_drive()) {
-        if constexpr (holds(Kernel::drive)) drive_ = std::make_unique<Simulation>(scenario.drive, step, control_);
+        if constexpr (holds(Kernel::drive))
+            drive_ = std::make_unique<Simulation>(scenario.drive, step, control_, played_sines(scenario));
     } else if constexpr (holds_trains) {
-        train_ = std::make_unique<TrainSimulation>(scenario.train, step, control_);
+        train_ = std::make_unique<TrainSimulation>(scenario.train, step, control_, played_sines(scenario));
     }
     laws_ = control_.laws();
     name_all(scenario);
     reset(scenario.start, scenario.hysteresis_capacities);
+}
+
+double ScenarioSimulation::played_input(std::size_t k) const {
+    for (const Played& p : played_)
+        if (p.input == k) {
+            double value = p.line(time());
+            for (const Sine& sine : p.signal.sines) value += sine.at(time());
+            return value;
+        }
+    const std::size_t a = k - free_.size();
+    return k >= free_.size() && a < own_reference_.size() && own_reference_[a]
+               ? control_.axes[a].law.reference.at(time()).value
+               : std::nan("");
 }
 
 std::string ScenarioSimulation::text(Status status) const {
@@ -39,16 +53,34 @@ std::string ScenarioSimulation::reset(std::span<const double> states, std::span<
 
 auto ScenarioSimulation::advance(double interval, std::span<const double> begin, std::span<const double> end)
     -> Status {
-    for (std::size_t k = 0; k < free_.size(); ++k) {
-        begin_[free_[k]] = begin[k];
-        end_[free_[k]] = end[k];
-    }
     set_references(begin, end, interval);
     return with([&]<class S>(S& s) {
-        InputsOf<typename S::D> first{}, last{};
-        std::copy(begin_.begin(), begin_.end(), first.begin());
-        std::copy(end_.begin(), end_.end(), last.begin());
-        return s.advance(interval, first, last);
+        const auto before = s.snapshot();
+        const double from = before.time, to = from + interval;
+        for (double until = from; until != to;) {
+            const double t = s.time();
+            follow_signals(t, accumulated);
+            const double next = next_breakpoint(t);
+            until = next < to - accumulated * to ? next : to;
+            for (std::size_t k = 0; k < free_.size(); ++k) {
+                const double slope = (end[k] - begin[k]) / interval;
+                begin_[free_[k]] = t == from ? begin[k] : begin[k] + slope * (t - from);
+                end_[free_[k]] = until == to ? end[k] : begin[k] + slope * (until - from);
+            }
+            for (const Played& p : played_) {
+                begin_[free_[p.input]] = p.line(t);
+                end_[free_[p.input]] = p.line(until);
+            }
+            InputsOf<typename S::D> first{}, last{};
+            std::copy(begin_.begin(), begin_.end(), first.begin());
+            std::copy(end_.begin(), end_.end(), last.begin());
+            const Status status = s.advance(t == from && until == to ? interval : until - t, first, last);
+            if (status != Status::done) {
+                s.restore(before);
+                return status;
+            }
+        }
+        return Status::done;
     });
 }
 
@@ -57,17 +89,21 @@ void ScenarioSimulation::hold(std::span<const double> inputs) {
         if (s.snapshot().started) return;
         auto snapshot = s.snapshot();
         for (std::size_t k = 0; k < free_.size(); ++k) snapshot.input[free_[k]] = inputs[k];
+        for (const Played& p : played_) snapshot.input[free_[p.input]] = p.line(snapshot.time);
         s.restore(snapshot);
     });
     set_references(inputs, inputs, 1.0);
 }
 
 void ScenarioSimulation::place(double time, std::span<const double> states, std::span<const double> inputs) {
+    for (Played& p : played_)
+        if (time < p.signal.breakpoints[p.segment].time) p.segment = p.signal.segment(time);
     with([&]<class S>(S& s) {
         auto x = s.snapshot().x;
         auto u = s.snapshot().input;
         for (std::size_t k = 0; k < states.size(); ++k) x[place_of<typename S::D>(k)] = states[first_[k]];
         for (std::size_t k = 0; k < free_.size(); ++k) u[free_[k]] = inputs[k];
+        for (const Played& p : played_) u[free_[p.input]] = p.line(time);
         s.place(time, x, u);
     });
     set_references(inputs, inputs, 1.0);
@@ -97,6 +133,16 @@ auto ScenarioSimulation::guards(double* out) -> Status {
     });
 }
 
+auto ScenarioSimulation::settle() -> Status {
+    follow_signals(time(), stopped);
+    return with([&](auto& s) {
+        auto snapshot = s.snapshot();
+        for (const Played& p : played_) snapshot.input[free_[p.input]] = p.line(snapshot.time);
+        s.restore(snapshot);
+        return s.settle();
+    });
+}
+
 auto ScenarioSimulation::read(double* out) -> Status {
     const Status status = with([](auto& s) { return s.find_regime(); });
     if (status != Status::done) return status;
@@ -121,6 +167,7 @@ void ScenarioSimulation::go_on_from(const ScenarioSimulation& before) {
             }
         });
     });
+    follow_signals(time(), accumulated);
 }
 
 std::size_t ScenarioSimulation::state_size() const {
@@ -149,7 +196,31 @@ bool ScenarioSimulation::set_state(const double* from) {
         if (!snapshot.started && snapshot.control.next == 0) snapshot.control.slots.clear();
         s.restore(snapshot);
     });
+    follow_signals(time(), accumulated);
     return true;
+}
+
+double ScenarioSimulation::Played::line(double time) const {
+    const Breakpoint& b = signal.breakpoints[segment];
+    return b.value + b.slope * (time - b.time);
+}
+
+auto ScenarioSimulation::played_sines(const Scenario& scenario) -> InputSines {
+    InputSines sines;
+    if (scenario.played.empty()) return sines;
+    const std::vector<FreeInput> free = lostmotion::free_inputs(scenario);
+    for (std::size_t k = 0; k < free.size() && k < scenario.played.size(); ++k)
+        if (scenario.played[k])
+            for (const Sine& sine : scenario.inputs[free[k].number].sines)
+                if (sine.amplitude != 0.0) sines.emplace_back(static_cast<int>(free[k].number), sine);
+    return sines;
+}
+
+double ScenarioSimulation::next_breakpoint(double time) const {
+    double next = std::numeric_limits<double>::infinity();
+    for (const Played& p : played_)
+        next = std::fmin(next, p.signal.next_breakpoint(std::fmax(time, p.signal.breakpoints[p.segment].time)));
+    return next;
 }
 
 auto ScenarioSimulation::of_train(const model::Train& train) -> Scenario {
@@ -174,12 +245,16 @@ void ScenarioSimulation::name_all(const Scenario& scenario) {
         first_.push_back(static_cast<std::size_t>(std::find(names_.states.begin(), names_.states.end(), name) -
                                                   names_.states.begin()));
     for (const FreeInput& i : lostmotion::free_inputs(scenario)) {
+        if (const std::size_t k = free_.size(); k < scenario.played.size() && scenario.played[k])
+            played_.push_back({k, scenario.inputs[i.number]});
         free_.push_back(i.number);
         names_.inputs.push_back(i.name);
-        at_start_.push_back(i.number < scenario.inputs.size() ? value_at_start(scenario.inputs[i.number]) : 0.0);
     }
-    for (std::size_t a = 0; a < control_.axes.size() && scenario.references_given; ++a)
+    for (std::size_t a = 0; a < control_.axes.size() && scenario.references_given; ++a) {
+        const std::size_t k = free_.size() + a;
         name_reference(scenario, control_.axes[a]);
+        own_reference_.push_back(k < scenario.played.size() && scenario.played[k]);
+    }
     begin_.resize(scenario.is_of_drive() ? std::size_t{n_inputs}
                                          : static_cast<std::size_t>(train_->assembly().layout().inputs));
     end_ = begin_;
@@ -205,11 +280,11 @@ void ScenarioSimulation::name_reference(const Scenario& scenario, const Controll
                                  : mode == control::Axis::speed_mode  ? "speed that the controller is to follow"
                                                                       : "torque of the motor that is to act"});
     names_.inputs.push_back(names_.references.back().name);
-    at_start_.push_back(axis.law.reference.at(0.0).value);
 }
 
 void ScenarioSimulation::set_references(std::span<const double> begin, std::span<const double> end, double interval) {
     for (std::size_t a = 0; a < names_.references.size(); ++a) {
+        if (own_reference_[a]) continue;
         const std::size_t k = free_.size() + a;
         with([&](auto& s) { s.set_reference(a, begin[k], (end[k] - begin[k]) / interval); });
     }

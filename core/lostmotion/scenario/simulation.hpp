@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -69,8 +71,8 @@ class ScenarioSimulation {
     std::size_t solver_inputs() const { return begin_.size(); }
     std::size_t solver_input(std::size_t k) const { return free_[k]; }
     std::size_t free_inputs() const { return free_.size(); }
-    // Of an input in the scenario, at t = 0.
-    double input_at_start(std::size_t k) const { return at_start_[k]; }
+    // The present value of an input that follows its signal in the scenario; NaN of one that is given.
+    double played_input(std::size_t k) const;
 
     // use(simulation) with that of its kernel.
     template <class Use>
@@ -99,7 +101,8 @@ class ScenarioSimulation {
         return lostmotion::train_start(train_->assembly(), states, capacities);
     }
 
-    // Each input of names().inputs runs in a straight line from its first to its second value.
+    // Each input of names().inputs runs in a straight line from its first to its second value, or follows its signal,
+    // at the breakpoints of which the interval is divided.
     Status advance(double interval, std::span<const double> begin, std::span<const double> end);
     // What acts at t = 0, for what is read before the first step.
     void hold(std::span<const double> inputs);
@@ -110,7 +113,9 @@ class ScenarioSimulation {
     bool has_windings() const {
         return std::any_of(laws_.begin(), laws_.end(), [](const control::Axis& a) { return !!a.field_orientation; });
     }
-    // At a time, with states by names().states and inputs by names().inputs, in the regime that it is in.
+    // At a time, with states by names().states and inputs by names().inputs, in the regime that it is in. Signals stay
+    // on the line that they had when it was last settled, so that an integrator does not see the next one before the
+    // event.
     void place(double time, std::span<const double> states, std::span<const double> inputs);
     void states(double* out) const;
     // Of the states.
@@ -119,11 +124,10 @@ class ScenarioSimulation {
         return with([]<class S>(const S&) { return static_cast<std::size_t>(S::n_guards); });
     }
     Status guards(double* out);
-    Status settle() {
-        return with([](auto& s) { return s.settle(); });
-    }
-    double next_tick() const {
-        return with([](const auto& s) { return s.next_tick(); });
+    Status settle();
+    // The next tick of sampled controllers, or breakpoint of a signal that is followed [s].
+    double next_event() const {
+        return std::fmin(next_breakpoint(time()), with([](const auto& s) { return s.next_tick(); }));
     }
     bool accept() {
         return with([](auto& s) { return s.find_regime() == Status::done && s.accept(); });
@@ -142,6 +146,26 @@ class ScenarioSimulation {
     bool set_state(const double* from);
 
  private:
+    // An input that follows its signal: of the segments between breakpoints, the one that holds.
+    struct Played {
+        std::size_t input;  // by its number among the names
+        Signal signal;
+        std::size_t segment = 0;
+
+        double line(double time) const;
+    };
+
+    // The sines of these inputs, which the solver adds.
+    static InputSines played_sines(const Scenario& scenario);
+    // By how much a time may miss a breakpoint, relative: one that accumulates from steps, one where an importer's
+    // integrator has stopped.
+    static constexpr double accumulated = 1e-12, stopped = 1e-9;
+    // Signals on the lines that hold from here on.
+    void follow_signals(double time, double missed) {
+        for (Played& p : played_) p.segment = p.signal.segment(time + missed * time);
+    }
+    double next_breakpoint(double time) const;
+
     static Scenario of_train(const model::Train& train);
     void name_all(const Scenario& scenario);
 
@@ -190,7 +214,8 @@ class ScenarioSimulation {
     Names names_;
     std::vector<std::size_t> free_;   // inputs that no controller gives
     std::vector<std::size_t> first_;  // of each state the first of its name
-    std::vector<double> at_start_;    // of each input
+    std::vector<Played> played_;
+    std::vector<bool> own_reference_;  // of each reference, whether it is that of the scenario
     std::vector<double> begin_, end_;
     std::uint64_t identity_ = 0;
 };

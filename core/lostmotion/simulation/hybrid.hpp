@@ -27,8 +27,9 @@ void SimulationOf<System>::place(double time, const StateOf<D>& x, const Inputs&
 template <class System>
 StateOf<typename System::Dims> SimulationOf<System>::rates() {
     const Regime& r = regime();
+    const Inputs input = inputs();
     StateOf<D> out{};
-    for (int k = 0; k < D::states; ++k) out[k] = evaluate<D>(r.rate[k], now_.x, now_.memory, now_.input);
+    for (int k = 0; k < D::states; ++k) out[k] = evaluate<D>(r.rate[k], now_.x, now_.memory, input);
     return out;
 }
 
@@ -36,13 +37,14 @@ template <class System>
 auto SimulationOf<System>::guards() -> std::array<double, n_guards> {
     const Regime& r = regime();
     const auto& entry = solver_.cache().entry(now_.key);
+    const Inputs input = inputs();
     std::array<double, n_guards> out;
     out.fill(1.0);
     for (int g = 0; g < r.n_guards; ++g) {
         if (r.guards[g].behind) continue;
         const double natural = entry.near_event[g] / far_from_event;
         out[static_cast<std::size_t>(g)] =
-            evaluate<D>(r.guards[g].form, now_.x, now_.memory, now_.input) / (natural > 0.0 ? natural : 1.0) + fallen;
+            evaluate<D>(r.guards[g].form, now_.x, now_.memory, input) / (natural > 0.0 ? natural : 1.0) + fallen;
     }
     return out;
 }
@@ -63,15 +65,15 @@ Status SimulationOf<System>::follow(const typename System::Guard* fired) {
     now.time = now_.time;
     now.x = now_.x;
     now.memory = now_.memory;
-    now.input[0] = now_.input;
-    for (std::size_t k = 0; k < now_.input.size(); ++k) now.input_magnitudes[k] = std::fabs(now_.input[k]);
-    const Inputs before = fired != nullptr ? now_.input : now_.course.input;
+    now.input[0] = inputs();
+    for (std::size_t k = 0; k < now.input[0].size(); ++k) now.input_magnitudes[k] = std::fabs(now.input[0][k]);
+    const Inputs before = fired != nullptr ? now.input[0] : now_.course.input;
     const Found found = system_.next(solver_.cache(), now, fired, now_.key, before);
     if (found != Found::yes) return status_of(found);
     now_.x = now.x;
     now_.memory = now.memory;
     now_.course = {};
-    now_.course.input = now_.input;
+    now_.course.input = now.input[0];
     return Status::done;
 }
 
@@ -102,8 +104,9 @@ double SimulationOf<System>::next_tick() const {
 
 template <class System>
 bool SimulationOf<System>::accept() {
-    if (follows_inputs(regime()) && !(now_.input == now_.course.input)) return true;
-    now_.course.input = now_.input;
+    const Inputs input = inputs();
+    if (follows_inputs(regime()) && !(input == now_.course.input)) return true;
+    now_.course.input = input;
     return false;
 }
 

@@ -28,7 +28,7 @@ def fmu(
         bool,
         typer.Option(
             "--reference-inputs",
-            help="The references of sampled controllers are inputs, in the place of those of the scenario.",
+            help="The references of sampled controllers are inputs, which replace those of the scenario.",
         ),
     ] = False,
     libraries: Annotated[
@@ -40,7 +40,7 @@ def fmu(
 ) -> None:
     """Write a scenario as an FMU (Co-Simulation and Model Exchange) for Simulink, Modelica tools and others.
 
-    Inputs are commands, load torques and references of continuous controllers; outputs are the result variables; parameters have the keys of the scenario file.
+    Inputs are commands, load torques and references of continuous controllers. Each follows its signal in the scenario until the importer sets it. Outputs are the result variables; parameters have the keys of the scenario file.
 
     \b
     lostmotion fmu drive.toml -o drive.fmu
@@ -55,7 +55,7 @@ def fmu(
     try_file(output)
     loaded = load(scenario, overrides or ())
     with busy("Finding out what its parameters change"):
-        export_fmu(
+        replaced = export_fmu(
             loaded,
             output,
             fmi=fmi,
@@ -64,3 +64,5 @@ def fmu(
             libraries=libraries,
         )
     print(f"{output}")
+    for name, key in replaced.items():
+        print(f"Input {name} replaces {key} of the scenario as soon as the importer sets it.")

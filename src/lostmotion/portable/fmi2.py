@@ -83,9 +83,10 @@ def _add_variables(variables: ET.Element, model: Model) -> None:
         add(v.name, FIRST_OUTPUT + k, v.meaning, real, causality="output", variability=kind, initial="calculated")
     local = {"causality": "local", "variability": "continuous", "initial": "calculated"}
     first = 2 + len(model.inputs) + len(model.outputs)
-    for k, v in enumerate(model.states):
+    for k, (v, start) in enumerate(zip(model.states, model.state_starts, strict=True)):
         meaning = f"continuous state: {v.meaning}"
-        add(f"state.{v.name}", FIRST_STATE + k, meaning, {"unit": v.unit} | v.nominal, **local)
+        real = {"unit": v.unit} | v.nominal | {"start": repr(start)}
+        add(f"state.{v.name}", FIRST_STATE + k, meaning, real, **local | {"initial": "approx"})
     for k, v in enumerate(model.states):
         real = {"unit": rate_unit(v.unit), "derivative": str(first + k)}
         add(f"der(state.{v.name})", FIRST_DERIVATIVE + k, f"time derivative of state.{v.name}", real, **local)

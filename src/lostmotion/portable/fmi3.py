@@ -53,14 +53,18 @@ def model_description(model: Model) -> bytes:
     states = [FIRST_STATE + k for k in range(len(model.states))]
     derivatives = [FIRST_DERIVATIVE + k for k in range(len(model.states))]
     indicators = [FIRST_INDICATOR + k for k in range(model.indicators if model.states else 0)]
-    for name, listed in (
-        ("Output", outputs),
-        ("ContinuousStateDerivative", derivatives),
-        ("InitialUnknown", [*outputs, *states, *derivatives]),
-        ("EventIndicator", indicators),
+    # Which regime holds decides what depends on what: on all of them, over a whole motion. Signals of the scenario depend on time.
+    known = [0, *(FIRST_INPUT + k for k in range(len(model.inputs))), *states]
+    start = [*known[: 1 + len(model.inputs)], *(FIRST_PARAMETER + k for k in range(len(model.parameters)))]
+    for name, listed, dependencies in (
+        ("Output", outputs, known),
+        ("ContinuousStateDerivative", derivatives, known),
+        ("InitialUnknown", [*outputs, *states, *derivatives], start),
+        ("EventIndicator", indicators, known),
     ):
+        text = " ".join(map(str, dependencies))
         for reference in listed:
-            ET.SubElement(structure, name, valueReference=str(reference))
+            ET.SubElement(structure, name, valueReference=str(reference), dependencies=text)
     return document(root)
 
 
@@ -79,8 +83,9 @@ def _add_variables(variables: ET.Element, model: Model) -> None:
         kind = {"variability": "discrete"} if v.discrete else {}
         add(v.name, FIRST_OUTPUT + k, v.meaning, v.unit, causality="output", initial="calculated", **kind, **v.nominal)
     local = {"causality": "local", "initial": "calculated"}
-    for k, v in enumerate(model.states):
-        add(f"state.{v.name}", FIRST_STATE + k, f"continuous state: {v.meaning}", v.unit, **local, **v.nominal)
+    for k, (v, start) in enumerate(zip(model.states, model.state_starts, strict=True)):
+        kind = {"causality": "local", "initial": "approx", "start": repr(start)}
+        add(f"state.{v.name}", FIRST_STATE + k, f"continuous state: {v.meaning}", v.unit, **kind, **v.nominal)
     for k, v in enumerate(model.states):
         meaning, of = f"time derivative of state.{v.name}", {"derivative": str(FIRST_STATE + k)}
         add(f"der(state.{v.name})", FIRST_DERIVATIVE + k, meaning, rate_unit(v.unit), **local, **of)

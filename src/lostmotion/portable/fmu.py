@@ -6,6 +6,7 @@ import hashlib
 import json
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -66,7 +67,7 @@ def export_fmu(
     controllers: bool = True,
     references: bool = False,
     libraries: str | Path | None = None,
-) -> None:
+) -> dict[str, str]:
     """Write a scenario as an FMU for Co-Simulation and Model Exchange, which no compiler is needed for.
 
     Its inputs are the commands, load torques and references of continuous controllers; sampled controllers are inside. Its
@@ -76,7 +77,7 @@ def export_fmu(
     Parameters
     ----------
     scenario
-        Its signals give the inputs their values at t = 0 only; from then on the importer gives them.
+        Each input follows its signal in the scenario until the importer sets that input.
     path
         Of the file, with the extension ``.fmu``.
     fmi
@@ -84,10 +85,15 @@ def export_fmu(
     controllers
         False: without them, so that the commands of their motors are inputs.
     references
-        True: the references of sampled controllers are inputs, too, named ``reference`` or ``<motor>_reference``; False: those of
-        the scenario are inside.
+        True: the references of sampled controllers are inputs, too, named ``reference`` or ``<motor>_reference``; False: the
+        importer cannot replace them.
     libraries
         Directory with the libraries of the platforms, as ``make fmu`` builds them; default those of this installation.
+
+    Returns
+    -------
+    dict
+        For each input of the FMU, the key of the scenario whose signal it replaces once it is set.
 
     Raises
     ------
@@ -134,6 +140,7 @@ def export_fmu(
                 archive.writestr(f"binaries/{name}", content)
 
     write_whole(path, write)
+    return {v.name: _key_of(scenario, v.name) for v in model.inputs}
 
 
 def without_controllers(scenario: Scenario | TrainScenario) -> Scenario | TrainScenario:
@@ -142,6 +149,16 @@ def without_controllers(scenario: Scenario | TrainScenario) -> Scenario | TrainS
         return scenario.replace(controller=None)
     commands = {name: CommandSignal() for name in scenario.controllers}
     return scenario.replace(controllers={}, command={**scenario.command, **commands})
+
+
+def _key_of(scenario: Scenario | TrainScenario, name: str) -> str:
+    """The key of the scenario whose signal an input replaces."""
+    if isinstance(scenario, Scenario):
+        return {"load_torque": "load.torque", "reference": "controller.reference"}.get(name, name)
+    for suffix, key in (("_load_torque", "shafts.{}.torque"), ("_reference", "controllers.{}.reference")):
+        if name.endswith(suffix):
+            return key.format(name.removesuffix(suffix))
+    return f"command.{name.removesuffix('_command')}"
 
 
 def _libraries(directory: Any, places: Mapping[str, str], kernel: str) -> dict[str, bytes]:
@@ -224,14 +241,20 @@ def _model(
         guid=guid,
         duration=scenario.simulation.duration,
         step=scenario.simulation.sample_interval,
-        inputs=[*(by_name[name] for name in inputs), *references],
+        inputs=[
+            replace(v, meaning=f"{v.meaning}; until it is set: {_key_of(scenario, v.name)} of the scenario")
+            for v in (*(by_name[name] for name in inputs), *references)
+        ],
         starts=[
             *(_at_start(signals[name]) for name in inputs),
             *(float(c.reference.at(0.0)[0]) for c in given.values()),
         ],
         # The quotient of two outputs is undefined while the drive stands, which no tool expects.
         outputs=[v for name, v in by_name.items() if name not in inputs and name != "efficiency"],
-        states=[] if windings else [by_name.get(s) or Declared(s, "1", "state of a controller", 0.0) for s in states],
+        states=[]
+        if windings
+        else [_fine(by_name.get(s) or Declared(s, "1", "state of a controller", 0.0)) for s in states],
+        state_starts=[] if windings else [_start_of(scenario, s) for s in states],
         indicators=GUARDS[type(scenario)],
         parameters=list(parameters),
         references_given=references_given,
@@ -248,6 +271,19 @@ def _at_start(signal: Signal[Any]) -> float:
     """Its value at t = 0."""
     sines = total(amplitude * sin(phase) for amplitude, _, phase in signal.sine_list())
     return float(signal.breakpoint_list()[0][1]) + sines
+
+
+def _fine(state: Declared) -> Declared:
+    """A state with a hundredth of its size: integrators take their absolute tolerance from there, and what follows a standstill is
+    decided by speeds that fade below that of the largest."""
+    return replace(state, size=state.size / 100.0)
+
+
+def _start_of(scenario: Scenario | TrainScenario, state: str) -> float:
+    """A state at t = 0; those of controllers begin at 0."""
+    if isinstance(scenario, Scenario):
+        return float(getattr(scenario.start(), state, 0.0))
+    return float(scenario.start().get(state, 0.0))
 
 
 def _sizes(scenario: Scenario | TrainScenario) -> tuple[dict[str, float], list[str]]:

@@ -24,6 +24,9 @@ FIRST_INPUT, FIRST_INPUT_RATE, FIRST_OUTPUT, FIRST_STATE, FIRST_DERIVATIVE, FIRS
     10000,
 )
 
+TOLERANCE = "1e-8"
+"""relative, of integrators in Model Exchange"""
+
 # Powers of kg, m, s, A, K, rad.
 _BASE = {
     "kilogram": (1, 0, 0, 0, 0, 0),
@@ -89,6 +92,8 @@ class Model:
     outputs: list[Declared]
     states: list[Declared]
     """of Model Exchange; empty: the FMU is for Co-Simulation alone"""
+    state_starts: list[float]
+    """values of the states at t = 0"""
     indicators: int
     """how many event indicators there are"""
     parameters: list[Parameter]
@@ -159,8 +164,9 @@ def add_log_categories(root: ET.Element) -> None:
 
 
 def add_default_experiment(root: ET.Element, model: Model) -> None:
-    """Duration and sample interval of the scenario."""
-    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime=repr(model.duration), stepSize=repr(model.step))
+    """Duration and sample interval of the scenario, and the tolerance at which an integrator gives its run."""
+    times = {"startTime": "0", "stopTime": repr(model.duration), "stepSize": repr(model.step)}
+    ET.SubElement(root, "DefaultExperiment", times | {"tolerance": TOLERANCE})
 
 
 def parameter_meaning(p: Parameter) -> str:
@@ -210,7 +216,8 @@ def page(model: Model) -> str:
         "<p>A geared servo drive, in Co-Simulation solved exactly between communication points: its result does not depend on their "
         "distance where the inputs run in straight lines between them. Give the inputs their time derivatives (FMI 2.0: "
         "fmi2SetRealInputDerivatives; FMI 3.0: the inputs der(...)); without these they are held over a step. Values are in SI units.</p>"
-        f"{exchange}<h2>Inputs</h2>{table(inputs, ('name', 'unit', 'meaning'))}"
+        f"{exchange}<h2>Inputs</h2><p>Each follows its signal in the scenario until the importer sets it.</p>"
+        f"{table(inputs, ('name', 'unit', 'meaning'))}"
         f"<h2>Outputs</h2>{table(outputs, ('name', 'unit', 'meaning'))}"
         "<h2>Parameters</h2><p>By their keys in the scenario file. They can be changed between communication points, those of the "
         f"start before the first.</p>{table(parameters, ('key', 'unit', 'value'))}</html>\n"
