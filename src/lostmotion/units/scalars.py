@@ -16,7 +16,7 @@ SI = {"", "rad", "s", "N", "m", "Nm", "kg", "A", "V", "W", "J", "H", "K", "Hz", 
 
 
 def scalar(value: Any) -> Any:
-    """The number, truth value or text that an array or DataArray without dimensions holds; anything else as it is."""
+    """The number, Boolean or text that an array or DataArray without dimensions holds; anything else as it is."""
     if type(value) in OWN or getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
         return value
     if _kind(value) not in PLAIN or not _is_in_si(value):
@@ -45,7 +45,7 @@ def is_several(value: Any) -> bool:
 
 
 def is_number(value: Any) -> bool:
-    """Whether it is a real number of any library, and no truth value."""
+    """Whether it is a real number of any library, and no Boolean."""
     return isinstance(value, Real | Decimal) and not isinstance(value, bool) and _kind(value) in NUMBERS
 
 
