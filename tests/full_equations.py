@@ -108,6 +108,7 @@ class Controller:
         self.integral = [0.0, 0.0]
         self.speed_integral = 0.0
         self.f = 0.0
+        self.beyond = 0.0
         self.wanted = 0j
         self.available = self.most_torque(0.0, a.p * a.x[1])
         self.angle = a.x[0] - a.x[1] * a.tick
@@ -168,7 +169,8 @@ class Controller:
         most = min(a.torque_limit, self.available)
         v = self.speed_integral
         M = min(max(a.speed_gain * (a.reference - w) + v, -most), most)
-        self.speed_integral += a.tick * a.integral_gain / a.speed_gain * (M - v)
+        if (M - v) * self.beyond <= 0.0:
+            self.speed_integral += a.tick * a.integral_gain / a.speed_gain * (M - v)
         return M
 
     def speed(self, x: np.ndarray) -> float:
@@ -197,6 +199,7 @@ class Controller:
         )
         self.wanted = u
         limited = u if abs(u) <= a.u_max else a.u_max * u / abs(u)
+        self.beyond = math.copysign(1.0, e[1]) if abs(u) > a.u_max else 0.0
         for k, (had, has) in enumerate(((u.real, limited.real), (u.imag, limited.imag))):
             self.integral[k] += a.gain * a.R * (e[k] + (has - had) / self.K[k])
         return limited, a.p * x[0] + 1.5 * w_e * a.tick

@@ -189,7 +189,7 @@ def test_linear_loop_of_two_masses_is_the_matrix_exponential() -> None:
 @pytest.mark.parametrize("anti_windup", [None, 0.1])
 def test_limit_and_anti_windup_are_those_of_an_independent_integration(anti_windup: float | None) -> None:
     limit, k_p, k_i, k_d, r = 1.2, 1.5, 8.0, 0.1, 3.2
-    k_t = 0.0 if anti_windup is None else 1.0 / anti_windup
+    k_t = k_i / k_p if anti_windup is None else 1.0 / anti_windup
 
     def output(x: np.ndarray) -> float:
         return float(k_p * (r - x[3]) + x[4] - k_d * x[0])

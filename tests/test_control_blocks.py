@@ -81,15 +81,15 @@ class Observer:
 
 
 class SpeedLoop:
-    """v = I - (k_p - k_t) w + M_ff, M = sat(k_t (w* - w) + v), I += T (k_i/k_t) (M - v)"""
+    """v = I - (k_p - k_t) w + M_ff, M = sat(k_t (w* - w) + v), I += T (k_i/k_t) (M - v), not further into a limit of the voltage"""
 
     def __init__(self, k_p: float, k_i: float, weight: float = 1.0, limit: float = math.inf) -> None:
         self.k_p, self.k_i, self.k_t, self.limit, self.I = k_p, k_i, weight * k_p, limit, 0.0
 
-    def __call__(self, wanted: float, speed: float, ahead: float = 0.0) -> float:
+    def __call__(self, wanted: float, speed: float, ahead: float = 0.0, beyond: float = 0.0) -> float:
         v = self.I - (self.k_p - self.k_t) * speed + ahead
         M = min(max(self.k_t * (wanted - speed) + v, -self.limit), self.limit)
-        self.I += T * self.k_i / self.k_t * (M - v)
+        self.I += 0.0 if (M - v) * beyond > 0.0 else T * self.k_i / self.k_t * (M - v)
         return M
 
 
@@ -334,7 +334,7 @@ def test_a_limit_of_the_torque_does_not_wind_up_the_speed_loop() -> None:
 
 
 def test_a_limit_of_the_voltage_does_not_wind_up_the_current_loop() -> None:
-    """u = sat(K e + I + K_e w), I += K (1 - a) e while u is not limited; the motor of (2) on an inertia."""
+    """v = K e + I + K_e w, u = sat(v), I += K (1 - a) (e + (u - v)/K); the motor of (2) on an inertia."""
     J, b, M_R, w_R, k_N, tau, g, limit = 8e-4, 3e-3, 0.5, 300.0, 4.0, 1.3e-3, 1.0 / 3.0, 1.2
     a = math.exp(-T / tau)
     K, K_e = g / (k_N * (1.0 - a)), (k_N - 1.0) / (k_N * w_R)
@@ -344,14 +344,15 @@ def test_a_limit_of_the_voltage_does_not_wind_up_the_current_loop() -> None:
     phi = expm(plant * T)[:2]
     loop, estimate = SpeedLoop(0.02, 0.4, limit=1.5), Difference(1, 0.0)
     angular = expm(np.block([[plant, np.zeros((3, 1))], [1.0, 0.0, 0.0, 0.0]]) * T)[3]
-    x, angle, integral, acting, speeds, voltages = np.zeros(2), 0.0, 0.0, 0.0, [], []
+    x, angle, integral, acting, beyond, speeds, voltages = np.zeros(2), 0.0, 0.0, 0.0, 0.0, [], []
     for _ in range(STEPS + 1):
         speeds.append(x[0])
         w = estimate(read(angle, 256), 0.0)
-        e = (loop(150.0, w) - x[1]) / M_R
+        e = (loop(150.0, w, beyond=beyond) - x[1]) / M_R
         wanted = K * e + integral + K_e * w
         u = min(max(wanted, -limit), limit)
-        integral += K * (1.0 - a) * e if u == wanted else 0.0
+        integral += K * (1.0 - a) * (e + (u - wanted) / K)
+        beyond = float(np.sign(wanted - u))
         voltages.append(u)
         angle += float(angular[:3] @ [*x, acting])
         x, acting = phi[:, :2] @ x + phi[:, 2] * acting, u

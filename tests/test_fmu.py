@@ -353,7 +353,10 @@ def test_a_path_that_cannot_be_written_is_refused(arguments: Any, said: str, tmp
 
 def test_without_a_library_there_is_no_fmu(tmp_path: Path, monkeypatch: Any) -> None:
     without_parameters(monkeypatch)
-    with pytest.raises(lm.InputError, match="has no library of an FMU; install a wheel, or build it in a checkout by `make fmu-library`"):
+    with pytest.raises(
+        lm.InputError,
+        match="has no library of an FMU; install a wheel, or build it in a checkout by `make fmu-library`",
+    ):
         lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / "drive.fmu", libraries=tmp_path)
 
 

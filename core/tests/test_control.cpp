@@ -85,6 +85,59 @@ TEST_CASE("with the true speed the limit is K T/J = 1, at f_s/6") {
     }
 }
 
+// After samples of a run-up at the limit, whatever their number, the first ones with the other sign lead out of it.
+TEST_CASE("no integrator of a limited loop runs further into its limit") {
+    for (const double way : {1.0, -1.0})
+        for (const double share : {1e-3, 0.1, 0.5, 0.999})  // 1 - exp(-T/tau_a)
+            for (const int samples : {1, 10, 10000}) {
+                CAPTURE(way);
+                CAPTURE(share);
+                CAPTURE(samples);
+                std::array<double, 2> current{}, speed{}, position{};
+                control::Slots slots;
+                control::CurrentLoop loop;
+                loop.gain = 1.0 / (6.0 * share);
+                loop.integral_gain = 1.0 / 6.0;
+                loop.back_emf = 0.5;
+                loop.limit = 1.0;
+                loop.place(slots);
+                // The current of a motor that runs up at the limit; its speed rises by at most 1e-3 in a sample.
+                double i = 0.0, w = 0.0;
+                for (int k = 0; k < samples; ++k) {
+                    CHECK(loop(way * 100.0, i, w, current.data()) == way);
+                    CHECK(loop.at_limit(current.data()) == way);
+                    w += way * std::fmin(1e-3, std::fabs(2.0 * way - w));
+                    i += share * (2.0 * (way - 0.5 * w) - i);
+                }
+                CHECK(way * loop(i - 4e-3 * way, i, w, current.data()) < 1.0);
+                CHECK(loop(i - way * 10.0 * share - way, i, w, current.data()) * way < 0.9);
+
+                slots = {};
+                control::SpeedLoop outer;
+                outer.gain = outer.reference_gain = 2.0;
+                outer.integral_gain = 5.0;
+                outer.place(slots);
+                const control::TorqueRange all{-1e9, 1e9}, some{-3.0, 3.0};
+                for (int k = 0; k < samples; ++k) outer(way * 10.0, 0.0, 0.0, all, way, 0.1 * share, speed.data());
+                CHECK(speed[0] == 0.0);
+                outer(way * -1.0, 0.0, 0.0, all, way, 0.1 * share, speed.data());
+                CHECK(way * speed[0] < 0.0);
+                for (int k = 0; k < samples; ++k) outer(way * 10.0, 0.0, 0.0, some, 0.0, 0.1 * share, speed.data());
+                CHECK(way * speed[0] <= 3.0 * (1.0 + 1e-12));
+                CHECK(way * outer(way * -1e-3, 0.0, 0.0, some, 0.0, 0.1 * share, speed.data()) < 3.0);
+
+                slots = {};
+                control::PositionLoop outermost;
+                outermost.gain = 2.0;
+                outermost.integral_gain = 5.0;
+                outermost.place(slots);
+                for (int k = 0; k < samples; ++k) outermost(way * 10.0, 0.0, way, share, position.data());
+                CHECK(position[0] == 0.0);
+                outermost(way * -1.0, 0.0, way, share, position.data());
+                CHECK(way * position[0] < 0.0);
+            }
+}
+
 TEST_CASE("exact and adaptive solver agree on five hundred random axes") {
     RandomTrains random(61);
     SolverTally tally;

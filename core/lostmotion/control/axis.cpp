@@ -65,22 +65,27 @@ bool Axis::step(std::int64_t tick, double tick_length, const Sampled& y, double*
     if (camera.present) watch(tick, tick_length, y, slot);
     if (speed_schedule.due(tick)) {
         const double T = tick_length * speed_schedule.every;
-        slot[measured_speed] = estimate(slot[speed_angle], speed_sensor.scale * y.speed, slot[torque_reference],
-                                        speed_schedule.sample(tick), T, slot);
+        const double acts = voltage_at_limit(slot) == 0.0 ? slot[torque_reference] : y.motor_torque;
+        slot[measured_speed] =
+            estimate(slot[speed_angle], speed_sensor.scale * y.speed, acts, speed_schedule.sample(tick), T, slot);
         if (load_observer.present) load_observer.observe(y.motor_torque, slot[measured_speed], inverse_model, slot);
     }
     if (own_law.present()) {
         if (!run_own_law(time, y, command, slot)) return false;
+        if (std::isfinite(command)) command = in_range(command, torque_range(y, slot));
     } else {
         if (mode == position_mode && position_schedule.due(tick))
             run_position_loop(time, tick_length * position_schedule.every, slot);
         if (mode != torque_mode && speed_schedule.due(tick))
-            run_speed_loop(time, tick_length * speed_schedule.every, slot);
-        if (mode == torque_mode) slot[torque_reference] = reference.at(time).value;
+            run_speed_loop(time, tick_length * speed_schedule.every, torque_range(y, slot), slot);
+        if (mode == torque_mode) {
+            const double asked = reference.at(time).value;  // field orientation limits it by itself
+            slot[torque_reference] = field_orientation ? asked : torque_range(y, slot)(asked);
+        }
         if (field_orientation) {
             if (current_schedule.due(tick)) field_orientation->control(slot[torque_reference], reading(y, slot), slot);
         } else if (!current_loop) {
-            command = slot[torque_reference] / rated_torque;
+            command = in_range(slot[torque_reference] / rated_torque, torque_range(y, slot));
         } else if (current_schedule.due(tick)) {
             command = (*current_loop)(slot[torque_reference], y.motor_torque, slot[measured_speed], slot);
         }
@@ -127,6 +132,24 @@ std::array<double, n_winding_signals> Axis::winding_signals(double time, const d
     return {i.d, i.q, u.d, u.q, electrical, heat};
 }
 
+auto Axis::torque_range(const Sampled& y, const double* slot) const -> TorqueRange {
+    double most = std::fmin(speed_loop.torque_limit, torque_limit);
+    if (field_orientation) most = std::fmin(most, field_orientation->available_torque(slot));
+    if (stall_torque == std::numeric_limits<double>::infinity()) return {-most, most};
+    const double fallen = torque_droop * y.rotor_speed;
+    const TorqueRange by_voltage{-stall_torque - fallen, stall_torque - fallen};
+    return {by_voltage(-most), by_voltage(most)};
+}
+
+double Axis::voltage_at_limit(const double* slot) const {
+    return field_orientation ? field_orientation->at_limit(slot) : current_loop ? current_loop->at_limit(slot) : 0.0;
+}
+
+double Axis::at_limit(const double* slot) const {
+    const double by_voltage = voltage_at_limit(slot);
+    return by_voltage != 0.0 ? by_voltage : slot[torque_at_limit];
+}
+
 void Axis::watch(std::int64_t tick, double tick_length, const Sampled& y, double* slot) const {
     const double time = static_cast<double>(tick) * tick_length;
     camera.expose(tick, reference.at(time).value - y.shaft_angle, line_of_sight(slot[speed_angle], slot), slot);
@@ -144,27 +167,27 @@ void Axis::run_position_loop(double time, double T, double* slot) const {
     slot[measured_position] = position(slot);
     const InverseModel::Ahead twist = inverse_model.twist(ahead.rate, ahead.second, load_observer.load(slot), T, slot);
     const double e = slot[position_reference] + backlash(ahead.rate, T, slot) + twist.angle - slot[measured_position];
-    slot[speed_reference] = ratio * position_loop(e, ahead.rate + twist.rate, T, slot);
+    slot[speed_reference] = ratio * position_loop(e, ahead.rate + twist.rate, sign_of(ratio) * at_limit(slot), T, slot);
 }
 
-void Axis::run_speed_loop(double time, double T, double* slot) const {
+void Axis::run_speed_loop(double time, double T, TorqueRange range, double* slot) const {
     const ReferencePoint r = wanted(time, slot);
     if (mode == speed_mode) slot[speed_reference] = ratio * r.value;
     const double speed_ahead = mode == speed_mode ? r.value : r.rate,
                  gain_ahead = mode == speed_mode ? r.rate : r.second;
     double speed = slot[speed_reference];
     for (const DiscreteSystem& f : speed_filters) speed = f(speed, slot);
-    const double known = inverse_model.present ? inverse_model.torque(speed_ahead, gain_ahead, load_observer.load(slot),
-                                                                      speed - slot[measured_speed], T, slot)
-                                               : feedforward(ratio * speed_ahead, ratio * gain_ahead);
-    const double limit = field_orientation
-                             ? std::fmin(speed_loop.torque_limit, field_orientation->available_torque(slot))
-                             : speed_loop.torque_limit;
-    double M =
-        load_observer.schedule(speed_loop, inverse_model, slot)(speed, slot[measured_speed], known, limit, T, slot);
-    show_model(slot);
+    InverseModel::Known known{feedforward(ratio * speed_ahead, ratio * gain_ahead)};
+    if (inverse_model.present) known = inverse_model.torque(speed_ahead, gain_ahead, load_observer.load(slot), slot);
+    double M = load_observer.schedule(speed_loop, inverse_model, slot)(speed, slot[measured_speed], known.torque, range,
+                                                                       voltage_at_limit(slot), T, slot);
     for (const DiscreteSystem& f : torque_filters) M = f(M, slot);
-    slot[torque_reference] = std::clamp(M, -limit, limit);
+    slot[torque_reference] = range(M);
+    slot[torque_at_limit] = range.at_limit(slot[torque_reference]);
+    // At a limit of the torque the error says nothing of the model.
+    if (const double error = speed - slot[measured_speed]; inverse_model.present && error * at_limit(slot) <= 0.0)
+        inverse_model.adapt(known, error, T, slot);
+    show_model(slot);
 }
 
 auto Axis::reading(const Sampled& y, const double* slot) const -> FieldOrientation::Reading {
@@ -199,7 +222,7 @@ bool Axis::run_own_law(double time, const Sampled& y, double& command, double* s
         measured[3] = i.d;
         measured[4] = i.q;
         if (own_law(time, measured.data(), asked.data(), given.data(), slot) != 0) return false;
-        field_orientation->command({given[0], given[1]}, seen, slot);
+        field_orientation->command(field_orientation->limited({given[0], given[1]}), seen, slot);
         return true;
     }
     if (own_law(time, measured.data(), asked.data(), given.data(), slot) != 0) return false;

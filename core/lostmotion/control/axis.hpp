@@ -117,7 +117,11 @@ class Axis {
     double reference_delay = 0.0;  // [s] by which the reference of the position loop comes later than its feedforward
     double ratio = 1.0;            // turns of the motor for one of the reference's shaft
     double rated_torque = 1.0;     // [N m] of command 1, without a current loop
-    TickDelay delay;               // until the command acts
+    double torque_limit = std::numeric_limits<double>::infinity();  // [N m] at the largest current
+    // Of the torque at the largest voltage, where no current loop keeps to it: at standstill [N m], and by how much it
+    // falls with the speed [N m s/rad].
+    double stall_torque = std::numeric_limits<double>::infinity(), torque_droop = 0.0;
+    TickDelay delay;  // until the command acts
 
     Sensor speed_sensor;          // to the motor
     Sensor position_sensor;       // to the reference's shaft
@@ -164,15 +168,28 @@ class Axis {
     std::array<double, n_winding_signals> winding_signals(double time, const double* slot) const;
 
  private:
-    // Beside the signals: the angles as read, how far the second encoder's is taken over, and the command.
+    // Beside the signals: the angles as read, how far the second encoder's is taken over, the command, and the sign of
+    // the limit that the speed loop's torque is at.
     enum OwnSlot : int {
         speed_angle = n_axis_signals,
         position_angle,
         blended,
         computed_command,
         acting_command,
+        torque_at_limit,
         n_own_slots
     };
+
+    // The torque that is possible at the speed of the rotor. Where the induced voltage alone makes more than the
+    // largest current, that of the voltage is all there is.
+    TorqueRange torque_range(const Sampled& y, const double* slot) const;
+    double in_range(double command, TorqueRange range) const {
+        return std::clamp(command, range.low / rated_torque, range.high / rated_torque);
+    }
+    // Sign of the torque that the voltage allows no more of, or 0.
+    double voltage_at_limit(const double* slot) const;
+    // The same by any limit of the torque.
+    double at_limit(const double* slot) const;
 
     // What the loops follow.
     ReferencePoint wanted(double time, const double* slot) const {
@@ -186,7 +203,7 @@ class Axis {
 
     void run_position_loop(double time, double T, double* slot) const;
 
-    void run_speed_loop(double time, double T, double* slot) const;
+    void run_speed_loop(double time, double T, TorqueRange range, double* slot) const;
 
     FieldOrientation::Reading reading(const Sampled& y, const double* slot) const;
     WindingCourse::Energy energy(double time, const WindingCourse& c, const double* slot) const;

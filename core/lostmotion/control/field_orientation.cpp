@@ -31,10 +31,16 @@ void FieldOrientation::control(double torque, const Reading& y, double* slot) co
     const double v_q = gain_q * e_q + own[integral_q] + decoupling * w_e * winding.inductance_d * i.d +
                        back_emf * w_e * winding.flux_linkage;
     own[wanted_square] = v_d * v_d + v_q * v_q;
-    const double share = std::fmin(1.0, voltage_limit / std::sqrt(own[wanted_square]));
+    const double share = within_circle(own[wanted_square]);
+    own[beyond] = share < 1.0 ? sign_of(e_q) : 0.0;
     own[integral_d] += integral_gain * (e_d + (share - 1.0) * v_d / gain_d);
     own[integral_q] += integral_gain * (e_q + (share - 1.0) * v_q / gain_q);
     command({share * v_d, share * v_q}, y, slot);
+}
+
+auto FieldOrientation::limited(DirectQuadrature voltage) const -> DirectQuadrature {
+    const double share = within_circle(voltage.d * voltage.d + voltage.q * voltage.q);
+    return {share * voltage.d, share * voltage.q};
 }
 
 void FieldOrientation::command(DirectQuadrature voltage, const Reading& y, double* slot) const {

@@ -14,6 +14,7 @@
 #include <cmath>
 
 #include "../kernel/sine.hpp"
+#include "reference.hpp"
 #include "slots.hpp"
 #include "synchronous_winding.hpp"
 
@@ -54,6 +55,10 @@ struct FieldOrientation {
     }
     // The voltage for a torque [N m].
     void control(double torque, const Reading& y, double* slot) const;
+    // Sign of the torque that the voltage circle allowed no more of at the last sample, or 0.
+    double at_limit(const double* slot) const { return slot[first_ + beyond]; }
+    // What the voltage circle leaves of a voltage in coordinates of the rotor.
+    DirectQuadrature limited(DirectQuadrature voltage) const;
     // A voltage in coordinates of the rotor as it is read now, for the time that it will act.
     void command(DirectQuadrature voltage, const Reading& y, double* slot) const;
     bool finite(const double* slot) const;
@@ -72,6 +77,7 @@ struct FieldOrientation {
         integral_q,
         weakening,
         wanted_square,
+        beyond,
         available,
         u_d,
         u_q,
@@ -82,6 +88,8 @@ struct FieldOrientation {
         n_own
     };
 
+    // Share of a voltage with this square of its amplitude.
+    double within_circle(double square) const { return std::fmin(1.0, voltage_limit / std::sqrt(square)); }
     static DirectQuadrature turned(DirectQuadrature v, double angle);
     // Where the circle of the largest current has its largest torque.
     double circle_i_d() const;

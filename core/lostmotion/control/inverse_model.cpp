@@ -19,19 +19,20 @@ auto InverseModel::twist(double speed, double acceleration, double observed_load
     return {angle, rate};
 }
 
-double InverseModel::torque(double speed, double acceleration, double observed_load, double error, double sample_time,
-                            double* slot) const {
+auto InverseModel::torque(double speed, double acceleration, double observed_load, const double* slot) const -> Known {
     const double i = losses.ratio, s = sign_of(speed);
     const double rate = through_gear ? slot[first_ + 3] : 0.0;
     const double w = i * (speed + rate), T_2 = output_torque(speed, acceleration, observed_load);
-    const double Y = s * losses(T_2, s, w);
-    double &kappa = slot[first_], &T_10 = slot[first_ + 1];
-    const double out = motor_inertia * i * acceleration + motor_viscous_friction * w + T_2 / i + s * T_10 + kappa * Y;
-    if (std::fabs(w) > min_speed) {
-        of_losses(kappa, error, Y, sample_time);
-        of_friction(T_10, error, s, sample_time);
-    }
-    return out;
+    const double Y = s * losses(T_2, s, w), kappa = slot[first_], T_10 = slot[first_ + 1];
+    const double torque =
+        motor_inertia * i * acceleration + motor_viscous_friction * w + T_2 / i + s * T_10 + kappa * Y;
+    if (std::fabs(w) > min_speed) return {torque, Y, s};
+    return {torque};
+}
+
+void InverseModel::adapt(const Known& by, double error, double sample_time, double* slot) const {
+    of_losses(slot[first_], error, by.losses, sample_time);
+    of_friction(slot[first_ + 1], error, by.way, sample_time);
 }
 
 double InverseModel::inverse(double torque) const {

@@ -51,9 +51,14 @@ struct InverseModel {
         double angle = 0.0, rate = 0.0;
     };
     Ahead twist(double speed, double acceleration, double observed_load, double sample_time, double* slot) const;
-    // M_ff [N m] for phi*' and phi*'' of the reference's shaft. error: what the speed of the motor lacks [rad/s].
-    double torque(double speed, double acceleration, double observed_load, double error, double sample_time,
-                  double* slot) const;
+    // M_ff [N m] for phi*' and phi*'' of the reference's shaft, and what it adapts by.
+    struct Known {
+        double torque = 0.0;
+        double losses = 0.0, way = 0.0;  // Y [N m] and s; 0 where nothing is adapted
+    };
+    Known torque(double speed, double acceleration, double observed_load, const double* slot) const;
+    // error: what the speed of the motor lacks [rad/s].
+    void adapt(const Known& by, double error, double sample_time, double* slot) const;
 
  private:
     double output_torque(double speed, double acceleration, double observed_load) const {

@@ -209,6 +209,9 @@ void describe(F& f, Axis& a) {
     f.number("reference_delay", a.reference_delay, Range::not_negative);
     f.number("ratio", a.ratio);
     f.number("rated_torque", a.rated_torque, Range::positive);
+    f.number("torque_limit", a.torque_limit, Range::limit);
+    f.number("stall_torque", a.stall_torque, Range::limit);
+    f.number("torque_droop", a.torque_droop, Range::not_negative);
     f.part("delay", [&] { describe(f, a.delay); });
     f.part("speed_sensor", [&] { describe(f, a.speed_sensor); });
     f.part("position_sensor", [&] { describe(f, a.position_sensor); });
@@ -243,6 +246,8 @@ void describe(F& f, Axis& a) {
         if (a.ratio == 0.0) f.wrong("ratio", "must not be 0");
         if (a.speed_loop.integral_gain != 0.0 && a.speed_loop.reference_gain == 0.0)
             f.wrong("speed_loop.reference_gain", "must not be 0 with an integral gain");
+        if (a.current_loop && a.current_loop->integral_gain != 0.0 && a.current_loop->gain == 0.0)
+            f.wrong("current_loop.gain", "must not be 0 with an integral gain");
         if (a.load_observer.present && (!a.inverse_model.present || a.speed_loop.gain == 0.0))
             f.wrong("load_observer", "needs an inverse model and a speed loop with a gain");
     }

@@ -96,6 +96,7 @@ class _Place:
             getattr(out, f"{name}_schedule").every = every * ticks
         self._encoders(out, ticks)
         self._loops(out)
+        self._limits(out)
         if c.camera is not None and c.tracker is not None:
             stream = zlib.crc32(self.name.encode())
             out.camera = core_camera(c.camera, c.sample_time, ticks, stream)
@@ -153,6 +154,16 @@ class _Place:
         if c.feedforward.backlash > 0.0:
             out.backlash.backlash = c.feedforward.backlash
             out.backlash.rate = c.feedforward.backlash_rate or 0.0
+
+    def _limits(self, out: _core.Axis) -> None:
+        """Those of motor and amplifier that no loop of the currents or voltages keeps to."""
+        current = self.controller.current
+        if isinstance(current, FieldOriented | VoltageCommand):
+            return
+        out.torque_limit = self.motor.largest_torque
+        line = self.motor.torque_line()
+        if line is not None and not isinstance(current, CurrentLoop):
+            out.stall_torque, out.torque_droop = line
 
     def _current(self, loop: CurrentLoop) -> _core.CurrentLoop:
         """Of (2): relative torque for current, 1/k_N for the resistance, so that K = g/(k_N (1 - a))."""

@@ -96,7 +96,7 @@ class _PID(Part):
         rows: dict[str, tuple[dict[str, float], float, float]] = {}  # of y, output, back-calculation
         direct = {"reference": b * k_p, "measured": -k_p}
         if k_i > 0.0:
-            back = 0.0 if anti_windup_time is None else 1.0 / anti_windup_time
+            back = k_i / k_p if anti_windup_time is None and k_p > 0.0 else 1.0 / (anti_windup_time or math.inf)
             rows["integral"] = ({"reference": k_i, "measured": -k_i}, 1.0, back)
         if k_d > 0.0 and tau > 0.0:
             rows["filter"] = ({"reference": c / tau, "measured": -1.0 / tau}, -k_d / tau, 0.0)
@@ -169,6 +169,13 @@ class StateSpace(Part):
             )
         return self
 
+    def winds_up(self) -> bool:
+        """Whether a state neither decays by itself nor follows the limited output."""
+        if self.back_calculation is not None or not self.A:
+            return False
+        poles = np.linalg.eigvals(np.array(self.A, float))
+        return bool((poles.real > -1e-9 * abs(poles).max()).any()) if poles.any() else True
+
     def system(self) -> LinearSystem:
         """Of reference and measured value."""
         n = len(self.C)
@@ -196,9 +203,9 @@ class ContinuousController(Part):
     state_space: StateSpace | None = None
     """controller of either, which gives the torque of the motor [N·m], or the relative voltage if current.kind is "voltage\""""
     limit: Annotated[Torque, Positive] | None = None
-    """of the magnitude of the torque; a limit of the motor holds beside it"""
+    """of the magnitude of the torque; torque_limit and the largest current of the motor hold beside it"""
     anti_windup_time: Annotated[Time, Positive] | None = None
-    """with which the integrator follows the limited output (back-calculation); left out, it winds up"""
+    """with which the integrator follows the limited output (back-calculation); left out, gain/integral_gain"""
     current: Annotated[IdealCurrent | FirstOrderCurrent | VoltageCommand, Field(discriminator="kind")] = IdealCurrent()
 
     @model_validator(mode="after")
@@ -259,8 +266,30 @@ class ContinuousController(Part):
         """Of the command, in units of the rated torque or of the rated voltage."""
         if isinstance(self.current, VoltageCommand):
             return math.inf if motor.command_limit is None else motor.command_limit
-        limits = [limit for limit in (self.limit, getattr(motor, "torque_limit", None)) if limit is not None]
-        return min(limits) / motor.rated_torque if limits else math.inf
+        return min(motor.largest_torque, math.inf if self.limit is None else self.limit) / motor.rated_torque
+
+    def _check_limits(self, motor: Motor, limit: float) -> None:
+        """Refuses a voltage limit that would have no effect, and integrators that would wind up at a limit."""
+        current = self.current
+        if motor.torque_line() is not None and not isinstance(current, VoltageCommand):
+            key = "voltage_limit" if motor.kind == "dc" else "dc_voltage"
+            remedy = 'make it a motor of kind "torque_source"' if motor.kind == "synchronous" else f"leave {key} out"
+            raise InputError(
+                f'current.kind: "{current.kind}" does not keep to the {key} of the motor; take "voltage" or a sampled controller, or {remedy}'
+            )
+        if math.isinf(limit):
+            if self.anti_windup_time is not None:
+                raise InputError("anti_windup_time: nothing limits the output; give a limit, or leave it out")
+            return
+        pid = self.position or self.speed
+        if pid is not None and pid.gains[0] == 0.0 < pid.gains[1] and self.anti_windup_time is None:
+            raise InputError(
+                "anti_windup_time: is missing; an integrator behind a limit needs it where there is no gain"
+            )
+        if self.state_space is not None and self.state_space.winds_up():
+            raise InputError(
+                "state_space: has an integrator behind a limit, which would wind up; give back_calculation (zeros let it wind up)"
+            )
 
     def add_to(self, core: _core.Train, train: DriveTrain, name: str) -> None:
         """Adds it to the solver's train, as the controller of a motor.
@@ -268,7 +297,7 @@ class ContinuousController(Part):
         Raises
         ------
         InputError
-            Its shaft is none of the train, or its anti-windup has no limit.
+            Its shaft is none of the train, a limit of the motor would have no effect, or it would wind up at its limit.
         """
         shaft = list(train.shafts)[-1] if self.shaft is None else self.shaft
         if shaft not in train.shafts:
@@ -276,8 +305,7 @@ class ContinuousController(Part):
             raise InputError(f"shaft: {shown(shaft)} is no shaft; {meant}")
         motor = train.motors[name]
         limit = self.output_limit(motor)
-        if self.anti_windup_time is not None and math.isinf(limit):
-            raise InputError("anti_windup_time: nothing limits the output; give a limit, or leave it out")
+        self._check_limits(motor, limit)
         system = self.system()
         per_unit = 1.0 if isinstance(self.current, VoltageCommand) else 1.0 / motor.rated_torque
         measured = "angle" if self.reference.kind == "position" else "speed"

@@ -156,7 +156,7 @@ class SpeedLoop(Part):
 
 
 class IdealCurrent(Part):
-    """The torque follows at once."""
+    """The torque follows at once, within the torque-speed line of the motor at its largest voltage."""
 
     kind: Literal["ideal"] = "ideal"
 
@@ -168,7 +168,7 @@ class VoltageCommand(Part):
 
 
 class FirstOrderCurrent(Part):
-    """The torque follows with a time constant, as a tuned current loop does."""
+    """The torque follows with a time constant, as a tuned current loop does, within the torque-speed line of the motor."""
 
     kind: Literal["first_order"]
     time_constant: Annotated[Time, Positive]

@@ -225,6 +225,29 @@ class Motor(Part):
             return None
         return self.voltage_limit / self.rated_voltage
 
+    def torque_line(self) -> tuple[float, float] | None:
+        """Largest torque [N·m] at standstill and its fall with the speed [N·m·s/rad], at the largest voltage of the amplifier.
+
+        None where no voltage is stated that a run keeps to.
+        """
+        if self.winding is not None and self.dc_voltage is not None:
+            phase = self.winding.phase_values()
+            per_volt = phase.torque_constant / phase.resistance
+            return per_volt * self.phase_voltage, per_volt * phase.voltage_constant
+        if self.kind != "dc" or self.command_limit is None:
+            return None
+        k_N, w_R = self.armature_voltage_constant, self.rated_speed
+        assert k_N is not None and w_R is not None  # noqa: PT018
+        return self.rated_torque * k_N * self.command_limit, self.rated_torque * (k_N - 1.0) / w_R
+
+    @property
+    def largest_torque(self) -> float:
+        """Torque [N·m] that the largest current of the winding makes with i_d = 0; infinite where none is stated."""
+        current = None if self.winding is None else self.winding.max_current
+        if current is None or self.winding is None:
+            return math.inf
+        return self.winding.phase_values().torque_constant * math.sqrt(2.0) * current
+
     @checked
     def at_voltage(self, voltage: Voltage) -> Self:
         """The same DC motor where command 1 is another voltage [V].
@@ -264,6 +287,18 @@ class ShaftMotor(Motor):
     """that it turns"""
     torque_limit: Annotated[Torque, Positive] | None = None
     """largest torque of a torque source"""
+
+    @property
+    def largest_torque(self) -> float:
+        """The smaller of torque_limit and of what the largest current makes [N·m]."""
+        largest = super().largest_torque
+        return largest if self.torque_limit is None else min(largest, self.torque_limit)
+
+    def without_torque_limits(self) -> Self:
+        """The same motor without torque_limit and largest current."""
+        none = {"max_current_rms": None, "max_current_peak": None}
+        winding = None if self.winding is None else self.winding.model_copy(update=none)
+        return self.model_copy(update={"torque_limit": None, "winding": winding})
 
     @model_validator(mode="after")
     def _limit_fits_kind(self) -> Self:

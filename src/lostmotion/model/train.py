@@ -135,14 +135,18 @@ class DriveTrain(TrainElements):
         raise InputError(f"key {table}.{name}: {text}")
 
     def core(self, loaded: Collection[str], driven: Mapping[str, MotorLaw | None] = {}) -> _core.Train:
-        """The solver's train, where a load torque acts on some of the shafts, and current loops change the law of some motors."""
+        """The solver's train, where a load torque acts on some of the shafts, and current loops change the law of some motors.
+
+        Controllers keep to the torque_limit of the motors that such loops drive.
+        """
         train = _core.Train()
         for name, s in self.shafts.items():
             drag = None if s.drag is None else s.drag.core()
             train.add_shaft(name, s.inertia, s.viscous_friction, s.friction(), drag, name in loaded)
         for name, m in self.motors.items():
-            limit = math.inf if m.torque_limit is None else m.torque_limit
-            changes, torque_source = driven.get(name) or ((), m.kind == "torque_source")
+            law = driven.get(name)
+            limit = m.torque_limit if m.torque_limit is not None and law is None else math.inf
+            changes, torque_source = law or ((), m.kind == "torque_source")
             train.add_motor(name, m.shaft, numbers(m.as_dc(), "motor") | dict(changes), torque_source, limit)
         for name, g in self.gears.items():
             add_gear(train, name, g)

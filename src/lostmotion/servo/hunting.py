@@ -157,11 +157,10 @@ def without_static_friction(train: TrainScenario) -> TrainScenario | None:
 def without_saturation(train: TrainScenario) -> TrainScenario | None:
     """Without the limits of continuous controllers and of their motors; None where that changes nothing."""
     controllers = {
-        name: c.model_copy(update={"limit": None, "anti_windup_time": None}) if c.limit is not None else c
-        for name, c in train.continuous().items()
+        name: c.model_copy(update={"limit": None, "anti_windup_time": None}) for name, c in train.continuous().items()
     }
     motors = {
-        name: m.model_copy(update={"torque_limit": None}) if m.torque_limit is not None and name in controllers else m
+        name: m.without_torque_limits() if math.isfinite(m.largest_torque) and name in controllers else m
         for name, m in train.motors.items()
     }
     if controllers == train.continuous() and motors == dict(train.motors):
