@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
+from lostmotion.pointing.budget import first_gap
 
 ROOT = Path(__file__).parent.parent
 IDEAL = {"ideal": True}
@@ -95,7 +96,7 @@ def test_causes_are_those_that_the_scenario_has() -> None:
 
 
 def test_a_cause_that_is_taken_away_is_the_scenario_without_it() -> None:
-    budget = lm.pointing_budget(FLY_BY, robustness=False)
+    budget = lm.pointing_budget(FLY_BY, after=0.0, robustness=False)
     by_hand = FLY_BY.replace(**{"gearbox.hysteresis": None})
     r = lm.simulate(by_hand)
     error = by_hand.controller.reference.at(r.time.values)[0] - r.load_angle.values
@@ -174,8 +175,10 @@ def test_a_gap_is_taken_out_of_the_torsion_curve() -> None:
            "controller.inverse_model": None, "simulation.duration": 3.0}
     )  # fmt: skip
     closed = gap.replace(**{"gearbox.stiffness.slopes": (2e4, 3e4), "gearbox.stiffness.breaks": (1e-3,)})
-    found = lm.pointing_budget(gap, robustness=False).without["backlash"]["motor"]
-    assert found.peak == pytest.approx(lm.pointing_budget(closed, robustness=False).whole["motor"].peak, rel=1e-12)
+    found = lm.pointing_budget(gap, after=0.0, robustness=False).without["backlash"]["motor"]
+    assert found.peak == pytest.approx(
+        lm.pointing_budget(closed, after=0.0, robustness=False).whole["motor"].peak, rel=1e-12
+    )
 
 
 def test_the_field_of_view_counts_time_and_probability() -> None:
@@ -243,3 +246,25 @@ def test_probable_error_is_half_of_all() -> None:
     from lostmotion.pointing.budget import PROBABLE
 
     assert math.erf(PROBABLE / math.sqrt(2.0)) == pytest.approx(0.5, rel=1e-15)
+
+
+def test_the_start_up_transient_is_left_out_and_said_so() -> None:
+    """The rms error after 2 s, long after the axes have caught up, by subtraction: not 36 times as much, as with their first jump."""
+    scenario = lm.load("direction-finder")
+    budget = lm.pointing_budget(scenario, robustness=False)
+    r = lm.simulate(scenario, energy=False)
+    error = scenario.controllers["traverse_drive"].reference.at(r.time.values)[0] - r.traverse_angle.values
+    after, whole = (float(np.sqrt(np.mean(e**2))) for e in (error[r.time.values >= 2.0], error))
+    assert 0.3 < budget.after < 2.0  # 5 and 34 time constants of the position loop
+    assert budget.whole["traverse_drive"].rms == pytest.approx(after, rel=0.03)
+    assert after < whole / 30.0
+    assert f"errors count from {budget.after:.4g} s on: the start-up transient before is left out" in budget.after_line
+
+
+@pytest.mark.parametrize(
+    ("times", "end"),
+    [([], 0.0), ([0.1, 0.2, 0.8], 0.2), ([0.1, 0.55, 0.9, 1.5, 4.0], 1.5), ([0.6, 0.7], 0.0)],
+)
+def test_a_transient_ends_before_the_first_gap_as_long_as_itself(times: list[float], end: float) -> None:
+    """With at least 0.5 s of quiet."""
+    assert first_gap(np.array(times), 0.5) == end

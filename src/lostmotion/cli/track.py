@@ -23,7 +23,12 @@ def track(
     ),
     after: Annotated[
         float | None,
-        typer.Option("--after", metavar="TIME", parser=number("s"), help='From which on errors count, e.g. "2 s".'),
+        typer.Option(
+            "--after",
+            metavar="TIME",
+            parser=number("s"),
+            help='From which on errors count, e.g. "2 s"; left out, from the end of the start-up transient.',
+        ),
     ] = None,
     view: Annotated[
         list[str] | None,
@@ -41,7 +46,7 @@ def track(
     wear; what each cause contributes.
 
     \b
-    lostmotion track tracking-loss-map --after "2 s"
+    lostmotion track tracking-loss-map
     lostmotion track axes.toml --view "traverse=6.65 deg" --view "elevation=5.27 deg" -o sheet
     """
     from ..errors import InputError, need
@@ -59,7 +64,7 @@ def track(
             raise InputError(f'--view: "{text}" must be MOTOR=ANGLE, such as "motor=6.65 deg"')
         angles[motor.strip()] = angle.strip()
     with progress(runs_of(loaded), "Runs") as step:
-        budget = pointing_budget(loaded, after=after or 0.0, view=angles, progress=step)
+        budget = pointing_budget(loaded, after=after, view=angles, progress=step)
     with writing(output), busy("Drawing"):
         from ..reports.pointing import write_pointing
 
@@ -81,5 +86,6 @@ def _print_summary(title: str, budget: PointingBudget) -> None:
     for row in budget_rows(budget):
         table.add_row(*map(Text, row))
     console(sys.stdout, 160).print(table)
+    print(f"  {budget.after_line}")
     if budget.view is not None:
         print(f"  {view_line(budget)}")

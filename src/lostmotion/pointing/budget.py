@@ -22,6 +22,8 @@ from ..simulation.train_scenario import TrainScenario, in_long_form
 from .causes import CAUSES, VARIANTS, present, without
 from .robustness import ROBUSTNESS, SPEEDS
 
+QUIET = 0.05  # of the duration, for which two runs stay together after the start-up transient
+PART = 0.1  # of the rms error, up to which two runs from different starts have come together
 PROBABLE = 0.6744897501960817  # of a normal distribution, in standard deviations: half of all errors are smaller
 
 
@@ -60,6 +62,8 @@ class PointingBudget:
     scenario: Scenario | TrainScenario
     after: float
     """[s], what is before does not count"""
+    after_line: str
+    """why errors count from then on"""
     time: np.ndarray
     """[s]"""
     errors: Mapping[str, np.ndarray]
@@ -100,7 +104,7 @@ class PointingBudget:
 def pointing_budget(
     scenario: Scenario | TrainScenario,
     *,
-    after: float | str = 0.0,
+    after: float | str | None = None,
     view: Mapping[str, float | str] | None = None,
     robustness: bool = True,
     progress: Callable[[], None] | None = None,
@@ -117,7 +121,9 @@ def pointing_budget(
     scenario
         One axis or several (`[controllers.MOTOR]`), each with a reference of the position.
     after
-        Time [s] from which errors count.
+        Time [s] from which errors count; left out, from the end of the start-up transient: the same run is made from another start,
+        on the reference or, where the scenario begins on it, at rest there, and errors count after twice the time in which both come
+        together to a tenth of the rms error, or as far as they do in the second half.
     view
         Whole angle of view [rad] of each axis, by the name of its motor; left out, those of the cameras.
     robustness
@@ -132,8 +138,11 @@ def pointing_budget(
     SolverError
     """
     loaded = in_long_form(scenario) if isinstance(scenario, Scenario) else scenario
-    start = argument("after", after, "s")
-    _check(loaded, start)
+    given = None if after is None else argument("after", after, "s")
+    _check(loaded, given or 0.0)
+    start, line = (
+        _end_of_transient(loaded) if given is None else (given, f"errors count from {given:.4g} s on, as given")
+    )
     angles = _view(loaded, view or {})
     cases = _cases(loaded, robustness=robustness)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -155,6 +164,7 @@ def pointing_budget(
     return PointingBudget(
         scenario,
         start,
+        line,
         time,
         errors,
         measured,
@@ -169,6 +179,46 @@ def pointing_budget(
         {m: c.camera.pixel for m, c in loaded.axes().items() if c.camera is not None and c.camera.pixel is not None},
         _in_view(time >= start, errors, angles) if angles else None,
     )
+
+
+def _end_of_transient(scenario: TrainScenario) -> tuple[float, str]:
+    """From when on errors do not depend on how the axes start [s], and the line that says so."""
+    (time, first, *_), (_, second, *_) = (
+        _run(s, 0.0) for s in (scenario, without(scenario, [_other_start(scenario)]) or scenario)
+    )
+    half = len(time) // 2
+    end = 0.0
+    for motor, error in first.items():
+        apart = np.abs(error - second[motor])
+        floor = max(PART * float(np.sqrt(np.mean(error[half:] ** 2))), float(apart[half:].max()))
+        end = max(end, first_gap(time[:half][apart[:half] > floor], QUIET * scenario.simulation.duration))
+    if end == 0.0:
+        return 0.0, "errors count from the start: how the axes start makes no difference that stands out"
+    # What is left of an exponential transient is squared in twice the time.
+    end *= 2.0
+    return end, f"errors count from {end:.4g} s on: the start-up transient before is left out (--after 0 counts it)"
+
+
+def first_gap(times: np.ndarray, quiet: float) -> float:
+    """The last of instants before the first gap that is as long as the time until it, and at least `quiet`; 0 without any."""
+    end = 0.0
+    for time in times.tolist():
+        if time - end > max(end, quiet):
+            break
+        end = time
+    return end
+
+
+def _other_start(scenario: TrainScenario) -> Callable[[dict[str, Any]], None]:
+    """On the reference; where the axes begin on it, at rest there."""
+    angles = dict(scenario.begin().angles)
+
+    def change(data: dict[str, Any]) -> None:
+        start: dict[str, Any] = data["initial"]
+        on_reference = not start.get("on_reference")
+        start |= {"angles": {} if on_reference else angles, "speeds": {}, "on_reference": on_reference}
+
+    return change
 
 
 Case = tuple[str, Any]
@@ -194,7 +244,7 @@ def _cases(scenario: TrainScenario, *, robustness: bool = True) -> dict[Case, Se
 
 
 def runs_of(scenario: Scenario | TrainScenario) -> int:
-    """How many runs a budget makes."""
+    """How many runs a budget makes, but for those that find the end of the start-up transient."""
     return len(_cases(in_long_form(scenario) if isinstance(scenario, Scenario) else scenario))
 
 

@@ -180,7 +180,7 @@ def write_pointing(directory: Path, name: str, budget: PointingBudget) -> Path:
             rows=rows,
             parts_header=CONTRIBUTIONS,
             parts=parts,
-            after=budget.after,
+            after=budget.after_line,
             view=view_line(budget),
             figures=figures,
         ),
