@@ -13,11 +13,13 @@ from ..errors import InputError
 from ..simulation.train_results import core_case, core_run
 from ..simulation.train_scenario import TrainScenario
 from .shooting import PERIODICITY, SAMPLES_PER_PERIOD, reason_of
+from .standstill import FOREVER, NOTHING_MOVES, Outlook, Verdict, Watch, frequency_of
 
 SAMPLES = 4000  # of the run that is watched
-LONGER = 5  # runs, each four times as long as the one before
+LONGER = 40  # runs, each four times as long as the one before, or twice as long as until a contact breaks away
+FEW = 100  # samples of a run whose end state alone counts
+SMALL = 1e-9  # of the largest value in the run, a swing that is none where the time that a simulation can reach ends
 DECAY = 0.5  # of the swing from one quarter of the run to the next, below which it dies out
-AT_REST = 1e-9  # of the largest value in the run: a swing below it is rounding
 GROWTH = 1e6  # of the swing over that in the shortest run
 MULTIPLES = (1, 2, 3)  # of the apparent period
 MAX_PERIODS = 60  # followed by the search
@@ -30,8 +32,9 @@ MAX_SWITCHINGS = 20_000
 class Found:
     """What became of the search."""
 
+    verdict: Verdict
     reason: str
-    """why there is no limit cycle; empty if there is one"""
+    """why there is no limit cycle, or none was found; empty if there is one"""
     result: dict[str, Any] = field(default_factory=dict, repr=False)
     """of the core's search, of one point"""
     channels: tuple[str, ...] = ()
@@ -61,6 +64,7 @@ class Loop:
     watched: str
     """the channel whose swing is looked at"""
     channels: tuple[str, ...]
+    scenario: TrainScenario
 
     @classmethod
     def of(cls, scenario: TrainScenario) -> Loop:
@@ -85,18 +89,18 @@ class Loop:
         controlled, last = scenario.continuous(), list(scenario.shafts)[-1]
         watched = f"{next(iter(controlled))}_error" if controlled else f"{last}_speed"
         channels = tuple(name for name, _, _ in core.channels())
-        return cls(core, inputs, constants, start, capacities, settled, watched, channels)
+        return cls(core, inputs, constants, start, capacities, settled, watched, channels, scenario)
 
     def run(self, duration: float, samples: int) -> dict[str, Any]:
         """From the start."""
         case = (self.core, self.inputs, self.start, self.capacities)
         return core_run(case, (duration, duration / samples, samples, False, 0.0, MAX_SWITCHINGS))
 
-    def rests(self, run: Mapping[str, Any]) -> bool:
-        """Whether no state moves in the last quarter of a run."""
-        states = [self.channels.index(name) for name in run["end_state"] if name in self.channels]
-        values = run["values"][states]
-        return bool(np.all(np.ptp(values[:, -SAMPLES // 4 :], axis=1) <= AT_REST * np.abs(values).max(axis=1)))
+    def outlook(self, duration: float) -> Outlook:
+        """What follows from the state so long after the inputs have come to rest."""
+        watch = Watch(self.scenario, (self.watched,))
+        watch.follow(duration, FEW)
+        return watch.outlook(duration / FEW)[0]
 
     def search(self, start: Mapping[str, float], period: float, *, threads: int = 1) -> dict[str, Any]:
         """Newton's method for state and period, from an estimate of both."""
@@ -130,12 +134,16 @@ def find_limit_cycle(loop: Loop, duration: float) -> Found:
         later = time >= loop.settled + 0.5 * duration
         x, t = watched[later], time[later]
         before, last = (float(np.ptp(part)) for part in np.array_split(x, 2))
-        if loop.rests(run):
-            return Found(f"it comes to rest: after {whole:.4g} s {loop.watched} stays at {x[-1]:.6g}")
+        outlook = loop.outlook(duration)
+        if outlook.rests:
+            return Found(
+                "at rest", f"it comes to rest: after {whole:.4g} s {loop.watched} stays at {x[-1]:.6g}; {NOTHING_MOVES}"
+            )
         first = first or last
         if last > GROWTH * first or not np.isfinite(last):
             return Found(
-                f"it grows without bound: the linear loop is unstable, and after {whole:.4g} s nothing limits it"
+                "not decided",
+                f"it grows without bound: the linear loop is unstable, and after {whole:.4g} s nothing limits it",
             )
         if 0.0 < last < DECAY * before:
             reason = f"it dies out: in the last quarter of {whole:.4g} s it swings by {last / before:.3g} of the quarter before"
@@ -145,8 +153,17 @@ def find_limit_cycle(loop: Loop, duration: float) -> Found:
             reason, found = _near(loop, run, 1.0 / f, whole)
             if found is not None:
                 return found
-        duration *= 4.0
-    return Found(reason)
+        if run["switching_count"] > MAX_SWITCHINGS:
+            break
+        duration = max(4.0 * duration, 2.0 * outlook.breaks_away if outlook.breaks_away < FOREVER else 0.0)
+        if duration > FOREVER and np.ptp(x) <= SMALL * np.abs(watched).max():
+            return Found(
+                "at rest",
+                f"it comes to rest: each slip is smaller than the one before, and from {t[0]:.3g} to {whole:.3g} s {loop.watched} stays at {x[-1]:.6g}",
+            )
+        if duration > FOREVER:
+            break
+    return Found("not decided", f"{reason} ({outlook.describe()})" if outlook.describe() else reason)
 
 
 def _near(loop: Loop, run: dict[str, Any], apparent: float, end: float) -> tuple[str, Found | None]:
@@ -159,7 +176,7 @@ def _near(loop: Loop, run: dict[str, Any], apparent: float, end: float) -> tuple
         result = loop.search(start, period)
         if reason := reason_of(result, 0):
             continue
-        found = Found("", result, loop.channels)
+        found = Found("hunts", "", result, loop.channels)
         swing = float(np.ptp(found.values(loop.watched)))
         watched = run["values"][loop.channels.index(loop.watched)]
         if abs(found.period / period - 1.0) < NEAR and swing > 1e-3 * float(np.ptp(watched[-SAMPLES // 8 :])):
@@ -181,7 +198,7 @@ def _part(loop: Loop, found: Found, parts: int) -> Found | None:
     result = loop.search(start, found.period / parts)
     if reason_of(result, 0) or abs(result["period"][0] * parts / found.period - 1.0) >= PART_OF:
         return None
-    return Found("", result, loop.channels)
+    return Found("hunts", "", result, loop.channels)
 
 
 def _quiet_instant(instants: np.ndarray, begin: float, end: float) -> float:
@@ -189,13 +206,3 @@ def _quiet_instant(instants: np.ndarray, begin: float, end: float) -> float:
     within = [begin, *instants[(instants > begin) & (instants < end)], end]
     k = int(np.argmax(np.diff(within)))
     return float(0.5 * (within[k] + within[k + 1]))
-
-
-def frequency_of(time: np.ndarray, values: np.ndarray) -> float:
-    """By the crossings of the middle with a hysteresis of a quarter of the swing, so that ripple does not count [Hz]; NaN
-    where there are no two swings."""
-    middle, quarter = 0.5 * (values.max() + values.min()), 0.25 * np.ptp(values)
-    side = np.where(values > middle + quarter, 1, np.where(values < middle - quarter, -1, 0))
-    known = np.flatnonzero(side)
-    rises = known[1:][(side[known][1:] > 0) & (side[known][:-1] < 0)]
-    return float((len(rises) - 1) / (time[rises[-1]] - time[rises[0]])) if len(rises) > 1 else float("nan")

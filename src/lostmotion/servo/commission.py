@@ -119,11 +119,10 @@ class ServoReport:
             return "not looked at: there is no position loop that could hold a place"
         whole = cycle.whole
         if not whole.cycles:
-            return f"no limit cycle (watched for {whole.watched:.3g} s after a small step)"
+            return f"{'no limit cycle' if whole.verdict == 'at rest' else whole.verdict}: {whole.described()}"
         frequency = "irregular" if math.isnan(whole.frequency) else f"{whole.frequency:.4g} Hz"
         text = f"limit cycle: ±{_shown(whole.motor_amplitude, 'rad')} at the motor, ±{_shown(whole.amplitude, 'rad')} at the load, {frequency}"
-        by = " or ".join(cycle.causes) or "none of backlash, dry friction and encoder resolution alone"
-        return f"{text}; goes without {by}"
+        return f"hunts, {text}; cause: {' and '.join(cycle.causes) or 'none of ' + ', '.join(cycle.without)}"
 
 
 @checked

@@ -18,6 +18,7 @@ from ..inputs.validation import shown
 from ..response.limit_cycle import Found, Loop, find_limit_cycle
 from ..response.plant import known_output, plant_of
 from ..response.shooting import floquet_multipliers, is_stable, motion_of
+from ..response.standstill import Verdict
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, in_long_form
 from .motion import PART, at_rest, without_backlash, without_friction
@@ -34,8 +35,10 @@ MAX_POINTS = 1_000_000  # of a map
 class Hunting:
     """A limit cycle, or why there is none."""
 
+    verdict: Verdict
+    """hunts; at rest, of a state that is shown to be an equilibrium; not decided"""
     reason: str
-    """why there is none; empty if there is one"""
+    """why there is no limit cycle, or what was watched in vain; empty if there is one"""
     exact: bool
     """by Newton's method with the period as an unknown; else by statistics of a long run, as of sampled controllers"""
     frequency: float
@@ -53,7 +56,7 @@ class Hunting:
     @property
     def cycles(self) -> bool:
         """Whether there is a limit cycle."""
-        return not self.reason
+        return self.verdict == "hunts"
 
     @property
     def period(self) -> float:
@@ -67,7 +70,7 @@ class Hunting:
 
     def __repr__(self) -> str:
         if not self.cycles:
-            return f"no limit cycle: {self.reason}"
+            return f"{'no limit cycle' if self.verdict == 'at rest' else self.verdict}: {self.reason}"
         by = f", by {' and '.join(self.causes)}" if self.causes else ""
         return f"{'stable' if self.stable else 'unstable'} limit cycle of {self.frequency:.6g} Hz{by}"
 
@@ -104,13 +107,12 @@ def limit_cycle(scenario: Scenario | TrainScenario, *, motor: str | None = None,
         return _sampled(train, motor, causes=causes)
     found = _found(train)
     if found.reason:
-        return Hunting(found.reason, True, NAN, {}, None, np.array([]), ())
+        return Hunting(found.verdict, found.reason, True, NAN, {}, None, np.array([]), ())
     plant = plant_of(train)
     motion = motion_of(found.result, plant, found.period)
     amplitudes = {v.name: 0.5 * float(np.ptp(motion[v.name].values)) for v in plant.variables}
-    return Hunting(
-        "", True, 1.0 / found.period, amplitudes, motion, _multipliers(found), _causes(train, found) if causes else ()
-    )
+    found_causes = _causes(train, found) if causes else ()
+    return Hunting("hunts", "", True, 1.0 / found.period, amplitudes, motion, _multipliers(found), found_causes)
 
 
 def _found(train: TrainScenario) -> Found:
@@ -181,12 +183,10 @@ def _sampled(train: TrainScenario, motor: str | None, *, causes: bool) -> Huntin
     cycle = watched(axis) if causes else None
     rest = cycle.whole if cycle is not None else at_rest(axis)
     if not rest.cycles:
-        return Hunting(
-            f"it comes to rest, or dies out, over {rest.watched:.4g} s", False, NAN, {}, None, np.array([]), ()
-        )
+        return Hunting(rest.verdict, rest.described(), False, NAN, {}, None, np.array([]), ())
     amplitudes = {f"{axis.motor_shaft}_angle": rest.motor_amplitude, f"{axis.shaft}_angle": rest.amplitude}
     found = tuple(cycle.causes) if cycle is not None else ()
-    return Hunting("", False, rest.frequency, amplitudes, None, np.array([]), found)
+    return Hunting("hunts", "", False, rest.frequency, amplitudes, None, np.array([]), found)
 
 
 @checked
@@ -217,8 +217,8 @@ def hunting_map(
     Returns
     -------
     xarray.Dataset
-        Over the values of the keys: ``amplitude`` (SI; 0 without a limit cycle), ``frequency`` [Hz] (NaN without), ``stable``, and
-        ``reason`` why there is none.
+        Over the values of the keys: ``amplitude`` (SI; 0 at rest, NaN where not decided), ``frequency`` [Hz] (NaN without a limit
+        cycle), ``stable``, ``verdict`` as of `Hunting`, and ``reason`` why there is no limit cycle.
 
     Raises
     ------
@@ -237,7 +237,7 @@ def hunting_map(
     of = f"{list(train.shafts)[-1]}_angle" if variable is None else known_output(variable, Loop.of(train).channels)
     done = 0
 
-    def point(index: tuple[int, ...]) -> tuple[float, float, bool, str]:
+    def point(index: tuple[int, ...]) -> tuple[float, float, bool, str, str]:
         nonlocal done
         changes = {key: values[k].item() for (key, values), k in zip(keys.items(), index, strict=True)}
         result = _point(train.replace(**changes), of)
@@ -254,6 +254,7 @@ def hunting_map(
         ("amplitude", {"long_name": f"half of what {of} swings by"}),
         ("frequency", {"long_name": "frequency of the limit cycle", "units": "Hz"}),
         ("stable", {"long_name": "whether neighbouring motions approach it"}),
+        ("verdict", {"long_name": "hunts, at rest, or not decided"}),
         ("reason", {"long_name": "why there is none"}),
     ]
     data = {name: (names, column, attrs) for (name, attrs), column in zip(about, columns, strict=True)}
@@ -261,12 +262,16 @@ def hunting_map(
     return xr.Dataset(data, coords=coords, attrs={"variable": of})
 
 
-def _point(train: TrainScenario, variable: str) -> tuple[float, float, bool, str]:
-    """Amplitude, frequency, stable, reason."""
+def _point(train: TrainScenario, variable: str) -> tuple[float, float, bool, str, str]:
+    """Amplitude, frequency, stable, verdict, reason."""
     if train.axes():
-        found = limit_cycle(train, causes=False)
-        return found.amplitudes.get(variable, 0.0), found.frequency, found.stable, found.reason
-    exact = _found(train)
-    if exact.reason:
-        return 0.0, NAN, False, exact.reason
-    return 0.5 * _swing(exact, variable), 1.0 / exact.period, is_stable(_multipliers(exact)), ""
+        hunting = limit_cycle(train, causes=False)
+        verdict, reason, stable = hunting.verdict, hunting.reason, hunting.stable
+        amplitude, frequency = hunting.amplitudes.get(variable, 0.0), hunting.frequency
+    else:
+        exact = _found(train)
+        verdict, reason, stable, amplitude, frequency = exact.verdict, exact.reason, False, 0.0, NAN
+        if not reason:
+            amplitude, frequency = 0.5 * _swing(exact, variable), 1.0 / exact.period
+            stable = is_stable(_multipliers(exact))
+    return NAN if verdict == "not decided" else amplitude, frequency, stable, verdict, reason

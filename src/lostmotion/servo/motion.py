@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,8 @@ from ..control.loops import CurrentLoop, Feedforward, FieldOriented
 from ..control.references import PositionReference
 from ..inputs.part import Part
 from ..model.torsion import TorsionCurve
-from ..response.limit_cycle import frequency_of
+from ..response.closed_loop import slowest
+from ..response.standstill import Verdict, Watch, decide, moving_input
 from ..simulation.run import run
 from ..simulation.train_scenario import TrainScenario
 from .data import inertias
@@ -25,13 +27,11 @@ if TYPE_CHECKING:
 STEPPED = ("current", "speed", "position")  # loops that a reference can step; that of i_d has none of its own
 HALVINGS = 12  # of a step, until no limit acts on it
 STEP_SHARE = 0.02  # of the longest move, the first size of a position step
-AT_REST = 1e-9  # of a turn: what a shaft that stands may move by rounding
-DECAY = 0.5  # of the amplitude over the time that is looked at, below which a swing dies out
 PART = 0.5  # of the amplitude, below which leaving something out takes a limit cycle away
 MAX_POINTS = 4000  # of a step response
-MAX_WATCHED = 100_000  # points
-LONGER = 3  # times that an axis is watched, longer each time, until its limit cycle has a frequency
-REST = 40.0  # time constants of the position loop for which an axis is watched at rest
+REST = 10.0  # of the slowest time constants of the loops, for which an axis is watched at least
+MOST_TICKS = 4e6  # for which it is watched at most
+PATIENCE = 4.0  # times as long as the whole axis, for which one without a possible cause is watched
 
 
 @dataclass(frozen=True)
@@ -242,32 +242,42 @@ def settling(axis: Axis, followed: Following, window: float) -> list[Settling]:
     return out
 
 
-# --- at rest ---
+# --- under a reference that stands ---
 
 
 @dataclass(frozen=True)
 class AtRest:
-    """What an axis does while its reference stands, watched after a small step."""
+    """What an axis does after its reference has come to rest."""
 
+    verdict: Verdict
+    reason: str
+    """why it is at rest, or not decided"""
     watched: float
-    """time at the end that is looked at [s]"""
+    """time since the reference has come to rest [s]"""
     motor_amplitude: float
-    """half of what the motor's angle swings by [rad]"""
+    """half of what the motor's angle swings by in the last quarter of that time [rad]"""
     amplitude: float
     """the same of the reference's shaft [rad]"""
     frequency: float
-    """[Hz]; NaN where there is no limit cycle"""
-    cycles: bool
-    """whether it swings on: neither at rest nor dying out"""
+    """[Hz]; NaN unless it hunts"""
+
+    @property
+    def cycles(self) -> bool:
+        """Whether it hunts."""
+        return self.verdict == "hunts"
+
+    def described(self) -> str:
+        """Why it does not hunt, with what was watched."""
+        return f"{self.reason} ({self.watched:.4g} s after the end of the reference)"
 
 
 @dataclass(frozen=True)
 class LimitCycle:
-    """The axis at rest, and with each possible cause of a limit cycle left out."""
+    """The axis under a constant reference, and with each possible cause of a limit cycle left out."""
 
     whole: AtRest
     without: Mapping[str, AtRest]
-    """by what is left out: backlash, dry friction, encoder resolution"""
+    """by what is left out: backlash, dry friction, encoder resolution; if none of them alone is a cause, two of them"""
 
     @property
     def causes(self) -> list[str]:
@@ -275,7 +285,7 @@ class LimitCycle:
         if not self.whole.cycles:
             return []
         low = PART * self.whole.motor_amplitude
-        return [name for name, rest in self.without.items() if not rest.cycles or rest.motor_amplitude < low]
+        return [name for name, rest in self.without.items() if rest.motor_amplitude < low]
 
 
 def limit_cycle(axis: Axis) -> LimitCycle | None:
@@ -285,40 +295,54 @@ def limit_cycle(axis: Axis) -> LimitCycle | None:
     whole = at_rest(axis)
     if not whole.cycles:
         return LimitCycle(whole, {})
-    others = {"backlash": without_backlash(axis.scenario), "dry friction": without_friction(axis.scenario)}
-    axes = {name: Axis(scenario, axis.motor) for name, scenario in others.items() if scenario is not None}
-    if (ideal := without_steps(axis)) is not None:
-        axes["encoder resolution"] = ideal
-    return LimitCycle(whole, {name: at_rest(other) for name, other in axes.items()})
+    most = PATIENCE * whole.watched
+    single = {name: at_rest(other, most) for name, other in _left_out(axis, 1)}
+    found = LimitCycle(whole, single)
+    if found.causes:
+        return found
+    return LimitCycle(whole, single | {name: at_rest(other, most) for name, other in _left_out(axis, 2)})
 
 
-def at_rest(axis: Axis) -> AtRest:
-    """After a small step of the position, over the second half of a long time."""
-    c = axis.controller
+def _left_out(axis: Axis, count: int) -> Iterator[tuple[str, Axis]]:
+    """The axis without so many of the possible causes of a limit cycle, by their names."""
+    changes: dict[str, Callable[[Axis], Axis | None]] = {
+        "backlash": lambda a: _with(a, without_backlash(a.scenario)),
+        "dry friction": lambda a: _with(a, without_friction(a.scenario)),
+        "encoder resolution": without_steps,
+    }
+    for names in itertools.combinations(changes, count):
+        other: Axis | None = axis
+        for name in names:
+            other = None if other is None else changes[name](other)
+        if other is not None:
+            yield " with ".join(names), other
+
+
+def _with(axis: Axis, scenario: TrainScenario | None) -> Axis | None:
+    return None if scenario is None else Axis(scenario, axis.motor)
+
+
+def at_rest(axis: Axis, most: float = math.inf) -> AtRest:
+    """After the end of its reference; after a small step of the position where that never comes to rest, or never moves.
+
+    Parameters
+    ----------
+    most
+        Longest time to follow [s].
+    """
+    c, reference = axis.controller, axis.controller.reference
     assert c.position is not None
-    start = axis.scenario.initial.angles.get(axis.shaft, 0.0)
-    held = with_controller(axis, reference={"kind": "position", "mean": start + _first_size(axis, "position")})
-    duration = max(REST / c.position.gain, 4.0 * step_duration(axis, "position"))
-    for _ in range(LONGER):
-        found = _watched(held, duration)
-        if not found.cycles or not math.isnan(found.frequency):
-            break
-        duration *= 4.0  # a slow one
-    return found
-
-
-def _watched(axis: Axis, duration: float) -> AtRest:
-    c = axis.controller
-    interval = c.sample_time * max(1, math.ceil(duration / MAX_WATCHED / c.sample_time))
-    data = ran(axis, duration=duration, sample_interval=interval)
-    half = len(data["time"]) // 2
-    time = data["time"].values[half:]
-    angle, load = data[f"{axis.motor_shaft}_angle"].values[half:], data[f"{axis.shaft}_angle"].values[half:]
-    first, last = np.array_split(angle, 2)
-    swing = float(np.ptp(angle))
-    cycles = float(np.ptp(last)) > max(DECAY * float(np.ptp(first)), 2.0 * math.pi * AT_REST)
-    frequency = frequency_of(time, angle) if cycles else math.nan
-    return AtRest(float(time[-1] - time[0]), 0.5 * swing, 0.5 * float(np.ptp(load)), frequency, cycles)
+    start = axis.scenario.begin().angles.get(axis.shaft, 0.0)
+    at_start = reference.duration == 0.0 and float(reference.at(0.0)[0]) == start
+    if at_start or reference.sine_list() or any(reference.pieces()[-1][2:]):
+        axis = with_controller(axis, reference={"kind": "position", "mean": start + _first_size(axis, "position")})
+    if name := moving_input(axis.scenario):
+        return AtRest("not decided", f"{name} never comes to rest", 0.0, math.nan, math.nan, math.nan)
+    first = max(REST * slowest(c), 4.0 * step_duration(axis, "position"), axis.scenario.simulation.duration)
+    watch = Watch(axis.scenario, (f"{axis.motor_shaft}_angle", f"{axis.shaft}_angle"))
+    found = decide(watch, first, min(most, max(MOST_TICKS * c.sample_time, 4.0 * first)))
+    motor, load = 0.5 * found.swing
+    return AtRest(found.verdict, found.reason, found.watched, motor, load, found.frequency)
 
 
 def _changed_all(scenario: TrainScenario, table: str, change: Any) -> TrainScenario | None:

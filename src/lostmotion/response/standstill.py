@@ -1,0 +1,378 @@
+"""Whether a loop whose inputs have come to rest swings on, rests for ever, or is not decided.
+
+A state in which all contacts are stuck is no proof of rest: an integrator that still moves breaks a contact away. From one
+frame, the time after which all sample times of the controllers repeat, to the next, stuck drive and controllers are a map.
+Where it takes the state into itself, the state is an equilibrium. Where its numbers go on as polynomials of time of second
+degree, as those of two integrators in series do, so do the torques of the contacts, which gives the time of the break-away.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..simulation.explanation import explain
+from ..simulation.stepping import Simulation, SimulationState
+from ..simulation.train_scenario import TrainScenario
+from .closed_loop import running_slots
+from .closed_response import frame_of
+
+Verdict = Literal["hunts", "at rest", "not decided"]
+
+FOREVER = 1e12  # [s], the longest interval of a simulation
+CONSTANT = 1e-14  # of the largest magnitude of a number, by which rounding may change it over a window
+STRAIGHT = 1e-6  # of a difference, by which rounding may change it
+MARGIN = 1e-9  # of a capacity, within which a contact counts as about to break away
+AHEAD = 1000  # windows at most by which a motion is extrapolated: rounding grows by the square
+SHORT_OF = 0.9  # of the time until a contact breaks away, by which a motion is extrapolated
+SAMPLES = 1000  # of one stretch that is watched
+QUICK = 4000  # ticks that are watched for the frequency of quick swings
+GROWTH = 1.5  # of the stretches that are watched
+IDLE = 8  # stretches without motion after which a state that is no equilibrium is left undecided
+CYCLES = 3.0  # in the last half of the watch
+STEADY = 0.9  # of a swing from one part of the watch to the next, below which it dies out
+CONFIRMED = 3.0  # times as long a watch confirms a swing
+NOISE = 2e-9 * math.pi  # [rad], a billionth of a turn: what a shaft at rest may move by rounding
+STILL = NOISE / FOREVER  # [rad/s]
+NOTHING_MOVES = "the state is an equilibrium, as no number of drive and controllers moves"
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """What follows from a state in which all contacts are stuck."""
+
+    breaks_away: float
+    """time until a contact breaks away [s]; infinite at an equilibrium, NaN where it does not follow from the state"""
+    contact: str = ""
+    """that breaks away"""
+
+    @property
+    def rests(self) -> bool:
+        """Whether nothing breaks away in any time that a simulation can reach."""
+        return self.breaks_away >= FOREVER
+
+    def describe(self) -> str:
+        """When a contact breaks away; empty where that does not follow from the state."""
+        if not math.isfinite(self.breaks_away):
+            return ""
+        return f"stuck, but an integrator breaks {self.contact} away after another {self.breaks_away:.3g} s"
+
+
+UNKNOWN = Outlook(math.nan)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """The state at one instant."""
+
+    numbers: np.ndarray
+    key: tuple[int, ...]
+    contacts: tuple[str, ...]
+    margins: np.ndarray
+    """of each contact the torque that frees it forward, and in reverse [N·m]"""
+    scales: np.ndarray
+    """capacities that these belong to [N·m]"""
+
+
+class Watch:
+    """A scenario from the instant on at which its inputs have come to rest."""
+
+    def __init__(self, scenario: TrainScenario, names: Sequence[str]) -> None:
+        self.simulation = Simulation(scenario)
+        self.core = self.simulation._core
+        self.names = tuple(names)
+        sampled = bool(scenario.axes())
+        self.tick, ticks = frame_of(scenario) if sampled else (0.0, 0)
+        self.frame = self.tick * ticks
+        self._running = list(running_slots(self.simulation._control))
+        self._skipped = 0.0
+        self.times = np.zeros(0)
+        self.rows = np.zeros((0, len(self.names)))
+        self.magnitude = np.zeros(0)
+        self._begin(scenario)
+
+    # --- time ---
+
+    def _begin(self, scenario: TrainScenario) -> None:
+        """Advances to the middle of a tick after all inputs have come to rest."""
+        signals = {name: s for name, s in scenario.signals().items() if name in self.simulation.inputs}
+        points = {name: s.breakpoint_list() for name, s in signals.items()}
+        settled = [points[-1][0] for points in points.values()]
+        settled += [c.reference.duration for c in scenario.axes().values()]
+        self.settled = max(settled, default=0.0)
+        instants = sorted({p[0] for of in points.values() for p in of} | {0.0})
+        for begin, end in itertools.pairwise([*instants, self._instant(self.settled)]):
+            values = {name: (_value(of, begin, begin), _value(of, begin, end)) for name, of in points.items()}
+            if end > self.simulation.time:
+                self.simulation.advance(end - self.simulation.time, **values)
+        self.inputs = {name: of[-1][1] for name, of in points.items()}
+
+    def _instant(self, time: float) -> float:
+        """The first after a time that is halfway between two ticks and a whole number of frames after the first."""
+        if self.frame == 0.0:
+            return time
+        return math.ceil(time / self.frame) * self.frame + 0.5 * self.tick
+
+    @property
+    def elapsed(self) -> float:
+        """Since the inputs have come to rest [s]."""
+        return self.simulation.time - self.settled + self._skipped
+
+    def _advance(self, interval: float) -> None:
+        """By a whole number of frames, at least one."""
+        if self.frame == 0.0:
+            self.simulation.advance(interval, **self.inputs)
+            return
+        frames = max(round(interval / self.frame), 1)
+        past = round((self.simulation.time - 0.5 * self.tick) / self.frame)
+        end = (past + frames) * self.frame + 0.5 * self.tick
+        self.simulation.advance(end - self.simulation.time, **self.inputs)
+
+    def follow(self, duration: float, samples: int = SAMPLES) -> None:
+        """Advances by a time [s], and keeps samples of the variables."""
+        interval = max(duration / samples, self.frame)
+        if self.frame:
+            interval = math.ceil(interval / self.frame * (1.0 - 1e-9)) * self.frame
+        times, rows = [], []
+        for k in range(max(round(duration / interval), 1)):
+            self._advance(interval)
+            times.append(self.elapsed)
+            rows.append(self.simulation[self.names])
+            if k % 10 == 0:
+                self._note(self._numbers()[0])
+        self.times = np.append(self.times, times)
+        self.rows = np.concatenate([self.rows, rows])
+
+    def _note(self, numbers: np.ndarray) -> None:
+        self.magnitude = np.maximum(self.magnitude, np.abs(numbers)) if len(self.magnitude) else np.abs(numbers)
+
+    # --- what follows from the state ---
+
+    def _numbers(self) -> tuple[np.ndarray, tuple[int, ...]]:
+        _, x, memory, key, _, _, _, control = self.core.get_state()
+        return np.array([*x, *memory, *np.delete(control[1:], self._running)]), tuple(key)
+
+    def _look(self) -> _Look | None:
+        """The state now; None where a contact slips."""
+        contacts = explain(self.simulation).contacts
+        if any(c.mode != 0 and abs(c.speed) > STILL for c in contacts):
+            return None
+        stuck = [c for c in contacts if c.mode == 0 and math.isfinite(c.capacity_forward)]
+        numbers, key = self._numbers()
+        self._note(numbers)
+        margins = np.array([(c.to_free_forward, c.to_free_backward) for c in stuck]).reshape(-1, 2)
+        scales = np.array([c.capacity_forward + c.capacity_backward for c in stuck])
+        return _Look(numbers, key, tuple(c.name for c in stuck), margins, scales)
+
+    def looks(self, window: float) -> list[_Look] | None:
+        """Four states, a window [s] apart; None where a contact slips or a law changes its segment in between."""
+        found: list[_Look] = []
+        for k in range(4):
+            if k:
+                self._advance(window)
+            look = self._look()
+            if look is None or (found and look.key != found[0].key):
+                return None
+            found.append(look)
+        return found
+
+    def outlook(self, window: float) -> tuple[Outlook, list[_Look] | None]:
+        """What follows from the state now and over three windows [s] from now on."""
+        looks = self.looks(window)
+        if looks is None:
+            return UNKNOWN, None
+        numbers = np.array([look.numbers for look in looks])
+        steps = np.diff(numbers, axis=0)
+        rounding = CONSTANT * self.magnitude
+        if np.all(np.abs(steps) <= rounding) and np.all(looks[-1].margins >= MARGIN * looks[-1].scales[:, None]):
+            return Outlook(math.inf), looks
+        if np.any(np.abs(np.diff(steps, 2, axis=0)) > STRAIGHT * np.abs(steps).max(axis=0) + 4.0 * rounding):
+            return UNKNOWN, None
+        margins = np.array([look.margins for look in looks])
+        times = [
+            (window * _zero(margins[:, c, way], CONSTANT * looks[-1].scales[c]), name)
+            for c, name in enumerate(looks[-1].contacts)
+            for way in range(2)
+        ]
+        return Outlook(*min(times, default=(math.nan, ""))), looks
+
+    def skip(self, outlook: Outlook, looks: list[_Look], window: float) -> bool:
+        """Extrapolates the motion until shortly before a contact breaks away; False where the motion then goes on differently."""
+        windows = min(int(SHORT_OF * outlook.breaks_away / window), AHEAD)
+        if self.frame == 0.0:
+            self._advance(SHORT_OF * outlook.breaks_away)
+            return True
+        if windows < 1 or self._running:
+            return False
+        kept: SimulationState = self.simulation.state
+        last, bend = (
+            looks[-1].numbers - looks[-2].numbers,
+            looks[-1].numbers - 2 * looks[-2].numbers + looks[-3].numbers,
+        )
+        self._set(looks[-1].numbers + windows * last + 0.5 * windows * (windows + 1) * bend)
+        wanted = last + (windows + 1) * bend
+        after = self.looks(window)
+        if after is not None:
+            step = after[1].numbers - after[0].numbers
+            bound = STRAIGHT * np.abs(wanted) + AHEAD * CONSTANT * self.magnitude
+            if np.all(np.abs(step - wanted) <= bound):
+                self._skipped += windows * window
+                return True
+        self.simulation.state = kept
+        return False
+
+    def _set(self, numbers: np.ndarray) -> None:
+        """In the present modes."""
+        time, x, memory, key, inputs, started, course, control = self.core.get_state()
+        v, n, m = numbers.tolist(), len(x), len(x) + len(memory)
+        forgotten = [0.0] * len(course)
+        self.core.set_state(time, v[:n], v[n:m], key, inputs, started, forgotten, [control[0], *v[m:]])
+
+    # --- what follows from the motion ---
+
+    def part(self, begin: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+        """Instants and variables (sample, variable) between two shares of the elapsed time."""
+        here = (self.times >= begin * self.elapsed) & (self.times <= end * self.elapsed)
+        return self.times[here], self.rows[here]
+
+    def swing(self, begin: float, end: float) -> np.ndarray:
+        """Largest less least value of each variable between two shares of the elapsed time."""
+        values = self.part(begin, end)[1]
+        return np.ptp(values, axis=0) if len(values) else np.zeros(len(self.names))
+
+    def frequency(self) -> float:
+        """Of the last half, of the first variable that moves [Hz]; NaN where there are no two swings."""
+        times, values = self.part(0.5, 1.0)
+        moving = self.swing(0.5, 1.0) > NOISE
+        return frequency_of(times, values[:, int(np.argmax(moving))]) if moving.any() else math.nan
+
+    def quick_frequency(self, variable: int, swing: float) -> float:
+        """By a sample each tick [Hz], which those of a long watch may be too far apart for; NaN of a slower one."""
+        if self.frame == 0.0:
+            return math.nan
+        values = []
+        for _ in range(QUICK):
+            self.simulation.advance(self.tick, **self.inputs)
+            values.append(self.simulation[self.names[variable]])
+        frequency = frequency_of(self.tick * np.arange(QUICK), np.array(values))
+        several = frequency * self.tick * QUICK >= CYCLES and np.ptp(values) >= swing
+        return frequency if several else math.nan
+
+    def swings(self) -> bool:
+        """Whether the last half of the watch has several cycles that do not die out."""
+        before, last = self.swing(0.5, 0.75), self.swing(0.75, 1.0)
+        moving = last > NOISE
+        cycles = 0.5 * self.elapsed * self.frequency() >= CYCLES
+        return bool(moving.any() and cycles and np.all(last[moving] >= STEADY * before[moving]))
+
+
+def _value(points: Sequence[tuple[float, ...]], begin: float, time: float) -> float:
+    """Of a signal at a time within its piece that begins at or before another."""
+    t, value, slope = next(p for p in reversed(points) if p[0] <= begin)
+    return value + slope * (time - t)
+
+
+def _zero(values: np.ndarray, rounding: float) -> float:
+    """How many steps after the last of four values their parabola is 0; infinite if never."""
+    value, step = values[-1], values[-1] - values[-2]
+    bend = values[-1] - 2.0 * values[-2] + values[-3]
+    bend = bend if abs(bend) > 8.0 * rounding else 0.0
+    step = step if abs(step) > rounding or bend else 0.0
+    roots = np.roots(np.array([0.5 * bend, step + 0.5 * bend, value]))
+    return float(min((r.real for r in roots if abs(r.imag) == 0.0 and r.real > 0.0), default=math.inf))
+
+
+def frequency_of(time: np.ndarray, values: np.ndarray) -> float:
+    """By the crossings of the middle with a hysteresis of a quarter of the swing, so that ripple does not count [Hz]; NaN
+    where there are no two swings."""
+    middle, quarter = 0.5 * (values.max() + values.min()), 0.25 * np.ptp(values)
+    side = np.where(values > middle + quarter, 1, np.where(values < middle - quarter, -1, 0))
+    known = np.flatnonzero(side)
+    rises = known[1:][(side[known][1:] > 0) & (side[known][:-1] < 0)]
+    return float((len(rises) - 1) / (time[rises[-1]] - time[rises[0]])) if len(rises) > 1 else float("nan")
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What a watch has found."""
+
+    verdict: Verdict
+    reason: str
+    watched: float
+    """[s], since the inputs have come to rest"""
+    frequency: float
+    """[Hz]; NaN unless it hunts"""
+    swing: np.ndarray
+    """largest less least value of each variable over the last quarter of the watch"""
+
+
+def decide(watch: Watch, first: float, most: float) -> Decision:
+    """Watches a loop until it is shown to be at rest, or to swing on.
+
+    Parameters
+    ----------
+    first
+        Shortest time to watch [s].
+    most
+        Longest time to follow [s]; stuck intervals that are extrapolated do not count.
+    """
+    duration, seen, idle, outlook = first, 0.0, 0, UNKNOWN
+    candidate: tuple[float, np.ndarray] | None = None
+    while seen < most and idle < IDLE:
+        watch.follow(duration)
+        idle = idle + 1 if np.ptp(watch.rows[-SAMPLES:], axis=0).max() <= NOISE else 0
+        seen += duration
+        window = max(duration / 100.0, watch.frame)
+        outlook, looks = watch.outlook(window)
+        while looks is not None and duration < outlook.breaks_away < FOREVER and watch.skip(outlook, looks, window):
+            window = max(window, 0.003 * min(outlook.breaks_away, AHEAD * window))
+            outlook, looks = watch.outlook(window)
+        if outlook.rests:
+            return _decision(watch, "at rest", NOTHING_MOVES)
+        if watch.swings():
+            if candidate is None:
+                candidate = watch.elapsed, watch.swing(0.75, 1.0)
+            elif watch.elapsed >= CONFIRMED * candidate[0]:
+                if np.all(watch.swing(0.75, 1.0) >= STEADY * candidate[1]):
+                    return _decision(watch, "hunts", "")
+                candidate = None
+        else:
+            candidate = None
+        idle = 0 if math.isfinite(outlook.breaks_away) else idle
+        duration = min(GROWTH * duration, max(most - seen, first))
+    return _decision(watch, "not decided", _why(watch, outlook))
+
+
+def _decision(watch: Watch, verdict: Verdict, reason: str) -> Decision:
+    swing, watched, frequency = watch.swing(0.75, 1.0), watch.elapsed, math.nan
+    if verdict == "hunts":
+        moving = int(np.argmax(swing > NOISE))
+        quick = watch.quick_frequency(moving, 0.5 * swing[moving])
+        frequency = watch.frequency() if math.isnan(quick) else quick
+    return Decision(verdict, reason, watched, frequency, swing)
+
+
+def _why(watch: Watch, outlook: Outlook) -> str:
+    if text := outlook.describe():
+        return text
+    before, last = watch.swing(0.5, 0.75), watch.swing(0.75, 1.0)
+    moving = np.flatnonzero(last > NOISE)
+    if not len(moving):
+        return "no shaft moves by more than a billionth of a turn, but not all contacts are stuck, or the controllers still move"
+    k = moving[0]
+    return f"{watch.names[k]} still moves by {last[k]:.3g} rad, {last[k] / max(before[k], last[k] * 1e-9):.3g} of the time before"
+
+
+def moving_input(scenario: TrainScenario) -> str:
+    """The name of an input that never comes to rest; empty if all do."""
+    signals = {name: (s.sine_list(), s.breakpoint_list()[-1][2:]) for name, s in scenario.signals().items()}
+    signals |= {
+        f"{motor}_reference": (c.reference.sine_list(), c.reference.pieces()[-1][2:])
+        for motor, c in scenario.axes().items()
+    }
+    return next((name for name, (sines, slopes) in signals.items() if sines or any(slopes)), "")

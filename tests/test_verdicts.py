@@ -1,0 +1,254 @@
+"""What loops do under a constant reference: hunt, rest or not decided; against long runs, and arithmetic by hand."""
+
+import math
+import random
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from lostmotion.response.standstill import NOISE, Watch
+from lostmotion.servo.motion import at_rest, limit_cycle
+from lostmotion.servo.regimes import axis_of
+from lostmotion.simulation.run import run
+
+SEED = 20_260_101
+AXES = 200
+LONG, LONGEST = 200.0, 2000.0  # [s], of the runs that decide
+
+
+def one_inertia(
+    *,
+    friction: float,
+    breakaway: float,
+    height: float,
+    position: dict[str, Any],
+    speed: dict[str, Any],
+    encoder: dict[str, Any],
+    duration: float,
+    sample_time: float = 1e-3,
+) -> lm.TrainScenario:
+    """A rotor of 1e-4 kg·m² with dry friction under a position loop."""
+    rotor = {"friction_torque": friction, "breakaway_torque": breakaway, "viscous_friction": 1e-3}
+    motor = {"kind": "torque_source", "shaft": "rotor", "rotor_inertia": 1e-4, "rated_torque": 0.5}
+    controller = {
+        "sample_time": sample_time,
+        "encoder": encoder,
+        "reference": {"kind": "position", "steps": [{"time": 0.05, "height": height}]},
+        "position": position,
+        "speed": {"torque_limit": 0.5} | speed,
+    }
+    return lm.TrainScenario(
+        shafts={"rotor": rotor},
+        motors={"m": motor},
+        controllers={"m": controller},
+        simulation={"duration": duration, "sample_interval": 0.01},
+    )
+
+
+def geared(of: lm.TrainScenario, backlash: float, friction: float) -> lm.TrainScenario:
+    """The same rotor behind a gear of ratio 20 with a gap, the position read at the load."""
+    gear = {
+        "input": "rotor",
+        "output": "load",
+        "ratio": 20.0,
+        "rated_input_speed": 300.0,
+        "rated_output_torque": 10.0,
+        "stiffness": {"kind": "curve", "slopes": [3000.0], "breaks": [], "backlash": backlash},
+        "losses": {"kind": "constant_efficiency", "efficiency": 0.95},
+    }
+    load = {"inertia": 0.04, "friction_torque": friction, "viscous_friction": 0.1}
+    data = of.model_dump()
+    data["shafts"] = {**data["shafts"], "load": load}
+    data["gears"] = {"gear": gear}
+    data["controllers"]["m"]["position_encoder"] = {"shaft": "load", "bits": 18}
+    return lm.TrainScenario(**data)
+
+
+def random_axis(rng: random.Random) -> lm.TrainScenario:
+    def log(low: float, high: float) -> float:
+        return float(low * (high / low) ** rng.random())
+
+    friction = log(5e-3, 5e-2)
+    speed: dict[str, Any] = {"gain": log(8e-3, 4e-2)}
+    if rng.random() < 0.7:
+        speed["integral_time"] = log(0.1, 2.0)
+    position: dict[str, Any] = {"gain": log(4.0, 30.0)}
+    if rng.random() < 0.3:
+        position["integral_gain"] = position["gain"] * log(0.3, 5.0)
+    if position.get("integral_gain") and rng.random() < 0.3:
+        position["dead_zone"] = (2e-3, 4e-3)
+    encoder: dict[str, Any] = rng.choice([{"ideal": True}, {"bits": 12}, {"bits": 17}])
+    whole = rng.random() < 0.3  # a reference that the encoder can read
+    height = 128 * 2.0 * np.pi / 4096 if whole else log(0.1, 1.0)
+    axis = one_inertia(
+        friction=friction,
+        breakaway=friction * rng.choice([1.0, 1.3, 2.0]),
+        height=float(height),
+        position=position,
+        speed=speed,
+        encoder=encoder,
+        duration=10.0,
+        sample_time=rng.choice([1e-3, 2e-3]),
+    )
+    return geared(axis, log(2e-4, 5e-3), rng.choice([0.0, 0.3])) if rng.random() < 0.3 else axis
+
+
+def angles_over(scenario: lm.TrainScenario, duration: float) -> tuple[np.ndarray, np.ndarray]:
+    """Instants and the rotor's angle of one run."""
+    whole = run(scenario.replace(**{"simulation.duration": duration}), energy=False)
+    return whole.time, whole["rotor_angle"]
+
+
+def test_verdicts_of_random_axes_are_those_of_long_runs() -> None:
+    """At rest: nothing moves in the long run after the watch. Hunts: it moves in each third of it, as far as was said."""
+    rng = random.Random(SEED)
+    counts, unchecked = {"hunts": 0, "at rest": 0, "not decided": 0}, 0
+    for k in range(AXES):
+        scenario = random_axis(rng)
+        found = at_rest(axis_of(scenario))
+        counts[found.verdict] += 1
+        told = f"seed {SEED}, axis {k}: {found}"
+        if found.verdict == "not decided" or 2.0 * found.watched + LONG > LONGEST:
+            unchecked += 1
+            continue
+        time, angle = angles_over(scenario, 2.0 * found.watched + LONG)
+        after = angle[time > 0.05 + found.watched]
+        if found.verdict == "at rest":
+            assert np.ptp(after) <= NOISE, told
+        else:
+            thirds = [np.ptp(part) for part in np.array_split(after, 3)]
+            assert min(thirds) > 0.6 * 2.0 * found.motor_amplitude, told
+            assert max(thirds) < 1.5 * 2.0 * found.motor_amplitude, told
+    print(f"seed {SEED}: {counts}, {unchecked} not decided or too slow for a long run")
+    assert unchecked <= 0.15 * AXES, counts
+    assert min(counts["hunts"], counts["at rest"]) >= 0.1 * AXES, counts
+
+
+def slow_hunting(**changes: Any) -> lm.TrainScenario:
+    """A weak integrator, and a rotor that breaks away at twice its sliding friction."""
+    axis = one_inertia(
+        friction=0.02,
+        breakaway=0.04,
+        height=0.3,
+        position={"gain": 10.0},
+        speed={"gain": 0.02, "integral_time": 1.0},
+        encoder={"bits": 17},
+        duration=120.0,
+        sample_time=5e-4,
+    )
+    return axis.replace(**changes) if changes else axis
+
+
+def test_hunting_slower_than_the_first_watch_is_found_with_its_cause() -> None:
+    """Period and swing of an exact run of 600 s, by the instants at which the rotor breaks away forward."""
+    scenario = slow_hunting()
+    time, angle = angles_over(scenario, 600.0)
+    late = time > 200.0
+    up = time[1:][late[1:] & (np.diff(angle) > 1e-6)]
+    slips = up[np.flatnonzero(np.diff(up, prepend=0.0) > 1.0)]
+    period = float(np.diff(slips).mean())
+    assert period == pytest.approx(14.76, abs=0.1)
+    cycle = limit_cycle(axis_of(scenario))
+    assert cycle is not None
+    assert cycle.whole.verdict == "hunts"
+    assert 1.0 / cycle.whole.frequency == pytest.approx(period, rel=0.01)
+    assert 2.0 * cycle.whole.motor_amplitude == pytest.approx(np.ptp(angle[late]), rel=0.02)
+    assert "dry friction" in cycle.causes
+    assert lm.limit_cycle(scenario, causes=False).verdict == "hunts"
+
+
+def test_the_time_of_the_break_away_follows_from_the_stuck_state() -> None:
+    """With T dI/dt = k_p/T_i K_v e the torque of the stuck rotor goes in a straight line to the 0.04 N·m that it holds."""
+    axis = axis_of(slow_hunting())
+    watch = Watch(axis.scenario, ("rotor_angle",))
+    outlook, looks = watch.outlook(0.05)
+    while looks is None or not outlook.breaks_away > 2.0:
+        watch.follow(0.25)
+        outlook, looks = watch.outlook(0.05)
+    s = watch.simulation
+    e, torque = s["m_position_reference"] - s["m_measured_position"], s["m_torque_reference"]
+    rate = 0.02 / 1.0 * 10.0 * e
+    assert outlook.breaks_away == pytest.approx((math.copysign(0.04, rate) - torque) / rate, abs=2e-3)
+    before = s["rotor_angle"]
+    watch.follow(outlook.breaks_away - 0.01)
+    assert s["rotor_angle"] == before
+    watch.follow(0.02)
+    assert s["rotor_angle"] != before
+
+
+def test_a_stuck_interval_that_is_extrapolated_ends_as_if_it_were_followed() -> None:
+    two = [Watch(slow_hunting(), ("rotor_angle",)) for _ in range(2)]
+    window, ends = 0.005, []
+    for watch in two:
+        watch.follow(10.0)
+        outlook, looks = watch.outlook(window)
+        while looks is None or not outlook.breaks_away > 2.0:
+            watch.follow(0.25)
+            outlook, looks = watch.outlook(window)
+        if watch is two[0]:
+            assert watch.skip(outlook, looks, window)
+        begin = watch.simulation["rotor_angle"]
+        while watch.simulation["rotor_angle"] == begin:
+            watch.follow(0.005, 1)
+        ends.append(watch.elapsed)
+    assert ends[0] == pytest.approx(ends[1], abs=0.011)
+
+
+def test_an_integrator_at_a_limit_below_the_break_away_is_at_rest() -> None:
+    """A torque limit of 0.03 N·m never frees the 0.04 N·m of the rotor, whatever error is left."""
+    found = at_rest(axis_of(slow_hunting(**{"controllers.m.speed.torque_limit": 0.03})))
+    assert found.verdict == "at rest"
+
+
+ROTARY_TABLE = {
+    "motor": {
+        "kind": "dc",
+        "rotor_inertia": "0.847 kg*cm^2",
+        "rated_torque": "2.1 N*m",
+        "rated_speed": "6000 rpm",
+        "rated_voltage": 326.0,
+        "electrical_time_constant": "4.26 ms",
+        "armature_voltage_constant": 18.0,
+        "friction_torque": "0.02 N*m",
+    },
+    "gearbox": {
+        "ratio": 50,
+        "rated_output_torque": "120 N*m",
+        "rated_input_speed": "3000 rpm",
+        "inertia": "0.3 kg*cm^2",
+        "stiffness": {"kind": "curve", "backlash": "3 arcmin", "slopes": ["25 N*m/arcmin"], "breaks": []},
+        "losses": {"kind": "constant_efficiency", "efficiency": 0.94},
+    },
+    "load": {"inertia": "2.5 kg*m^2", "friction_torque": "3 N*m"},
+    "simulation": {"duration": "3 s", "sample_interval": "1 ms"},
+}
+
+
+def rotary_table(**changes: Any) -> lm.Scenario:
+    controller: dict[str, Any] = {
+        "sample_time": "125 us",
+        "encoder": {"lines": 2048},
+        "reference": {
+            "kind": "position",
+            "speed": "60 deg/s",
+            "acceleration": "400 deg/s^2",
+            "jerk": "8000 deg/s^3",
+            "moves": [{"to": "90 deg"}],
+        },
+        "position": {"gain": "20 1/s", "integral_gain": "60 1/s^2", "sample_time": "1 ms"},
+        "speed": {"gain": "0.1 N*m*s/rad", "integral_gain": "2 N*m/rad", "torque_limit": "6 N*m"},
+        "current": {"kind": "pi"},
+    }
+    return lm.Scenario(**ROTARY_TABLE, controller=controller | changes)
+
+
+def test_hunting_through_the_gap_is_found_and_rest_without_it() -> None:
+    scenario = rotary_table(position_encoder={"shaft": "load", "bits": 20})
+    r = lm.simulate(scenario, duration=60.0, energy=False)
+    late = r.time.values > 30.0
+    found = lm.limit_cycle(scenario, causes=False)
+    assert found.verdict == "hunts"
+    assert 2.0 * found.amplitudes["load_angle"] == pytest.approx(np.ptp(r.load_angle.values[late]), rel=0.1)
+    assert np.ptp(r.twist.values[late]) > math.radians(3.0 / 60.0)  # the motor crosses the whole gap
