@@ -9,8 +9,9 @@ import pytest
 
 import lostmotion as lm
 from lostmotion.response.standstill import NOISE, Watch
+from lostmotion.servo.margins import instability
 from lostmotion.servo.motion import at_rest, limit_cycle
-from lostmotion.servo.regimes import axis_of
+from lostmotion.servo.regimes import axis_of, regimes
 from lostmotion.simulation.run import run
 
 SEED = 20_260_101
@@ -202,6 +203,30 @@ def test_an_integrator_at_a_limit_below_the_break_away_is_at_rest() -> None:
     assert found.verdict == "at rest"
 
 
+def test_an_unstable_loop_is_named_with_its_frequency() -> None:
+    """A rigid drive under a proportional speed loop with one sample time of delay: the limit is 2 (sqrt 2 - 1) J/T, at f_s/8."""
+    T, J = 125e-6, 1e-4
+    limit = 2.0 * (math.sqrt(2.0) - 1.0) * J / T
+    motor = {"kind": "torque_source", "shaft": "rotor", "rotor_inertia": J, "rated_torque": 0.5}
+
+    def found(gain: float) -> Any:
+        controller = {"sample_time": T, "encoder": {"ideal": True}, "speed": {"gain": gain}}
+        scenario = lm.TrainScenario(
+            shafts={"rotor": {}},
+            motors={"m": motor},
+            controllers={"m": controller | {"reference": {"kind": "speed", "mean": 1.0}}},
+            simulation={"duration": 0.1, "sample_interval": 1e-3},
+        )
+        axis = axis_of(scenario)
+        return instability(axis, regimes(axis)[0])
+
+    assert found(0.999 * limit) is None
+    above = found(1.001 * limit)
+    assert (above.loop, above.regime) == ("speed", "rigid")
+    assert above.frequency == pytest.approx(1000.0, rel=1e-3)
+    assert above.growth > 0.0
+
+
 ROTARY_TABLE = {
     "motor": {
         "kind": "dc",
@@ -242,6 +267,18 @@ def rotary_table(**changes: Any) -> lm.Scenario:
         "current": {"kind": "pi"},
     }
     return lm.Scenario(**ROTARY_TABLE, controller=controller | changes)
+
+
+def test_a_loop_that_outer_loops_damp_is_no_instability() -> None:
+    """An undamped mesh grows under the current loop alone, whose back-e.m.f. comes late; the speed loop damps it, as the run shows."""
+    tuned = lm.tune(rotary_table(), rule="suited").scenario
+    report = lm.commission(tuned)
+    alone = next(row for row in report.loops if (row.loop, row.regime) == ("current", "stiffness"))
+    assert not alone.margins.stable
+    assert alone.verdict == "with outer loops"
+    assert report.stable
+    r = lm.simulate(tuned, duration=10.0, energy=False)
+    assert np.ptp(r.load_angle.values[r.time.values > 8.0]) == 0.0
 
 
 def test_hunting_through_the_gap_is_found_and_rest_without_it() -> None:

@@ -123,6 +123,7 @@ if TYPE_CHECKING:
     from .servo.hunting import hunting_map as hunting_map
     from .servo.hunting import limit_cycle as limit_cycle
     from .servo.margins import Bandwidth as Bandwidth
+    from .servo.margins import Instability as Instability
     from .servo.margins import Margins as Margins
     from .servo.motion import AtRest as AtRest
     from .servo.motion import Following as Following
@@ -244,6 +245,7 @@ _HOMES = {
     "servo.hunting": ("Hunting", "hunting_map", "limit_cycle"),
     "servo.margins": (
         "Bandwidth",
+        "Instability",
         "Margins",
     ),
     "servo.motion": ("AtRest", "Following", "LimitCycle", "Settling", "StepResponse"),

@@ -47,8 +47,8 @@ def servo(
 ) -> None:
     """Commission a servo axis: margins, bandwidths, steps, following, settling, stiffness, limit cycle.
 
-    Writes servo.html (one page), its figures as PNG and SVG, and their data and the margins as CSV. Exit code 1 if a loop is
-    unstable in one of its regimes; the page is written all the same.
+    Writes servo.html (one page), its figures as PNG and SVG, and their data and the margins as CSV. Exit code 1 if the
+    complete loop is unstable in one of its regimes; the page is written all the same.
 
     \b
     lostmotion servo position-axis
@@ -79,8 +79,7 @@ def servo(
     _print_summary(loaded.title or Path(scenario).stem, report)
     print(f"The sheet is at {page}")
     if not report.stable:
-        names = [f"{row.loop} ({row.regime})" for row in report.loops if not row.margins.stable]
-        fail(f"unstable: {', '.join(names)}")
+        fail(f"unstable: {'; '.join(map(str, report.instabilities()))}")
 
 
 def _print_summary(title: str, report: ServoReport) -> None:

@@ -35,6 +35,6 @@ def _view(sheet: LoopSheet, meaning: str) -> dict[str, Any]:
         "loop": sheet.loop,
         "regime": sheet.regime,
         "meaning": meaning,
-        "stable": m.stable,
+        "stable": sheet.unstable is None,
         **{name: value if math.isfinite(value) else None for name, value in numbers.items()},
     }

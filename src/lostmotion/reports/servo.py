@@ -62,7 +62,7 @@ def _loop_row(row: LoopSheet) -> list[str]:
         m.gain_margin_frequency,
     )
     more = (DEGREES * m.phase_margin, m.crossover, m.sensitivity_peak, m.sensitivity_peak_frequency)
-    return [row.loop, row.regime, "yes" if m.stable else "NO", *(_text(x) for x in (*numbers, *more))]
+    return [row.loop, row.regime, row.verdict, *(_text(x) for x in (*numbers, *more))]
 
 
 def _text(value: float) -> str:

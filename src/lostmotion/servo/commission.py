@@ -15,7 +15,7 @@ from ..inputs.quantities import Angle
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from ..units.practical import practical
-from .margins import Bandwidth, Margins, bandwidth_of, frequencies, margins
+from .margins import Bandwidth, Instability, Margins, bandwidth_of, frequencies, instability, margins
 from .motion import (
     STEPPED,
     Following,
@@ -51,6 +51,15 @@ class LoopSheet:
     """L(exp(j w T))"""
     closed_loop: np.ndarray
     """as of bandwidth"""
+    unstable: Instability | None
+    """of the complete loop, where this one alone has a pole outside the unit circle"""
+
+    @property
+    def verdict(self) -> str:
+        """ "yes", "NO", or "with outer loops" of a loop that is stable only with those around it closed."""
+        if self.margins.stable:
+            return "yes"
+        return "NO" if self.unstable is not None else "with outer loops"
 
 
 @dataclass(frozen=True)
@@ -92,8 +101,12 @@ class ServoReport:
 
     @property
     def stable(self) -> bool:
-        """Whether each loop is stable in each regime."""
-        return all(row.margins.stable for row in self.loops)
+        """Whether the complete loop is stable in each regime."""
+        return not self.instabilities()
+
+    def instabilities(self) -> list[Instability]:
+        """Poles of the complete loop outside the unit circle, one for each regime that has some."""
+        return list(dict.fromkeys(row.unstable for row in self.loops if row.unstable is not None))
 
     def motion_rows(self) -> list[tuple[str, str]]:
         """Following, settling, stiffness and rest, as (what, value)."""
@@ -210,16 +223,18 @@ def loop_sheet(axis: Axis, regime: Regime, loop: str) -> LoopSheet:
     )
     if loop == c.reference.kind and any(ahead):
         fed = bandwidth_of(f, partial(closed.closed_loop, feedforward=True))
+    own = margins(cut, closed)
     return LoopSheet(
         loop,
         regime.name,
         closed.sample_time,
-        margins(cut, closed),
+        own,
         bandwidth_of(f, closed.closed_loop),
         fed,
         f,
         cut.open_loop(f),
         closed.closed_loop(f),
+        None if own.stable else instability(axis, regime),
     )
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from .regimes import Axis, Regime
 from .sampled import SampledLoop
 
 Response = Callable[[Any], np.ndarray]
@@ -23,7 +24,7 @@ class Margins:
     """Margins of a loop; NaN where a curve does not cross."""
 
     stable: bool
-    """the closed loop: all eigenvalues over one sample time within the unit circle"""
+    """the closed loop with those around it open: all eigenvalues over one sample time within the unit circle"""
     gain_margin: float
     """least factor above 1 by which the gain may rise"""
     gain_margin_frequency: float
@@ -55,6 +56,43 @@ class Bandwidth:
     """where the phase first falls through -90 degrees [Hz]"""
     resonance_peak: float
     """greatest gain"""
+
+
+@dataclass(frozen=True)
+class Instability:
+    """A pole of the complete sampled loop outside the unit circle."""
+
+    loop: str
+    """whose closing causes it: without this loop and those around it all poles are within"""
+    regime: str
+    magnitude: float
+    """of the pole, over the sample time of the outermost loop"""
+    frequency: float
+    """[Hz]"""
+    growth: float
+    """rate at which its motion grows [1/s]"""
+
+    def __str__(self) -> str:
+        return (
+            f"{self.loop} ({self.regime}): a pole of magnitude {self.magnitude:.6g} at {self.frequency:.4g} Hz, caused by the "
+            f"{self.loop} loop, grows with {self.growth:.3g} 1/s"
+        )
+
+
+def instability(axis: Axis, regime: Regime) -> Instability | None:
+    """What is unstable with all loops of an axis closed; None where nothing is."""
+    found = None
+    for loop in reversed(axis.loops):
+        closed = SampledLoop(axis, regime, loop, False)
+        values = np.linalg.eigvals(closed.transition)
+        pole = complex(values[np.argmax(np.abs(values))])
+        if abs(pole) < STABLE:
+            break
+        frequency = abs(float(np.angle(pole))) / (2.0 * math.pi * closed.sample_time)
+        growth = math.log(abs(pole)) / closed.sample_time
+        outer = found or Instability(loop, regime.name, abs(pole), frequency, growth)
+        found = replace(outer, loop=loop)
+    return found
 
 
 def frequencies(*loops: SampledLoop) -> np.ndarray:
