@@ -4,10 +4,12 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from importlib.util import find_spec
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -39,6 +41,26 @@ def large() -> Path:
 @pytest.fixture(scope="session")
 def small() -> Path:
     return ROOT / "scenarios" / "paper-2dof-nl-small.toml"
+
+
+def for_all(cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[[], None]]:
+    """A test of many small cases that reports all failures at once; a tuple gives several arguments."""
+
+    def wrap(check: Callable[..., None]) -> Callable[[], None]:
+        def test() -> None:
+            failures = []
+            for case in cases:
+                arguments = case if isinstance(case, tuple) else (case,)
+                try:
+                    check(*arguments)
+                except (Exception, pytest.fail.Exception) as failure:
+                    failures.append(f"{arguments!r:.200}: {type(failure).__name__}: {failure}")
+            assert not failures, "\n".join([f"{len(failures)} cases fail:", *failures])
+
+        test.__name__, test.__doc__, test.__module__ = check.__name__, check.__doc__, check.__module__
+        return test
+
+    return wrap
 
 
 def installed_builds() -> list[str]:

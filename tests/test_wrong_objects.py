@@ -17,6 +17,7 @@ import scipy.signal
 import xarray as xr
 
 import lostmotion as lm
+from conftest import for_all
 from lostmotion.identification.parameters import FreeParameter
 from lostmotion.inputs.part import Part
 from lostmotion.studies.select import Selection
@@ -195,7 +196,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize("name", names())
+@for_all(names())
 def test_an_exported_name_refuses_wrong_objects_by_place(name: str) -> None:
     exported = getattr(lm, name)
     for wrong in WRONG:
@@ -203,9 +204,7 @@ def test_an_exported_name_refuses_wrong_objects_by_place(name: str) -> None:
         refused_plainly(lambda wrong=wrong: exported(wrong, wrong), f"{name}(two of {wrong!r:.30})")
 
 
-@pytest.mark.parametrize(
-    "name", [n for n in names() if inspect.isclass(getattr(lm, n)) and issubclass(getattr(lm, n), Part)]
-)
+@for_all(n for n in names() if inspect.isclass(getattr(lm, n)) and issubclass(getattr(lm, n), Part))
 def test_a_part_refuses_wrong_objects_under_each_key(name: str) -> None:
     part = getattr(lm, name)
     for key in part.model_fields:
@@ -215,7 +214,7 @@ def test_a_part_refuses_wrong_objects_under_each_key(name: str) -> None:
         refused_plainly(lambda wrong=wrong: part.model_validate(wrong), f"{name}.model_validate({wrong!r:.30})")
 
 
-@pytest.mark.parametrize("name", CALLS)
+@for_all(CALLS)
 def test_each_argument_of_a_function_is_checked(name: str) -> None:
     function, good = CALLS[name]
     if name not in SLOW | {"load_study", "open_result", "Scenario.from_json"}:
@@ -240,7 +239,7 @@ SCALARS: list[Callable[[Any], Any]] = [
 SCALARS_OF_FLOATS: list[Callable[[Any], Any]] = [*SCALARS, np.float32, np.longdouble, Fraction, Decimal]
 
 
-@pytest.mark.parametrize("name", [n for n in CALLS if n not in SLOW])
+@for_all(n for n in CALLS if n not in SLOW)
 def test_a_number_of_any_library_is_taken_where_one_of_python_is(name: str) -> None:
     function, good = CALLS[name]
     for key, value in good.items():
@@ -294,7 +293,7 @@ NEARLY = [
 ]
 
 
-@pytest.mark.parametrize(("value", "sentence"), NEARLY, ids=[s for _, s in NEARLY])
+@for_all(NEARLY)
 def test_what_is_nearly_a_number_is_refused_with_the_reason(value: Any, sentence: str) -> None:
     train, drive = lm.Simulation(TRAIN), lm.Simulation(SCENARIO)
     calls: list[tuple[str, Callable[[], Any]]] = [
@@ -341,7 +340,7 @@ SENTENCES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("call", "sentence"), SENTENCES, ids=[s for _, s in SENTENCES])
+@for_all(SENTENCES)
 def test_what_is_wanted_is_said(call: Callable[[], Any], sentence: str) -> None:
     with pytest.raises(lm.InputError, match=re.escape(sentence)):
         call()
@@ -377,7 +376,7 @@ MISSPELT: list[tuple[Callable[[], Any], str]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("call", "sentence"), MISSPELT, ids=[s for _, s in MISSPELT])
+@for_all(MISSPELT)
 def test_a_misspelt_argument_is_told_with_its_function(call: Callable[[], Any], sentence: str) -> None:
     with pytest.raises(lm.InputError, match=re.escape(sentence)) as caught:
         call()
