@@ -620,7 +620,7 @@ def test_an_unreadable_file_is_refused(tmp_path: Path, monkeypatch: pytest.Monke
     def refuse(*_: object, **__: object) -> str:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_text", refuse)  # a test that runs as root could read anything
+    monkeypatch.setattr(Path, "open", refuse)  # a test that runs as root could read anything
     with pytest.raises(lm.InputError, match=r"secret\.toml: cannot be read: Permission denied"):
         lm.load(path)
 

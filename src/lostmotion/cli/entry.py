@@ -94,11 +94,33 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _limit_memory(text: str | None) -> None:
+    """Take the limit for this command and for the processes that it starts."""
+    if text is None:
+        return
+    from ..inputs.limits import VARIABLE, size_of
+
+    try:
+        size_of(text)
+    except ValueError as error:
+        raise typer.BadParameter(f'"{text}" {error}') from None
+    os.environ[VARIABLE] = text
+
+
 @app.callback()
 def common(
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
+    memory: Annotated[
+        str | None,
+        typer.Option(
+            "--memory",
+            metavar="SIZE",
+            callback=_limit_memory,
+            help='Memory that one input file may need, such as "2 GB" (512 MiB; a saved result 4 GiB).',
+        ),
+    ] = None,
 ) -> None:
     """Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly."""
 

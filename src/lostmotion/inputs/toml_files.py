@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from .limits import read_text
 
+PER_BYTE = 16  # bytes of memory for each byte of a TOML file, measured
 RESULTS = (".nc", ".csv", ".parquet")  # endings of saved results
 MAX_LEVELS = 50  # of tables and lists within each other
 MAX_NAME = 200  # characters of the name of a file that is shown
@@ -43,7 +45,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     if path.suffix in RESULTS and os.path.isfile(path):
         raise InputError(f"{path}: has the ending of a saved result; {what} is a TOML file (.toml)")
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path, per_byte=PER_BYTE)
     except IsADirectoryError:
         raise InputError(f"{path}: is a directory; name a file of {what} (.toml)") from None
     except FileNotFoundError:

@@ -14,6 +14,8 @@ import numpy as np
 from ..atomic_writer import write_whole
 from ..errors import InputError, need
 from ..inputs.arguments import checked
+from ..inputs.hdf5_files import datasets
+from ..inputs.limits import RESULT, check_memory, read_text
 from ..inputs.toml_files import in_short
 from .results import labelled, recorded_variables
 from .switchings import ATTRIBUTE as SWITCHINGS
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     import xarray
 
 FORMATS = {".nc": "NetCDF", ".csv": "CSV", ".parquet": "Parquet"}
+PARQUET_NUMBERS = ("DOUBLE", "FLOAT", "INT32", "INT64", "BOOLEAN")
+PER_BYTE = 4  # bytes of memory for each byte of a result in CSV
 
 
 def check_output(path: str | Path) -> Path:
@@ -74,7 +78,7 @@ def open_result(path: str | Path) -> xarray.Dataset:
     Raises
     ------
     InputError
-        The file is not such a result.
+        The file is not such a result, or needs more memory than the limit.
     """
     path = Path(path)
     readers = {".nc": _read_netcdf, ".csv": _read_csv, ".parquet": _read_parquet}
@@ -113,8 +117,11 @@ def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
 
 def _read_netcdf(path: Path) -> xarray.Dataset:
     import h5netcdf
+    import h5py
     import xarray as xr
 
+    with h5py.File(path, "r") as raw:
+        datasets(path, raw, RESULT, depth=1)
     with xr.open_dataset(path, engine="h5netcdf") as opened:
         result = opened.load()
     with h5netcdf.File(path) as file:
@@ -168,15 +175,13 @@ def _write_csv(dataset: xarray.Dataset, path: Path) -> None:
 
 
 def _read_csv(path: Path) -> xarray.Dataset:
-    with path.open(encoding="utf-8") as file:
-        first = file.readline()
-        names = [cell.split(" [")[0] for cell in file.readline().strip().split(",")]
-        if not first.startswith("# lostmotion "):
-            raise InputError(f"{path}: is no result of lostmotion; its first line does not say so")
-        lines = file.readlines()
-        if not lines or not lines[-1].endswith("\n"):
-            raise InputError(_damaged(path))
-        table = np.loadtxt(lines, delimiter=",", ndmin=2)
+    first, heading, *lines = read_text(path, per_byte=PER_BYTE, default=RESULT).splitlines(keepends=True)
+    names = [cell.split(" [")[0] for cell in heading.strip().split(",")]
+    if not first.startswith("# lostmotion "):
+        raise InputError(f"{path}: is no result of lostmotion; its first line does not say so")
+    if not lines or not lines[-1].endswith("\n"):
+        raise InputError(_damaged(path))
+    table = np.loadtxt(lines, delimiter=",", ndmin=2)
     return _assemble(first.removeprefix("# lostmotion "), dict(zip(names, table.T.copy(), strict=True)), path)
 
 
@@ -192,6 +197,11 @@ def _write_parquet(dataset: xarray.Dataset, path: Path) -> None:
 def _read_parquet(path: Path) -> xarray.Dataset:
     import pyarrow.parquet as pq
 
-    table = pq.read_table(path)
+    with pq.ParquetFile(path) as file:
+        about = file.metadata
+        check_memory(16.0 * about.num_rows * about.num_columns, str(path), RESULT)
+        if any(about.schema.column(k).physical_type not in PARQUET_NUMBERS for k in range(about.num_columns)):
+            raise InputError(f"{path}: is no result of lostmotion; it has columns without numbers")
+        table = file.read()
     header = (table.schema.metadata or {}).get(b"lostmotion", b"")
     return _assemble(header.decode(), {name: table[name].to_numpy() for name in table.column_names}, path)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import io
 import re
 from contextlib import suppress
 from pathlib import Path
 
 from ..errors import InputError
+from ..inputs.limits import read_text
 from ..inputs.validation import shown
 from ..units.conversion import to_si
 from ..units.grammar import UnknownUnitError, plain, read_unit
@@ -22,9 +24,8 @@ def read_series(path: Path, unit: str) -> tuple[list[float], list[float]]:
         With one line that names the file, the line and the remedy.
     """
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = csv.reader(file)
-            rows = [(lines.line_num, row) for row in lines if row and not row[0].startswith("#")]
+        lines = csv.reader(io.StringIO(read_text(path), newline=""))
+        rows = [(lines.line_num, row) for row in lines if row and not row[0].startswith("#")]
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error):

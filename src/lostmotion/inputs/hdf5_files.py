@@ -1,0 +1,86 @@
+"""What an HDF5 file asks of its reader, checked before anything of it is read."""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from .limits import LOG, check_memory
+
+DEFLATE, SHUFFLE, CHECKSUM, LZF = 1, 2, 3, 32000
+FILTERS = {DEFLATE, SHUFFLE, CHECKSUM, LZF}
+EXPANSION = 1032  # bytes that deflate makes of one, at most
+
+
+def datasets(path: Path, file: Any, limit: int = LOG, depth: int = 0) -> dict[str, Any]:
+    """Datasets of an open file by their paths, if all of them fit into memory.
+
+    Parameters
+    ----------
+    file
+        ``h5py.File``.
+    limit
+        Default of the memory limit [bytes].
+    depth
+        Levels of groups below the root whose datasets are wanted.
+
+    Raises
+    ------
+    InputError
+        The file announces or contains more data than the limit, or refers to other files.
+    """
+    found: dict[str, Any] = {}
+    _collect(path, file, "", found, depth)
+    texts = sum(node.size for node in found.values() if node.dtype.hasobject)  # each may be as long as the file
+    check_memory(texts * path.stat().st_size + sum(map(_needed, found.values())), str(path), limit)
+    for node in found.values():
+        _check_filters(path, node, limit)
+    return found
+
+
+def _collect(path: Path, group: Any, where: str, found: dict[str, Any], depth: int) -> None:
+    import h5py
+
+    for name in group:
+        at = f"{where}{name}"
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise InputError(f"{path}: {at}: is a link to another place or file; save the data itself")
+        node = group[name]
+        if isinstance(node, h5py.Group) and depth > 0:
+            _collect(path, node, f"{at}/", found, depth - 1)
+        elif isinstance(node, h5py.Dataset):
+            if node.is_virtual or node.external:
+                raise InputError(f"{path}: {at}: refers to data in other files; save the data itself")
+            found[at] = node
+
+
+def _needed(node: Any) -> float:
+    """Bytes that a dataset needs, and those of one of its chunks while it is decompressed."""
+    chunk = 1.0
+    for length in node.chunks or (0,):
+        chunk *= length
+    return float(node.nbytes + chunk * node.dtype.itemsize)
+
+
+def _check_filters(path: Path, node: Any, limit: int) -> None:
+    """Refuse chunks that decompress to more than they announce; the library would take memory for them without limit."""
+    properties = node.id.get_create_plist()
+    used = {properties.get_filter(k)[0] for k in range(properties.get_nfilters())}
+    if not used <= FILTERS:
+        raise InputError(f"{path}: {node.name}: is compressed by a filter other than deflate; save it with deflate")
+    if DEFLATE not in used:
+        return
+    for k in range(node.id.get_num_chunks()):
+        chunk = node.id.get_chunk_info(k)
+        check_memory(chunk.size, f"{path}: {node.name}", limit)
+        _, content = node.id.read_direct_chunk(chunk.chunk_offset)
+        announced = _needed(node) + 4.0  # of a checksum
+        if len(content) * EXPANSION > announced and not chunk.filter_mask:
+            try:
+                made = len(zlib.decompressobj().decompress(content, int(announced) + 1))
+            except zlib.error:
+                continue  # the library reports it
+            if made > announced:
+                raise InputError(f"{path}: {node.name}: has a chunk that is longer than it announces; save it again")
