@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import io
+import math
+import struct
+import zlib
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, need
+from ..inputs.hdf5_files import datasets
+from ..inputs.limits import check_memory, memory_limit
 from ..inputs.validation import did_you_mean
+from .conversions import conversion_of
 from .logs import Channel, Log, as_number
+from .mdf_blocks import check_mdf_blocks
 
+MATLAB_NUMBERS = {*(f"{u}int{n}" for u in ("", "u") for n in (8, 16, 32, 64)), "double", "single", "char", "logical"}
+COMPRESSED = 15  # type of an element of a MATLAB file
+PIECE = 2**20  # [bytes] that are decompressed at once
+ALGEBRAIC = 3  # type of a conversion of MDF 4
+MDF_NUMBERS = range(6)  # data types of MDF 4: integers and floating-point numbers of both byte orders
 TIME_NAMES = ("time", "t", "timestamp", "times", "tm")
 
 
@@ -40,11 +53,37 @@ def _mat5_variables(path: Path) -> dict[str, Any]:
     need("scipy", "Reading MATLAB files", "identify")
     import scipy.io
 
+    check_memory(_mat5_bytes(path), str(path))
     try:
-        data = scipy.io.loadmat(str(path), squeeze_me=True)
+        listed = [(name, shape) for name, shape, kind in scipy.io.whosmat(str(path)) if kind in MATLAB_NUMBERS]
+        check_memory(8.0 * sum(math.prod(shape) for _, shape in listed), str(path))
+        data = scipy.io.loadmat(str(path), squeeze_me=True, variable_names=[name for name, _ in listed])
+    except InputError:
+        raise
     except Exception as error:  # the library raises what its parts raise
         raise InputError(f"{path}: is not a MATLAB file ({error}); save it with -v7 or -v7.3") from None
     return {name: value for name, value in data.items() if not name.startswith("__")}
+
+
+def _mat5_bytes(path: Path) -> int:
+    """Bytes that the compressed elements of a file hold, at most one more than the memory limit; 0 of other versions."""
+    total, limit = 0, memory_limit()
+    with path.open("rb") as file:
+        order = {b"IM": "<", b"MI": ">"}.get(file.read(128)[126:])
+        while order and len(tag := file.read(8)) == 8:
+            kind, length = struct.unpack(f"{order}II", tag)
+            if kind != COMPRESSED:
+                file.seek(length, io.SEEK_CUR)
+                continue
+            stream = zlib.decompressobj()
+            content = file.read(length)
+            try:
+                while content and total <= limit:
+                    total += len(stream.decompress(content, PIECE))
+                    content = stream.unconsumed_tail
+            except zlib.error:
+                return total  # the library reports it
+    return total
 
 
 def _hdf5_variables(path: Path) -> dict[str, Any]:
@@ -54,18 +93,23 @@ def _hdf5_variables(path: Path) -> dict[str, Any]:
     found: dict[str, Any] = {}
     try:
         with h5py.File(path, "r") as file:
-            for name, node in file.items():
-                if isinstance(node, h5py.Dataset):
-                    value = np.squeeze(node[()])
-                    text = node.attrs.get("MATLAB_class", b"") == b"char"
-                    found[name] = "".join(map(chr, np.atleast_1d(value))) if text else value
-    except OSError as error:
+            for name, node in datasets(path, file).items():
+                if node.dtype.kind not in "biuf":
+                    continue
+                value = np.squeeze(node[()])
+                text = node.attrs.get("MATLAB_class", b"") == b"char"
+                found[name] = "".join(map(chr, np.atleast_1d(value))) if text else value
+    except InputError:
+        raise
+    except Exception as error:  # the library raises what its parts raise
         raise InputError(f"{path}: is not a MATLAB 7.3 file ({error})") from None
     return found
 
 
 def read_parquet_log(path: Path, *, time: str = "") -> Log:
     """Of a Parquet table; a field's metadata ``unit`` is the unit of its column, other metadata of the table the header.
+
+    Columns without numbers are not read.
 
     Raises
     ------
@@ -75,12 +119,22 @@ def read_parquet_log(path: Path, *, time: str = "") -> Log:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    def is_read(kind: pa.DataType) -> bool:
+        types = pa.types
+        return bool(
+            types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind) or types.is_timestamp(kind)
+        )
+
     try:
-        table = pq.read_table(path)
+        with pq.ParquetFile(path) as file:
+            schema = file.schema_arrow
+            names = [field.name for field in schema if is_read(field.type)]
+            check_memory(16.0 * len(names) * file.metadata.num_rows, str(path))
+            table = file.read(names)
     except (OSError, pa.ArrowException) as error:
         raise InputError(f"{path}: is not a Parquet file ({error})") from None
-    units = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in table.schema}
-    header = {k.decode(): v.decode() for k, v in (table.schema.metadata or {}).items() if not k.startswith(b"ARROW")}
+    units = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in schema}
+    header = {k.decode(): v.decode() for k, v in (schema.metadata or {}).items() if not k.startswith(b"ARROW")}
     columns: dict[str, Any] = {}
     for name in table.column_names:
         column = table.column(name)
@@ -97,6 +151,8 @@ def read_parquet_log(path: Path, *, time: str = "") -> Log:
 def read_mdf_log(path: Path, *, time: str = "") -> Log:
     """Of an MDF 4 file by asammdf: all channels at the instants of the channel `time`, or of the first.
 
+    Algebraic conversions are read by `conversion_of`. Databases of buses that a file attaches are not read.
+
     Raises
     ------
     InputError
@@ -104,10 +160,16 @@ def read_mdf_log(path: Path, *, time: str = "") -> Log:
     need("asammdf", "Reading MDF files", "identify")
     import asammdf
 
+    check_mdf_blocks(path)
     try:
-        with asammdf.MDF(path) as file:
-            masters = {file.groups[k].channels[m].name for k, m in file.masters_db.items()}
-            signals = [file.get(name) for name in file.channels_db if name not in masters]
+        with asammdf.MDF(path, process_bus_logging=False) as file:  # type: ignore[call-arg]
+            formulas = _formulas(path, file)
+            _check_mdf_memory(path, file)
+            masters = {(k, m) for k, m in file.masters_db.items()}
+            places = {name: at for name, at in file.channels_db.items() if not masters.intersection(at)}
+            signals = [_signal(file, name, at, formulas) for name, at in places.items() if _is_plain(file, at[0])]
+    except InputError:
+        raise
     except Exception as error:  # the library raises what its parts raise
         raise InputError(f"{path}: is not an MDF file that asammdf reads ({error})") from None
     numbers = [signal for signal in signals if signal.samples.dtype.kind in "biuf" and signal.samples.ndim == 1]
@@ -121,8 +183,66 @@ def read_mdf_log(path: Path, *, time: str = "") -> Log:
     return Log(path.name, clock - clock[0], channels)
 
 
+Formulas = dict[tuple[int, int], Callable[[np.ndarray], np.ndarray]]
+
+
+def _formulas(path: Path, file: Any) -> Formulas:
+    """Algebraic conversions by group and channel; they are taken out of the file, so that its library evaluates none."""
+    found: Formulas = {}
+    for k, group in enumerate(file.groups):
+        for n, channel in enumerate(group.channels):
+            rule = channel.conversion
+            if rule is None:
+                continue
+            try:
+                if rule.conversion_type == ALGEBRAIC:
+                    found[k, n] = conversion_of(rule.formula)
+                    channel.unit = channel.unit or rule.unit
+                    channel.conversion = None
+                elif _has_formula(rule):
+                    raise ValueError("is a table with a formula in it, which is not supported")
+            except ValueError as error:
+                raise InputError(f"{path}: channel {channel.name}: its conversion {error}") from None
+    return found
+
+
+def _has_formula(rule: Any) -> bool:
+    inner = [one for one in (rule.referenced_blocks or {}).values() if hasattr(one, "conversion_type")]
+    return any(one.conversion_type == ALGEBRAIC or _has_formula(one) for one in inner)
+
+
+def _check_mdf_memory(path: Path, file: Any) -> None:
+    """Refuse channels that need more memory than the limit: raw values, physical ones, and instants of each."""
+    needed = 0.0
+    for group in file.groups:
+        about = group.channel_group
+        record = about.samples_byte_nr + about.invalidation_bytes_nr
+        needed += float(about.cycles_nr) * (record + 24.0 * len(group.channels))
+    check_memory(needed, str(path))
+
+
+def _is_plain(file: Any, at: tuple[int, int]) -> bool:
+    """Whether a channel holds one number for each instant, by what its block says."""
+    channel = file.groups[at[0]].channels[at[1]]
+    return channel.data_type in MDF_NUMBERS and not file.groups[at[0]].channel_dependencies[at[1]]
+
+
+def _signal(file: Any, name: str, at: Sequence[tuple[int, int]], formulas: Formulas) -> Any:
+    """Physical values of a channel at their instants."""
+    signal = file.get(name)  # refuses a name that several groups have
+    group, place = at[0]
+    if (group, place) in formulas:
+        signal.samples = formulas[group, place](signal.samples)
+    master = (group, file.masters_db.get(group))
+    if master in formulas:
+        signal.timestamps = formulas[master](signal.timestamps)
+    return signal
+
+
 def read_tdms_log(path: Path, *, time: str = "") -> Log:
     """Of a TDMS file by npTDMS: the channels of all groups; their time is a channel, or increments of the waveform.
+
+    Channels without numbers are not read.
 
     Raises
     ------
@@ -131,19 +251,23 @@ def read_tdms_log(path: Path, *, time: str = "") -> Log:
     need("nptdms", "Reading TDMS files", "identify")
     import nptdms
 
-    try:
-        file = nptdms.TdmsFile.read(path)
-    except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not a TDMS file ({error})") from None
     variables: dict[str, Any] = {}
     units = {}
-    for group in file.groups():
-        for channel in group.channels():
-            variables[channel.name] = np.asarray(channel[:])
-            units[channel.name] = str(channel.properties.get("unit_string", ""))
-            if "wf_increment" in channel.properties and not any(name in variables for name in TIME_NAMES):
-                variables["time"] = channel.time_track()
-    variables |= {name: value for name, value in file.properties.items() if isinstance(value, int | float | str)}
+    try:
+        with path.open("rb") as stream, nptdms.TdmsFile.open(stream) as file:
+            channels = [c for group in file.groups() for c in group.channels() if c.dtype.kind in "biuf"]
+            check_memory(sum(float(len(c)) * (c.dtype.itemsize + 8.0) for c in channels), str(path))
+            for channel in channels:
+                variables[channel.name] = np.asarray(channel[:])
+                units[channel.name] = str(channel.properties.get("unit_string", ""))
+                if "wf_increment" in channel.properties and not any(name in variables for name in TIME_NAMES):
+                    variables["time"] = channel.time_track()
+            properties = file.properties
+    except InputError:
+        raise
+    except Exception as error:  # the library raises what its parts raise
+        raise InputError(f"{path}: is not a TDMS file ({error})") from None
+    variables |= {name: value for name, value in properties.items() if isinstance(value, int | float | str)}
     return _of_variables(path, variables, units, time)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.limits import check_memory
 from .binary_logs import read_mat_log, read_mdf_log, read_parquet_log, read_tdms_log
 from .csv_log import read_csv_log
 from .logs import Log
@@ -26,6 +27,8 @@ TABLES: dict[str, Callable[..., Log]] = {
     ".db3": read_ros_bag,
 }
 ENDINGS = (".json", *TABLES)
+TEXTS = (".csv", ".txt", ".tsv", ".json")
+PER_BYTE = 8  # bytes of memory for each byte of a log in text; other formats announce what they need
 
 
 @checked
@@ -41,16 +44,19 @@ def read_log(path: str | Path, *, time: str = "") -> Log:
     Raises
     ------
     InputError
-        With one line that names the file and the remedy.
+        With one line that names the file and the remedy; also of a log that needs more memory than the limit.
     MissingLibraryError
         The library of the format is not installed.
     """
     path = Path(path)
     if path.is_dir():
         raise InputError(f"{path}: is a directory; name the logs in it")
-    if not path.is_file():
+    if not path.exists():
         raise InputError(f"{path}: there is no such file; check the name")
+    if not path.is_file():
+        raise InputError(f"{path}: is a device or a pipe; name a file")
     ending = path.suffix.lower()
+    check_memory((PER_BYTE if ending in TEXTS else 1) * path.stat().st_size, str(path))
     if ending == ".json":
         return read_servo_json(path, time=time)
     if ending not in TABLES:

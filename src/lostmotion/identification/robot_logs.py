@@ -2,31 +2,55 @@
 
 from __future__ import annotations
 
+import bz2
 import json
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, fields, is_dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from ..errors import InputError, need
+from ..inputs.limits import check_memory, memory_limit
 from .logs import Channel, Log, as_number
 
 Course = tuple[np.ndarray, np.ndarray]  # times of the messages [ns] and values
 STAMP = ".header.stamp"
 LONGEST_LIST = 100  # of numbers that are channels; longer ones are images, point clouds, maps
+LONGEST_DEFINITION = 200_000  # characters of the definition of a message
+MOST_ENTRIES = 10_000  # of fixed lists of words and messages in a definition
+MOST_LEVELS = 50  # of lists and objects inside of a message
+PER_MESSAGE = 1000  # bytes of memory for a message and its parts
+PER_CHARACTER = 10  # bytes of memory for a character of JSON
 
 
 @dataclass
 class Recording:
     """What a file holds: (time [ns], message) by topic, encodings of the topics that are left out, and its header."""
 
+    path: Path
     topics: dict[str, list[tuple[int, Any]]] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
     header: dict[str, Any] = field(default_factory=dict)
+    held: int = 0
+    """bytes of memory that its messages need, as estimated"""
+
+    def add(self, topic: str, at: int, decode: Callable[[bytes], Any] | None, data: bytes, encoding: str) -> None:
+        """Decode a message and keep it, if all messages together fit into the memory limit.
+
+        Raises
+        ------
+        InputError
+        """
+        if decode is None:
+            self.left_out[topic] = encoding or "of no stated encoding"
+            return
+        self.held += PER_MESSAGE + (PER_CHARACTER if encoding == "json" else 1) * len(data)
+        check_memory(self.held, str(self.path))
+        self.topics.setdefault(topic, []).append((at, _decoded(self.path, topic, decode, data)))
 
 
 def read_mcap_log(path: Path, *, time: str = "") -> Log:
@@ -91,7 +115,7 @@ def _log(path: Path, recording: Recording, time: str) -> Log:
     channels = {
         name: Channel(_at(instants, course, own=of == topic))
         for of, rows in topics.items()
-        for name, course in _courses(of, rows, long).items()
+        for name, course in _courses(path, of, rows, long).items()
     }
     if not channels:
         raise InputError(f"{path}: the messages of {', '.join(topics)} have no number")
@@ -108,31 +132,77 @@ def _log(path: Path, recording: Recording, time: str) -> Log:
 
 
 def _read_mcap(path: Path) -> Recording:
-    from mcap.reader import make_reader
+    from mcap import records
 
-    recording = Recording()
+    recording = Recording(path)
     decoders: dict[int, Callable[[bytes], Any] | None] = {}
+    channels: dict[int, Any] = {}
+    schemas: dict[int, Any] = {}
+    first: dict[str, int] = {}  # log time of the first message of each topic
     try:
         with path.open("rb") as file:
-            reader = make_reader(file)
-            for schema, channel, message in reader.iter_messages():
-                topic = channel.topic.strip("/")
-                if channel.id not in decoders:
-                    decoders[channel.id] = _decoder(path, topic, channel.message_encoding, schema)
-                decode = decoders[channel.id]
-                if decode is None:
-                    recording.left_out[topic] = channel.message_encoding or "of no stated encoding"
-                    continue
-                row = (message.publish_time, _decoded(path, topic, decode, message.data))
-                recording.topics.setdefault(topic, []).append(row)
-            recording.header = {k: as_number(v) for entry in reader.iter_metadata() for k, v in entry.metadata.items()}
+            for record in _mcap_records(path, file):
+                if isinstance(record, records.Schema):
+                    schemas[record.id] = record
+                elif isinstance(record, records.Channel):
+                    channels[record.id] = record
+                elif isinstance(record, records.Metadata):
+                    recording.header |= {k: as_number(v) for k, v in record.metadata.items()}
+                elif isinstance(record, records.Message):
+                    channel = channels[record.channel_id]
+                    topic = channel.topic.strip("/")
+                    if channel.id not in decoders:
+                        decoders[channel.id] = _decoder(
+                            path, topic, channel.message_encoding, schemas.get(channel.schema_id)
+                        )
+                    first[topic] = min(record.log_time, first.get(topic, record.log_time))
+                    recording.add(
+                        topic, record.publish_time, decoders[channel.id], record.data, channel.message_encoding
+                    )
     except (InputError, ImportError):
         raise
     except Exception as error:  # the library raises what its parts raise
         raise InputError(
             f"{path}: is not an MCAP file that mcap reads ({_line(error)}); if cut off, use `mcap recover`"
         ) from None
+    recording.topics = {topic: recording.topics[topic] for topic in sorted(recording.topics, key=lambda t: first[t])}
     return recording
+
+
+def _mcap_records(path: Path, file: BinaryIO) -> Iterator[Any]:
+    """Records in the order of the file, those of chunks included."""
+    from mcap.records import Chunk
+    from mcap.stream_reader import StreamReader, breakup_chunk
+
+    for record in StreamReader(file, emit_chunks=True, record_size_limit=memory_limit()).records:
+        if isinstance(record, Chunk):
+            check_memory(record.uncompressed_size, str(path))
+            content = _decompressed(record.compression, record.data, record.uncompressed_size)
+            if len(content) > record.uncompressed_size:
+                raise ValueError("a chunk is longer than it announces")
+            yield from breakup_chunk(replace(record, compression="", data=content))
+        else:
+            yield record
+
+
+def _decompressed(method: str, data: bytes, size: int) -> bytes:
+    """Content of a chunk, cut off one byte after the given size."""
+    if method == "zstd":
+        import zstandard
+
+        with zstandard.ZstdDecompressor().stream_reader(data) as stream:
+            content = stream.read(size + 1)
+    elif method == "lz4":
+        import lz4.frame  # type: ignore[import-untyped]
+
+        content = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+    elif method == "bz2":
+        content = bz2.BZ2Decompressor().decompress(data, max_length=size + 1)
+    elif method in ("", "none"):
+        content = data
+    else:
+        raise ValueError(f"compression {method!r} is not supported")
+    return bytes(content)
 
 
 def _decoder(path: Path, topic: str, encoding: str, schema: Any) -> Callable[[bytes], Any] | None:
@@ -142,17 +212,12 @@ def _decoder(path: Path, topic: str, encoding: str, schema: Any) -> Callable[[by
     if encoding not in ("cdr", "ros1") or schema is None or schema.encoding not in ("ros2msg", "ros2idl", "ros1msg"):
         return None
     need("rosbags", "Reading messages of ROS", "identify")
-    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+    from rosbags.typesys import Stores, get_typestore
     from rosbags.typesys.msg import normalize_msgtype
 
-    text = schema.data.decode(errors="replace")
     try:
         store = get_typestore(Stores.EMPTY)
-        if schema.encoding == "ros2idl":
-            for part in re.split(r"^=+\nIDL: \S+\n", text, flags=re.MULTILINE):
-                store.register(get_types_from_idl(part) if part.strip() else {})
-        else:
-            store.register(get_types_from_msg(text, schema.name))
+        store.register(_types(schema.data.decode(errors="replace"), schema.name, idl=schema.encoding == "ros2idl"))
         kind = normalize_msgtype(schema.name)
         store.get_msgdef(kind)
     except Exception as error:  # of a grammar
@@ -163,17 +228,79 @@ def _decoder(path: Path, topic: str, encoding: str, schema: Any) -> Callable[[by
     return partial(decode, typename=kind)
 
 
+def _types(text: str, name: str, *, idl: bool) -> dict[str, Any]:
+    """Types that a definition holds, checked before the library writes and runs code that reads them.
+
+    The library takes only letters, digits and underscores into names, and writes out values as literals. What it does
+    without limit is refused here: fixed lists of words or messages, for each entry of which it writes lines of code, lists
+    of messages without any byte, and shifts to numbers of any length.
+
+    Raises
+    ------
+    ValueError
+        The definition is too large; the library raises errors of its own where it cannot be read.
+    """
+    from rosbags.typesys import get_types_from_idl, get_types_from_msg
+
+    if len(text) > LONGEST_DEFINITION:
+        raise ValueError(f"it is longer than {LONGEST_DEFINITION} characters")
+    if idl and "<<" in text:
+        raise ValueError("it has a shift <<; write the number")
+    types: dict[str, Any] = {}
+    for part in re.split(r"^=+\nIDL: \S+\n", text, flags=re.MULTILINE) if idl else [text]:
+        if part.strip():
+            types |= get_types_from_idl(part) if idl else get_types_from_msg(part, name)
+    _check_lists(types)
+    return types
+
+
+def _check_lists(types: Mapping[str, Any]) -> None:
+    from rosbags.interfaces import Nodetype
+
+    empty: set[str] = set()  # messages without any byte
+
+    def is_empty(node: Any, inner: Any) -> bool:
+        if node == Nodetype.ARRAY:
+            return inner[1] == 0 or is_empty(*inner[0])
+        return node == Nodetype.NAME and inner in empty
+
+    before = -1
+    while len(empty) > before:
+        before = len(empty)
+        empty |= {kind for kind, (_, members) in types.items() if all(is_empty(*desc) for _, desc in members)}
+    entries = 0
+    for kind, (_, members) in types.items():
+        for member, (node, inner) in members:
+            if node not in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+                continue
+            (of, what), length = inner
+            if is_empty(of, what):
+                raise ValueError(f"{kind}.{member} is a list of messages without data")
+            if node == Nodetype.ARRAY and (of == Nodetype.NAME or what[0] in ("string", "wstring")):
+                entries += length
+    if entries > MOST_ENTRIES:
+        raise ValueError(f"its fixed lists of words or messages have more than {MOST_ENTRIES} entries")
+
+
 def _read_bag(path: Path) -> Recording:
+    from rosbags import rosbag1, rosbag2
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    recording = Recording()
+    recording = Recording(path)
     try:
+        if path.suffix.lower() == ".db3":
+            _check_tables(path)
+        with rosbag2.Reader(path) if path.suffix.lower() == ".db3" else rosbag1.Reader(path) as opened:
+            for connection in opened.connections:
+                _check_definition(path, connection)
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            for one in reader.readers:
+                if isinstance(one, rosbag1.Reader):
+                    one.chunks = {at: _bounded(path, chunk) for at, chunk in one.chunks.items()}
             for connection, at, data in reader.messages():
                 topic = connection.topic.strip("/")
-                message = _decoded(path, topic, partial(reader.deserialize, typ=connection.msgtype), data)
-                recording.topics.setdefault(topic, []).append((at, message))
+                recording.add(topic, at, partial(reader.deserialize, typ=connection.msgtype), data, "ros")
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
@@ -182,6 +309,47 @@ def _read_bag(path: Path) -> Recording:
             "`ros2 bag reindex`"
         ) from None
     return recording
+
+
+def _check_definition(path: Path, connection: Any) -> None:
+    from rosbags.interfaces import MessageDefinitionFormat
+
+    kind = connection.msgdef.format
+    if kind == MessageDefinitionFormat.NONE:
+        return
+    try:
+        _types(connection.msgdef.data, connection.msgtype, idl=kind == MessageDefinitionFormat.IDL)
+    except Exception as error:  # of a grammar
+        raise InputError(
+            f"{path}: topic {connection.topic.strip('/')}: the definition of {connection.msgtype} cannot be read "
+            f"({_line(error)}); record it again"
+        ) from None
+
+
+def _bounded(path: Path, chunk: Any) -> Any:
+    """A chunk of a bag of ROS 1 that is decompressed up to the memory limit; the library knows none."""
+    from rosbags.rosbag1.reader import decompressors
+
+    method = next(name for name, how in decompressors.items() if how is chunk.decompressor)
+
+    def decompress(data: bytes) -> bytes:
+        content = _decompressed(method, data, memory_limit())
+        check_memory(len(content), str(path))
+        return content
+
+    return chunk._replace(decompressor=decompress)
+
+
+def _check_tables(path: Path) -> None:
+    """Refuse a bag of ROS 2 whose database computes rows in place of holding them."""
+    import sqlite3
+    from contextlib import closing
+
+    with closing(sqlite3.connect(f"{path.resolve().as_uri()}?immutable=1", uri=True)) as database:
+        entries = database.execute("SELECT type, name, coalesce(sql, '') FROM sqlite_master").fetchall()
+    for kind, name, text in entries:
+        if kind not in ("table", "index") or re.search(r"\b(VIRTUAL|GENERATED|AS)\b", text, re.IGNORECASE):
+            raise ValueError(f"its database computes {name}; it must hold plain tables")
 
 
 def _decoded(path: Path, topic: str, decode: Callable[[bytes], Any], data: bytes) -> Any:
@@ -214,32 +382,49 @@ def _member(message: Any, name: str) -> Any:
     return message.get(name) if isinstance(message, dict) else getattr(message, name, None)
 
 
-def _courses(topic: str, rows: list[tuple[int, Any]], long: set[str]) -> dict[str, Course]:
+def _courses(path: Path, topic: str, rows: list[tuple[int, Any]], long: set[str]) -> dict[str, Course]:
     """By channel, NaN in messages that lack it; names of lists that are too long go to ``long``."""
     found: dict[str, np.ndarray] = {}
     for k, (_, message) in enumerate(rows):
-        for name, value in _numbers(message, topic, long):
-            found.setdefault(name, np.full(len(rows), np.nan))[k] = value
+        for name, value in _shallow(path, topic, message, long):
+            if name not in found:
+                check_memory(16.0 * len(rows) * (len(found) + 1), f"{path}: topic {topic}: {len(found) + 1} channels")
+                found[name] = np.full(len(rows), np.nan)
+            found[name][k] = value
     at = np.array([at for at, _ in rows], dtype=np.int64)
     return {name: (at, values) for name, values in found.items()}
 
 
-def _numbers(node: Any, name: str, long: set[str]) -> Iterator[tuple[str, float]]:
+def _shallow(path: Path, topic: str, message: Any, long: set[str]) -> Iterator[tuple[str, float]]:
+    try:
+        yield from _numbers(message, topic, long)
+    except RecursionError:
+        raise InputError(
+            f"{path}: topic {topic}: a message has more than {MOST_LEVELS} lists and objects inside of each other"
+        ) from None
+
+
+def _numbers(node: Any, name: str, long: set[str], levels: int = MOST_LEVELS) -> Iterator[tuple[str, float]]:
     """Of a message, those within lists and objects too; words are left out."""
+    if levels == 0:
+        raise RecursionError
     if isinstance(node, dict):
         for key, inner in node.items():
-            yield from _numbers(inner, f"{name}.{key}", long)
+            yield from _numbers(inner, f"{name}.{key}", long, levels - 1)
     elif is_dataclass(node):
         for part in fields(node):
-            yield from _numbers(getattr(node, part.name), f"{name}.{part.name}", long)
+            yield from _numbers(getattr(node, part.name), f"{name}.{part.name}", long, levels - 1)
     elif isinstance(node, list | np.ndarray):
         if len(node) > LONGEST_LIST:
             long.add(name)
             return
         for k, inner in enumerate(node):
-            yield from _numbers(inner, f"{name}[{k}]", long)
+            yield from _numbers(inner, f"{name}[{k}]", long, levels - 1)
     elif isinstance(node, int | float | np.number | np.bool_):
-        yield name, float(node)
+        try:
+            yield name, float(node)
+        except OverflowError:
+            yield name, float("inf")
 
 
 def _at(instants: np.ndarray, course: Course, *, own: bool) -> np.ndarray:
