@@ -1,5 +1,6 @@
 """Studies: designs, rows equal to single runs, interruption at any instant, executors, what they show."""
 
+import hashlib
 import json
 import math
 import os
@@ -345,6 +346,124 @@ def test_a_directory_of_another_study_is_left_alone(tmp_path: Path):
     (tmp_path / "p" / "mine.parquet").write_bytes(b"")
     with pytest.raises(InputError, match="of no study"):
         lm.study(make(runs=4), tmp_path / "p")
+
+
+SWAPPED = ("part-000000.parquet", "part-000001.parquet")
+
+
+def truncate(directory: Path) -> None:
+    part = directory / SWAPPED[1]
+    part.write_bytes(part.read_bytes()[:-100])
+
+
+def flip(directory: Path) -> None:
+    part = directory / SWAPPED[1]
+    content = bytearray(part.read_bytes())
+    content[len(content) // 3] ^= 1
+    part.write_bytes(content)
+
+
+def fill(directory: Path) -> None:
+    (directory / SWAPPED[1]).write_bytes(np.random.default_rng(1).bytes(5000))
+
+
+def empty(directory: Path) -> None:
+    (directory / SWAPPED[1]).write_bytes(b"")
+
+
+def swap(directory: Path) -> None:
+    first, second = (directory / name for name in SWAPPED)
+    content = first.read_bytes()
+    first.write_bytes(second.read_bytes())
+    second.write_bytes(content)
+
+
+def swap_with_checksums(directory: Path) -> None:
+    swap(directory)
+    sums = directory / "_checksums.txt"
+    sums.write_text(sums.read_text().replace("000000.p", "x").replace("000001.p", "000000.p").replace("x", "000001.p"))
+
+
+def from_another_study(directory: Path) -> None:
+    other = lm.study(make(design="random", runs=2 * CHUNK + 1, seed=9), directory.parent / "other")
+    for name in (SWAPPED[1], "_checksums.txt"):
+        (directory / name).write_bytes((other / name).read_bytes())
+
+
+def forget(directory: Path) -> None:
+    (directory / "_checksums.txt").write_bytes(b"\xff\x00 rubbish\n")
+
+
+@pytest.mark.parametrize(
+    ("harm", "said"),
+    [
+        (truncate, "part-000001.parquet: is damaged: its checksum differs"),
+        (flip, "part-000001.parquet: is damaged: its checksum differs"),
+        (fill, "part-000001.parquet: is damaged: its checksum differs"),
+        (empty, "part-000001.parquet: is damaged: its checksum differs"),
+        (swap, r"part-000000.parquet: is damaged: its checksum differs \(1 more parts are damaged\)"),
+        (swap_with_checksums, "part-000000.parquet: does not hold the runs 0 to 499"),
+        (
+            from_another_study,
+            "part-000001.parquet: (is damaged|belongs to another study)|part-000000.parquet: is damaged",
+        ),
+        (forget, "part-000000.parquet: has no line in _checksums.txt"),
+    ],
+)
+def test_damaged_parts_are_named_and_made_again(tmp_path: Path, harm, said: str):
+    study = make(design="random", runs=2 * CHUNK + 1)
+    directory = lm.study(study, tmp_path / "s")
+    whole = read_table(directory)
+    harm(directory)
+    for call in (lambda: read_table(directory), lambda: lm.study(study, directory)):
+        with pytest.raises(InputError, match=said) as caught:
+            call()
+        assert "study resume" in str(caught.value) and "--repair" in str(caught.value)
+    for command in (["show"], ["resume"]):
+        done = CliRunner().invoke(app, ["study", *command, str(directory)])
+        assert isinstance(done.exception, InputError)
+    done = CliRunner().invoke(app, ["study", "resume", str(directory), "--repair"])
+    assert done.exit_code == 0, done.output
+    assert read_table(directory).equals(whole)
+
+
+def test_only_damaged_parts_are_made_again(tmp_path: Path):
+    study = make(design="random", runs=2 * CHUNK + 1)
+    directory = lm.study(study, tmp_path / "s")
+    flip(directory)
+    before = {p.name: p.stat().st_mtime_ns for p in directory.glob("part-*.parquet")}
+    lm.study(study, directory, repair=True)
+    changed = [p.name for p in directory.glob("part-*.parquet") if before[p.name] != p.stat().st_mtime_ns]
+    assert changed == [SWAPPED[1]]
+    sums = [line.split() for line in (directory / "_checksums.txt").read_text().splitlines()]
+    assert {name: hashlib.sha256((directory / name).read_bytes()).hexdigest() for _, name in sums} == {
+        name: checksum for checksum, name in sums
+    }
+
+
+def test_a_part_that_no_run_of_the_study_is_in_is_refused(tmp_path: Path):
+    directory = lm.study(make(runs=4), tmp_path / "s")
+    (directory / "part-000007.parquet").write_bytes((directory / SWAPPED[0]).read_bytes())
+    with pytest.raises(InputError, match=r"part-000007\.parquet: is no part of this study; remove it"):
+        read_table(directory)
+    with pytest.raises(InputError, match="remove it"):
+        lm.study(make(runs=4), directory, repair=True)
+    assert (directory / "part-000007.parquet").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"\xff\xfe", b"[]", b'{"scenario": 3}', b"[" * 100_000])
+def test_a_damaged_note_is_restored_from_a_part(tmp_path: Path, content: bytes):
+    directory = lm.study(make(runs=4), tmp_path / "s")
+    whole = read_table(directory)
+    (directory / "_study.json").write_bytes(content)
+    for call in (lambda: read_table(directory), lambda: lm.study(make(runs=4), directory)):
+        with pytest.raises(
+            InputError, match=r"_study\.json: is damaged; `lostmotion study resume .* --repair` restores it"
+        ):
+            call()
+    done = CliRunner().invoke(app, ["study", "resume", str(directory), "--repair"])
+    assert done.exit_code == 0, done.output
+    assert read_table(directory).equals(whole)
 
 
 @pytest.mark.filterwarnings("default")

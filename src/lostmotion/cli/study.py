@@ -31,9 +31,12 @@ SchedulerOption = Annotated[
 
 
 def study(
-    what: Annotated[str, typer.Argument(metavar="STUDY.toml | show", help="Study file; or `show` and a directory.")],
+    what: Annotated[
+        str,
+        typer.Argument(metavar="STUDY.toml | show | resume", help="Study file; or `show` or `resume` and a directory."),
+    ],
     shown: Annotated[
-        Path | None, typer.Argument(metavar="[DIR]", help="With `show`: the directory of a study.")
+        Path | None, typer.Argument(metavar="[DIR]", help="With `show` and `resume`: the directory of a study.")
     ] = None,
     output: OutputOption = None,
     threads: ThreadsOption = None,
@@ -45,6 +48,7 @@ def study(
             "--best", metavar="COLUMN[:largest]", help="With `show`: the ten runs with the least, or largest."
         ),
     ] = None,
+    repair: Annotated[bool, typer.Option("--repair", help="Make damaged parts of the directory again.")] = False,
 ) -> None:
     """Many runs: vary parameters, store selected results, resume after an interruption.
 
@@ -54,13 +58,23 @@ def study(
     \b
     lostmotion study tolerance.toml -o tolerance
     lostmotion study show tolerance --best peak_load_speed
+    lostmotion study resume tolerance --repair
     """
     from ..errors import InputError
 
-    if what == "show":
-        if shown is None:
-            raise InputError("study show: name the directory of a study, as in `lostmotion study show DIR`")
+    if what in ("show", "resume") and shown is None:
+        raise InputError(f"study {what}: name the directory of a study, as in `lostmotion study {what} DIR`")
+    if what == "show" and shown is not None:
         _show(shown, best)
+        return
+    if what == "resume" and shown is not None:
+        from ..studies.engine import restore_note, study_of
+
+        if repair:
+            restore_note(shown)
+        loaded = study_of(shown)
+        compute(loaded, shown, threads, processes, scheduler, "Runs", repair=repair)
+        print_outcome(shown, loaded.total)
         return
     if shown is not None:
         raise InputError(f"study {what} {shown}: too many names; the directory is given by -o")
@@ -68,12 +82,19 @@ def study(
 
     loaded = load_study(what)
     directory = output or Path(Path(what).stem)
-    compute(loaded, directory, threads, processes, scheduler, "Runs")
+    compute(loaded, directory, threads, processes, scheduler, "Runs", repair=repair)
     print_outcome(directory, loaded.total)
 
 
 def compute(
-    loaded: Study, directory: Path, threads: int | None, processes: int | None, scheduler: str | None, unit: str
+    loaded: Study,
+    directory: Path,
+    threads: int | None,
+    processes: int | None,
+    scheduler: str | None,
+    unit: str,
+    *,
+    repair: bool = False,
 ) -> None:
     """Runs a study with a progress bar, or resumes it."""
     from contextlib import ExitStack
@@ -86,7 +107,7 @@ def compute(
         report = stack.enter_context(progress(loaded.total, unit))
         try:
             with writing(directory, "; what is written stays"):
-                work(loaded, directory, threads=threads, executor=executor, progress=report)
+                work(loaded, directory, threads=threads, executor=executor, progress=report, repair=repair)
         except KeyboardInterrupt:
             fail(f"interrupted; what is in {directory} stays, and the same command resumes it", 130)
 

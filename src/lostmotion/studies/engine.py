@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,11 @@ from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from .chunk import as_parquet, as_table, compute_chunk, parsed, pieces, run_piece
-from .design import CHUNK
 from .file import from_json, to_json
+from .parts import STRAY, chunks, damages, forget_missing, part_of, write_part
 from .study import Study
+
+NOTE = "_study.json"  # a leading underscore: readers of Parquet directories pass it over
 
 
 @checked
@@ -26,6 +28,7 @@ def study(
     threads: Count | None = None,
     executor: Executor | None = None,
     progress: Callable[[int], None] | None = None,
+    repair: bool = False,
 ) -> Path:
     """Run a study, or resume it, into a directory of Parquet files.
 
@@ -45,6 +48,8 @@ def study(
         Any `concurrent.futures.Executor`, such as a process pool or that of a Dask client.
     progress
         Called with the number of runs done; of slow studies without executor also within a chunk, before it is written.
+    repair
+        Make damaged parts again; otherwise they are refused.
 
     Returns
     -------
@@ -54,19 +59,24 @@ def study(
     Raises
     ------
     InputError
-        The directory holds another study, or cannot be written; what is there stays.
+        The directory holds another study or damaged parts, or cannot be written; what is there stays.
     """
     need("pyarrow", "A study", "study")
     need("scipy", "A study", "study")
     directory = Path(directory)
     text = to_json(what)
     _prepare(directory, text)
-    missing = [(first, last) for first, last in _chunks(what) if not _part(directory, first).exists()]
+    damaged = damages(directory, text, what.total)
+    refuse_damaged(directory, {path: why for path, why in damaged.items() if not repair or why == STRAY})
+    for path in damaged:
+        path.unlink()
+    forget_missing(directory)
+    missing = [(first, last) for first, last in chunks(what.total) if not part_of(directory, first).exists()]
     done = what.total - sum(last - first for first, last in missing)
     report = _rising(progress or _silent)
     report(done)
     for first, last, content in _compute(text, missing, threads or os.cpu_count() or 1, executor, report, done):
-        write_bytes(_part(directory, first), content)
+        write_part(directory, first, content)
         done += last - first
         report(done)
     return directory
@@ -88,17 +98,24 @@ def _rising(progress: Callable[[int], None]) -> Callable[[int], None]:
     return report
 
 
-def _chunks(study: Study) -> Iterator[tuple[int, int]]:
-    return ((first, min(first + CHUNK, study.total)) for first in range(0, study.total, CHUNK))
+def refuse_damaged(directory: Path, damaged: Mapping[Path, str]) -> None:
+    """Refuse a directory with damaged parts.
 
-
-def _part(directory: Path, first: int) -> Path:
-    return directory / f"part-{first // CHUNK:06d}.parquet"
+    Raises
+    ------
+    InputError
+        It names the first of them.
+    """
+    for path, reason in damaged.items():
+        if reason == STRAY:
+            raise InputError(f"{path}: {reason}; remove it")
+        more = f" ({len(damaged) - 1} more parts are damaged)" if len(damaged) > 1 else ""
+        raise InputError(f"{path}: {reason}{more}; `lostmotion study resume {directory} --repair` makes it again")
 
 
 def _prepare(directory: Path, text: str) -> None:
     """Makes the directory, or sees that it holds this study; what a killed run left half-written is removed."""
-    note = directory / "_study.json"  # a leading underscore: readers of Parquet directories pass it over
+    note = directory / NOTE
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -106,6 +123,7 @@ def _prepare(directory: Path, text: str) -> None:
     for leftover in directory.glob(".part-*"):
         leftover.unlink(missing_ok=True)
     if note.exists():
+        study_of(directory)
         if note.read_text(encoding="utf-8") != text:
             raise InputError(f"{directory}: holds another study; name another directory, or remove it")
         return
@@ -186,7 +204,41 @@ def study_of(directory: str | Path) -> Study:
     InputError
         It holds none.
     """
-    note = Path(directory) / "_study.json"
+    note = Path(directory) / NOTE
     if not note.is_file():
         raise InputError(f"{directory}: holds no study; run `lostmotion study STUDY.toml -o {directory}` first")
-    return from_json(note.read_text(encoding="utf-8"))
+    try:
+        return from_json(note.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{note}: cannot be read: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise InputError(
+            f"{note}: is damaged; `lostmotion study resume {directory} --repair` restores it from a part"
+        ) from None
+
+
+def restore_note(directory: Path) -> None:
+    """Write the study that a part carries into the directory, if its own note is missing or damaged.
+
+    Raises
+    ------
+    InputError
+        No part can be read.
+    """
+    need("pyarrow", "A study", "study")
+    import pyarrow.parquet as pq
+
+    try:
+        study_of(directory)
+        return
+    except InputError as error:
+        problem = error
+    for part in sorted(directory.glob("part-*.parquet")):
+        try:
+            text = (pq.read_schema(part).metadata or {})[b"lostmotion_study"].decode()
+            from_json(text)
+        except Exception:  # damaged in whatever way; the next part may be whole
+            continue
+        write_bytes(directory / NOTE, text.encode())
+        return
+    raise problem

@@ -6,6 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from .engine import refuse_damaged, study_of
+from .file import to_json
+from .parts import damages
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -17,21 +20,27 @@ def read_table(directory: Path) -> pa.Table:
     Raises
     ------
     InputError
-        There are none.
+        There are none, or a part is damaged.
     """
     import pyarrow.dataset as ds
 
-    files = sorted(str(p) for p in directory.glob("part-*.parquet"))
+    files = _whole_parts(directory)
     if not files:
         raise InputError(f"{directory}: holds no runs yet; run the study first")
     return ds.dataset(files, format="parquet").to_table().sort_by("run")
+
+
+def _whole_parts(directory: Path) -> list[str]:
+    what = study_of(directory)
+    refuse_damaged(directory, damages(directory, to_json(what), what.total))
+    return sorted(str(p) for p in directory.glob("part-*.parquet"))
 
 
 def failures(directory: Path) -> list[str]:
     """Why runs have failed, each reason once for each of them."""
     import pyarrow.dataset as ds
 
-    files = sorted(str(p) for p in directory.glob("part-*.parquet"))
+    files = _whole_parts(directory)
     table = ds.dataset(files, format="parquet").to_table(columns=["error"], filter=ds.field("error") != "")
     return [str(reason) for reason in table["error"].to_pylist()]
 

@@ -1,0 +1,97 @@
+"""Parts of the directory of a study: their names, their checksums, and what is wrong with them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+from ..atomic_writer import unwritable, write_bytes
+from .design import CHUNK
+
+CHECKSUMS = "_checksums.txt"  # as `sha256sum` writes and checks it; readers of Parquet directories pass it over
+
+STRAY = "is no part of this study"
+
+
+def chunks(total: int) -> Iterator[tuple[int, int]]:
+    """First run of each part, and the run after its last."""
+    return ((first, min(first + CHUNK, total)) for first in range(0, total, CHUNK))
+
+
+def part_of(directory: Path, first: int) -> Path:
+    """File of the part that begins with a run."""
+    return directory / f"part-{first // CHUNK:06d}.parquet"
+
+
+def write_part(directory: Path, first: int, content: bytes) -> None:
+    """Write a part whole or not at all. Its checksum comes first: a part without one would be made again.
+
+    Raises
+    ------
+    InputError
+        The part cannot be written.
+    """
+    part = part_of(directory, first)
+    try:
+        with (directory / CHECKSUMS).open("a", encoding="ascii") as file:
+            file.write(f"{hashlib.sha256(content).hexdigest()}  {part.name}\n")
+    except OSError as error:
+        raise unwritable(directory / CHECKSUMS, error) from None
+    write_bytes(part, content)
+
+
+def checksums(directory: Path) -> dict[str, str]:
+    """Checksums of parts by their names; lines that a kill or damage left unreadable are passed over."""
+    try:
+        lines = (directory / CHECKSUMS).read_text(encoding="ascii", errors="replace").splitlines()
+    except FileNotFoundError:
+        return {}
+    return {words[1]: words[0] for line in lines if len(words := line.split()) == 2 and len(words[0]) == 64}
+
+
+def forget_missing(directory: Path) -> None:
+    """Rewrite the checksums with those of parts that are there."""
+    kept = {name: sum_ for name, sum_ in checksums(directory).items() if (directory / name).is_file()}
+    write_bytes(directory / CHECKSUMS, "".join(f"{kept[name]}  {name}\n" for name in sorted(kept)).encode())
+
+
+def damages(directory: Path, text: str, total: int) -> dict[Path, str]:
+    """Parts that are damaged, or belong elsewhere, each with the reason.
+
+    Parameters
+    ----------
+    text
+        The study as JSON.
+    total
+        Number of its runs.
+    """
+    known = checksums(directory)
+    runs = {part_of(directory, first): (first, last) for first, last in chunks(total)}
+    found = {}
+    for path in sorted(directory.glob("part-*.parquet")):
+        reason = _damage(path, *runs[path], text, known.get(path.name)) if path in runs else STRAY
+        if reason:
+            found[path] = reason
+    return found
+
+
+def _damage(path: Path, first: int, last: int, text: str, checksum: str | None) -> str:
+    import pyarrow.parquet as pq
+
+    if checksum is None:
+        return f"has no line in {CHECKSUMS}"
+    try:
+        with path.open("rb") as file:
+            if hashlib.file_digest(file, "sha256").hexdigest() != checksum:
+                return "is damaged: its checksum differs"
+        with pq.ParquetFile(path) as part:
+            if (part.schema_arrow.metadata or {}).get(b"lostmotion_study", b"").decode() != text:
+                return "belongs to another study"
+            if part.read(["run"])["run"].to_pylist() != list(range(first, last)):
+                return f"does not hold the runs {first} to {last - 1}"
+    except OSError as error:
+        return f"cannot be read: {error.strerror or error}"
+    except Exception:  # the library raises what its parts raise
+        return "is no Parquet file of a study"
+    return ""
