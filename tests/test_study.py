@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -487,6 +487,87 @@ def test_a_dask_worker_that_dies_takes_no_run_with_it(tmp_path: Path):
         assert pids[0] not in client.run(os.getpid).values()
     assert seen[-1] == study.total
     assert read_table(tmp_path / "d").equals(read_table(lm.study(study, tmp_path / "t")))
+
+
+class Lost(Executor):
+    """An executor whose second chunk is lost."""
+
+    def __init__(self, error: Exception) -> None:
+        self.error, self.chunks = error, 0
+
+    def submit(self, function, /, *args, **kwargs):
+        self.chunks += 1
+        future: Future = Future()
+        if self.chunks == 2:
+            future.set_exception(self.error)
+        else:
+            future.set_result(function(*args, **kwargs))
+        return future
+
+
+@pytest.mark.parametrize("name", ["CancelledError", "BrokenProcessPool", "KilledWorker"])
+def test_lost_workers_end_in_one_line_and_lose_no_part(tmp_path: Path, name: str):
+    from concurrent.futures import CancelledError
+    from concurrent.futures.process import BrokenProcessPool
+
+    killed = type("KilledWorker", (Exception,), {"__module__": "distributed.scheduler"})
+    error = {"CancelledError": CancelledError, "BrokenProcessPool": BrokenProcessPool, "KilledWorker": killed}[name]()
+    study = make(design="random", runs=2 * CHUNK + 1)
+    with pytest.raises(InputError, match=f"were lost .{name}.; what is written stays, and the same command resumes"):
+        lm.study(study, tmp_path / "s", executor=Lost(error))
+    assert read_table(lm.study(study, tmp_path / "s")).equals(read_table(lm.study(study, tmp_path / "t")))
+
+
+class Cluster:
+    """A Dask scheduler and two workers as processes of their own, as docs/studies.md starts them on several machines."""
+
+    def __init__(self, directory: Path, port: int = 0) -> None:
+        self.directory, self.port = directory, port
+
+    def start(self, name: str, *words: str) -> subprocess.Popen:
+        with (self.directory / f"{name}.log").open("a") as log:
+            command = [sys.executable, "-m", f"distributed.cli.dask_{name}", "--no-dashboard", *words]
+            return subprocess.Popen(command, stdout=log, stderr=log)
+
+    def __enter__(self) -> "Cluster":
+        about = self.directory / "scheduler.json"
+        about.unlink(missing_ok=True)
+        where = ("--host", "127.0.0.1", "--port", str(self.port), "--scheduler-file", str(about))
+        self.scheduler = self.start("scheduler", *where)
+        while not (about.is_file() and about.stat().st_size):  # however long a busy machine takes
+            assert self.scheduler.poll() is None
+            time.sleep(0.05)
+        self.address = json.loads(about.read_text())["address"]
+        self.workers = [self.start("worker", self.address, "--nthreads", "1", "--no-nanny") for _ in range(2)]
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for process in (*self.workers, self.scheduler):
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_scheduler_that_dies_takes_no_written_part_with_it(tmp_path: Path):
+    from distributed import Client
+
+    study = make(design="random", runs=30 * CHUNK)
+    directory = tmp_path / "s"
+    with Cluster(tmp_path) as cluster, Client(cluster.address, timeout="10s") as client:
+
+        def kill_scheduler(done: int) -> None:
+            if done >= 2 * CHUNK:
+                cluster.scheduler.kill()
+
+        with pytest.raises(InputError, match="workers or their scheduler were lost"):
+            lm.study(study, directory, executor=client.get_executor(pure=False), progress=kill_scheduler)
+    kept = {p.name: p.stat().st_mtime_ns for p in directory.glob("part-*.parquet")}
+    assert 2 <= len(kept) < 30
+    (tmp_path / "scheduler.json").unlink()
+    with Cluster(tmp_path) as cluster, Client(cluster.address, timeout="60s") as client:
+        lm.study(study, directory, executor=client.get_executor(pure=False))
+    assert {name: (directory / name).stat().st_mtime_ns for name in kept} == kept
+    assert read_table(directory).equals(read_table(lm.study(study, tmp_path / "t")))
 
 
 def test_progress_rises_to_the_total_and_starts_from_what_is_there(tmp_path: Path):

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +67,8 @@ def study(
     Raises
     ------
     InputError
-        The directory holds another study or damaged parts, or cannot be written; what is there stays.
+        The directory holds another study or damaged parts, or cannot be written, or the executor lost its workers; what is
+        there stays.
     """
     need("pyarrow", "A study", "study")
     need("scipy", "A study", "study")
@@ -157,10 +166,23 @@ def _compute(
                 return
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 first, last = waiting.pop(future)
-                yield first, last, future.result()
+                yield first, last, _result(future)
     finally:
         for future in waiting:
             future.cancel()
+
+
+def _result(future: Future[bytes]) -> bytes:
+    try:
+        return future.result()
+    except Exception as error:
+        if isinstance(error, CancelledError | BrokenExecutor) or type(error).__module__.startswith("distributed."):
+            why = " ".join(str(error).split())
+            raise InputError(
+                f"workers or their scheduler were lost ({type(error).__name__}{': ' if why else ''}{why[:80]}); "
+                "what is written stays, and the same command resumes it"
+            ) from None
+        raise
 
 
 def _compute_here(
