@@ -75,7 +75,7 @@ BROKEN = [
     ("misspelt table", "[load]", "[laod]", ["laod", "did you mean load"]),
     ("misspelt nested table", "[gearbox.hysteresis]", "[gearbox.histeresis]", ["gearbox.histeresis", "hysteresis"]),
     ("misspelt kind", 'kind = "curve"', 'kind = "curv"', ["gearbox.stiffness", "curv", "linear"]),
-    ("key of another kind", "mirrored = true", "mirrored = true\nefficiency = 0.9", ["gearbox.losses.efficiency", "known"]),
+    ("key of another kind", "mirrored = true", "mirrored = true\nefficiency = 0.9", ["gearbox.losses.efficiency", "a key of kind"]),
     ("unknown key at the top", "[command]", "speed = 1\n[command]", ["speed", "not known"]),
     ("unknown key in the command", "amplitude = 1.0", "amplitud = 1.0", ["command.amplitud", "did you mean amplitude"]),
     ("unit of something else", '"3300 rpm"', '"3300 N*m"', ["motor.rated_speed", "3300 N*m", "rad/s"]),
