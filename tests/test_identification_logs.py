@@ -287,6 +287,35 @@ def test_stamps_that_messages_do_not_carry_are_refused(tmp_path: Path) -> None:
         read_log(path, time="/servo/goal.header.stamp")
 
 
+@pytest.mark.parametrize(
+    ("heading", "channels"),
+    [
+        ("time [s],pos (5),pos (3)", {"pos (5)": "", "pos (3)": ""}),
+        ("time [s],load (5),speed (rpm)", {"load (5)": "", "speed": "rpm"}),
+        ("time (s),joint[0],joint[1]", {"joint[0]": "", "joint[1]": ""}),
+        ("time (s),efficiency [1],pos (deg)", {"efficiency": "1", "pos": "deg"}),
+        ("time [s],pos (left),pos (right)", {"pos (left)": "", "pos (right)": ""}),
+        ("time [s],pos,pos (left)", {"pos": "", "pos (left)": ""}),
+        ("t,cell (-2.5),raw (counts)", {"cell (-2.5)": "", "raw": "counts"}),
+    ],
+)
+def test_a_number_in_brackets_belongs_to_the_name_of_a_column(
+    tmp_path: Path, heading: str, channels: dict[str, str]
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(f"{heading}\n0,1,2\n1,3,4\n2,5,6\n")
+    log = read_log(path)
+    assert {name: c.unit for name, c in log.channels.items()} == channels
+    assert [c.values.tolist() for c in log.channels.values()] == [[1.0, 3.0, 5.0], [2.0, 4.0, 6.0]]
+
+
+def test_two_columns_of_one_quantity_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("time [s],pos (deg),pos (rad)\n0,1,2\n1,3,4\n2,5,6\n")
+    with pytest.raises(lm.InputError, match="has the column 'pos' twice"):
+        read_log(path)
+
+
 def test_a_pattern_that_names_no_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(lm.InputError, match="names no log"):
         find_logs(["*.json"], tmp_path)

@@ -266,3 +266,30 @@ def test_windows_are_refused_where_they_cannot_be(tmp_path: Path) -> None:
     rig = Rig(Identification(**data), tmp_path)
     with pytest.raises(lm.InputError, match="no measured channel is the angle of a shaft"):
         windows(rig, logs, start_point(rig.task, logs), 0, 1.0)
+    data["measured"] = {"speed": {"channel": "angle", "variable": "arm_speed"}}
+    rig = Rig(Identification(**data), tmp_path)
+    with pytest.raises(lm.InputError, match=r"^key fit\.horizon: .* leave fit\.horizon out$"):
+        windows(rig, logs, start_point(rig.task, logs), 0, 1.0)
+
+
+def test_values_of_multi_start_have_units_as_start_values_have(tmp_path: Path) -> None:
+    data = swing_rig(tmp_path).task.model_dump()
+    data["parameters"]["offset"] |= {"unit": "N*m", "fixed": False}
+    data["parameters"]["weight"] |= {"unit": "kg"}
+    rung = {"name": "all", "free": ["offset", "weight"]}
+    tried = {"offset": ["5 mN*m", 0.01, "0.02 N*m"], "weight": ["500 g"]}
+    data["ladder"] = [rung | {"multi_start": tried}]
+    (read,) = Identification(**data).ladder
+    assert dict(read.multi_start) == {"offset": (5e-3, 0.01, 0.02), "weight": (0.5,)}
+    for wrong, text in (
+        ({"offset": ["5 deg"]}, r"ladder\[0\]\.multi_start\.offset = '5 deg'"),
+        (
+            {"inertia": ["1 kg*m^2"]},
+            r"ladder\[0\]\.multi_start\.inertia with '1 kg\*m\^2', but parameters.inertia has no unit",
+        ),
+        ({"offset": ["90 N*m"]}, r"multi_start\.offset with 90 outside of"),
+    ):
+        data["ladder"] = [rung | {"multi_start": wrong}]
+        with pytest.raises(lm.InputError, match=text) as refused:
+            Identification(**data)
+        assert "\n" not in str(refused.value)

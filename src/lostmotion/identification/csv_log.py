@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.validation import did_you_mean
 from .logs import Channel, Log
+from .prepare import is_unit
 
 NAME = re.compile(r"^\s*(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*$")
 COMMENT = re.compile(r"^\s*(?P<key>[\w .-]+?)\s*[:=]\s*(?P<value>.+?)\s*$")
@@ -21,7 +22,8 @@ COMMENT = re.compile(r"^\s*(?P<key>[\w .-]+?)\s*[:=]\s*(?P<value>.+?)\s*$")
 def read_csv_log(path: Path, *, time: str = "") -> Log:
     """Of a table with one heading: ``time [s], position [deg]``, with ``# key: value`` above it as the header.
 
-    Separators are commas, semicolons or tabs. A comment ``# unit position: deg`` gives the unit of a column.
+    Separators are commas, semicolons or tabs. A comment ``# unit position: deg`` gives the unit of a column. A number in brackets,
+    as in ``load (5)``, is a part of the name.
 
     Parameters
     ----------
@@ -56,12 +58,9 @@ def read_csv_log(path: Path, *, time: str = "") -> Log:
             f"{path}, line {lines[0][0]}: has no heading; name the columns, such as time [s],position [rad]"
         )
     header, units = _header(comments)
-    names = []
-    for cell in heading:
-        match = NAME.match(cell)
-        names.append(match["name"] if match else cell)
-        if match:
-            units[match["name"]] = match["unit"]
+    columns = _columns(heading)
+    names = [name for name, _ in columns]
+    units |= {name: unit for name, unit in columns if unit is not None}
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise InputError(f"{path}, line {lines[0][0]}: has the column {twice[0]!r} twice; rename one of them")
@@ -70,6 +69,28 @@ def read_csv_log(path: Path, *, time: str = "") -> Log:
     values = table[:, place] * _seconds(path, units.get(names[place], ""))
     channels = {name: Channel(table[:, k], units.get(name, "")) for k, name in enumerate(names) if k != place and name}
     return Log(path.name, values, channels, header)
+
+
+def _columns(heading: list[str]) -> list[tuple[str, str | None]]:
+    """(name, unit) of each column.
+
+    A number in brackets counts columns, so it belongs to the name. So does a text that is no known unit, if columns would be
+    alike without it.
+    """
+    matches = [NAME.match(cell) for cell in heading]
+    names = [match["name"] if match else cell for match, cell in zip(matches, heading, strict=True)]
+    found: list[tuple[str, str | None]] = []
+    for cell, name, match in zip(heading, names, matches, strict=True):
+        alone = names.count(name) == 1
+        if match is None:
+            found.append((cell, None))
+        elif match["unit"] == "1" and alone and "[" in cell:  # dimensionless
+            found.append((name, "1"))
+        elif _number(match["unit"]) is not None or not (alone or is_unit(match["unit"])):
+            found.append((cell, None))
+        else:
+            found.append((name, match["unit"]))
+    return found
 
 
 def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:

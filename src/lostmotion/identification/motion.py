@@ -68,7 +68,12 @@ def windows(rig: Rig, logs: Sequence[Prepared], point: Point, rung: int, length:
     InputError
         The state of the rig is not that of a measured angle, or a window has too few samples.
     """
-    position = position_of(rig)
+    try:
+        position = position_of(rig)
+    except InputError as problem:
+        raise InputError(
+            f"key fit.horizon: {problem}, and windows begin at a measured angle; leave fit.horizon out"
+        ) from None
     return [_in_windows(rig, log, point, rung, length, position) for log in logs]
 
 

@@ -85,6 +85,15 @@ def channel_factor(written: str, of_file: str, unit: str, where: str) -> float:
     raise InputError(f"{where}: the unit {text!r} is not known ({problem}); write it with measured or inputs ... unit")
 
 
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit of a channel."""
+    try:
+        channel_factor(text, "", "", "")
+    except InputError:
+        return False
+    return True
+
+
 def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepared:
     """A log of the task, screened.
 

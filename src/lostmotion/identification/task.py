@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -17,7 +18,7 @@ from ..inputs.toml_files import read_toml
 from ..inputs.validation import did_you_mean
 from ..model.train import Elements
 from .formulas import CONSTANTS, FUNCTIONS, Formula
-from .parameters import FreeParameter
+from .parameters import FreeParameter, in_unit
 
 FormulaText = str | float
 Setting = FormulaText | tuple["Setting", ...] | dict[str, Any]
@@ -104,7 +105,7 @@ class Rung(Part):
     set: dict[str, Any] = Field(default_factory=dict)
     """values of the scenario by dotted key, beside those of the rungs below"""
     multi_start: Elements[tuple[Number, ...]] = Field(default_factory=nothing)
-    """of parameters that the motion does not depend on smoothly: the values that are tried"""
+    """of parameters that the motion does not depend on smoothly: the values that are tried, SI or text with a unit"""
 
 
 class FitOptions(Part):
@@ -155,6 +156,21 @@ class Identification(Part):
     fit: FitOptions = FitOptions()
     record: str = ""
     """``gear.NAME`` of the rig, of which a data sheet is written"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_multi_start(cls, data: Any) -> Any:
+        """Texts of `multi_start` in the unit of their parameter, as those of its start value are read."""
+        ladder, parameters = data.get("ladder"), data.get("parameters")
+        if not isinstance(ladder, list | tuple) or not isinstance(parameters, Mapping):
+            return data
+        rungs = list(ladder)
+        for k, rung in enumerate(ladder):
+            tried = rung.get("multi_start") if isinstance(rung, Mapping) else None
+            if isinstance(tried, Mapping):
+                read = {name: _in_unit_of(parameters, name, values, k) for name, values in tried.items()}
+                rungs[k] = {**rung, "multi_start": read}
+        return {**data, "ladder": rungs}
 
     @model_validator(mode="after")
     def _hangs_together(self) -> Self:
@@ -215,6 +231,18 @@ class Identification(Part):
         """The ladder; without one, a rung of all free parameters."""
         free = tuple(name for name, p in self.parameters.items() if not p.fixed)
         return self.ladder or (Rung(name="all parameters", free=free),)
+
+
+def _in_unit_of(parameters: Mapping[str, Any], name: str, tried: Any, rung: int) -> Any:
+    p = parameters.get(name)
+    unit = str(p.get("unit", "")) if isinstance(p, Mapping) else p.unit if isinstance(p, FreeParameter) else ""
+    if not isinstance(tried, list | tuple):
+        return tried
+    key = f"ladder[{rung}].multi_start.{name}"
+    for value in tried:
+        if isinstance(value, str) and not unit:
+            raise ValueError(f"has {key} with {value!r}, but parameters.{name} has no unit; add one to it, or give SI")
+    return [in_unit(value, unit, key) if isinstance(value, str) else value for value in tried]
 
 
 @checked
