@@ -99,6 +99,18 @@ def names_in(text: str | float) -> frozenset[str]:
     return formula(text).names if isinstance(text, str) else frozenset()
 
 
+def names_within(value: object) -> frozenset[str]:
+    """What the formulas in a value, a list or a table name; texts that are no formulas name nothing."""
+    if isinstance(value, list | tuple):
+        return frozenset().union(*map(names_within, value))
+    if isinstance(value, dict):
+        return frozenset().union(*map(names_within, value.values()))
+    try:
+        return formula(value).names if isinstance(value, str) else frozenset()
+    except ValueError:
+        return frozenset()
+
+
 def number(text: str | float, known: Mapping[str, Any], key: str) -> float:
     """The value of a formula.
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .fit import Fit, slope_of
-from .formulas import Formula
+from .formulas import names_within
 from .parameters import FreeParameter
 from .task import Identification
 
@@ -155,25 +155,14 @@ def _remedy(task: Identification, names: Sequence[str]) -> str:
 def _keys(task: Identification, name: str) -> list[str]:
     """Keys of the scenario, and of channels, that a parameter enters."""
     tables = [task.set, *(rung.set for rung in task.ladder), *(phase.set for phase in task.phases)]
-    found = [key for table in tables for key, value in table.items() if name in _names(value)]
+    found = [key for table in tables for key, value in table.items() if name in names_within(value)]
     for entry in (*task.inputs.values(), *task.measured.values()):
         found += [
-            key for key in ("delay", "scale", "offset", "filter_time") if name in _names(getattr(entry, key, None))
+            key
+            for key in ("delay", "scale", "offset", "filter_time")
+            if name in names_within(getattr(entry, key, None))
         ]
     return found
-
-
-def _names(value: object) -> frozenset[str]:
-    if isinstance(value, list | tuple):
-        return frozenset().union(*map(_names, value))
-    if isinstance(value, dict):
-        return frozenset().union(*map(_names, value.values()))
-    if not isinstance(value, str):
-        return frozenset()
-    try:
-        return Formula(value).names
-    except ValueError:
-        return frozenset()
 
 
 def at_bounds(fit: Fit, parameters: Mapping[str, FreeParameter]) -> list[str]:

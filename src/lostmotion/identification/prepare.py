@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
-from ..units.conversion import si_value
-from .formulas import Formula
+from ..units.conversion import si_factor, si_value
+from .formulas import Formula, names_within
 from .logs import Channel, Log
 from .screening import screened
 from .task import FormulaText, Identification
@@ -36,12 +37,13 @@ class Prepared:
     """A log that is compared with runs of the rig."""
 
     log: Log
+    """screened; all channels whose unit is known in SI"""
     time: np.ndarray
     """[s], from 0"""
     inputs: dict[str, np.ndarray]
     measured: dict[str, np.ndarray]
     facts: dict[str, Any]
-    """what formulas may name: its header, and ``first_CHANNEL`` and ``mean_CHANNEL``"""
+    """what formulas may name: its header, and ``first_CHANNEL`` and ``mean_CHANNEL`` in SI"""
     segments: tuple[Segment, ...]
     held_out: bool
     weight: np.ndarray
@@ -57,7 +59,12 @@ class Prepared:
 
 
 def channel_factor(written: str, of_file: str, unit: str, where: str) -> float:
-    """What one of the unit of a channel is in SI.
+    """What one of the unit of a channel is in SI; see `channel_unit`."""
+    return channel_unit(written, of_file, unit, where)[0]
+
+
+def channel_unit(written: str, of_file: str, unit: str, where: str) -> tuple[float, str]:
+    """(what one of the unit of a channel is in SI, the SI unit).
 
     Parameters
     ----------
@@ -73,15 +80,17 @@ def channel_factor(written: str, of_file: str, unit: str, where: str) -> float:
     """
     text = (written or of_file).strip()
     if text in ("", "-", "1", "bool"):
-        return 1.0
+        return 1.0, "" if text else unit
     problem: ValueError | None = None
     for kind in dict.fromkeys((unit, *KINDS)):
         if kind in ("", "1"):
             continue
         try:
-            return si_value(f"1 {text}", kind)
+            return si_value(f"1 {text}", kind), kind
         except ValueError as error:
             problem = problem or error
+    with suppress(ValueError):
+        return si_factor(text), "SI"
     raise InputError(f"{where}: the unit {text!r} is not known ({problem}); write it with measured or inputs ... unit")
 
 
@@ -118,7 +127,7 @@ def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepar
         for i in task.inputs.values()
         if i.default is not None and i.channel not in log.channels
     }
-    log = replace(log, channels={**log.channels, **absent})
+    log = _in_si(task, replace(log, channels={**log.channels, **absent}), units)
     acting = (*inputs.values(), *_switches(task, log))
     log = screened(
         Log(log.name, log.time, log.channels, header, log.notes), measured.values(), acting, task.logs.stated
@@ -139,23 +148,45 @@ def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepar
                 f"{name} is known of the log, and a parameter of the task, which counts; rename one of them"
             )
 
-    def in_si(channel: str, unit: str, variable: str, where: str) -> np.ndarray:
-        factor = channel_factor(unit, log.channels[channel].unit, units.get(variable, ""), f"{log.name}: {where}")
-        return np.asarray(log.values(channel) * factor, dtype=float)
-
     first = task.fit.first is not None and bool(_fact(task.fit.first, facts, log, "fit.first"))
     held_out = task.logs.held_out is not None and bool(_fact(task.logs.held_out, facts, log, "logs.held_out"))
     return Prepared(
         log,
         log.time - log.time[0],
-        {name: in_si(i.channel, i.unit, name, f"inputs.{name}") for name, i in task.inputs.items()},
-        {name: in_si(m.channel, m.unit, m.variable, f"measured.{name}") for name, m in task.measured.items()},
+        {name: log.values(channel) for name, channel in inputs.items()},
+        {name: log.values(channel) for name, channel in measured.items()},
         facts,
         _segments(task, log, facts),
         held_out,
         _weights(task, log, facts),
         first,
     )
+
+
+def _in_si(task: Identification, log: Log, units: Mapping[str, str]) -> Log:
+    """The log with its channels in SI; one whose unit is not known stays as it is, unless the task names it."""
+    entries = [(f"inputs.{name}", i.channel, i.unit, units.get(name, "")) for name, i in task.inputs.items()]
+    entries += [(f"measured.{n}", m.channel, m.unit, units.get(m.variable, "")) for n, m in task.measured.items()]
+    known: dict[str, tuple[float, str]] = {}
+    for where, channel, written, kind in entries:
+        log.values(channel)  # refuses a name that is none
+        found = channel_unit(written, log.channels[channel].unit, kind, f"{log.name}: {where}")
+        if known.setdefault(channel, found)[0] != found[0]:
+            raise InputError(f"{log.name}: {where}: channel {channel} has another unit elsewhere in the task; give one")
+    named = names_within(task.model_dump(include={"set", "phases", "ladder", "logs", "measured", "inputs"}))
+    channels = {}
+    for name, c in log.channels.items():
+        if name not in known:
+            with suppress(InputError):
+                known[name] = channel_unit("", c.unit, "", "")
+        if name not in known and named & {name, *_facts_of(name)}:
+            raise InputError(
+                f"{log.name}: channel {name}: the unit {c.unit!r} is not known, and a formula names the channel; "
+                f"give the channel in SI, or with a unit that is known"
+            )
+        factor, unit = known.get(name, (1.0, c.unit))
+        channels[name] = c if factor == 1.0 and unit == c.unit else Channel(c.values * factor, unit)
+    return replace(log, channels=channels)
 
 
 def _switches(task: Identification, log: Log) -> list[str]:
@@ -168,10 +199,16 @@ def _facts(log: Log) -> dict[str, Any]:
     """What formulas may name of a log."""
     facts = {key: value for key, value in log.header.items() if isinstance(value, int | float | str)}
     for name, channel in log.channels.items():
-        key = "".join(c if c.isalnum() else "_" for c in name)
-        facts[f"first_{key}"] = float(channel.values[0])
-        facts[f"mean_{key}"] = float(np.mean(channel.values))
+        first, mean = _facts_of(name)
+        facts[first] = float(channel.values[0])
+        facts[mean] = float(np.mean(channel.values))
     return facts
+
+
+def _facts_of(channel: str) -> tuple[str, str]:
+    """What formulas call the first value and the mean of a channel."""
+    key = "".join(c if c.isalnum() else "_" for c in channel)
+    return f"first_{key}", f"mean_{key}"
 
 
 def _fact(text: Any, facts: Mapping[str, Any], log: Log, key: str) -> Any:

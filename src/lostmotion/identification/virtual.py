@@ -12,7 +12,7 @@ import numpy as np
 
 from .formulas import number
 from .logs import Channel, Log
-from .prepare import Prepared, prepared
+from .prepare import channel_factor, prepared
 from .rig import Rig
 from .runs import run_log
 
@@ -64,16 +64,10 @@ def virtual_log(
         x = run[name] + draw.normal(size=len(log.time)) * (noise or {}).get(name, 0.0)
         step = number(m.resolution, {}, f"measured.{name}.resolution")
         x = step * np.round(x / step) if step > 0.0 else x
-        factor = _factor(log, name, m.channel)
-        channels[m.channel] = Channel(x / factor, m.unit)
+        of_plan = plan.channels[m.channel].unit if m.channel in plan.channels else ""
+        factor = channel_factor(m.unit, of_plan, rig.units.get(m.variable, ""), f"measured.{name}")
+        channels[m.channel] = Channel(x / factor, m.unit or of_plan)
     return replace(plan, channels=channels)
-
-
-def _factor(log: Prepared, name: str, channel: str) -> float:
-    """SI per unit of a channel."""
-    raw, si = log.log.values(channel), log.measured[name]
-    k = int(np.argmax(np.abs(raw)))
-    return float(si[k] / raw[k]) if raw[k] != 0.0 else 1.0
 
 
 def write_servo_json(path: Path, log: Log) -> None:
