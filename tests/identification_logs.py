@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -75,3 +76,43 @@ def write_servo_logs(directory: Path, values: dict[str, float], *, rung: int, se
         log = virtual_log(rig, plan, values, rung=rung, noise={"position": NOISE}, seed=seed + k)
         write_servo_json(directory / plan.name, log)
     return rig
+
+
+SPRING = """
+[shafts.carriage]
+viscous_friction = 20.0
+torque = { mean = 0.0 }
+[springs.rail]
+shaft = "carriage"
+stiffness = { kind = "linear", stiffness = 900.0 }
+[motors.drive]
+shaft = "carriage"
+kind = "torque_source"
+rated_torque = 1.0
+rotor_inertia = 95.0
+[simulation]
+duration = "1 s"
+sample_interval = "1 ms"
+"""
+POSITION_NOISE = 2e-5  # m
+MASS, FRICTION, STIFFNESS = 95.0, 20.0, 900.0
+
+
+def released(time: np.ndarray, begin: float) -> np.ndarray:
+    """Position of m x'' + b x' + k x = 0, released at rest."""
+    decay = FRICTION / (2.0 * MASS)
+    w = np.sqrt(STIFFNESS / MASS - decay**2)
+    return np.asarray(begin * np.exp(-decay * time) * (np.cos(w * time) + decay / w * np.sin(w * time)))
+
+
+def spring_task(directory: Path, **more: Any) -> Identification:
+    (directory / "axis.toml").write_text(SPRING)
+    data: dict[str, Any] = {
+        "scenario": "axis.toml",
+        "logs": {"files": ["*.csv"]},
+        "measured": {"position": {"channel": "pos", "variable": "carriage_angle"}},
+        "set": {"motors.drive.rotor_inertia": "mass", "initial.angles.carriage": "first_pos"},
+        "parameters": {"mass": {"start": 60.0, "min": 1.0, "max": 1000.0}},
+        "fit": {"regression": False},
+    }
+    return Identification(**data | more)

@@ -3,68 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
+from identification_logs import MASS, POSITION_NOISE, released, spring_task
 from lostmotion.errors import InputError
 from lostmotion.identification.identify import identify_task
 from lostmotion.identification.logs import Channel, Log
 from lostmotion.identification.prepare import prepared
 from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification
-
-SPRING = """
-[shafts.carriage]
-viscous_friction = 20.0
-torque = { mean = 0.0 }
-[springs.rail]
-shaft = "carriage"
-stiffness = { kind = "linear", stiffness = 900.0 }
-[motors.drive]
-shaft = "carriage"
-kind = "torque_source"
-rated_torque = 1.0
-rotor_inertia = 95.0
-[simulation]
-duration = "1 s"
-sample_interval = "1 ms"
-"""
-NOISE = 2e-5  # m
-MASS, FRICTION, STIFFNESS = 95.0, 20.0, 900.0
-
-
-def released(time: np.ndarray, begin: float) -> np.ndarray:
-    """Position of m x'' + b x' + k x = 0, released at rest."""
-    decay = FRICTION / (2.0 * MASS)
-    w = np.sqrt(STIFFNESS / MASS - decay**2)
-    return np.asarray(begin * np.exp(-decay * time) * (np.cos(w * time) + decay / w * np.sin(w * time)))
-
-
-def spring_task(directory: Path, **more: Any) -> Identification:
-    (directory / "axis.toml").write_text(SPRING)
-    data: dict[str, Any] = {
-        "scenario": "axis.toml",
-        "logs": {"files": ["*.csv"]},
-        "measured": {"position": {"channel": "pos", "variable": "carriage_angle"}},
-        "set": {"motors.drive.rotor_inertia": "mass", "initial.angles.carriage": "first_pos"},
-        "parameters": {"mass": {"start": 60.0, "min": 1.0, "max": 1000.0}},
-        "fit": {"regression": False},
-    }
-    return Identification(**data | more)
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("mm", 1e3), ("um", 1e6)])
 def test_a_log_in_another_unit_gives_the_same_mass(tmp_path: Path, unit: str, factor: float) -> None:
     """The first value of the channel is where the run begins."""
     time = np.arange(0.0, 3.0, 2e-3)
-    x = released(time, 0.05) + NOISE * np.random.default_rng(1).normal(size=len(time))
+    x = released(time, 0.05) + POSITION_NOISE * np.random.default_rng(1).normal(size=len(time))
     rows = "\n".join(f"{t:.4f},{factor * v:.9g}" for t, v in zip(time, x, strict=True))
     (tmp_path / "log.csv").write_text(f"time [s],pos [{unit}]\n{rows}\n")
     result = identify_task(spring_task(tmp_path), tmp_path, threads=1)
     assert result.values["mass"] == pytest.approx(MASS, rel=2e-3)
-    assert result.error()[1] == pytest.approx(NOISE, rel=0.1)
+    assert result.error()[1] == pytest.approx(POSITION_NOISE, rel=0.1)
 
 
 def test_first_values_means_and_conditions_are_in_si(tmp_path: Path) -> None:

@@ -56,9 +56,12 @@ def identify(
 
 def _print_summary(result: IdentificationResult) -> None:
     print(result.task.title or "Identification")
+    unit = f" {result.error_unit}".rstrip()
     for k, rung in enumerate(result.rungs):
-        held_out = "" if math.isnan(rung.held_out) else f", held out {rung.held_out:.5g}"
-        print(f"  {'*' if k == result.chosen else ' '} {rung.name}: mean absolute error {rung.train:.5g}{held_out}")
+        held_out = "" if math.isnan(rung.held_out) else f", held out {rung.held_out:.5g}{unit}"
+        print(
+            f"  {'*' if k == result.chosen else ' '} {rung.name}: mean absolute error {rung.train:.5g}{unit}{held_out}"
+        )
     for line in result.lines():
         print(line)
     if result.left_out:

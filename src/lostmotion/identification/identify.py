@@ -82,6 +82,26 @@ class IdentificationResult:
         name = channel or next(iter(self.task.measured))
         return total(self.errors, held_out=held_out, channel=name)
 
+    def unit(self, channel: str) -> str:
+        """SI unit of the errors of a channel; empty where neither its file nor the rig gives one."""
+        return next((log.log.channels[self.task.measured[channel].channel].unit for log in self.logs), "")
+
+    @property
+    def error_unit(self) -> str:
+        """Unit of the errors by which rungs are compared."""
+        first, *more = self.task.measured
+        return "standard deviations" if more else self.unit(first)
+
+    def errors_text(self, *, held_out: bool) -> str:
+        """MAE and RMSE of each channel that has errors, with its unit."""
+        found = []
+        for channel in self.task.measured:
+            mae, rmse = self.error(channel, held_out=held_out)
+            if not math.isnan(mae):
+                unit = f" {self.unit(channel)}".rstrip()
+                found.append(f"{channel} MAE {mae:.4g}{unit}, RMSE {rmse:.4g}{unit}")
+        return "; ".join(found)
+
     def values_for(self, log: str) -> dict[str, float]:
         """Values of all parameters, and of the nuisances of one log by its name."""
         return self.values | self.fit.point.nuisance.get(log, {})
@@ -107,7 +127,8 @@ class IdentificationResult:
                 if not math.isnan(mae):
                     own = [e for e in self.errors if e.held_out == held_out and e.channel == channel]
                     n = sum(not math.isnan(e.mae) for e in own)
-                    lines.append(f"  {channel}, {n} logs {what}: MAE {mae:.5g}, RMSE {rmse:.5g}")
+                    unit = f" {self.unit(channel)}".rstrip()
+                    lines.append(f"  {channel}, {_logs(n)} {what}: MAE {mae:.5g}{unit}, RMSE {rmse:.5g}{unit}")
         lines += [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
         return lines + [f"  {text}" for text in [*self.differences(), *self.starts()]]
 
@@ -159,8 +180,11 @@ class IdentificationResult:
     def source(self) -> str:
         """What the values were identified from, for records."""
         fitted = sum(not log.held_out for log in self.logs)
-        mae, rmse = self.error(held_out=any(log.held_out for log in self.logs))
-        return f"identified from {fitted} logs ({', '.join(self.task.logs.files)}), {self.rungs[self.chosen].name}; error of other logs: MAE {mae:.4g}, RMSE {rmse:.4g}"
+        files, rung = ", ".join(self.task.logs.files), self.rungs[self.chosen].name
+        text = f"identified from {_logs(fitted)} ({files}), {rung}"
+        if held_out := self.errors_text(held_out=True):
+            return f"{text}; error of {_logs(len(self.logs) - fitted)} held out: {held_out}"
+        return f"{text}; error of the fit, since no log was held out: {self.errors_text(held_out=False)}"
 
     def scenario_text(self) -> str:
         """The identified rig as a scenario file."""
@@ -183,6 +207,10 @@ class IdentificationResult:
         return sheet_text(
             gear_sheet(self.scenario.gears[name], f"{plain}-identified", self.task.title or name, self.source())
         )
+
+
+def _logs(count: int) -> str:
+    return f"{count} log{'' if count == 1 else 's'}"
 
 
 def _no_notice(what: str, iteration: int, cost: float) -> None:

@@ -59,10 +59,11 @@ def write_identification(directory: Path, name: str, result: IdentificationResul
             e.channel,
             "held out" if e.held_out else "fitted",
             *(["no run", "", ""] if math.isnan(e.mae) else [f"{e.mae:.6g}", f"{e.rmse:.6g}", f"{100 * e.fit:.4g}"]),
+            result.unit(e.channel),
         ]
         for e in result.errors
     ]
-    header = ["log", "channel", "part", "MAE", "RMSE", "fit [%]"]
+    header = ["log", "channel", "part", "MAE", "RMSE", "fit [%]", "unit of MAE and RMSE"]
     write_text(directory / "errors.csv", table_csv(header, errors))
     parameters = parameter_rows(result)
     write_text(
@@ -72,6 +73,7 @@ def write_identification(directory: Path, name: str, result: IdentificationResul
     context = {
         "title": result.task.title or name,
         "rungs": [[r.name, f"{r.train:.5g}", _held_out(r), k == result.chosen] for k, r in enumerate(result.rungs)],
+        "error_unit": result.error_unit,
         "failures": [*result.failures(), *result.passed_over()],
         "parameters": parameters,
         "undetermined": [u.text for u in result.undetermined],
@@ -182,11 +184,17 @@ def _overlays(result: IdentificationResult, log: str, held_out: bool, run: dict[
             Panel(
                 f"{_short(log)}{' (held out)' if held_out else ''}",
                 "time [s]",
-                channel,
+                _labelled(result, channel),
                 curves,
             )
         )
     return panels
+
+
+def _labelled(result: IdentificationResult, channel: str) -> str:
+    """A channel with its unit."""
+    unit = result.unit(channel)
+    return f"{channel} [{unit}]" if unit else channel
 
 
 def _clouds(
@@ -200,7 +208,10 @@ def _clouds(
         x = np.concatenate([run[name] for run in table.values()])
         panels.append(
             Panel(
-                f"over {name}", label, f"residual of {channel}", (Curve("residual", x[::step], residual[::step], DOTS),)
+                f"over {name}",
+                label,
+                f"residual of {_labelled(result, channel)}",
+                (Curve("residual", x[::step], residual[::step], DOTS),),
             )
         )
     return panels
