@@ -52,7 +52,9 @@ class Engine:
         """by log: why it has no run, where residuals were last asked for"""
 
     def residuals(self, logs: Sequence[Prepared], point: Point, rung: int) -> list[np.ndarray]:
-        """Of each log measured less computed, times the weights of the samples, one row for each measured channel, SI; NaN where the rig has no motion."""
+        """Of each log measured less computed, times the weights of the samples, one row for each measured channel, SI; NaN where the rig has no motion,
+        0 where the log has no number.
+        """
         rows, self.failed = self._residuals([(log, point.of(log)) for log in logs], rung)
         return rows
 
@@ -79,6 +81,7 @@ class Engine:
         for k, (log, seen) in enumerate(zip(logs, found, strict=True)):
             J = np.full((*seen.values.shape, len(names)), np.nan)
             J[..., [names.index(name) for name in exact]] = -seen.derivatives * log.weight[:, None]
+            J[~log.valid] = 0.0
             out.append(J)
             self.touching.pop(log.name, None)
             if seen.error is None and seen.ends_by:
@@ -121,7 +124,7 @@ class Engine:
             if seen.error is not None or not np.isfinite(seen.values).all()
         }
         rows = [
-            (np.array([log.measured[name] for name in log.measured]) - seen.values) * log.weight
+            np.where(log.valid, (np.array(list(log.measured.values())) - seen.values) * log.weight, 0.0)
             for (log, _), seen in zip(requests, found, strict=True)
         ]
         return rows, failed

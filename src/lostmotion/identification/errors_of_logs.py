@@ -30,7 +30,8 @@ def log_errors(logs: Sequence[Prepared], residuals: Sequence[np.ndarray]) -> lis
     """Of each log and each measured channel, of residuals with their weights; the errors are without. NaN of a log that has no run."""
     found = []
     for log, rows in zip(logs, residuals, strict=True):
-        for (name, measured), r in zip(log.measured.items(), rows / log.weight, strict=True):
+        for (name, values), row, there in zip(log.measured.items(), rows / log.weight, log.valid, strict=True):
+            measured, r = values[there], row[there]
             rmse = float(np.sqrt(np.mean(r**2)))
             spread = float(np.std(measured))
             fit = 1.0 - rmse / spread if spread > 0.0 else float("nan")

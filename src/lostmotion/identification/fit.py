@@ -63,9 +63,13 @@ class Problem:
         """Standard deviations of the channels, those not given from the residuals, not below those of the quantisation."""
         if self.given is not None:
             return self.given
-        rows = np.hstack([r for r in residuals if np.isfinite(r).all()])
-        spread = NORMAL * np.mean(np.abs(rows), axis=1)
+        rows = np.hstack([r for r in self.compared(residuals) if np.isfinite(r).any(axis=1).all()])
+        spread = NORMAL * np.nanmean(np.abs(rows), axis=1)
         return np.asarray(np.maximum(np.maximum(spread, self.resolution / math.sqrt(12.0)), 1e-12))
+
+    def compared(self, residuals: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Residuals with NaN where the log has no number."""
+        return [np.where(log.valid, r, np.nan) for log, r in zip(self.logs, residuals, strict=True)]
 
     def weights(self, scaled: np.ndarray) -> np.ndarray:
         """Of residuals in units of their deviations: 1, and with the robust loss less beyond `outlier`."""
@@ -181,12 +185,15 @@ def linearised(
 
 
 def correlation_of(residuals: Sequence[np.ndarray]) -> float:
-    """How many residuals in a row say what one independent one would: (1 + rho)/(1 - rho), rho the lag-one correlation."""
+    """How many residuals in a row say what one independent one would: (1 + rho)/(1 - rho), rho the lag-one correlation.
+
+    NaN stands where there is no residual.
+    """
     above = below = 0.0
     for r in residuals:
-        centred = r - r.mean(axis=1, keepdims=True)
-        above += float(np.sum(centred[:, 1:] * centred[:, :-1]))
-        below += float(np.sum(centred**2))
+        centred = r - np.nanmean(r, axis=1, keepdims=True)
+        above += float(np.nansum(centred[:, 1:] * centred[:, :-1]))
+        below += float(np.nansum(centred**2))
     rho = min(max(above / below if below > 0.0 else 0.0, 0.0), 0.98)
     return (1.0 + rho) / (1.0 - rho)
 
@@ -216,7 +223,7 @@ def search(
     names = list(problem.parameters)
     done = small = 0
     for done in range(1, iterations + 1):
-        deviations, correlation = problem.deviations(residuals), correlation_of(residuals)
+        deviations, correlation = problem.deviations(residuals), correlation_of(problem.compared(residuals))
         cost = problem.cost(residuals, deviations, point, correlation)
         history.append(cost)
         if notify is not None:
@@ -241,11 +248,11 @@ def search(
         small = small + 1 if cost - better[2] < SMALL * max(cost, 1e-30) else 0
         if small == 2 or moved_by < 1e-5:
             break
-    deviations, correlation = problem.deviations(residuals), correlation_of(residuals)
+    deviations, correlation = problem.deviations(residuals), correlation_of(problem.compared(residuals))
     linear = linearised(problem, point, residuals, deviations, correlation)
     cost = problem.cost(residuals, deviations, point, correlation)
     unit = np.ones(1) if problem.given is None else problem.given
-    mae = float(np.mean(np.hstack([np.abs(r / unit[:, None]).ravel() for r in residuals])))
+    mae = float(np.nanmean(np.hstack([np.abs(r / unit[:, None]).ravel() for r in problem.compared(residuals)])))
     return Fit(point, mae, cost, deviations, tuple(names), done, history, linear.normal, linear.scores, correlation)
 
 

@@ -20,6 +20,7 @@ from .gather import gathered
 from .identifiability import Undetermined, at_bounds, resting_on, undetermined
 from .intervals import Interval, bootstrap, profile
 from .ladder import GAIN, RungResult, begun_with, chosen, climb, free_on, problem_of, start_point
+from .pauses import split_at_pauses
 from .prepare import DEFAULT, Prepared
 from .record import gear_sheet, scenario_text, sheet_text
 from .rig import Rig
@@ -262,7 +263,7 @@ def identify_task(
     rig = Rig(task, directory)
     logs, left_out = gathered(rig, directory)
     result = identify_logs(rig, logs, threads=threads, profiles=profiles, notify=notify)
-    result.left_out = left_out
+    result.left_out = {**left_out, **result.left_out}
     return result
 
 
@@ -270,6 +271,7 @@ def identify_logs(
     rig: Rig, logs: list[Prepared], *, threads: int | None = None, profiles: bool = False, notify: Notify = _no_notice
 ) -> IdentificationResult:
     """As `identify`, of logs that have been prepared."""
+    rig, logs, left_out = split_at_pauses(rig, logs)
     task, engine = rig.task, Engine(rig, threads)
     point, start = start_point(task, logs), Regression()
     if task.fit.regression and (fitted := [log for log in logs if not log.held_out]):
@@ -300,6 +302,7 @@ def identify_logs(
         start,
         rig,
         logs,
+        left_out=left_out,
     )
 
 

@@ -56,7 +56,8 @@ def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], position: Posit
     h, found = log.log.interval, []
     for segment in log.segments:
         of = slice(segment.begin, segment.end)
-        own, values = at[of], x[of]
+        there = np.isfinite(x[of])
+        own, values = at[of][there], x[of][there]
         for piece in np.split(np.arange(len(own)), np.flatnonzero(np.diff(own) > PAUSE * h) + 1):
             if len(piece) < 3 * width:
                 continue
@@ -142,7 +143,9 @@ def _motor_torque(
     """Measured, or of the command of a torque source."""
     for channel, m in rig.task.measured.items():
         if m.variable == f"{name}_torque" and m.filter_time == 0.0:
-            return np.asarray(np.interp(s.time, *measured_course(rig, s.log, channel, known)))
+            at, torque = measured_course(rig, s.log, channel, known)
+            there = np.isfinite(torque)
+            return np.asarray(np.interp(s.time, at[there], torque[there]))
     if name in scenario.controllers:
         raise InputError(f"motors.{name} is under its controller, and no channel shows its torque")
     if motor.kind != "torque_source":

@@ -98,7 +98,7 @@ class Measuring:
         return self._grid if numbers["filter_time"] > 0.0 else self._read(numbers)
 
     def _read(self, numbers: Mapping[str, float]) -> np.ndarray:
-        return np.clip(self._log.time - numbers["delay"], 0.0, self._log.time[-1])
+        return np.clip(self._log.time - numbers["delay"], self._log.begin, self._log.time[-1])
 
     def _each(self, seen: Sequence[np.ndarray]) -> list[tuple[str, np.ndarray, np.ndarray | None]]:
         """(name, variable, its rate) of each channel."""
@@ -116,7 +116,7 @@ class Measuring:
     def _rate(self, name: str, x: np.ndarray, rate: np.ndarray | None, numbers: Mapping[str, float]) -> np.ndarray:
         """By time of what a channel shows."""
         at = self._read(numbers)
-        inside = (at > 0.0) & (at < self._log.time[-1])
+        inside = (at > self._log.begin) & (at < self._log.time[-1])
         if (tau := numbers["filter_time"]) > 0.0:
             slope = numbers["scale"] * _slopes(at, self._grid, _filtered(self._grid, x, tau))
         elif rate is not None:
@@ -144,13 +144,13 @@ def delays_that_name(task: Identification, names: Sequence[str]) -> bool:
 
 
 def _grid(log: Prepared, interval: float | None) -> np.ndarray:
-    end = float(log.time[-1])
-    return np.linspace(0.0, end, max(2, round(end / (interval or min(log.log.interval, FINE))) + 1))
+    span = float(log.time[-1]) - log.begin
+    return np.linspace(log.begin, log.time[-1], max(2, round(span / (interval or min(log.log.interval, FINE))) + 1))
 
 
 def _interpolated(at: np.ndarray, t: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Straight between samples at equal distances; rows x instants or instants."""
-    place = np.clip(at / (t[1] - t[0]), 0.0, len(t) - 1.0)
+    place = np.clip((at - t[0]) / (t[1] - t[0]), 0.0, len(t) - 1.0)
     k = np.minimum(place.astype(int), len(t) - 2)
     share = place - k
     return np.asarray((1.0 - share) * x[..., k] + share * x[..., k + 1])
@@ -159,7 +159,7 @@ def _interpolated(at: np.ndarray, t: np.ndarray, x: np.ndarray) -> np.ndarray:
 def _slopes(at: np.ndarray, t: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Of the straight lines of `_interpolated`."""
     h = t[1] - t[0]
-    k = np.clip((at / h).astype(int), 0, len(t) - 2)
+    k = np.clip(((at - t[0]) / h).astype(int), 0, len(t) - 2)
     return np.asarray((x[k + 1] - x[k]) / h)
 
 

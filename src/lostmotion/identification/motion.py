@@ -16,6 +16,7 @@ from .formulas import names_in
 from .measuring import numbers_of
 from .prepare import Prepared, Segment
 from .rig import Rig
+from .task import FormulaText
 
 LEAST = 5  # samples of a cubic
 
@@ -44,7 +45,7 @@ def position_of(rig: Rig) -> Position:
 
 
 def measured_course(rig: Rig, log: Prepared, channel: str, known: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """(instants [s], values SI) of the variable that a channel shows: without its scale, offset and delay."""
+    """(instants [s], values SI) of the variable that a channel shows, NaN where it has none: without its scale, offset and delay."""
     numbers = numbers_of(rig.task.measured[channel], known)
     return log.time - numbers["delay"], (log.measured[channel] - numbers["offset"]) / numbers["scale"]
 
@@ -94,21 +95,25 @@ def _in_windows(rig: Rig, log: Prepared, point: Point, rung: int, length: float,
             f"key fit.horizon: {length:g} s has fewer than {LEAST} samples of {log.name}; give longer ones"
         )
     ratios = {s: turns(scenario.train(), s, position.shaft) for s in scenario.shafts}
-    begins: dict[int, dict[str, float]] = {}
+    begins: dict[int, dict[str, FormulaText]] = {}
     for k in starts[1:]:
         x, v = _cubic(time, angle, int(k), max(2, round(length / log.log.interval / 8)))
-        begins[int(k)] = {f"initial.angles.{position.shaft}": x} | {
-            f"initial.speeds.{s}": n * v for s, n in ratios.items() if n is not None
-        }
+        if np.isnan(v):
+            continue
+        begins[int(k)] = {f"initial.speeds.{s}": n * v for s, n in ratios.items() if n is not None}
+        begins[int(k)][f"initial.angles.{position.shaft}"] = x
     segments = []
     for segment in log.segments:
         edges = [segment.begin, *(k for k in begins if segment.begin < k < segment.end), segment.end]
-        segments += [Segment(a, b, segment.phase, begins.get(a)) for a, b in itertools.pairwise(edges)]
+        segments += [Segment(a, b, segment.phase, begins.get(a, segment.initial)) for a, b in itertools.pairwise(edges)]
     return replace(log, segments=tuple(segments), cache={})
 
 
 def _cubic(time: np.ndarray, x: np.ndarray, k: int, half: int) -> tuple[float, float]:
-    """Value and slope at a sample by the cubic of least squares through those beside it."""
-    near = slice(max(0, k - half), k + half + 1)
+    """Value and slope at a sample by the cubic of least squares through those beside it; NaN where they are too few."""
+    near = np.arange(max(0, k - half), min(len(x), k + half + 1))
+    near = near[np.isfinite(x[near])]
+    if len(near) < LEAST:
+        return np.nan, np.nan
     *_, slope, value = np.polyfit(time[near] - time[k], x[near], 3)
     return float(value), float(slope)

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,8 +29,9 @@ class Segment:
     begin: int
     end: int
     phase: int
-    initial: Mapping[str, float] | None = None
-    """measured state at which a run begins anew, by dotted key of the scenario; None: it goes on from the segment before"""
+    initial: Mapping[str, FormulaText] | None = None
+    """formulas of the measured state at which a run begins anew, by dotted key of the scenario; None: it goes on from the segment
+    before"""
 
 
 @dataclass
@@ -42,6 +44,7 @@ class Prepared:
     """[s], from 0"""
     inputs: dict[str, np.ndarray]
     measured: dict[str, np.ndarray]
+    """NaN where a channel has no number: such samples are not compared, and what acts goes on"""
     facts: dict[str, Any]
     """what formulas may name: its header, and ``first_CHANNEL`` and ``mean_CHANNEL`` in SI"""
     segments: tuple[Segment, ...]
@@ -50,7 +53,14 @@ class Prepared:
     """of each sample, by which its errors are multiplied"""
     first: bool
     """whether the search is to begin with it"""
+    begin: float = 0.0
+    """[s] of the run: of a log behind a pause, when all that acts is known"""
     cache: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def valid(self) -> np.ndarray:
+        """Channels x samples: whether there is a number."""
+        return np.asarray(np.isfinite(np.array(list(self.measured.values()))))
 
     @property
     def name(self) -> str:
@@ -173,7 +183,7 @@ def _in_si(task: Identification, log: Log, units: Mapping[str, str]) -> Log:
         found = channel_unit(written, log.channels[channel].unit, kind, f"{log.name}: {where}")
         if known.setdefault(channel, found)[0] != found[0]:
             raise InputError(f"{log.name}: {where}: channel {channel} has another unit elsewhere in the task; give one")
-    named = names_within(task.model_dump(include={"set", "phases", "ladder", "logs", "measured", "inputs"}))
+    named = _named(task)
     channels = {}
     for name, c in log.channels.items():
         if name not in known:
@@ -199,10 +209,29 @@ def _facts(log: Log) -> dict[str, Any]:
     """What formulas may name of a log."""
     facts = {key: value for key, value in log.header.items() if isinstance(value, int | float | str)}
     for name, channel in log.channels.items():
-        first, mean = _facts_of(name)
-        facts[first] = float(channel.values[0])
-        facts[mean] = float(np.mean(channel.values))
-    return facts
+        if (there := np.isfinite(channel.values)).any():
+            facts[_facts_of(name)[1]] = float(np.mean(channel.values[there]))
+    return facts | first_values(log)
+
+
+def first_values(log: Log) -> dict[str, float]:
+    """``first_CHANNEL`` of the channels of a log: the first value that is a number."""
+    return {
+        _facts_of(name)[0]: float(channel.values[np.argmax(there)])
+        for name, channel in log.channels.items()
+        if (there := np.isfinite(channel.values)).any()
+    }
+
+
+def first_values_named(task: Identification) -> set[str]:
+    """Measured channels whose first value a formula names."""
+    named = _named(task)
+    return {name for name, m in task.measured.items() if _facts_of(m.channel)[0] in named}
+
+
+def _named(task: Identification) -> frozenset[str]:
+    """What the formulas of a task name."""
+    return names_within(task.model_dump(include={"set", "phases", "ladder", "logs", "measured", "inputs"}))
 
 
 def _facts_of(channel: str) -> tuple[str, str]:

@@ -16,7 +16,7 @@ from .. import _core
 from ..errors import InputError
 from ..simulation.sensitivities import CENTRAL, ONE_SIDED, run_cases
 from .acting import NUMBERS, Acting
-from .formulas import names_in
+from .formulas import names_in, number
 from .measuring import Measuring, Probe, delays_that_name, numbers_of, rate_of
 from .parameters import FreeParameter
 from .prepare import Prepared, Segment
@@ -153,7 +153,7 @@ class _Course:
         except InputError as error:
             self._error, probes = error, []
         self._count = len(probes)
-        self._probes = [*probes, *(Probe(name, log.time) for name in extra)]
+        self._probes = [*probes, *(Probe(name, np.maximum(log.time, log.begin)) for name in extra)]
         self._extra = extra
         self._rows: list[list[np.ndarray]] = [[] for _ in self._probes]
         self._rows_by: list[list[np.ndarray]] = [[] for _ in self._probes]
@@ -180,7 +180,7 @@ class _Course:
         rig = self._rig
         if segment.initial is not None:
             self._state, self._state_by, self._smooth = None, {}, True
-        changes = _begun(rig.changes(self._known, self._rung, segment.phase), segment)
+        changes = _begun(rig.changes(self._known, self._rung, segment.phase), segment, self._known)
         built = rig.built(changes)
         acting = Acting(rig.task, self._log, self._known, begin, end)
         start, capacities = rig.start(self._log, built, changes) if self._state is None else (self._state, {})
@@ -223,15 +223,16 @@ class _Course:
         _refuse_held_delay(task, name, acts & axes)
         of_control = bool(axes) and (bool(acts & axes) or any(key.startswith("controllers") for key in of_rig))
         moved = self._state_by.get(name)
-        other_start = self._state is None and (len(keys) > len(of_rig) or rig.sets_start(built, of_rig))
+        own_start = any(name in names_in(formula) for formula in (segment.initial or {}).values())
+        other_start = self._state is None and (own_start or len(keys) > len(of_rig) or rig.sets_start(built, of_rig))
         other_inputs = bool(acts - axes) or any(_SIGNALS.fullmatch(key) for key in of_rig)
-        if not (keys or acts or moved is not None):
+        if not (keys or acts or own_start or moved is not None):
             return []
         out = []
         for offset, weight in stencil(self._values[name], p, long=bool(axes)):
             known = {**self._known, name: self._values[name] + offset}
             try:
-                there = _begun({**changes, **rig.changes(known, self._rung, phase, keys)}, segment)
+                there = _begun({**changes, **rig.changes(known, self._rung, phase, keys)}, segment, known)
                 at = rig.built(there) if of_rig else built
             except InputError as error:
                 raise NoDerivativeError(name, f"beside the value of {name}: {error}") from None
@@ -328,12 +329,12 @@ def _refuse_held_delay(task: Identification, name: str, references: set[str]) ->
             )
 
 
-def _begun(changes: Mapping[str, Any], segment: Segment) -> dict[str, Any]:
+def _begun(changes: Mapping[str, Any], segment: Segment, known: Mapping[str, Any]) -> dict[str, Any]:
     """With the measured state at which a segment begins, in place of that of the rig."""
     if segment.initial is None:
         return dict(changes)
     own = {k: v for k, v in changes.items() if not k.startswith(("initial.angles", "initial.speeds"))}
-    return {**own, **segment.initial}
+    return {**own, **{key: number(formula, known, key) for key, formula in segment.initial.items()}}
 
 
 def _ends(log: Prepared, segment: Segment) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,9 +28,9 @@ def screened(log: Log, measured: Iterable[str], inputs: Iterable[str], stated: d
     Parameters
     ----------
     measured
-        Channels that are compared: glitches and missing values in them are dropped.
+        Channels that are compared: glitches in them become NaN as missing values are, and all others keep the sample.
     inputs
-        Channels that act on the rig: where they are missing the log ends.
+        Channels that act on the rig, or that switch it: samples in which one is missing are dropped.
     stated
         Keys of the header, and the channels that ought to agree with them.
 
@@ -46,9 +47,10 @@ def screened(log: Log, measured: Iterable[str], inputs: Iterable[str], stated: d
     log = _in_seconds(_rising(log))
     log = _numbers(log, measured, inputs)
     for name in measured:
-        log = _without_glitches(log, name)
-        if np.ptp(log.values(name)) == 0.0:
-            log = log.noted(f"{name} stays at {log.values(name)[0]:.6g} all through; it says nothing of the motion")
+        log = _without_glitches(log, name, name in inputs)
+        there = log.values(name)[np.isfinite(log.values(name))]
+        if np.ptp(there) == 0.0:
+            log = log.noted(f"{name} stays at {there[0]:.6g} all through; it says nothing of the motion")
     for name in measured:
         log = _noted(log, name)
     log = _stalls(log)
@@ -127,7 +129,7 @@ def _spread(log: Log) -> Log:
 
 
 def _numbers(log: Log, measured: list[str], inputs: list[str]) -> Log:
-    """Without samples in which a channel that is needed is no number."""
+    """With NaN where a measured channel is no number, and without samples in which an input is none."""
     for name in dict.fromkeys((*inputs, *measured)):
         bad = ~(np.abs(log.values(name)) < HUGE)
         if bad.all():
@@ -139,41 +141,50 @@ def _numbers(log: Log, measured: list[str], inputs: list[str]) -> Log:
                 f"{log.name}: channel {name} has no number in {np.mean(bad):.0%} of the samples; leave the file out"
             )
         if bad.any():
-            log = log.only(~bad, f"dropped {np.sum(bad)} samples in which {name} is no number")
+            log = _without(
+                log, name, bad, name in inputs, f"dropped {np.sum(bad)} samples in which {name} is no number"
+            )
     return log
 
 
-def _without_glitches(log: Log, name: str) -> Log:
+def _without(log: Log, name: str, bad: np.ndarray, acts: bool, note: str) -> Log:
+    """Without some samples of a channel: all of the log's if the channel acts, else NaN there, so that inputs keep theirs."""
+    if acts:
+        return log.only(~bad, note)
+    channel = log.channels[name]
+    masked = replace(channel, values=np.where(bad, np.nan, channel.values))
+    return replace(log, channels={**log.channels, name: masked}).noted(note)
+
+
+def _without_glitches(log: Log, name: str, acts: bool) -> Log:
     """Without single samples that jump away and back."""
-    x = log.values(name)
+    there = np.flatnonzero(np.isfinite(log.values(name)))
+    x = log.values(name)[there]
     step = np.diff(x)
-    there, back = step[:-1], step[1:]
-    away = np.minimum(np.abs(there), np.abs(back))
-    returns = (np.sign(there) * np.sign(back) < 0.0) & (np.abs(there + back) < 0.5 * away)
+    away = np.minimum(np.abs(step[:-1]), np.abs(step[1:]))
+    returns = (np.sign(step[:-1]) * np.sign(step[1:]) < 0.0) & (np.abs(step[:-1] + step[1:]) < 0.5 * away)
     # Steps there and back do not tell what is usual: a few glitches would hide each other.
     calm = np.ones(len(step), dtype=bool)
     calm[:-1] &= ~returns
     calm[1:] &= ~returns
     usual = float(np.percentile(np.abs(step[calm]), 99.0)) if calm.any() else 0.0
     if usual == 0.0:
-        usual = float(np.percentile(np.abs(step), 99.0))
+        usual = float(np.percentile(np.abs(step), 99.0)) if len(step) else 0.0
     if usual == 0.0:
         return log
-    glitch = np.zeros(len(x), dtype=bool)
-    glitch[1:-1] = returns & (away > GLITCH * usual)
-    if not glitch.any():
+    found = there[1:-1][returns & (away > GLITCH * usual)]
+    if not len(found):
         return log
-    k = int(np.argmax(glitch))
-    count = int(np.sum(glitch))
-    return log.only(
-        ~glitch,
-        f"dropped {count} glitch{'es' if count > 1 else ''} of {name}, the first at {log.time[k]:.4g} s ({x[k]:.6g})",
-    )
+    glitch = np.zeros(len(log.time), dtype=bool)
+    glitch[found] = True
+    k, count = int(found[0]), len(found)
+    note = f"dropped {count} glitch{'es' if count > 1 else ''} of {name}, the first at {log.time[k]:.4g} s"
+    return _without(log, name, glitch, acts, f"{note} ({log.values(name)[k]:.6g})")
 
 
 def _noted(log: Log, name: str) -> Log:
     """Notes on a channel that ends at a limit, or is slower than its samples."""
-    x = log.values(name)
+    x = log.values(name)[np.isfinite(log.values(name))]
     changes = int(np.sum(np.diff(x) != 0.0))
     if changes <= SLOW:
         return log
