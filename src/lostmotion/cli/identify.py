@@ -56,14 +56,14 @@ def identify(
 
 def _print_summary(result: IdentificationResult) -> None:
     print(result.task.title or "Identification")
+    print(*(f"  {text}" for text in result.warnings()), sep="\n", end="\n" if result.warnings() else "")
     unit = f" {result.error_unit}".rstrip()
     for k, rung in enumerate(result.rungs):
         held_out = "" if math.isnan(rung.held_out) else f", held out {rung.held_out:.5g}{unit}"
         print(
             f"  {'*' if k == result.chosen else ' '} {rung.name}: mean absolute error {rung.train:.5g}{unit}{held_out}"
         )
-    for line in result.lines():
-        print(line)
+    print(*result.lines()[len(result.warnings()) :], sep="\n")
     if result.left_out:
         print(
             f"Left out, since they cannot be used, are {len(result.left_out)} of {len(result.left_out) + len(result.logs)} logs:"

@@ -13,16 +13,18 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from ..simulation.train_scenario import TrainScenario
-from .engine import Engine
+from .engine import Engine, Point
 from .errors_of_logs import LogError, total
 from .fit import Fit, Problem, linearised
 from .gather import gathered
 from .identifiability import Undetermined, at_bounds, resting_on, undetermined
-from .intervals import Interval, bootstrap, profile
-from .ladder import GAIN, RungResult, begun_with, chosen, climb, free_on, problem_of, start_point
+from .intervals import Interval, bootstrap, profile, widest
+from .ladder import GAIN, RungResult, begun_with, chosen, climb, first_fit, free_on, is_rough, problem_of, start_point
+from .misfit import Misfit, hidden, misfits
 from .pauses import split_at_pauses
 from .prepare import DEFAULT, Prepared
 from .record import gear_sheet, scenario_text, sheet_text
+from .recorded import as_recorded, nearer_ways
 from .rig import Rig
 from .runs import run_log
 from .start import Regression, regressed
@@ -50,6 +52,10 @@ class IdentificationResult:
     """by log: what was dropped of it, and what looks wrong"""
     left_out: dict[str, str] = field(default_factory=dict, kw_only=True)
     """by log that cannot be used: why"""
+    inputs: list[str] = field(default_factory=list, kw_only=True)
+    """how inputs go on between samples, of those that the task leaves open: and why"""
+    misfits: list[Misfit] = field(default_factory=list, kw_only=True)
+    """channels whose residuals are no noise, or far above the stated deviation"""
     scenario: TrainScenario
     """the rig with the values that were found, of the first log"""
     profiles: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
@@ -113,6 +119,7 @@ class IdentificationResult:
     def lines(self) -> list[str]:
         """The answer as text."""
         lines = [
+            *self.warnings(),
             f"{self.rungs[self.chosen].name}: the rung that is taken",
             *(f"  {text}" for text in [*self.failures(), *self.passed_over()]),
         ]
@@ -131,7 +138,16 @@ class IdentificationResult:
                     unit = f" {self.unit(channel)}".rstrip()
                     lines.append(f"  {channel}, {_logs(n)} {what}: MAE {mae:.5g}{unit}, RMSE {rmse:.5g}{unit}")
         lines += [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
-        return lines + [f"  {text}" for text in [*self.differences(), *self.starts()]]
+        return lines + [f"  {text}" for text in [*self.differences(), *self.inputs, *self.starts()]]
+
+    def warnings(self) -> list[str]:
+        """Why the values and their intervals are to be doubted; nothing where the residuals are noise."""
+        lost = [name for name, i in self.intervals.items() if i.method == "bounds"]
+        text = (
+            "may have any value within its bounds: the motion does not depend smoothly on it, and no start led to residuals of the "
+            "stated deviation"
+        )
+        return [*(m.text(self.unit(m.channel)) for m in self.misfits), *(f"{name} {text}" for name in lost)]
 
     def passed_over(self) -> list[str]:
         """Rungs with a smaller error that were not taken, since the logs do not tell what they free."""
@@ -272,20 +288,39 @@ def identify_logs(
 ) -> IdentificationResult:
     """As `identify`, of logs that have been prepared."""
     rig, logs, left_out = split_at_pauses(rig, logs)
+    rig, ways, undecided = as_recorded(rig, logs)
+    engine = Engine(rig, threads)
+    point, start = start_point(rig.task, logs), Regression()
+    train = [log for log in logs if not log.held_out]
+    few = begun_with(rig.task, train)
+    if rig.task.fit.regression and train:
+        point, start = regressed(rig, engine, few, point, free_on(rig.task, 0))
+    if undecided and train:
+
+        def fitted(rig: Rig, logs: list[Prepared], start: Point) -> Fit:
+            return first_fit(rig, Engine(rig, threads), logs, start, notify)
+
+        rig, point, more = nearer_ways(rig, few, undecided, point, fitted)
+        ways |= more
+        logs = [replace(log, cache={}) for log in logs]
     task, engine = rig.task, Engine(rig, threads)
-    point, start = start_point(task, logs), Regression()
-    if task.fit.regression and (fitted := [log for log in logs if not log.held_out]):
-        point, start = regressed(rig, engine, begun_with(task, fitted), point, free_on(task, 0))
     rungs = climb(rig, engine, logs, point, notify)
     best = chosen(rungs)
     fit, free = rungs[best].fit, free_on(task, best)
     train = [log for log in logs if not log.held_out]
     problem: Problem = problem_of(rig, engine, train, best)
-    intervals = bootstrap(problem, fit)
+    residuals = engine.residuals(train, fit.point, best)
+    misfit = misfits(problem, residuals)
+    intervals = bootstrap(problem, fit, hidden=hidden(problem, residuals, misfit, fit.correlation))
+    for point in rungs[best].minima:
+        intervals = {n: widest(i, Interval(point.values[n], point.values[n], i.method)) for n, i in intervals.items()}
     found = {}
     if profiles:
         for name in free:
-            intervals[name], found[name] = profile(problem, fit, name)
+            profiled, found[name] = profile(problem, fit, name)
+            intervals[name] = widest(profiled, intervals[name]) if any(m.large for m in misfit) else profiled
+    lost = [n for n in free if any(m.large and m.structured for m in misfit) and is_rough(rig, n, best)]
+    intervals |= {n: Interval(free[n].min, free[n].max, "bounds") for n in lost}
     first = logs[0]
     return IdentificationResult(
         task,
@@ -303,6 +338,8 @@ def identify_logs(
         rig,
         logs,
         left_out=left_out,
+        inputs=list(ways.values()),
+        misfits=[m for m in misfit if m.large or m.structured],
     )
 
 

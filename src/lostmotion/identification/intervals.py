@@ -23,14 +23,15 @@ class Interval:
     low: float
     high: float
     method: str
-    """``bootstrap`` or ``profile``"""
+    """``bootstrap`` or ``profile``; ``bounds``, where the fit says nothing of the value"""
 
 
-def bootstrap(problem: Problem, fit: Fit, seed: int = 0) -> dict[str, Interval]:
+def bootstrap(problem: Problem, fit: Fit, seed: int = 0, hidden: float = 0.0) -> dict[str, Interval]:
     """By resampling blocks of the residuals, with one Gauss-Newton step for each sample.
 
     The pieces of the gradient of half a second each are drawn anew with replacement, so that errors that last, as those of a
     model that is not quite right do, widen the interval. It is at least that of independent errors: a few blocks say little.
+    With `hidden`, weighted squares of residuals that no noise explains, it is wider by all that these can be the effect of.
     Along the directions that neither logs nor priors determine, the parameters go on together until one is at its bound.
     """
     names = list(problem.parameters)
@@ -51,7 +52,8 @@ def bootstrap(problem: Problem, fit: Fit, seed: int = 0) -> dict[str, Interval]:
     steps = (count @ blocks) @ inverse * math.sqrt(len(blocks) / max(1, len(blocks) - len(names)))
     low, high = np.percentile(steps, [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)], axis=0)
     normal = 1.96 * np.sqrt(np.diag(inverse))  # of independent errors
-    low, high = np.minimum(low, -normal), np.maximum(high, normal)
+    wider = np.sqrt(hidden * np.diag(inverse))
+    low, high = np.minimum(low, -normal) - wider, np.maximum(high, normal) + wider
     if weak.any():
         room = [room_of(problem.parameters[name], fit.point.values[name]) for name in names]
         down, up = reach(vectors[:, weak], np.array(room))
@@ -61,6 +63,11 @@ def bootstrap(problem: Problem, fit: Fit, seed: int = 0) -> dict[str, Interval]:
         p, value = problem.parameters[name], fit.point.values[name]
         found[name] = Interval(moved(p, value, low[k]), moved(p, value, high[k]), "bootstrap")
     return found
+
+
+def widest(a: Interval, b: Interval) -> Interval:
+    """From the lower of two lower ends to the higher of two higher ones."""
+    return replace(a, low=min(a.low, b.low), high=max(a.high, b.high))
 
 
 def reach(directions: np.ndarray, room: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

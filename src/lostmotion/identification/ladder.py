@@ -4,23 +4,32 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..errors import InputError
 from .engine import Engine, Point
 from .errors_of_logs import LogError, log_errors
-from .fit import Fit, Problem, search
+from .fit import NORMAL, Fit, Problem, search
 from .formulas import number
 from .identifiability import Undetermined, undetermined
+from .intervals import CHI_SQUARE
+from .misfit import explained
 from .motion import windows
 from .parameters import FreeParameter
 from .prepare import Prepared
 from .rig import Rig
 from .task import Identification
 
+ROUGH = re.compile(r"(^|\.)(backlash|breaks|breakaway_torque)(\.|$)")  # keys on which a motion does not depend smoothly
+SCAN = 9  # values of such a parameter at which the cost is computed
+SPAN = 8.0  # from an eighth of the value found to eight times it
+PARTS = (1 / 16, 1 / 8, 1 / 4, 1 / 2)  # of the logs, to which a fit is made before that to the whole
+LEAST = 50  # samples of the first
+TRIED = 2  # of the minima of the scan, from which a fit begins
 GAIN = 0.01  # of the held-out error, by which a higher rung must be better to be taken
 GAIN_UNDETERMINED = 0.05  # the same, where its parameters leave more directions undetermined
 Notify = Callable[[str, int, float], None]
@@ -41,6 +50,8 @@ class RungResult:
     """by log held out that has no run with the values of this rung: why"""
     undetermined: list[Undetermined]
     """what the logs cannot tell of the parameters of this rung"""
+    minima: list[Point] = field(default_factory=list)
+    """other minima of the cost that these logs do not tell from the one found"""
 
     @property
     def error(self) -> float:
@@ -130,12 +141,87 @@ def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, noti
             )
             if _cost(problem, again, best) < best.cost:
                 best = again
+        rough = [name for name in added if name not in entry.multi_start and is_rough(rig, name, rung)]
+        best, minima = _other_minima(rig, engine, train, rung, point, best, rough, notify)
         point = best.point
         best.point = point = _with_own(rig, engine, logs, point, rung)
         unsure = undetermined(task, best, free_on(task, rung))
         errors = log_errors(logs, engine.residuals(logs, point, rung))
-        found.append(RungResult(entry.name, best, errors, *_means(task, errors, best), engine.failed, unsure))
+        means = _means(task, errors, best)
+        found.append(RungResult(entry.name, best, errors, *means, engine.failed, unsure, minima))
     return found
+
+
+def is_rough(rig: Rig, name: str, rung: int) -> bool:
+    """Whether the motion does not depend smoothly on a parameter: it enters a gap or a break of a law."""
+    phases = range(-1, len(rig.task.phases))
+    return any(ROUGH.search(key) for phase in phases for key in rig.leaves_of(name, rung, phase))
+
+
+def _other_minima(
+    rig: Rig,
+    engine: Engine,
+    train: list[Prepared],
+    rung: int,
+    first: Point,
+    best: Fit,
+    names: Sequence[str],
+    notify: Notify,
+) -> tuple[Fit, list[Point]]:
+    """(best fit, points of other minima that are as good) from several values of parameters on which the motion does not depend smoothly.
+
+    Nothing is tried where the residuals of the fit are the noise that the task states.
+    """
+    problem = problem_of(rig, engine, train, rung)
+    if not names or explained(problem, engine.residuals(train, best.point, rung)):
+        return best, []
+    others: list[Fit] = []
+
+    def starts() -> Iterator[Point]:
+        for k, name in enumerate(names):
+            if k == 0:
+                yield _grown(problem, first)
+            for value in _promising(problem, best, name):
+                yield _grown(problem, replace(best.point, values=best.point.values | {name: value}))
+
+    for start in starts():
+        fit = _one(rig, engine, train, rung, start, rig.rungs()[rung].name, notify)
+        others.append(fit)
+        if _cost(problem, fit, best) < best.cost:
+            others[-1], best = best, fit
+        if explained(problem, engine.residuals(train, best.point, rung)):
+            break
+    scale = 1.0 if problem.given is None else max(1.0, (NORMAL * best.mae) ** 2)  # errors above those stated
+    return best, [fit.point for fit in others if _cost(problem, fit, best) - best.cost < CHI_SQUARE * scale]
+
+
+def _grown(problem: Problem, start: Point) -> Point:
+    """Where fits to the first parts of the logs lead, each longer than the one before: there are few impacts in the first."""
+    for share in PARTS:
+        logs = [log.part(0, max(LEAST, round(share * len(log.time)))) for log in problem.logs]
+        if all(log.valid.any(axis=1).all() for log in logs):
+            start = search(replace(problem, logs=logs), start, iterations=problem.options.iterations).point
+    return start
+
+
+def _promising(problem: Problem, fit: Fit, name: str) -> list[float]:
+    """Values of a parameter at which a scan, all others as found, has its lowest other minima of the cost."""
+    p, value = problem.parameters[name], fit.point.values[name]
+    low, high = max(p.min, value / SPAN), min(p.max, SPAN * max(value, p.step))
+    grid = np.geomspace(low, high, SCAN) if low > 0.0 else np.linspace(low, high, SCAN)
+    grid = np.unique(np.append(grid, value))
+    costs = []
+    for x in grid.tolist():
+        point = replace(fit.point, values=fit.point.values | {name: x})
+        residuals = problem.engine.residuals(problem.logs, point, problem.rung)
+        costs.append(problem.cost(residuals, fit.deviations, point, fit.correlation))
+    c = np.nan_to_num(np.array(costs), nan=np.inf)
+    own = int(np.flatnonzero(grid == value)[0])
+    walls = np.pad(c, 1, constant_values=np.inf)
+    minima = np.flatnonzero((c < walls[:-2]) & (c < walls[2:]))
+    minima = minima[minima != own]
+    far = minima if len(minima) else np.array([max(0, own // 2), (own + len(grid)) // 2])  # no minimum: both sides
+    return [float(x) for x in grid[far[np.argsort(c[far])]][:TRIED] if x != value]
 
 
 def _cost(problem: Problem, fit: Fit, other: Fit) -> float:
@@ -169,13 +255,25 @@ def _one(rig: Rig, engine: Engine, train: list[Prepared], rung: int, start: Poin
     def tell(iteration: int, cost: float) -> None:
         notify(name, iteration, cost)
 
-    for length in options.horizon:
-        cut = windows(rig, few, start, rung, length)
-        start = search(problem_of(rig, engine, cut, rung), start, iterations=options.iterations, notify=tell).point
-    fit = search(problem_of(rig, engine, few, rung), start, iterations=options.iterations, notify=tell)
+    fit = _some(rig, engine, few, rung, start, tell)
     if len(few) == len(train):
         return fit
     return search(problem_of(rig, engine, train, rung), fit.point, iterations=options.iterations, notify=tell)
+
+
+def _some(
+    rig: Rig, engine: Engine, few: Sequence[Prepared], rung: int, start: Point, tell: Callable[[int, float], None]
+) -> Fit:
+    options = rig.task.fit
+    for length in options.horizon:
+        cut = windows(rig, few, start, rung, length)
+        start = search(problem_of(rig, engine, cut, rung), start, iterations=options.iterations, notify=tell).point
+    return search(problem_of(rig, engine, few, rung), start, iterations=options.iterations, notify=tell)
+
+
+def first_fit(rig: Rig, engine: Engine, few: Sequence[Prepared], start: Point, notify: Notify) -> Fit:
+    """The lowest rung, fitted to the logs with which a search begins."""
+    return _some(rig, engine, few, 0, start, lambda iteration, cost: notify(rig.rungs()[0].name, iteration, cost))
 
 
 def _means(task: Identification, errors: list[LogError], fit: Fit) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from .formulas import number
 from .ladder import start_point
 from .measuring import numbers_of
 from .parameters import FreeParameter
-from .prepare import Prepared, Segment, first_values, first_values_named
+from .prepare import Prepared, Segment, first_values_named
 from .rig import Rig
 from .screening import PAUSE
 from .task import FormulaText, Identification
@@ -154,30 +154,7 @@ def _up_to_first_pause(log: Prepared, begins: list[int], ends: list[int], why: s
 
 def _part(log: Prepared, begin: int, end: int) -> Prepared | None:
     """Samples of a log as a log of their own; nothing where they are too few."""
-    if (begin, end) == (0, len(log.time)):
-        return log
-    of = slice(begin, end)
-    channels = {name: replace(c, values=c.values[of]) for name, c in log.log.channels.items()}
-    name = log.name if begin == 0 else f"{log.name} from {log.time[begin]:.4g} s"
-    own = replace(
-        log.log, name=name, time=log.log.time[of], channels=channels, notes=log.log.notes if begin == 0 else ()
-    )
-    segments = [
-        Segment(max(s.begin, begin) - begin, min(s.end, end) - begin, s.phase, s.initial)
-        for s in log.segments
-        if s.begin < end and s.end > begin
-    ]
-    part = replace(
-        log,
-        log=own,
-        time=log.time[of] - log.time[begin],
-        inputs={n: x[of] for n, x in log.inputs.items()},
-        measured={n: x[of] for n, x in log.measured.items()},
-        facts=log.facts | first_values(own),
-        segments=tuple(segments),
-        weight=log.weight[of],
-        cache={},
-    )
+    part = log.part(begin, end)
     return part if np.all(part.valid.sum(axis=1) >= LEAST) else None
 
 

@@ -67,6 +67,35 @@ class Prepared:
         """Of its file."""
         return self.log.name
 
+    def part(self, begin: int, end: int) -> Prepared:
+        """Some of its samples as a log of their own, whose time begins at 0; all of them as they are."""
+        if (begin, end) == (0, len(self.time)):
+            return self
+        of = slice(begin, end)
+        own = replace(
+            self.log,
+            name=self.name if begin == 0 else f"{self.name} from {self.time[begin]:.4g} s",
+            time=self.log.time[of],
+            channels={name: replace(c, values=c.values[of]) for name, c in self.log.channels.items()},
+            notes=self.log.notes if begin == 0 else (),
+        )
+        segments = [
+            Segment(max(s.begin, begin) - begin, min(s.end, end) - begin, s.phase, s.initial)
+            for s in self.segments
+            if s.begin < end and s.end > begin
+        ]
+        return replace(
+            self,
+            log=own,
+            time=self.time[of] - self.time[begin],
+            inputs={name: x[of] for name, x in self.inputs.items()},
+            measured={name: x[of] for name, x in self.measured.items()},
+            facts=self.facts | first_values(own) if begin > 0 else self.facts,
+            segments=tuple(segments),
+            weight=self.weight[of],
+            cache={},
+        )
+
 
 def channel_factor(written: str, of_file: str, unit: str, where: str) -> float:
     """What one of the unit of a channel is in SI; see `channel_unit`."""

@@ -164,6 +164,11 @@ class Rig:
             self._keys[where] = [key for key, f in self.formulas(rung, phase).items() if name in names_of(f)]
         return self._keys[where]
 
+    def leaves_of(self, name: str, rung: int, phase: int) -> list[str]:
+        """As `keys_of`, down to the keys within tables."""
+        formulas = self.formulas(rung, phase)
+        return [leaf for key in self.keys_of(name, rung, phase) for leaf in _leaves(formulas[key], key, name)]
+
     def changes(
         self, values: Mapping[str, Any], rung: int, phase: int, keys: list[str] | None = None
     ) -> dict[str, Any]:
@@ -231,6 +236,13 @@ def names_of(node: Any) -> frozenset[str]:
         return node.names
     inner = node.values() if isinstance(node, dict) else node if isinstance(node, list) else ()
     return frozenset().union(*map(names_of, inner))
+
+
+def _leaves(node: Any, key: str, name: str) -> list[str]:
+    """Keys within a value whose formulas name something."""
+    if isinstance(node, dict):
+        return [leaf for k, inner in node.items() for leaf in _leaves(inner, f"{key}.{k}", name)]
+    return [key] if name in names_of(node) else []
 
 
 def _read(value: Any, key: str) -> Any:

@@ -323,7 +323,7 @@ def _refuse_held_delay(task: Identification, name: str, references: set[str]) ->
     """A reference that is held and comes later is the same at a tick of the controller, or another one altogether."""
     for i in sorted(references):
         channel = task.inputs[i]
-        if channel.interpolation == "hold" and name in names_in(channel.delay):
+        if channel.interpolation != "linear" and name in names_in(channel.delay):
             raise NoDerivativeError(
                 name, f"{name}: delays {i}, which is held between samples and read by a sampled controller at its ticks"
             )

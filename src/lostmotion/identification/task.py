@@ -62,8 +62,8 @@ class InputChannel(Part):
     """added to it after the factor"""
     delay: FormulaText = 0.0
     """by which it acts later: dead time [s]"""
-    interpolation: Literal["hold", "linear"] = "hold"
-    """between samples"""
+    interpolation: Literal["hold", "linear"] | None = None
+    """between samples; left out, held where the channel repeats its values or moves in steps, else the way that is nearer to the logs"""
 
 
 class MeasuredChannel(Part):
