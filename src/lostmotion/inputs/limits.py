@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from pathlib import Path
@@ -28,7 +29,7 @@ def size_of(text: str) -> int:
     if match is None:
         raise ValueError("is no size of memory, such as 2 GB")
     prefix = match[2].replace("K", "k")
-    factor = 1024.0 ** list(PREFIXES).index(prefix) if match[3] else PREFIXES[prefix]
+    factor = math.ldexp(1.0, 10 * list(PREFIXES).index(prefix)) if match[3] else PREFIXES[prefix]
     return int(float(match[1]) * factor)
 
 
