@@ -17,12 +17,11 @@ from lostmotion.data_sheets.records import read_sheets
 from lostmotion.identification.engine import Engine, Point
 from lostmotion.identification.fit import search
 from lostmotion.identification.formulas import Formula
-from lostmotion.identification.identifiability import Undetermined, _sentence
+from lostmotion.identification.identifiability import Undetermined
 from lostmotion.identification.identify import IdentificationResult, _notes, identify_task
 from lostmotion.identification.intervals import reach
 from lostmotion.identification.ladder import RungResult, chosen, climb, free_on, problem_of, start_point
 from lostmotion.identification.logs import Channel
-from lostmotion.identification.parameters import FreeParameter
 from lostmotion.identification.prepare import prepared
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
@@ -317,22 +316,6 @@ def test_what_the_values_rest_on_is_said(found: IdentificationResult) -> None:
     assert said.changes["resistance"] == pytest.approx(-share, rel=0.1)
     assert "rest on direction = 0" in said.text and f"armature {100 * share:+.0f} %" in said.text
     assert "stall torque" in said.text and "torque_constant" not in said.text
-
-
-@pytest.mark.parametrize(
-    ("second", "unit", "what"),
-    [
-        (-1.06 / 1.28, "N*m", "only the sum a + b is"),
-        (1.06 / 1.28, "N*m", "only the difference a - b is"),
-        (-1.06 / 1.28, "", "only the product a*b is"),
-        (-0.99, "N*m", "only the product a*b is"),
-        (0.99, "N*m", "only the ratio a/b is"),
-    ],
-)
-def test_a_sum_is_told_from_a_product(second: float, unit: str, what: str, logs: Path) -> None:
-    """Of 1.06 and 1.28: the sum stays where the second falls by as much as the first rises, the product by the same share."""
-    parameters = {"a": FreeParameter(start=1.0, unit="N*m"), "b": FreeParameter(start=1.0, unit=unit)}
-    assert what in _sentence(servo_task(logs), {"a": 1.0, "b": second}, {"a": 1.06, "b": 1.28}, parameters)
 
 
 def test_parameters_that_are_undetermined_together_go_on_until_one_is_at_its_bound() -> None:

@@ -136,11 +136,22 @@ def test_parameters_of_which_the_torques_are_no_sum_keep_their_starts(tmp_path: 
     logs = axis_logs(rig, VALUES | {"coulomb": 0.3})
     point, start = regressed(rig, Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
     assert "prior" in start.kept["inertia"]
-    assert "not linear" in start.kept["weight"]  # `radius`, of the two the first in the file, is found
+    assert "their product with radius" in start.kept["weight"]  # `radius`, of the two the first in the file, is found
     assert "out of its bounds" in start.kept["coulomb"]
     assert point.values["inertia"] == starts["inertia"] and point.values["coulomb"] == 0.149
     assert set(start.found) == {"radius", "viscous", "offset"}
     assert start.found["radius"] == pytest.approx(VALUES["weight"] * VALUES["radius"] / starts["weight"], rel=0.05)
+
+
+def test_a_weight_is_linear_however_many_straight_lines_its_torque_has(tmp_path: Path) -> None:
+    """With a fixed error of the straight lines their number grows with the weight."""
+    rig = axis_rig(tmp_path, {**{k: v for k, v in VALUES.items() if k != "radius"}, "weight": 2.0})
+    data = rig.task.model_dump()
+    data["set"]["gravity.weight.error"] = 0.005
+    rig = Rig(Identification(**data), tmp_path)
+    logs = axis_logs(rig, VALUES)
+    _, start = regressed(rig, Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
+    assert not start.kept and start.found["weight"] == pytest.approx(VALUES["weight"], rel=0.05)
 
 
 @pytest.mark.parametrize(

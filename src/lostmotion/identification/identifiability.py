@@ -2,40 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .fit import Fit, slope_of
-from .formulas import names_within
+from .fit import Fit, Problem, slope_of
 from .parameters import FreeParameter
-from .task import Identification
+from .remedies import remedy_for
+from .rig import Rig
 
 LOOSE = 1.0  # relative change, of the values in a direction, that 95 % of equally good fits stay within: beyond, it is not determined
 PART = 0.25  # of the largest relative change in a direction, from which on a parameter has a part in it
 WORTH = 0.02  # relative change of a value, from which on it is named as resting on another
 ALIKE = 0.3  # by which relative changes of parameters of one scale may differ
-
-# What determines a parameter, by the key of the scenario that it enters.
-REMEDIES: tuple[tuple[tuple[str, ...], str], ...] = (
-    (
-        ("drive_efficiency", "backdrive_efficiency", "losses"),
-        "give a stall torque, or a log with output torque in both directions of power flow",
-    ),
-    (("stiffness", "backlash", "hysteresis"), "give a slow torque ramp with the output locked"),
-    (("delay", "sample_time"), "give a log with steps of the reference"),
-    (("breakaway_torque", "stribeck_speed", "friction_curve"), "give slow reversals, and a log that creeps from rest"),
-    (
-        ("rotor_inertia", "inertia"),
-        "give a log with high acceleration and a known torque, or the inertia of the data sheet",
-    ),
-    (
-        ("gain", "limit", "rated_torque", "viscous_friction", "friction_torque"),
-        "give a stall torque, a log of the motor's torque or current, or a log in which the motor is off",
-    ),
-    (("angle",), "give a log at rest with the motor off"),
-)
+FINITE = 0.3  # relative change of a parameter, by which a sum is told from a product
+SAME = 0.2  # of the change of the runs with one parameter alone, below which they are taken to stay the same
 
 
 @dataclass(frozen=True)
@@ -49,8 +31,9 @@ class Undetermined:
     text: str
 
 
-def undetermined(task: Identification, fit: Fit, parameters: Mapping[str, FreeParameter]) -> list[Undetermined]:
+def undetermined(problem: Problem, fit: Fit) -> list[Undetermined]:
     """Directions that the logs alone, without priors, leave wider than the values themselves."""
+    parameters = problem.parameters
     names = list(parameters)
     if not names:
         return []
@@ -65,20 +48,20 @@ def undetermined(task: Identification, fit: Fit, parameters: Mapping[str, FreePa
         largest = int(np.argmax(np.abs(vector)))
         if width * abs(vector[largest]) < LOOSE:
             continue
-        changes = {
-            n: float(x / vector[largest])
-            for n, x in zip(names, vector, strict=True)
-            if abs(x) >= PART * abs(vector[largest])
-        }
+        whole = {n: float(x / vector[largest]) for n, x in zip(names, vector, strict=True)}
+        changes = {n: x for n, x in whole.items() if abs(x) >= PART}
         sizes = {n: float(x) for n, x in zip(names, size, strict=True)}
-        found.append(
-            Undetermined(changes, float(width * abs(vector[largest])), _sentence(task, changes, sizes, parameters))
-        )
+        if len(changes) == 1:  # of a small value and a large one, a sum takes a small relative part of the large one
+            (own,) = changes
+            moves = {n: abs(x) * sizes[n] / sizes[own] for n, x in whole.items() if n != own}
+            changes |= {n: whole[n] for n, move in moves.items() if abs(move - 1.0) < ALIKE}
+        text = _sentence(problem, fit, changes, sizes)
+        found.append(Undetermined(changes, float(width * abs(vector[largest])), text))
     return found
 
 
 def resting_on(
-    task: Identification, fit: Fit, parameters: Mapping[str, FreeParameter], normal: np.ndarray, name: str
+    rig: Rig, fit: Fit, parameters: Mapping[str, FreeParameter], normal: np.ndarray, name: str
 ) -> list[Undetermined]:
     """That the values rest on the value of a parameter that is not free, if the logs would not tell it to within its scale.
 
@@ -111,58 +94,63 @@ def resting_on(
     listed = ", ".join(f"{n} {100.0 * share:+.0f} %" for n, share in sorted(shares.items(), key=lambda x: -abs(x[1])))
     text = (
         f"the values rest on {name} = {p.shown(given)}, which these logs do not tell to within {p.shown(p.step)}: with {p.shown(to)} "
-        f"they would be {listed}; {_remedy(task, [name])}"
+        f"they would be {listed}; {remedy_for(rig, [name])}"
     )
     return [Undetermined({name: 1.0, **shares}, float(width / p.step), text)]
 
 
-def _sentence(
-    task: Identification,
-    changes: Mapping[str, float],
-    sizes: Mapping[str, float],
-    parameters: Mapping[str, FreeParameter],
-) -> str:
+def _sentence(problem: Problem, fit: Fit, changes: Mapping[str, float], sizes: Mapping[str, float]) -> str:
     names = sorted(changes, key=lambda n: -abs(changes[n]))
-    remedy = _remedy(task, names)
-    if len(names) == 1:
-        return f"{names[0]} is not determined by these logs; {remedy}"
-    a, b, *more = names
-    ratio = changes[b] / changes[a]
-    # Of values that are nearly the same, a sum looks like a product: what is the more alike decides.
-    ratio_of_sizes = ratio * sizes[b] / sizes[a]
-    nearer = abs(abs(ratio_of_sizes) - 1.0) < abs(abs(ratio) - 1.0)
-    if not more and nearer and abs(abs(ratio_of_sizes) - 1.0) < ALIKE and parameters[a].unit == parameters[b].unit:
-        what, sign = ("sum", "+") if ratio < 0.0 else ("difference", "-")
-        return f"only the {what} {a} {sign} {b} is determined; {remedy}"
-    if not more and abs(abs(ratio) - 1.0) < ALIKE:
-        what = "product" if ratio < 0.0 else "ratio"
-        sign = "*" if ratio < 0.0 else "/"
-        return f"only the {what} {a}{sign}{b} is determined; {remedy}"
-    if all(abs(changes[n] - 1.0) < ALIKE for n in names):
+    remedy = remedy_for(problem.engine.rig, names)
+    if len(names) == 2 and (what := _determined_of_two(problem, fit, names[0], names[1], changes, sizes)):
+        return f"only the {what} is determined; {remedy}"
+    if len([n for n in names if abs(changes[n]) >= PART]) == 1:
+        return f"{names[0]} is not determined by these logs; {remedy_for(problem.engine.rig, names[:1])}"
+    if len(names) > 2 and all(abs(changes[n] - 1.0) < ALIKE for n in names):
         return f"{', '.join(names)} have one scale in common, which is not determined, only their ratios are; {remedy}"
     moves = ", ".join(f"{n} {10.0 * changes[n]:+.0f} %" for n in names)
     return f"the logs stay the same if these change together: {moves}; {remedy}"
 
 
-def _remedy(task: Identification, names: Sequence[str]) -> str:
-    keys = [key for name in names for key in _keys(task, name)]
-    for ends, text in REMEDIES:
-        if any(end in key for key in keys for end in ends):
-            return text
-    return "give a value with a tolerance as a prior, or a log in which they act apart"
+def _determined_of_two(
+    problem: Problem, fit: Fit, a: str, b: str, changes: Mapping[str, float], sizes: Mapping[str, float]
+) -> str:
+    """The combination of two parameters along whose level lines the logs stay the same; empty if it is none of four.
+
+    The null direction is the tangent of such a line. Of values that are alike it does not tell a sum from a product, so runs at the
+    end of a finite step along each line do.
+    """
+    relative = changes[b] / changes[a]
+    absolute = relative * sizes[b] / sizes[a]
+    x, y = fit.point.values[a], fit.point.values[b]
+    lines: dict[str, tuple[float, Callable[[float], float]]] = {
+        f"sum {a} + {b}": (-absolute, lambda d: y - d),
+        f"difference {a} - {b}": (absolute, lambda d: y + d),
+        f"product {a}*{b}": (-relative, lambda d: y * x / (x + d)),
+        f"ratio {a}/{b}": (relative, lambda d: y * (x + d) / x),
+    }
+    alike = {what: line for what, (tangent, line) in lines.items() if abs(tangent - 1.0) < ALIKE and x != 0.0}
+    p, q = problem.parameters[a], problem.parameters[b]
+    for d in (FINITE * sizes[a] * sign / 2**k for k in range(4) for sign in (1.0, -1.0)):
+        if x + d == 0.0:
+            continue
+        ends = {what: line(d) for what, line in alike.items()}
+        if not (p.min <= x + d <= p.max and all(q.min <= end <= q.max for end in ends.values())):
+            continue
+        alone = _departure(problem, fit, {a: x + d})
+        apart = {what: _departure(problem, fit, {a: x + d, b: end}) for what, end in ends.items()}
+        best = min(apart, key=lambda what: apart[what], default="")
+        return best if best and apart[best] < SAME * alone else ""
+    return ""
 
 
-def _keys(task: Identification, name: str) -> list[str]:
-    """Keys of the scenario, and of channels, that a parameter enters."""
-    tables = [task.set, *(rung.set for rung in task.ladder), *(phase.set for phase in task.phases)]
-    found = [key for table in tables for key, value in table.items() if name in names_within(value)]
-    for entry in (*task.inputs.values(), *task.measured.values()):
-        found += [
-            key
-            for key in ("delay", "scale", "offset", "filter_time")
-            if name in names_within(getattr(entry, key, None))
-        ]
-    return found
+def _departure(problem: Problem, fit: Fit, values: Mapping[str, float]) -> float:
+    """Root of the sum of squares, in deviations, by which runs with some other values depart from those of the fit."""
+    there = replace(fit.point, values=fit.point.values | dict(values))
+    runs = [problem.engine.residuals(problem.logs, point, problem.rung) for point in (fit.point, there)]
+    scale = fit.deviations[:, None]
+    total = sum(float(np.sum(((r - s) / scale) ** 2)) for r, s in zip(*runs, strict=True))
+    return float(np.sqrt(total)) if np.isfinite(total) else np.inf
 
 
 def at_bounds(fit: Fit, parameters: Mapping[str, FreeParameter]) -> list[str]:

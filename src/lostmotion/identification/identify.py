@@ -17,7 +17,7 @@ from .engine import Engine, Point
 from .errors_of_logs import LogError, total
 from .fit import Fit, Problem, linearised
 from .gather import gathered
-from .identifiability import Undetermined, at_bounds, resting_on, undetermined
+from .identifiability import Undetermined, at_bounds, resting_on
 from .intervals import Interval, bootstrap, profile, widest
 from .ladder import GAIN, RungResult, begun_with, chosen, climb, first_fit, free_on, is_rough, problem_of, start_point
 from .misfit import Misfit, hidden, misfits
@@ -327,7 +327,7 @@ def identify_logs(
         rungs,
         best,
         intervals,
-        [*undetermined(task, fit, free), *_resting(problem, fit)],
+        [*rungs[best].undetermined, *_resting(problem, fit)],
         at_bounds(fit, free),
         _notes(logs),
         rig.scenario_at(first, fit.point.of(first), best),
@@ -374,7 +374,7 @@ def _resting(problem: Problem, fit: Fit) -> list[Undetermined]:
         wider = replace(problem, parameters={**problem.parameters, name: p})
         residuals = wider.engine.residuals(wider.logs, fit.point, rung)
         normal = linearised(wider, fit.point, residuals, fit.deviations, fit.correlation).normal
-        found += resting_on(rig.task, fit, wider.parameters, normal, name)
+        found += resting_on(rig, fit, wider.parameters, normal, name)
     return found
 
 

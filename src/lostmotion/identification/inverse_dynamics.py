@@ -18,6 +18,7 @@ from scipy.signal import savgol_filter
 
 from ..control.axis import turns
 from ..errors import InputError
+from ..model.angle_torques import STANDARD_GRAVITY, AngleTorque, Gravity, TorqueHarmonic
 from ..model.losses import ConstantEfficiency, MeshEfficiency
 from ..model.motor import ShaftMotor
 from ..simulation.train_scenario import TrainScenario
@@ -110,13 +111,23 @@ def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, po
         dry += abs(n) * motor.friction_torque
         other -= n * _motor_torque(rig, s, known, scenario, name, motor)
     for t in (*scenario.gravity.values(), *scenario.angle_torques.values()):
-        n, curve = ratios[t.shaft], t.core()
-        other -= n * np.array([curve(phi) for phi in (n * s.angle).tolist()])
+        n = ratios[t.shaft]
+        other -= n * _over_angle(t, n * s.angle)
     for spring in scenario.springs.values():
         n, spring_curve = ratios[spring.shaft], spring.stiffness.core()
         other += n * np.array([spring_curve.torque(phi - spring.rest_angle) for phi in (n * s.angle).tolist()])
     r = inertia * s.acceleration + viscous * s.speed + dry * np.sign(s.speed) + other
     return np.asarray(r[s.blocks].mean(axis=1))
+
+
+def _over_angle(t: Gravity | AngleTorque, angle: np.ndarray) -> np.ndarray:
+    """A torque over the angle; sines as such, since the number of their straight lines may depend on the parameters."""
+    if isinstance(t, Gravity):
+        return np.asarray(-t.mass * STANDARD_GRAVITY * t.radius * np.sin(angle + t.angle))
+    if isinstance(t, TorqueHarmonic):
+        return np.asarray(t.amplitude * np.sin(t.order * angle + t.phase))
+    curve = t.core()
+    return np.array([curve(phi) for phi in angle.tolist()])
 
 
 def _check(scenario: TrainScenario) -> None:

@@ -145,7 +145,7 @@ def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, noti
         best, minima = _other_minima(rig, engine, train, rung, point, best, rough, notify)
         point = best.point
         best.point = point = _with_own(rig, engine, logs, point, rung)
-        unsure = undetermined(task, best, free_on(task, rung))
+        unsure = undetermined(problem, best)
         errors = log_errors(logs, engine.residuals(logs, point, rung))
         means = _means(task, errors, best)
         found.append(RungResult(entry.name, best, errors, *means, engine.failed, unsure, minima))

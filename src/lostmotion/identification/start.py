@@ -134,9 +134,9 @@ def _solved(
             kept[name] = "of the measurement or of a delay"
         else:
             h = _step(p, point.values[name])
-            column = balance.column(name, h, steps, columns)
+            column, why = balance.column(name, h, steps, columns)
             if column is None:
-                kept[name] = "the torques are not linear in them"
+                kept[name] = why
             elif not np.any(column):
                 kept[name] = "the torques of the logs do not depend on them"
             else:
@@ -198,14 +198,18 @@ class _Balance:
 
     def column(
         self, name: str, h: float, others: Mapping[str, float], columns: Mapping[str, np.ndarray]
-    ) -> np.ndarray | None:
-        """Change of the missing torques with a step of a parameter; None where it is not linear, alone or with others."""
+    ) -> tuple[np.ndarray | None, str]:
+        """(change of the missing torques with a step of a parameter, "") or (None, why it is not linear, alone or with others)."""
         try:
             one, two = self._change({name: h}), self._change({name: 2.0 * h})
             together = self._change({**others, name: h}) if others else one
-        except InputError:
-            return None
-        expected = one + sum(columns.values()) if others else one
-        size = LINEAR * max(float(np.abs(x).max()) for x in (one, together, 1e-9 * self.there))
-        straight = np.abs(two - 2.0 * one).max() <= size and np.abs(together - expected).max() <= size
-        return one if straight else None
+            size = LINEAR * max(float(np.abs(x).max()) for x in (one, together, 1e-9 * self.there))
+            if np.abs(two - 2.0 * one).max() > size:
+                return None, "the torques are not linear in them"
+            if np.abs(together - one - sum(columns.values())).max() <= size:
+                return one, ""
+            apart = [n for n in others if np.abs(self._change({n: others[n], name: h}) - one - columns[n]).max() > size]
+        except InputError as problem:
+            return None, f"a change of them has no torques ({problem})"
+        with_them = ", ".join(apart) or "others"
+        return None, f"the torques depend on their product with {with_them}, which the regression finds"

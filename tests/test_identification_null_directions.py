@@ -1,0 +1,95 @@
+"""What the logs cannot tell follows from the null direction, and what would tell it from the channels that are missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lostmotion.identification.identify import IdentificationResult, identify_logs
+from lostmotion.identification.logs import Channel, Log
+from lostmotion.identification.prepare import prepared
+from lostmotion.identification.rig import Rig
+from lostmotion.identification.task import Identification
+from lostmotion.identification.virtual import virtual_log
+
+AXIS = """
+[shafts.carriage]
+viscous_friction = 200.0
+friction_torque = 20.0
+torque = { mean = 0.0 }
+[motors.drive]
+shaft = "carriage"
+kind = "torque_source"
+rated_torque = 1.0
+rotor_inertia = 95.0
+[simulation]
+duration = "1 s"
+sample_interval = "1 ms"
+"""
+NOISE = 5e-3  # m/s
+TIME = 2e-3 * np.arange(1500)
+FORCE = 80.0 * np.sin(4.0 * TIME) + 40.0 * np.sin(11.0 * TIME)
+
+
+def identified(directory: Path, values: dict[str, float], **tables: Any) -> IdentificationResult:
+    """Of a log with these values, which are the start values too."""
+    (directory / "axis.toml").write_text(AXIS)
+    data: dict[str, Any] = {
+        "scenario": "axis.toml",
+        "logs": {"files": ["*.csv"]},
+        "inputs": {"drive_command": {"channel": "force", "interpolation": "linear"} | tables.pop("input", {})},
+        "measured": {
+            "speed": {"channel": "speed", "variable": "carriage_speed", "deviation": NOISE} | tables.pop("measured", {})
+        },
+        "parameters": {n: {"start": v, "min": -10.0 if n in "pq" else 1e-3, "max": 1e3} for n, v in values.items()},
+        "fit": {"regression": False, "iterations": 8},
+    }
+    rig = Rig(Identification(**data | tables), directory)
+    plan = Log("0.csv", TIME, {"force": Channel(FORCE)})
+    log = virtual_log(rig, plan, values, noise={"speed": NOISE}, seed=5)
+    return identify_logs(rig, [prepared(rig.task, log, rig.units)], threads=1)
+
+
+@pytest.mark.parametrize("late", [0.02, 0.022, 0.03])
+def test_two_delays_in_a_row_are_a_sum(tmp_path: Path, late: float) -> None:
+    """What acts late and what is shown late shift the same speed; alike in size, they look like a product."""
+    result = identified(
+        tmp_path,
+        {"dead_time": 0.02, "speed_delay": late},
+        input={"delay": "dead_time"},
+        measured={"delay": "speed_delay"},
+    )
+    (said,) = [u.text for u in result.undetermined]
+    assert said in {
+        f"only the sum {a} + {b} is determined; fix one of them, or give a channel whose delay is known"
+        for a, b in (("dead_time", "speed_delay"), ("speed_delay", "dead_time"))
+    }
+
+
+@pytest.mark.parametrize(
+    ("values", "scale", "offset", "what"),
+    [
+        ({"gain": 1.1, "volts": 0.9}, "gain*volts", 0.0, {"product gain*volts", "product volts*gain"}),
+        ({"gain": 1.1, "volts": 1.2}, "gain/volts", 0.0, {"ratio gain/volts", "ratio volts/gain"}),
+        ({"gain": 0.5, "volts": 0.55}, "gain + volts", 0.0, {"sum gain + volts", "sum volts + gain"}),
+        ({"p": 1.0, "q": 1.1}, 1.0, "p - q", {"difference p - q", "difference q - p"}),
+    ],
+)
+def test_the_combination_that_is_determined_is_that_of_the_formula(
+    tmp_path: Path, values: dict[str, float], scale: Any, offset: Any, what: set[str]
+) -> None:
+    result = identified(tmp_path, values, input={"scale": scale}, measured={"offset": offset})
+    (said,) = [u.text for u in result.undetermined]
+    assert said.removeprefix("only the ").partition(" is determined")[0] in what
+
+
+def test_advice_does_not_ask_for_what_the_log_has(tmp_path: Path) -> None:
+    """Where the force is the input and is known, no log of it is missing; without a controller there is no reference."""
+    values = {"own": 120.0, "guide": 80.0}
+    result = identified(tmp_path, values, set={"shafts.carriage.viscous_friction": "own + guide"})
+    (said,) = [u.text for u in result.undetermined]
+    assert "only the sum" in said and "coasts" in said
+    assert "torque or current" not in said and "stall" not in said and "reference" not in said
