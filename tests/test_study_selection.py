@@ -84,7 +84,7 @@ def test_the_command_line_shows_the_selection(selection: tuple[lm.Study, Path]):
         assert text in done.output
     figures = directory.with_name("rows-figures")
     assert {"selection.csv", "limits.csv", "pareto.png", "pareto.svg"} <= {p.name for p in figures.iterdir()}
-    assert {p.suffix for p in directory.iterdir()} == {".parquet", ".json"}
+    assert {p.suffix for p in directory.iterdir()} == {".parquet", ".json", ".txt"}
     with (figures / "selection.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [int(r["rank"]) for r in rows] == list(range(1, len(rows) + 1))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -309,18 +310,7 @@ def identify_logs(
     fit, free = rungs[best].fit, free_on(task, best)
     train = [log for log in logs if not log.held_out]
     problem: Problem = problem_of(rig, engine, train, best)
-    residuals = engine.residuals(train, fit.point, best)
-    misfit = misfits(problem, residuals)
-    intervals = bootstrap(problem, fit, hidden=hidden(problem, residuals, misfit, fit.correlation))
-    for point in rungs[best].minima:
-        intervals = {n: widest(i, Interval(point.values[n], point.values[n], i.method)) for n, i in intervals.items()}
-    found = {}
-    if profiles:
-        for name in free:
-            profiled, found[name] = profile(problem, fit, name)
-            intervals[name] = widest(profiled, intervals[name]) if any(m.large for m in misfit) else profiled
-    lost = [n for n in free if any(m.large and m.structured for m in misfit) and is_rough(rig, n, best)]
-    intervals |= {n: Interval(free[n].min, free[n].max, "bounds") for n in lost}
+    misfit, intervals, found = _intervals(rig, engine, problem, rungs[best], best, profiles)
     first = logs[0]
     return IdentificationResult(
         task,
@@ -341,6 +331,25 @@ def identify_logs(
         inputs=list(ways.values()),
         misfits=[m for m in misfit if m.large or m.structured],
     )
+
+
+def _intervals(
+    rig: Rig, engine: Engine, problem: Problem, rung: RungResult, best: int, profiles: bool
+) -> tuple[list[Misfit], dict[str, Interval], dict[str, Any]]:
+    """Misfits of the fitted logs; intervals of the parameters, wider where the model does not fit; profiles by parameter."""
+    fit, free = rung.fit, free_on(rig.task, best)
+    residuals = engine.residuals(list(problem.logs), fit.point, best)
+    misfit = misfits(problem, residuals)
+    intervals = bootstrap(problem, fit, hidden=hidden(problem, residuals, misfit, fit.correlation))
+    for point in rung.minima:
+        intervals = {n: widest(i, Interval(point.values[n], point.values[n], i.method)) for n, i in intervals.items()}
+    found = {}
+    if profiles:
+        for name in free:
+            profiled, found[name] = profile(problem, fit, name)
+            intervals[name] = widest(profiled, intervals[name]) if any(m.large for m in misfit) else profiled
+    lost = [n for n in free if any(m.large and m.structured for m in misfit) and is_rough(rig, n, best)]
+    return misfit, intervals | {n: Interval(free[n].min, free[n].max, "bounds") for n in lost}, found
 
 
 def _notes(logs: list[Prepared]) -> dict[str, tuple[str, ...]]:

@@ -161,6 +161,8 @@ class Identification(Part):
     @classmethod
     def _read_multi_start(cls, data: Any) -> Any:
         """Texts of `multi_start` in the unit of their parameter, as those of its start value are read."""
+        if not isinstance(data, Mapping):
+            return data
         ladder, parameters = data.get("ladder"), data.get("parameters")
         if not isinstance(ladder, list | tuple) or not isinstance(parameters, Mapping):
             return data

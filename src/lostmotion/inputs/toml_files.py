@@ -46,6 +46,8 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         raise InputError(f"{path}: has the ending of a saved result; {what} is a TOML file (.toml)")
     try:
         text = read_text(path, per_byte=PER_BYTE)
+    except InputError:
+        raise
     except IsADirectoryError:
         raise InputError(f"{path}: is a directory; name a file of {what} (.toml)") from None
     except FileNotFoundError:
