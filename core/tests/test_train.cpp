@@ -126,8 +126,13 @@ TEST_CASE("what is wrong with a train is said in one line with the names of its 
           "gear 'mesh' joins shaft 'worm' with itself; give it another output");
     CHECK(with([](Train& t) { t.gears.pop_back(); }) ==
           "shaft 'table' is turned by nothing: no motor, gear or load torque acts on it; join it to the train");
-    CHECK(with([](Train& t) { t.shafts[2].inertia = 0.0; }) ==
-          "shaft 'table' has no inertia; give it one, or that of a motor or gear on it");
+    CHECK(with([](Train& t) {
+              t.shafts[2].inertia = 0.0;
+              t.gears[1].law.compliance = Gearbox::torsion_curve;
+          }) ==
+          "shaft 'table' has no inertia and no rigid gear ties its speed to shafts that have one; give it an "
+          "inertia, or that of a motor or gear on it");
+    CHECK(with([](Train& t) { t.shafts[2].inertia = 0.0; }) == "");
     CHECK(with(loop(5.0)) ==
           "gear 'bypass' closes a loop of rigid gears with another ratio: nothing could turn; give it "
           "a stiffness or leave it out");

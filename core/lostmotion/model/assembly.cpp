@@ -8,14 +8,13 @@ Regime Assembly::build(const Key& key) const {
     r.ties = tie(places().contacts, static_cast<int>(train().shafts.size()), key.modes.data());
     for (int c = 0; c < layout().contacts; ++c) r.at_rest[c] = kept_at_rest(places().contacts[c], r.ties);
 
-    std::vector<Row> acceleration(train().shafts.size());
-    equations_.compose(key, r, acceleration);
+    std::vector<Row> motion(train().shafts.size());
+    equations_.compose(key, r, motion);
     std::vector<Row*> forms;
-    for (std::vector<Row>* rows :
-         {&r.output_torque, &r.input_torque, &r.gear_hysteresis, &r.contact_torque, &acceleration})
+    for (std::vector<Row>* rows : {&r.output_torque, &r.input_torque, &r.gear_hysteresis, &r.contact_torque})
         for (Row& f : *rows) forms.push_back(&f);
-    r.solvable = solve_reactions(places().contacts, layout(), key, r.ties, acceleration, forms);
-    equations_.set_rates(key, acceleration, r);
+    r.solvable = Statics(places(), key, r.ties, motion).solve(forms);
+    equations_.set_rates(key, motion, r);
     RegimeGuards(equations_, *this, r).add_all();
     return r;
 }

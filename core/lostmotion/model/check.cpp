@@ -136,9 +136,22 @@ std::string TrainCheck::elements() const {
 
 std::string TrainCheck::inertias() const {
     const Places places(train_);
-    for (std::size_t s = 0; s < train_.shafts.size(); ++s)
-        if (!(places.shafts[s].inertia > 0.0))
-            return shaft(static_cast<int>(s)) + " has no inertia; give it one, or that of a motor or gear on it";
+    // While all dry contacts slip: are those without at rest if all that have one are?
+    const int shafts = static_cast<int>(train_.shafts.size());
+    std::vector<ContactPlace> held;
+    for (int s = 0; s < shafts; ++s) {
+        if (!(places.shafts[s].inertia >= 0.0))
+            return shaft(s) + " has a negative inertia; give it none or a positive one";
+        if (places.shafts[s].inertia > 0.0) held.push_back({ContactPlace::shaft, s, s});
+    }
+    for (const ContactPlace& c : places.contacts)
+        if (c.bilateral) held.push_back(c);
+    const Ties ties = tie(held, shafts, std::vector<std::int8_t>(held.size()).data());
+    for (int s = 0; s < shafts; ++s)
+        if (!ties.at_rest[s])
+            return shaft(s) +
+                   " has no inertia and no rigid gear ties its speed to shafts that have one; give it an "
+                   "inertia, or that of a motor or gear on it";
     return {};
 }
 

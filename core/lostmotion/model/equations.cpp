@@ -2,7 +2,7 @@
 
 namespace lostmotion::model {
 
-void Equations::compose(const Key& key, Regime& r, std::vector<Row>& acceleration) const {
+void Equations::compose(const Key& key, Regime& r, std::vector<Row>& motion) const {
     const std::size_t gears = train_.gears.size();
     r.output_torque.resize(gears);
     r.input_torque.resize(gears);
@@ -17,8 +17,7 @@ void Equations::compose(const Key& key, Regime& r, std::vector<Row>& acceleratio
         const int c = places_.shafts[s].contact;
         if (c != nowhere) r.contact_torque[c] = shaft_friction(static_cast<int>(s), key, r, loss);
     }
-    for (std::size_t s = 0; s < train_.shafts.size(); ++s)
-        acceleration[s] = net_torque(static_cast<int>(s), key, r) / places_.shafts[s].inertia;
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s) motion[s] = net_torque(static_cast<int>(s), key, r);
     r.locked.clear();
     for (std::size_t c = places_.contacts.size(); c-- > 0;)
         if (r.ties.redundant[c]) r.locked.push_back(locked_torque(static_cast<int>(c), key, r));

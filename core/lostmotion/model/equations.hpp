@@ -23,8 +23,8 @@ class Equations {
           layout_(forms.layout()),
           terms_(forms.terms()) {}
 
-    // Torques and accelerations, in terms of the reactions of the stuck contacts as well.
-    void compose(const Key& key, Regime& r, std::vector<Row>& acceleration) const;
+    // Torques, and the net torque of each shaft, in terms of the reactions of the stuck contacts as well.
+    void compose(const Key& key, Regime& r, std::vector<Row>& motion) const;
     // Rates of the states, from accelerations without reactions.
     void set_rates(const Key& key, const std::vector<Row>& acceleration, Regime& r) const;
 

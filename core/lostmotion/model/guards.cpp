@@ -140,10 +140,10 @@ void RegimeGuards::add_driver(int contact) {
     stuck.key = regime_.key;
     stuck.key.modes[contact] = 0;
     stuck.ties = tie(places_.contacts, static_cast<int>(train_.shafts.size()), stuck.key.modes.data());
-    std::vector<Row> acceleration(train_.shafts.size());
-    equations_.compose(stuck.key, stuck, acceleration);
+    std::vector<Row> motion(train_.shafts.size());
+    equations_.compose(stuck.key, stuck, motion);
     Row& overcome = stuck.contact_torque[contact];
-    if (!solve_reactions(places_.contacts, layout_, stuck.key, stuck.ties, acceleration, {&overcome})) return;
+    if (!Statics(places_, stuck.key, stuck.ties, motion).solve({&overcome})) return;
     // The torque that its rest leaves open in addition.
     int open = 0;
     while (open < layout_.contacts && (!stuck.ties.redundant[open] || regime_.ties.redundant[open])) ++open;

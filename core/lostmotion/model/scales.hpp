@@ -61,7 +61,10 @@ template <class State>
 void balanced_scale(const Assembly& a, State& s, int first_angle) {
     const Train& train = a.train();
     const Places& p = a.places();
-    const auto inertia = [&](int shaft) { return p.shafts[shaft].inertia; };
+    double largest = 0.0;
+    for (const ShaftPlace& shaft : p.shafts) largest = std::fmax(largest, shaft.inertia);
+    // A shaft without inertia follows others.
+    const auto inertia = [&](int shaft) { return p.shafts[shaft].inertia > 0.0 ? p.shafts[shaft].inertia : largest; };
     const int first = train.motors.empty() ? 0 : train.motors[0].shaft;
     for (std::size_t m = 0; m < train.motors.size(); ++m)
         if (p.motors[m].torque != nowhere) s[p.motors[m].torque] = 1.0;

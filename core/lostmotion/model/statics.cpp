@@ -1,17 +1,62 @@
 #include "statics.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+#include <utility>
+
 namespace lostmotion::model {
 
-StuckRows::StuckRows(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key, const Ties& ties,
-                     const std::vector<Row>& acceleration) {
-    for (std::size_t k = 0; k < contacts.size(); ++k) {
-        if (key.modes[k] != 0 || ties.redundant[k]) continue;
-        const ContactPlace& c = contacts[k];
-        rows.emplace_back();
-        c.each_shaft([&](int s, double per) { rows.back() += per * acceleration[s]; });
-        unknowns.push_back(layout.terms + static_cast<int>(k));
+namespace {
+
+// From here on reactions that come first lose more than three of the sixteen digits.
+constexpr double much_lighter = 1e3;
+
+// f -= factor * row. What cancels to within rounding is zero: of a torque that is zero, such as that of a shaft at rest
+// that nothing turns, no rounding may be left whose sign would mean something. (Of two shafts nothing is.)
+template <class F, class R>
+void subtract(F& f, double factor, const R& row, bool two_shafts) {
+    constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
+    for (std::size_t k = 0; k < f.c.size(); ++k) {
+        const double a = f.c[k], b = factor * row.c[k];
+        f.c[k] = !two_shafts && std::fabs(a - b) <= few_roundings * std::fabs(a) ? 0.0 : a - b;
     }
 }
+
+using Matrix = std::vector<std::vector<double>>;
+
+// 0 if the matrix is singular.
+int sign_of_determinant(Matrix K) {
+    const std::size_t n = K.size();
+    int sign = 1;
+    for (std::size_t k = 0; k < n; ++k) {
+        std::size_t pivot = k;
+        for (std::size_t row = k + 1; row < n; ++row)
+            if (std::fabs(K[row][k]) > std::fabs(K[pivot][k])) pivot = row;
+        if (pivot != k) {
+            std::swap(K[k], K[pivot]);
+            sign = -sign;
+        }
+        if (K[k][k] == 0.0) return 0;
+        if (K[k][k] < 0.0) sign = -sign;
+        for (std::size_t row = k + 1; row < n; ++row)
+            for (std::size_t col = n; col-- > k;) K[row][col] -= K[row][k] / K[k][k] * K[k][col];
+    }
+    return sign;
+}
+
+// The balance of a shaft: terms and reactions, then the accelerations that stay free.
+struct Balance {
+    std::array<double, max_columns + max_shafts> c{};
+    friend Balance operator/(Balance b, double a) {
+        for (double& v : b.c) v /= a;
+        return b;
+    }
+};
+
+}  // namespace
 
 std::array<int, max_shafts> parts(const std::vector<ContactPlace>& contacts, const Key& key) {
     std::array<int, max_shafts> part;
@@ -28,66 +73,135 @@ std::array<int, max_shafts> parts(const std::vector<ContactPlace>& contacts, con
     return part;
 }
 
-bool moves_freely(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key, const Ties& ties,
-                  const std::vector<Row>& acceleration) {
-    const StuckRows all(contacts, layout, key, ties, acceleration);
-    const std::array<int, max_shafts> of = parts(contacts, key);
-    std::vector<bool> done(all.rows.size());
-    for (std::size_t first = 0; first < all.rows.size(); ++first) {
-        const auto shaft = [&](std::size_t k) { return contacts[all.unknowns[k] - layout.terms].a; };
-        if (done[first]) continue;
-        std::vector<std::size_t> part;
-        for (std::size_t k = first; k < all.rows.size(); ++k)
-            if (of[shaft(k)] == of[shaft(first)]) {
-                part.push_back(k);
-                done[k] = true;
+Statics::Statics(const Places& places, const Key& key, const Ties& ties, std::vector<Row>& motion)
+    : contacts_(places.contacts), layout_(places.layout), key_(key), ties_(ties), motion_(motion) {
+    for (const ShaftPlace& s : places.shafts) inertia_.push_back(s.inertia);
+}
+
+// Contacts at rest that raise the rank.
+std::vector<int> Statics::stuck() const {
+    std::vector<int> of;
+    for (std::size_t k = 0; k < contacts_.size(); ++k)
+        if (key_.modes[k] == 0 && !ties_.redundant[k]) of.push_back(static_cast<int>(k));
+    return of;
+}
+
+// Do the inertias of shafts that hang together, as one of them feels them, differ that much?
+bool Statics::has_light_shafts() const {
+    std::array<double, max_shafts> speed{};  // magnitudes, of each shaft for that of the first of its part
+    for (std::size_t first = 0; first < inertia_.size(); ++first) {
+        if (speed[first] != 0.0) continue;
+        speed[first] = 1.0;
+        double least = inertia_[first], most = inertia_[first];
+        for (bool more = true; more;) {
+            more = false;
+            for (std::size_t k = 0; k < contacts_.size(); ++k) {
+                double slip = 0.0;
+                if (key_.modes[k] != 0) continue;
+                contacts_[k].each_shaft([&](int s, double per) { slip = std::fmax(slip, std::fabs(per) * speed[s]); });
+                contacts_[k].each_shaft([&](int s, double per) {
+                    if (slip == 0.0 || speed[s] != 0.0 || per == 0.0) return;
+                    speed[s] = slip / std::fabs(per);
+                    const double J = inertia_[s] * speed[s] * speed[s];
+                    least = std::fmin(least, J);
+                    most = std::fmax(most, J);
+                    more = true;
+                });
             }
-        const std::size_t n = part.size();
-        std::vector<std::vector<double>> K(n, std::vector<double>(n));
-        for (std::size_t a = 0; a < n; ++a)
-            for (std::size_t b = 0; b < n; ++b) K[a][b] = -all.rows[part[a]].c[all.unknowns[part[b]]];
-        for (std::size_t k = 0; k < n; ++k) {
-            std::size_t pivot = k;
-            for (std::size_t row = k + 1; row < n; ++row)
-                if (std::fabs(K[row][k]) > std::fabs(K[pivot][k])) pivot = row;
-            if (pivot != k) {
-                std::swap(K[k], K[pivot]);
-                for (double& v : K[k]) v = -v;
-            }
-            if (K[k][k] == 0.0) return false;
-            for (std::size_t row = k + 1; row < n; ++row)
-                for (std::size_t col = n; col-- > k;) K[row][col] -= K[row][k] / K[k][k] * K[k][col];
         }
-        double sign = 1.0;
-        for (std::size_t k = 0; k < n; ++k) sign *= K[k][k] > 0.0 ? 1.0 : -1.0;
-        if (sign < 0.0) return false;
+        if (most > much_lighter * least) return true;
+    }
+    return false;
+}
+
+bool Statics::solve(const std::vector<Row*>& forms) {
+    const std::vector<int> of = stuck();
+    if (has_light_shafts()) return solve_balances(of, forms);
+    for (std::size_t s = 0; s < motion_.size(); ++s) motion_[s] = motion_[s] / inertia_[s];
+    return solve_reactions(of, forms);
+}
+
+bool Statics::solve_reactions(const std::vector<int>& of, const std::vector<Row*>& forms) {
+    const std::size_t n = of.size();
+    std::vector<Row> rows(n);
+    std::vector<int> unknowns;
+    for (std::size_t k = 0; k < n; ++k) {
+        contacts_[of[k]].each_shaft([&](int s, double per) { rows[k] += per * motion_[s]; });
+        unknowns.push_back(unknown(of[k]));
+    }
+    const bool free = moves_freely(of, rows), two_shafts = motion_.size() == 2;
+    const auto take = [&](Row& f, double factor, const Row& row) { subtract(f, factor, row, two_shafts); };
+    if (!eliminate(rows, unknowns, n, take)) return false;
+    for (Row* f : forms) substitute(*f, rows, unknowns, n, take);
+    for (Row& f : motion_) substitute(f, rows, unknowns, n, take);
+    return free;
+}
+
+bool Statics::moves_freely(const std::vector<int>& of, const std::vector<Row>& rows) const {
+    const std::array<int, max_shafts> part = parts(contacts_, key_);
+    for (std::size_t p = 0; p < inertia_.size(); ++p) {
+        std::vector<std::size_t> in;
+        for (std::size_t k = 0; k < of.size(); ++k)
+            if (part[contacts_[of[k]].a] == static_cast<int>(p)) in.push_back(k);
+        Matrix K(in.size(), std::vector<double>(in.size()));
+        for (std::size_t a = 0; a < in.size(); ++a)
+            for (std::size_t b = 0; b < in.size(); ++b) K[a][b] = -rows[in[a]].c[unknown(of[in[b]])];
+        if (sign_of_determinant(std::move(K)) <= 0) return false;
     }
     return true;
 }
 
-void subtract(Row& f, double factor, const Row& row, bool two_shafts) {
-    if (two_shafts) {
-        f -= factor * row;
-        return;
+bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>& forms) {
+    const int shafts = static_cast<int>(motion_.size());
+    const Ties heavy = tie(contacts_, shafts, key_.modes.data(), inertia_.data());
+    std::vector<int> unknowns;
+    for (const int c : of) unknowns.push_back(unknown(c));
+    for (int s = 0; s < shafts; ++s)
+        if (heavy.free[s] >> s & 1) unknowns.push_back(max_columns + s);
+    if (unknowns.size() != motion_.size()) return false;
+    std::vector<Balance> rows(motion_.size());
+    for (int s = 0; s < shafts; ++s) {
+        std::transform(motion_[s].c.begin(), motion_[s].c.end(), rows[s].c.begin(), std::negate<>());
+        heavy.each_share(s, [&](int k, double share) { rows[s].c[max_columns + k] = inertia_[s] * share; });
     }
-    constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
-    for (int k = 0; k < max_columns; ++k) {
-        const double a = f.c[k], b = factor * row.c[k];
-        f.c[k] = std::fabs(a - b) <= few_roundings * std::fabs(a) ? 0.0 : a - b;
+    const bool free = balances_move_freely(of, heavy);
+    const auto take = [](auto& f, double factor, const Balance& row) { subtract(f, factor, row, false); };
+    if (!eliminate(rows, unknowns, rows.size(), take)) return false;
+    for (Row* f : forms) substitute(*f, rows, unknowns, of.size(), take);
+    for (int s = 0; s < shafts; ++s) {
+        motion_[s] = Row{};
+        heavy.each_share(s, [&](int k, double share) {
+            const auto at = std::find(unknowns.begin(), unknowns.end(), max_columns + k) - unknowns.begin();
+            for (int j = 0; j < layout_.terms; ++j) motion_[s].c[j] -= share * rows[at].c[j];
+        });
     }
+    return free;
 }
 
-bool solve_reactions(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key, const Ties& ties,
-                     const std::vector<Row>& acceleration, const std::vector<Row*>& forms) {
-    const bool free = moves_freely(contacts, layout, key, ties, acceleration);
-    StuckRows stuck(contacts, layout, key, ties, acceleration);
-    auto& [rows, unknowns] = stuck;
-    const std::size_t n = rows.size();
-    const bool two_shafts = acceleration.size() == 2;
-    const auto take = [&](Row& f, double factor, const Row& row) { subtract(f, factor, row, two_shafts); };
-    if (!eliminate(rows, unknowns, n, take)) return false;
-    for (Row* f : forms) substitute(*f, rows, unknowns, n, take);
-    return free;
+bool Statics::balances_move_freely(const std::vector<int>& of, const Ties& heavy) const {
+    const std::array<int, max_shafts> part = parts(contacts_, key_);
+    for (std::size_t p = 0; p < inertia_.size(); ++p) {
+        std::vector<int> in;
+        for (std::size_t s = 0; s < inertia_.size(); ++s)
+            if (part[s] == static_cast<int>(p)) in.push_back(static_cast<int>(s));
+        Matrix with(in.size()), without(in.size());
+        for (std::size_t row = 0; row < in.size(); ++row) {
+            const int s = in[row];
+            for (const int k : in)
+                if (heavy.free[k] >> k & 1)
+                    with[row].push_back((heavy.free[s] >> k & 1) != 0 ? inertia_[s] * heavy.share[s][k] : 0.0);
+            without[row] = with[row];
+            for (const int c : of) {
+                if (part[contacts_[c].a] != static_cast<int>(p)) continue;
+                with[row].push_back(-motion_[s].c[unknown(c)]);
+                double per_speed = 0.0;
+                contacts_[c].each_shaft([&](int at, double per) { per_speed += at == s ? per : 0.0; });
+                without[row].push_back(per_speed);
+            }
+        }
+        if (sign_of_determinant(std::move(with)) * sign_of_determinant(std::move(without)) <= 0) return false;
+    }
+    return true;
 }
 
 }  // namespace lostmotion::model

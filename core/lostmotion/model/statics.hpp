@@ -1,44 +1,48 @@
 // Reactions of stuck contacts, from the condition that their speeds stay zero.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cmath>
-#include <limits>
-#include <numeric>
-#include <utility>
 #include <vector>
 
-#include "../elements/contact_place.hpp"
-#include "../elements/regime.hpp"
 #include "../kernel/elimination.hpp"
+#include "places.hpp"
 
 namespace lostmotion::model {
-
-// Rates of the speeds of the stuck contacts that raise the rank, and the columns of their reactions.
-struct StuckRows {
-    std::vector<Row> rows;
-    std::vector<int> unknowns;
-
-    StuckRows(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key, const Ties& ties,
-              const std::vector<Row>& acceleration);
-};
 
 // The first shaft of those that hang together by contacts at rest, of each shaft.
 std::array<int, max_shafts> parts(const std::vector<ContactPlace>& contacts, const Key& key);
 
-// Does a torque that the gears of a rigidly tied part pass on turn it forward or, while a contact of it is at its
-// limit, wind it up? Without friction the matrix of accelerations over reactions, -d(rows)/d(reactions), is positive
-// definite. Friction that changes the sign of its determinant jams: no motion or several (Painleve).
-bool moves_freely(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key, const Ties& ties,
-                  const std::vector<Row>& acceleration);
+// What the reactions of stuck contacts are solved from. Where the shafts of each rigidly tied part have inertias of
+// like size, reactions come first: C J^-1 (F + B lambda) = 0, C being the speeds of the contacts by those of the
+// shafts. A light shaft makes terms 1/J of that which cancel. Then all is solved at once, without a division by an
+// inertia: the balances J S a = F + B lambda of all shafts, S being their speeds by those that stay free, the heaviest.
+class Statics {
+ public:
+    // motion: of each shaft, the net torque; it becomes the acceleration.
+    Statics(const Places& places, const Key& key, const Ties& ties, std::vector<Row>& motion);
 
-// f -= factor * row. What cancels to within rounding is zero: of a torque that is zero, such as that of a shaft at rest
-// that nothing turns, no rounding may be left whose sign would mean something. (Of two shafts nothing is.)
-void subtract(Row& f, double factor, const Row& row, bool two_shafts);
+    // Eliminates the reactions from the motion and the forms. False if they have no unique solution.
+    bool solve(const std::vector<Row*>& forms);
 
-// Eliminates the reactions from the forms. False if they have no unique solution.
-bool solve_reactions(const std::vector<ContactPlace>& contacts, const Layout& layout, const Key& key, const Ties& ties,
-                     const std::vector<Row>& acceleration, const std::vector<Row*>& forms);
+ private:
+    std::vector<int> stuck() const;
+    bool has_light_shafts() const;
+    bool solve_reactions(const std::vector<int>& of, const std::vector<Row*>& forms);
+    bool solve_balances(const std::vector<int>& of, const std::vector<Row*>& forms);
+    // Does a torque that the gears of a rigidly tied part pass on turn it forward or, while a contact of it is at its
+    // limit, wind it up? Without friction the matrix of accelerations over reactions, C J^-1 C^T, is positive definite.
+    // Friction that changes the sign of its determinant jams: no motion or several (Painleve). That sign is also that
+    // of det [J S, -B] over det [J S, C^T].
+    bool moves_freely(const std::vector<int>& of, const std::vector<Row>& rows) const;
+    bool balances_move_freely(const std::vector<int>& of, const Ties& heavy) const;
+    int unknown(int contact) const { return layout_.terms + contact; }
+
+    const std::vector<ContactPlace>& contacts_;
+    const Layout& layout_;
+    const Key& key_;
+    const Ties& ties_;
+    std::vector<Row>& motion_;
+    std::vector<double> inertia_;  // of each shaft
+};
 
 }  // namespace lostmotion::model

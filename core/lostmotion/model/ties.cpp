@@ -20,11 +20,29 @@ unsigned tied_speed(const ContactPlace& c, const Ties& t, std::array<double, max
     return moves;
 }
 
-bool stop_contact(const ContactPlace& c, int shafts, Ties& t) {
+// The free shaft whose inertia, with that of all that follow it, is least as the contact feels it.
+static int lightest(unsigned moves, const std::array<double, max_shafts>& speed, int shafts, const Ties& t,
+                    const double* inertia) {
+    int found = nowhere;
+    double least = 0.0;
+    for (unsigned left = moves; left != 0; left &= left - 1) {
+        const int k = std::countr_zero(left);
+        double J = 0.0;
+        for (int s = 0; s < shafts; ++s)
+            if (t.free[s] >> k & 1) J += inertia[s] * t.share[s][k] * t.share[s][k];
+        J /= speed[k] * speed[k];
+        if (found != nowhere && !(J < least)) continue;
+        found = k;
+        least = J;
+    }
+    return found;
+}
+
+bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* inertia) {
     std::array<double, max_shafts> speed;
     const unsigned moves = tied_speed(c, t, speed);
     if (moves == 0) return false;
-    const int last = std::bit_width(moves) - 1;
+    const int last = inertia != nullptr ? lightest(moves, speed, shafts, t, inertia) : std::bit_width(moves) - 1;
     for (int s = 0; s < shafts; ++s) {
         if ((t.free[s] >> last & 1) == 0) continue;
         t.free[s] ^= static_cast<std::uint16_t>(1u << last);
@@ -41,7 +59,7 @@ bool stop_contact(const ContactPlace& c, int shafts, Ties& t) {
     return true;
 }
 
-Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes) {
+Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes, const double* inertia) {
     Ties t;
     for (int s = 0; s < shafts; ++s) {
         t.free[s] = static_cast<std::uint16_t>(1u << s);
@@ -50,7 +68,7 @@ Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_
     for (const bool frame : {true, false})
         for (std::size_t k = 0; k < contacts.size(); ++k)
             if (modes[k] == 0 && (contacts[k].b == nowhere) == frame)
-                t.redundant[k] = !stop_contact(contacts[k], shafts, t);
+                t.redundant[k] = !stop_contact(contacts[k], shafts, t, inertia);
     for (int s = 0; s < shafts; ++s) t.at_rest[s] = t.free[s] == 0;
     return t;
 }

@@ -20,13 +20,15 @@ inline constexpr double loop_rounding = 1e-12;
 // The speed of a contact in terms of those that are free, as bits of them; what cancels to within rounding is none.
 unsigned tied_speed(const ContactPlace& c, const Ties& t, std::array<double, max_shafts>& speed);
 
-// Makes the last of the free shafts that the speed of a contact depends on follow the others. False if it follows
-// from those before that its speed is zero.
-bool stop_contact(const ContactPlace& c, int shafts, Ties& t);
+// Makes the last of the free shafts that the speed of a contact depends on follow the others; with the inertias of the
+// shafts, the one that carries least, so that the heavy ones stay free. False if it follows from those before that its
+// speed is zero.
+bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* inertia = nullptr);
 
 // stuck: a contact is at rest where this is 0. Frame contacts come first, so that it is a gear or coupling whose
 // torque is redundant where a shaft is held twice.
-Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes);
+Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes,
+         const double* inertia = nullptr);
 
 // Is the speed of a contact kept at zero by these ties?
 bool kept_at_rest(const ContactPlace& c, const Ties& t);
