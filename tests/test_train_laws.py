@@ -316,3 +316,25 @@ def test_a_stiffness_without_measure_ends_in_one_line(stiffness: float) -> None:
     for scenario in (to_frame, between):
         with pytest.raises(lm.SolverError, match="left the range that can be computed at t = 0"):
             lm.simulate(scenario)
+
+
+@pytest.mark.parametrize("solver", ["exact", "dormand-prince"])
+@pytest.mark.parametrize("inertia", [1e-4, 1e-10, 1e-13, 0.0])
+def test_the_inertia_of_a_held_ring_does_not_matter(inertia: float, solver: str) -> None:
+    """Sun 1 kg m^2 and carrier 10 kg m^2 at ratio 2.5: 20 N m accelerate the sun by 20/(1 + 10/2.5^2) rad/s^2."""
+    scenario = lm.TrainScenario(
+        shafts={"sun": {"inertia": 1.0}, "ring": {"inertia": inertia}, "carrier": {"inertia": 10.0}},
+        motors={"m": {"shaft": "sun", "kind": "torque_source", "rotor_inertia": 0.0}},
+        gears={"p": {"input": "sun", "output": "carrier", "housing": "ring", "ratio": 2.5}},
+        brakes={"b": {"shaft": "ring", "torque": 100.0}},
+        command={"m": 20.0, "b": 1.0},
+        simulation={"duration": 1.0, "sample_interval": 0.5},
+    )
+    run = lm.simulate(scenario, solver=solver)
+    assert float(run["carrier_speed"][-1]) == pytest.approx(20.0 / (1.0 + 10.0 / 6.25) / 2.5, rel=1e-13)
+    if solver == "exact":
+        energy = lm.energy_of(run)
+        assert abs(energy["residual"]) < 1e-14 * energy["turned_over"]
+    model = lm.linearize(scenario, time=0.5)
+    rate = model.B[list(model.states).index("carrier_speed"), list(model.inputs).index("m_command")]
+    assert rate == pytest.approx(1.0 / (1.0 + 10.0 / 6.25) / 2.5, rel=1e-13)
