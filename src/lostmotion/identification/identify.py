@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -289,28 +288,15 @@ def identify_logs(
 ) -> IdentificationResult:
     """As `identify`, of logs that have been prepared."""
     rig, logs, left_out = split_at_pauses(rig, logs)
-    rig, ways, undecided = as_recorded(rig, logs)
-    engine = Engine(rig, threads)
-    point, start = start_point(rig.task, logs), Regression()
-    train = [log for log in logs if not log.held_out]
-    few = begun_with(rig.task, train)
-    if rig.task.fit.regression and train:
-        point, start = regressed(rig, engine, few, point, free_on(rig.task, 0))
-    if undecided and train:
-
-        def fitted(rig: Rig, logs: list[Prepared], start: Point) -> Fit:
-            return first_fit(rig, Engine(rig, threads), logs, start, notify)
-
-        rig, point, more = nearer_ways(rig, few, undecided, point, fitted)
-        ways |= more
-        logs = [replace(log, cache={}) for log in logs]
+    rig, logs, point, start, ways = _begun(rig, logs, threads, notify)
     task, engine = rig.task, Engine(rig, threads)
     rungs = climb(rig, engine, logs, point, notify)
     best = chosen(rungs)
     fit, free = rungs[best].fit, free_on(task, best)
     train = [log for log in logs if not log.held_out]
     problem: Problem = problem_of(rig, engine, train, best)
-    misfit, intervals, found = _intervals(rig, engine, problem, rungs[best], best, profiles)
+    misfit = misfits(problem, engine.residuals(train, fit.point, best))
+    intervals, found = _intervals(problem, fit, misfit, rungs[best].minima, profiles)
     first = logs[0]
     return IdentificationResult(
         task,
@@ -328,28 +314,49 @@ def identify_logs(
         rig,
         logs,
         left_out=left_out,
-        inputs=list(ways.values()),
+        inputs=ways,
         misfits=[m for m in misfit if m.large or m.structured],
     )
 
 
+def _begun(
+    rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify
+) -> tuple[Rig, list[Prepared], Point, Regression, list[str]]:
+    """(rig and logs with a way for each input, where the search begins, why there, words on the inputs)."""
+    rig, ways, undecided = as_recorded(rig, logs)
+    point, start = start_point(rig.task, logs), Regression()
+    train = [log for log in logs if not log.held_out]
+    few = begun_with(rig.task, train)
+    if rig.task.fit.regression and train:
+        point, start = regressed(rig, Engine(rig, threads), few, point, free_on(rig.task, 0))
+    if undecided and train:
+
+        def fitted(rig: Rig, logs: list[Prepared], start: Point) -> Fit:
+            return first_fit(rig, Engine(rig, threads), logs, start, notify)
+
+        rig, point, more = nearer_ways(rig, few, undecided, point, fitted)
+        ways |= more
+        logs = [replace(log, cache={}) for log in logs]
+    return rig, logs, point, start, list(ways.values())
+
+
 def _intervals(
-    rig: Rig, engine: Engine, problem: Problem, rung: RungResult, best: int, profiles: bool
-) -> tuple[list[Misfit], dict[str, Interval], dict[str, Any]]:
-    """Misfits of the fitted logs; intervals of the parameters, wider where the model does not fit; profiles by parameter."""
-    fit, free = rung.fit, free_on(rig.task, best)
-    residuals = engine.residuals(list(problem.logs), fit.point, best)
-    misfit = misfits(problem, residuals)
+    problem: Problem, fit: Fit, misfit: list[Misfit], minima: list[Point], profiles: bool
+) -> tuple[dict[str, Interval], dict[str, list[tuple[float, float]]]]:
+    """(intervals, profiles), wide enough for residuals that no noise explains, and for other minima."""
+    residuals = problem.engine.residuals(problem.logs, fit.point, problem.rung)
     intervals = bootstrap(problem, fit, hidden=hidden(problem, residuals, misfit, fit.correlation))
-    for point in rung.minima:
+    for point in minima:
         intervals = {n: widest(i, Interval(point.values[n], point.values[n], i.method)) for n, i in intervals.items()}
     found = {}
-    if profiles:
-        for name in free:
-            profiled, found[name] = profile(problem, fit, name)
-            intervals[name] = widest(profiled, intervals[name]) if any(m.large for m in misfit) else profiled
-    lost = [n for n in free if any(m.large and m.structured for m in misfit) and is_rough(rig, n, best)]
-    return misfit, intervals | {n: Interval(free[n].min, free[n].max, "bounds") for n in lost}, found
+    for name in problem.parameters if profiles else ():
+        profiled, found[name] = profile(problem, fit, name)
+        intervals[name] = widest(profiled, intervals[name]) if any(m.large for m in misfit) else profiled
+    if any(m.large and m.structured for m in misfit):
+        for name, p in problem.parameters.items():
+            if is_rough(problem.engine.rig, name, problem.rung):
+                intervals[name] = Interval(p.min, p.max, "bounds")
+    return intervals, found
 
 
 def _notes(logs: list[Prepared]) -> dict[str, tuple[str, ...]]:
