@@ -29,6 +29,7 @@ SCAN = 9  # values of such a parameter at which the cost is computed
 SPAN = 8.0  # from an eighth of the value found to eight times it
 PARTS = (1 / 16, 1 / 8, 1 / 4, 1 / 2)  # of the logs, to which a fit is made before that to the whole
 LEAST = 50  # samples of the first
+LOWER = 0.02  # of the cost, by which another minimum must be lower: less is where a search happens to end
 TRIED = 2  # of the minima of the scan, from which a fit begins
 GAIN = 0.01  # of the held-out error, by which a higher rung must be better to be taken
 GAIN_UNDETERMINED = 0.05  # the same, where its parameters leave more directions undetermined
@@ -187,7 +188,7 @@ def _other_minima(
     for start in starts():
         fit = _one(rig, engine, train, rung, start, rig.rungs()[rung].name, notify)
         others.append(fit)
-        if _cost(problem, fit, best) < best.cost:
+        if _cost(problem, fit, best) < best.cost * (1.0 - LOWER):
             others[-1], best = best, fit
         if explained(problem, engine.residuals(train, best.point, rung)):
             break
