@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from .. import _core
+from ..inputs.breakpoints import check_apart
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Length, Mass, NotNegative, Positive, Torque, Whole
 from .shaft import SHARE
@@ -47,6 +48,7 @@ class AngleCurve(Part):
         for k, (a, b) in enumerate(itertools.pairwise(self.angles)):
             if b <= a:
                 raise ValueError(f"angles must rise, but angles[{k + 1}] = {b} follows {a}")
+        check_apart((*self.angles, self.period), "angles")
         if self.angles[-1] >= self.period:
             raise ValueError(
                 f"has angles that end at {self.angles[-1]}; the last must be below the period {self.period}, where the first value comes again"

@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from .. import _core
+from ..inputs.breakpoints import check_apart
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Angle,
@@ -49,6 +50,7 @@ class LossMap(Part):
         for k, (a, b) in enumerate(itertools.pairwise(axis)):
             if b <= a:
                 raise ValueError(f"must rise, but entry {k + 1} is {b} after {a}")
+        check_apart(axis)
         return axis
 
     @model_validator(mode="after")

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from .. import _core
+from ..inputs.breakpoints import check_apart
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Inertia,
@@ -31,6 +32,7 @@ def _check_points(speeds: tuple[float, ...], torques: tuple[float, ...]) -> None
     for k, (a, b) in enumerate(itertools.pairwise(speeds)):
         if b <= a:
             raise ValueError(f"speeds must rise, but speeds[{k + 1}] = {b} follows {a}")
+    check_apart(speeds, "speeds")
 
 
 class FrictionCurve(Part):

@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from .. import _core
+from ..inputs.breakpoints import check_apart
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Angle,
@@ -46,6 +47,7 @@ class TorsionCurve(Part):
         for k, (a, b) in enumerate(itertools.pairwise(self.breaks)):
             if b <= a:
                 raise ValueError(f"breaks must rise, but breaks[{k + 1}] = {b} follows {a}")
+        check_apart((0.0, *self.breaks), "breaks")
         if self.slopes[-1] <= 0.0:
             raise ValueError("ends with slope 0; the last segment must carry torque")
         if self.backlash > 0.0 and self.preload > 0.0:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 
 ENERGY = tuple(_core.energy_entries())
+MOST_RESIDUAL = 1e-6  # of the energy turned over, by which the balance of an accurate run fails at most
 """entries of the energy ledger"""
 
 
@@ -78,16 +79,31 @@ def raw_result(scenario: Scenario, result: Any, solver: str, *, ledger: bool) ->
         "steps": int(steps),
         SWITCHINGS: packed(switchings),
     }
-    if ledger:
-        attributes["energy"] = json.dumps(dict(zip(ENERGY, energy, strict=True)))
+    warnings = []
     if np.isfinite(left_data_at):
-        attributes["warning"] = (
+        warnings.append(
             f"from t = {left_data_at:.6g} s on the loss map is used outside its data; there it continues with the slope "
             "of its edge. Extend gearbox.losses."
         )
+    if ledger:
+        add_ledger(attributes, dict(zip(ENERGY, energy, strict=True)), warnings)
+    if warnings:
+        attributes["warning"] = " ".join(warnings)
     if scenario.gearbox.note:
         attributes["note"] = scenario.gearbox.note
     return RawResult(time, data, attributes, variables_of(scenario))
+
+
+def add_ledger(attributes: dict[str, Any], energy: dict[str, float], warnings: list[str]) -> None:
+    """Add the energy ledger of a run to its attributes, and a warning if the ledger does not close."""
+    attributes["energy"] = json.dumps(energy)
+    share = abs(energy["residual"]) / energy["turned_over"] if energy["turned_over"] > 0.0 else 0.0
+    attributes["energy_residual"] = share
+    if not share <= MOST_RESIDUAL:
+        warnings.append(
+            f"the energy balance closes to no more than {share:.1e} of the energy turned over, so this run is inaccurate. "
+            "Look for ratios, inertias or stiffnesses many orders of magnitude apart."
+        )
 
 
 def labelled(

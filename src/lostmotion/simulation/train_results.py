@@ -13,7 +13,7 @@ from .. import _core
 from ..control.axis import OPEN_LOOP, Bound
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
-from .results import RawResult, installed_version, variables_of
+from .results import RawResult, add_ledger, installed_version, variables_of
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import CONTACTS_OF_TRAIN, packed
 from .train_parts import SIDE_BY_SIDE, control_of_part, joined_results, parts_of
@@ -100,13 +100,16 @@ def _attributes(scenario: TrainScenario, result: dict[str, Any], how: str, *, le
         "steps": int(result["steps"]),
         SWITCHINGS: packed(result["switchings"]),
     }
-    if ledger:
-        attributes["energy"] = json.dumps(result["energy"])
+    warnings = []
     if np.isfinite(result["left_data_at"]):
-        attributes["warning"] = (
+        warnings.append(
             f"from t = {result['left_data_at']:.6g} s on a loss map is used outside its data; there it continues with the slope "
             "of its edge. Extend the losses of the gear."
         )
+    if ledger:
+        add_ledger(attributes, result["energy"], warnings)
+    if warnings:
+        attributes["warning"] = " ".join(warnings)
     if notes := [f"{name}: {gear.note}" for name, gear in scenario.gears.items() if gear.note]:
         attributes["note"] = " ".join(notes)
     return attributes

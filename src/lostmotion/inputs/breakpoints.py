@@ -1,0 +1,19 @@
+"""Breakpoints of piecewise-linear laws."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+RESOLUTION = 1e-9  # of the largest breakpoint; the solver takes 4e-12 of the terms of a condition for zero
+
+
+def check_apart(breakpoints: Sequence[float], name: str = "") -> None:
+    """Refuse rising breakpoints that the solver cannot tell apart."""
+    largest = max(map(abs, breakpoints))
+    for a, b in itertools.pairwise(breakpoints):
+        if b - a < RESOLUTION * largest:
+            raise ValueError(
+                f"{name} {a:.17g} and {b:.17g} are too close: they differ by less than {RESOLUTION:g} of the largest, "
+                f"{largest:.6g}; leave one of them out".lstrip()
+            )
