@@ -149,3 +149,19 @@ def test_an_axis_follows_a_target() -> None:
     error = r.load_angle.values - s.controller.reference.at(r.time.values)[0]
     late = (r.time.values > 1.0) & (r.time.values < 5.9)
     assert np.abs(error[late]).max() < 1e-4
+
+
+@pytest.mark.parametrize("speed", [3e4, 1e7, 1e12, 1e200])
+def test_a_path_too_fast_to_follow_is_refused_before_memory_is_taken(speed: float) -> None:
+    import tracemalloc
+
+    tracemalloc.start()
+    try:
+        with (
+            np.errstate(all="ignore"),
+            pytest.raises(ValueError, match="more than 2000000 pieces over 60 s; lower its speed"),
+        ):
+            reference(FLY_BY, "traverse", distance=100.0, speed=speed).target.breakpoints()
+        assert tracemalloc.get_traced_memory()[1] < 10_000_000
+    finally:
+        tracemalloc.stop()

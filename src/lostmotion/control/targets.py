@@ -106,11 +106,15 @@ class TargetPath(Part):
             step = self.duration / n
             # The fourth derivative from the third ones.
             remainder = np.abs(np.diff(found[3])).max() * step * step * step / 24.0
-            if not np.isfinite(found).all() or n > MAX_PIECES:
-                raise ValueError("passes too near to the station: its angle changes faster than numbers can follow")
             if remainder <= TOLERANCE:
                 break
-            n = math.ceil(1.1 * n * max(1.0, math.sqrt(math.sqrt(remainder / TOLERANCE))))
+            wanted = 1.1 * n * max(1.0, math.sqrt(math.sqrt(remainder / TOLERANCE)))
+            if not (np.isfinite(found).all() and wanted <= MAX_PIECES):  # before memory is taken for them
+                raise ValueError(
+                    f"passes too near to the station or too fast: its angle needs more than {MAX_PIECES} pieces over "
+                    f"{self.duration:g} s; lower its speed or its duration, or take it farther away"
+                )
+            n = math.ceil(wanted)
         last = (self.duration, float(found[0, -1]), 0.0, 0.0, 0.0)
         return [*map(tuple, np.vstack([t, found])[:, :-1].T.tolist()), last]
 
