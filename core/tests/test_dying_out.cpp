@@ -106,8 +106,7 @@ TEST_SUITE("dying_out") {
                           static_cast<int>(s.split), ", gap ", s.gap, ", amplification ", s.amplification);
             worst = std::fmax(worst, s.amplification > 1e-10 ? 0.0 : s.gap);
         }
-        std::printf("dying out: random drives split, largest gap of a motion that amplifies nothing %.1e\n",
-                    worst);
+        std::printf("dying out: random drives split, largest gap of a motion that amplifies nothing %.1e\n", worst);
     }
     TEST_CASE("stick-slip that dies out, and ringing about zero torque, go on as long as there is anything left") {
         // 2007: a self-locking gear creeps down in slips whose torques fall by a sixth each, from 1e-10 N m on beside

@@ -49,7 +49,8 @@ SensitivityTally compare_random(unsigned seed, int trains, bool closed_loop) {
 }  // namespace
 
 TEST_CASE("derivatives of random trains are those of differences of their runs") {
-    const SensitivityTally open = compare_random(5000, cases(200), false), closed = compare_random(7000, cases(100), true);
+    const SensitivityTally open = compare_random(5000, cases(200), false),
+                           closed = compare_random(7000, cases(100), true);
     const long compared = open.compared + closed.compared, switchings = open.switchings + closed.switchings;
     const double worst = std::fmax(open.worst, closed.worst);
     MESSAGE(compared << " numbers compared, " << switchings << " switchings, largest difference " << worst);

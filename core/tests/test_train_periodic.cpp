@@ -24,7 +24,9 @@ struct Path final : Observer<System> {
     model::Key key;
 
     bool wants_switching() const override { return true; }
-    void switching(const SwitchingOf<System>& s) override { events.emplace_back(s.input_jump ? -1 : s.kind, s.contact); }
+    void switching(const SwitchingOf<System>& s) override {
+        events.emplace_back(s.input_jump ? -1 : s.kind, s.contact);
+    }
     friend bool same_events(const Path& a, const Path& b) { return a.events == b.events && a.key == b.key; }
 };
 
@@ -136,7 +138,7 @@ TEST_SUITE("train_periodic") {
                 ++compared;
                 stopped += plain.events.size() > 2;
                 limited += n >= cases(400) && std::count(plain.events.begin(), plain.events.end(),
-                                                  std::pair<int, int>(model::Guard::edge, nowhere)) > 0;
+                                                         std::pair<int, int>(model::Guard::edge, nowhere)) > 0;
                 for (const NamedComponent& of : train_components<D>(c.assembly)) {
                     if (!c.laws.matters(plain.key, of.place)) continue;
                     double found = 0.0;

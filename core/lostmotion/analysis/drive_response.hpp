@@ -3,8 +3,8 @@
 
 #include "../drive/components.hpp"
 #include "../simulation/result_names.hpp"
-#include "../simulation/sampler.hpp"
 #include "../simulation/run.hpp"
+#include "../simulation/sampler.hpp"
 #include "../simulation/stepping.hpp"
 #include "response.hpp"
 
