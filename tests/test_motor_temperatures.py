@@ -235,5 +235,5 @@ def test_a_motor_of_a_train_is_chosen_by_name() -> None:
     assert float(lm.motor_current(result, "two")["current"][0]) == pytest.approx(0.1 / 0.06)
     with pytest.raises(lm.InputError, match="motor is missing; the motors are one, two"):
         lm.temperatures(result)
-    with pytest.raises(lm.InputError, match="motor 'onw': did you mean one"):
+    with pytest.raises(lm.InputError, match="motor 'onw': the motors are one, two"):
         lm.motor_current(result, "onw")

@@ -29,16 +29,20 @@ CONSTANT = 1e-14  # of the largest magnitude of a number, by which rounding may 
 STRAIGHT = 1e-6  # of a difference, by which rounding may change it
 MARGIN = 1e-9  # of a capacity, within which a contact counts as about to break away
 AHEAD = 1000  # windows at most by which a motion is extrapolated: rounding grows by the square
+PARTS = 10  # samples of a window
+SKIPS = 20  # extrapolations after one stretch
 SHORT_OF = 0.9  # of the time until a contact breaks away, by which a motion is extrapolated
-SAMPLES = 1000  # of one stretch that is watched
+SAMPLES, FINEST = 1000, 4000  # of the first stretch that is watched, and of one at most
+CREEP = 1e-12  # of the largest number of the state, a speed [rad/s] that is none but rounding
 QUICK = 4000  # ticks that are watched for the frequency of quick swings
 GROWTH = 1.5  # of the stretches that are watched
 IDLE = 8  # stretches without motion after which a state that is no equilibrium is left undecided
-CYCLES = 3.0  # in the last half of the watch
-STEADY = 0.9  # of a swing from one part of the watch to the next, below which it dies out
+CYCLES = 4  # in the last half of the watch
+STEADY = (
+    0.75  # of swing and frequency from one part of the watch to the next, below which they die out; irregular ones vary
+)
 CONFIRMED = 3.0  # times as long a watch confirms a swing
 NOISE = 2e-9 * math.pi  # [rad], a billionth of a turn: what a shaft at rest may move by rounding
-STILL = NOISE / FOREVER  # [rad/s]
 NOTHING_MOVES = "the state is an equilibrium, as no number of drive and controllers moves"
 
 
@@ -77,6 +81,8 @@ class _Look:
     """of each contact the torque that frees it forward, and in reverse [N·m]"""
     scales: np.ndarray
     """capacities that these belong to [N·m]"""
+    creep: float
+    """speed of contacts that slip by no more than rounding [rad/s]"""
 
 
 class Watch:
@@ -138,8 +144,11 @@ class Watch:
         interval = max(duration / samples, self.frame)
         if self.frame:
             interval = math.ceil(interval / self.frame * (1.0 - 1e-9)) * self.frame
+        self._record(interval, max(round(duration / interval), 1))
+
+    def _record(self, interval: float, count: int) -> None:
         times, rows = [], []
-        for k in range(max(round(duration / interval), 1)):
+        for k in range(count):
             self._advance(interval)
             times.append(self.elapsed)
             rows.append(self.simulation[self.names])
@@ -160,21 +169,27 @@ class Watch:
     def _look(self) -> _Look | None:
         """The state now; None where a contact slips."""
         contacts = explain(self.simulation).contacts
-        if any(c.mode != 0 and abs(c.speed) > STILL for c in contacts):
+        creep = max((abs(c.speed) for c in contacts if c.mode != 0), default=0.0)
+        if creep > CREEP * self.magnitude.max(initial=0.0):
             return None
         stuck = [c for c in contacts if c.mode == 0 and math.isfinite(c.capacity_forward)]
         numbers, key = self._numbers()
         self._note(numbers)
         margins = np.array([(c.to_free_forward, c.to_free_backward) for c in stuck]).reshape(-1, 2)
         scales = np.array([c.capacity_forward + c.capacity_backward for c in stuck])
-        return _Look(numbers, key, tuple(c.name for c in stuck), margins, scales)
+        return _Look(numbers, key, tuple(c.name for c in stuck), margins, scales, creep)
+
+    def window(self, about: float) -> float:
+        """A time that consists of whole frames in each of its parts [s]."""
+        part = about / PARTS
+        return PARTS * (math.ceil(part / self.frame) * self.frame if self.frame else part)
 
     def looks(self, window: float) -> list[_Look] | None:
         """Four states, a window [s] apart; None where a contact slips or a law changes its segment in between."""
         found: list[_Look] = []
         for k in range(4):
             if k:
-                self._advance(window)
+                self._record(window / PARTS, PARTS)
             look = self._look()
             if look is None or (found and look.key != found[0].key):
                 return None
@@ -188,7 +203,7 @@ class Watch:
             return UNKNOWN, None
         numbers = np.array([look.numbers for look in looks])
         steps = np.diff(numbers, axis=0)
-        rounding = CONSTANT * self.magnitude
+        rounding = CONSTANT * self.magnitude + PARTS * window * max(look.creep for look in looks)
         if np.all(np.abs(steps) <= rounding) and np.all(looks[-1].margins >= MARGIN * looks[-1].scales[:, None]):
             return Outlook(math.inf), looks
         if np.any(np.abs(np.diff(steps, 2, axis=0)) > STRAIGHT * np.abs(steps).max(axis=0) + 4.0 * rounding):
@@ -203,20 +218,25 @@ class Watch:
 
     def skip(self, outlook: Outlook, looks: list[_Look], window: float) -> bool:
         """Extrapolates the motion until shortly before a contact breaks away; False where the motion then goes on differently."""
-        windows = min(int(SHORT_OF * outlook.breaks_away / window), AHEAD)
         if self.frame == 0.0:
             self._advance(SHORT_OF * outlook.breaks_away)
             return True
-        if windows < 1 or self._running:
+        if self._running:
             return False
+        windows = int(SHORT_OF * outlook.breaks_away / window)
+        steps = np.diff([look.numbers for look in looks], axis=0)
+        bend = steps[-1] - steps[-2]
+        if np.all(np.abs(bend) <= 4.0 * CONSTANT * self.magnitude) and self._jump(looks, 0.0 * bend, windows, window):
+            return True
+        return self._jump(looks, bend, min(windows, AHEAD), window)
+
+    def _jump(self, looks: list[_Look], bend: np.ndarray, windows: int, window: float) -> bool:
+        """By so many windows, if the next one then goes as predicted."""
         kept: SimulationState = self.simulation.state
-        last, bend = (
-            looks[-1].numbers - looks[-2].numbers,
-            looks[-1].numbers - 2 * looks[-2].numbers + looks[-3].numbers,
-        )
+        last = looks[-1].numbers - looks[-2].numbers
         self._set(looks[-1].numbers + windows * last + 0.5 * windows * (windows + 1) * bend)
         wanted = last + (windows + 1) * bend
-        after = self.looks(window)
+        after = self.looks(window) if windows > 0 else None
         if after is not None:
             step = after[1].numbers - after[0].numbers
             bound = STRAIGHT * np.abs(wanted) + AHEAD * CONSTANT * self.magnitude
@@ -245,11 +265,15 @@ class Watch:
         values = self.part(begin, end)[1]
         return np.ptp(values, axis=0) if len(values) else np.zeros(len(self.names))
 
-    def frequency(self) -> float:
-        """Of the last half, of the first variable that moves [Hz]; NaN where there are no two swings."""
+    def rises(self) -> np.ndarray:
+        """Upward crossings in the last half, of the first variable that moves [s]."""
         times, values = self.part(0.5, 1.0)
         moving = self.swing(0.5, 1.0) > NOISE
-        return frequency_of(times, values[:, int(np.argmax(moving))]) if moving.any() else math.nan
+        return rises_of(times, values[:, int(np.argmax(moving))]) if moving.any() else np.zeros(0)
+
+    def period(self) -> float:
+        """Mean of the last half [s]."""
+        return float(np.mean(np.diff(self.rises())))
 
     def quick_frequency(self, variable: int, swing: float) -> float:
         """By a sample each tick [Hz], which those of a long watch may be too far apart for; NaN of a slower one."""
@@ -264,11 +288,14 @@ class Watch:
         return frequency if several else math.nan
 
     def swings(self) -> bool:
-        """Whether the last half of the watch has several cycles that do not die out."""
+        """Whether the last half of the watch has several cycles that neither die out nor become ever slower."""
         before, last = self.swing(0.5, 0.75), self.swing(0.75, 1.0)
-        moving = last > NOISE
-        cycles = 0.5 * self.elapsed * self.frequency() >= CYCLES
-        return bool(moving.any() and cycles and np.all(last[moving] >= STEADY * before[moving]))
+        periods = np.diff(self.rises())
+        if len(periods) < CYCLES or not np.any(last > NOISE):
+            return False
+        half = len(periods) // 2
+        steady = STEADY * np.mean(periods[-half:]) <= np.mean(periods[:half])
+        return bool(steady and np.all(last[last > NOISE] >= STEADY * before[last > NOISE]))
 
 
 def _value(points: Sequence[tuple[float, ...]], begin: float, time: float) -> float:
@@ -287,14 +314,18 @@ def _zero(values: np.ndarray, rounding: float) -> float:
     return float(min((r.real for r in roots if abs(r.imag) == 0.0 and r.real > 0.0), default=math.inf))
 
 
-def frequency_of(time: np.ndarray, values: np.ndarray) -> float:
-    """By the crossings of the middle with a hysteresis of a quarter of the swing, so that ripple does not count [Hz]; NaN
-    where there are no two swings."""
+def rises_of(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Instants at which the middle is crossed upward, with a hysteresis of a quarter of the swing, so that ripple does not count."""
     middle, quarter = 0.5 * (values.max() + values.min()), 0.25 * np.ptp(values)
     side = np.where(values > middle + quarter, 1, np.where(values < middle - quarter, -1, 0))
     known = np.flatnonzero(side)
-    rises = known[1:][(side[known][1:] > 0) & (side[known][:-1] < 0)]
-    return float((len(rises) - 1) / (time[rises[-1]] - time[rises[0]])) if len(rises) > 1 else float("nan")
+    return np.asarray(time[known[1:][(side[known][1:] > 0) & (side[known][:-1] < 0)]])
+
+
+def frequency_of(time: np.ndarray, values: np.ndarray) -> float:
+    """By the upward crossings of the middle [Hz]; NaN where there are no two swings."""
+    rises = rises_of(time, values)
+    return float((len(rises) - 1) / (rises[-1] - rises[0])) if len(rises) > 1 else math.nan
 
 
 @dataclass(frozen=True)
@@ -322,23 +353,26 @@ def decide(watch: Watch, first: float, most: float) -> Decision:
         Longest time to follow [s]; stuck intervals that are extrapolated do not count.
     """
     duration, seen, idle, outlook = first, 0.0, 0, UNKNOWN
-    candidate: tuple[float, np.ndarray] | None = None
+    candidate: tuple[float, np.ndarray, float] | None = None
     while seen < most and idle < IDLE:
-        watch.follow(duration)
-        idle = idle + 1 if np.ptp(watch.rows[-SAMPLES:], axis=0).max() <= NOISE else 0
+        before = len(watch.rows)
+        watch.follow(duration, min(round(SAMPLES * duration / first), FINEST))
+        idle = idle + 1 if np.ptp(watch.rows[before:], axis=0).max() <= NOISE else 0
         seen += duration
-        window = max(duration / 100.0, watch.frame)
+        window = watch.window(duration / 100.0)
         outlook, looks = watch.outlook(window)
-        while looks is not None and duration < outlook.breaks_away < FOREVER and watch.skip(outlook, looks, window):
-            window = max(window, 0.003 * min(outlook.breaks_away, AHEAD * window))
+        for _ in range(SKIPS):
+            if looks is None or not duration < outlook.breaks_away < FOREVER or not watch.skip(outlook, looks, window):
+                break
             outlook, looks = watch.outlook(window)
         if outlook.rests:
             return _decision(watch, "at rest", NOTHING_MOVES)
         if watch.swings():
             if candidate is None:
-                candidate = watch.elapsed, watch.swing(0.75, 1.0)
+                candidate = watch.elapsed, watch.swing(0.75, 1.0), watch.period()
             elif watch.elapsed >= CONFIRMED * candidate[0]:
-                if np.all(watch.swing(0.75, 1.0) >= STEADY * candidate[1]):
+                swings = np.all(watch.swing(0.75, 1.0) >= STEADY * candidate[1])
+                if swings and STEADY * watch.period() <= candidate[2]:
                     return _decision(watch, "hunts", "")
                 candidate = None
         else:
@@ -353,7 +387,7 @@ def _decision(watch: Watch, verdict: Verdict, reason: str) -> Decision:
     if verdict == "hunts":
         moving = int(np.argmax(swing > NOISE))
         quick = watch.quick_frequency(moving, 0.5 * swing[moving])
-        frequency = watch.frequency() if math.isnan(quick) else quick
+        frequency = 1.0 / watch.period() if math.isnan(quick) else quick
     return Decision(verdict, reason, watched, frequency, swing)
 
 
