@@ -45,8 +45,8 @@ def test_the_files_follow_the_rules_and_fmpy_gives_the_reference(
         fmi_type={"cs": "CoSimulation", "me": "ModelExchange"}[interface],
         step_size=options["StepSize"],
         output_interval=options["StepSize"],
-        # FMPy's CVODE reaches its limit of steps at the 1e-8 of modelDescription.xml, where inputs come from a table.
-        relative_tolerance=1e-6,
+        # With inputs from a table FMPy's CVODE reaches its limit of steps at the 1e-8 of modelDescription.xml (docs/fmu.md).
+        relative_tolerance=1e-4,
         stop_time=options["StopTime"],
         input=read_csv(str(directory / f"{model}_in.csv")),
         output=reference.dtype.names[1:],
