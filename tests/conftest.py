@@ -88,3 +88,49 @@ def rows_by_any_threads_and_executor(study: lm.Study, directory: Path) -> pa.Tab
     assert one.equals(three)
     assert one.equals(processes)
     return one
+
+
+# Files whose tests take long, and why they are worth it. `make check` leaves them out; `make test` runs them and prints their time.
+SLOW = {
+    "test_closed_loop_response.py": "periodic motions under sampled control against long runs: no closed form covers them",
+    "test_command_line.py": "each command in a process of its own, as a user calls it",
+    "test_docs.py": "every code block, number and link of the documentation is executed or followed",
+    "test_field_oriented.py": "500 random axes against the full equations of the winding, the only second method for it",
+    "test_fmu.py": "FMUs of every scenario by another importer",
+    "test_fmu_cross_check.py": "the rules of the FMI cross-check, by its own program",
+    "test_fmu_exchange.py": "Model Exchange by CVODE against the exact run",
+    "test_fmu_played.py": "signals that an FMU plays, in both interfaces and versions",
+    "test_identification.py": "whole fits: the intervals contain the values put in",
+    "test_identification_campaign.py": "a gearbox found from the logs of its own virtual rig",
+    "test_identification_cycloidal.py": "measured logs with published values",
+    "test_identification_residuals.py": "fits that end in a wrong minimum must be reported",
+    "test_joint_rest.py": "break-away times against a linear programme",
+    "test_packaging.py": "processes without each optional library",
+    "test_pages.py": "every page that is made is parsed",
+    "test_pointing.py": "tracking errors of whole passes",
+    "test_portable.py": "every scenario in WebAssembly, bit for bit",
+    "test_response.py": "Jacobians of periodic motions against differences of runs",
+    "test_servo.py": "margins and tuning against time responses of the exact loop",
+    "test_study.py": "interrupted and distributed studies with real processes",
+    "test_study_train.py": "the same for trains",
+    "test_verdicts.py": "200 random axes whose verdicts are decided by long runs",
+}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if why := SLOW.get(item.path.name):
+            item.add_marker(pytest.mark.slow(why))
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    spent: dict[str, float] = {}
+    for reports in terminalreporter.stats.values():
+        for report in reports:
+            name = Path(getattr(report, "nodeid", "").partition("::")[0]).name
+            if name in SLOW:
+                spent[name] = spent.get(name, 0.0) + getattr(report, "duration", 0.0)
+    if spent:
+        terminalreporter.section("slow files, and why they are worth their time")
+    for name, seconds in sorted(spent.items(), key=lambda pair: -pair[1]):
+        terminalreporter.write_line(f"{seconds:6.1f} s  {name}: {SLOW[name]}")
