@@ -106,6 +106,8 @@ SLOW = {
     "test_identification_residuals.py": "fits that end in a wrong minimum must be reported",
     "test_joint_rest.py": "break-away times against a linear programme",
     "test_packaging.py": "processes without each optional library",
+    "test_paper.py": "the whole reproduction of the paper",
+    "test_select.py": "pairs of motor and gearbox simulated over whole cycles",
     "test_pages.py": "every page that is made is parsed",
     "test_pointing.py": "tracking errors of whole passes",
     "test_portable.py": "every scenario in WebAssembly, bit for bit",
