@@ -133,7 +133,7 @@ $(VENV)/portable: $(VENV)/dev
 
 # In Chromium; left out where there is no node.
 .PHONY: page-where-node test-page
-page-where-node: $(VENV)/dev
+page-where-node: $(VENV)/portable
 	@! $(NODE) || $(MAKE) page
 test-page: page-where-node
 	@$(NODE) || exit 0; { command -v chromium >/dev/null || { apt-get update -q && apt-get install -qy chromium; }; } && cd page && npm run --silent lint && npm test --silent
