@@ -78,6 +78,20 @@ def write_servo_logs(directory: Path, values: dict[str, float], *, rung: int, se
     return rig
 
 
+AXIS = """
+[shafts.carriage]
+viscous_friction = 200.0
+friction_torque = 20.0
+torque = { mean = 0.0 }
+[motors.drive]
+shaft = "carriage"
+kind = "torque_source"
+rated_torque = 1.0
+rotor_inertia = 95.0
+[simulation]
+duration = "1 s"
+sample_interval = "1 ms"
+"""
 SPRING = """
 [shafts.carriage]
 viscous_friction = 20.0

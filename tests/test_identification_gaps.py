@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification_logs import MASS, POSITION_NOISE, SERVO, released, servo_plans, servo_task, spring_task
+from identification_logs import AXIS, MASS, POSITION_NOISE, SERVO, released, servo_plans, servo_task, spring_task
 from lostmotion.errors import InputError
 from lostmotion.identification.identify import identify_task
 from lostmotion.identification.logs import Channel, Log
@@ -56,20 +56,6 @@ def test_a_formula_with_a_channel_of_an_unknown_unit_is_refused(tmp_path: Path) 
         prepared(task, Log("log.csv", np.arange(20) * 0.01, channels), Rig(task, tmp_path).units)
 
 
-AXIS = """
-[shafts.carriage]
-viscous_friction = 200.0
-friction_torque = 20.0
-torque = { mean = 0.0 }
-[motors.drive]
-shaft = "carriage"
-kind = "torque_source"
-rated_torque = 1.0
-rotor_inertia = 95.0
-[simulation]
-duration = "1 s"
-sample_interval = "1 ms"
-"""
 TRUTH = {"mass": 95.0, "viscous_friction": 200.0, "coulomb_friction": 20.0}
 INTERVAL = 2e-3  # s
 

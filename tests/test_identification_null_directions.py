@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from identification_logs import AXIS
 from lostmotion.identification.identify import IdentificationResult, identify_logs
 from lostmotion.identification.logs import Channel, Log
 from lostmotion.identification.prepare import prepared
@@ -15,20 +16,6 @@ from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
 from lostmotion.identification.virtual import virtual_log
 
-AXIS = """
-[shafts.carriage]
-viscous_friction = 200.0
-friction_torque = 20.0
-torque = { mean = 0.0 }
-[motors.drive]
-shaft = "carriage"
-kind = "torque_source"
-rated_torque = 1.0
-rotor_inertia = 95.0
-[simulation]
-duration = "1 s"
-sample_interval = "1 ms"
-"""
 NOISE = 5e-3  # m/s
 TIME = 2e-3 * np.arange(1500)
 FORCE = 80.0 * np.sin(4.0 * TIME) + 40.0 * np.sin(11.0 * TIME)
