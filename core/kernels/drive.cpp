@@ -7,6 +7,20 @@ namespace lostmotion {
 template class ExactSolver<SwitchedDrive>;
 template class SimulationOf<SwitchedDrive>;
 
+namespace {
+
+// What a run has ended with, by either solver.
+template <class Solver>
+void note_end(RunReport& report, const Solver& solver) {
+    report.time = solver.time();
+    report.contact = solver.stopped_at();
+    report.x = solver.state();
+    report.memory = solver.memory();
+    report.switching_count = solver.switchings();
+}
+
+}  // namespace
+
 RunReport run_exact(Workspace& workspace, const Signals& signals, const Start& start, const RunOptions& options,
                     double* out) {
     RunReport report;
@@ -18,12 +32,8 @@ RunReport run_exact(Workspace& workspace, const Signals& signals, const Start& s
     report.status = run_recorded(solver, start, options, recorder,
                                  [&](const auto& laws) { return closed_loop_of(drive, options.control, laws); });
     recorder.end(solver.state());
-    report.time = solver.time();
-    report.contact = solver.stopped_at();
-    report.x = solver.state();
-    report.memory = solver.memory();
+    note_end(report, solver);
     report.steps = solver.event_checks();
-    report.switching_count = solver.switchings();
     return report;
 }
 
@@ -43,12 +53,8 @@ RunReport run_adaptive(const Drive& drive, const Signals& signals, const Start& 
     AdaptiveRecorder recorder(drive, solver, options, out, report);
     report.status = run_recorded(solver, start, options, recorder,
                                  [&](const auto& laws) { return closed_loop_of(drive, options.control, laws); });
-    report.time = solver.time();
-    report.contact = solver.stopped_at();
-    report.x = solver.state();
-    report.memory = solver.memory();
+    note_end(report, solver);
     report.steps = solver.steps();
-    report.switching_count = solver.switchings();
     return report;
 }
 
