@@ -175,25 +175,22 @@ std::string TrainCheck::rigid_loops() const {
 }
 
 std::string TrainCheck::turned() const {
-    std::vector<int> part(train_.shafts.size());
-    for (std::size_t s = 0; s < part.size(); ++s) part[s] = static_cast<int>(s);
-    const auto join = [&](int a, int b) {
-        const int from = part[static_cast<std::size_t>(a)], to = part[static_cast<std::size_t>(b)];
-        std::replace(part.begin(), part.end(), from, to);
-    };
+    std::vector<bool> acted_on(train_.shafts.size());
+    const auto act_on = [&](int s) { acted_on[static_cast<std::size_t>(s)] = true; };
     for (const Gear& g : train_.gears) {
-        join(g.input, g.output);
-        if (g.housing != nowhere) join(g.input, g.housing);
+        act_on(g.input);
+        act_on(g.output);
+        if (g.housing != nowhere) act_on(g.housing);
     }
-    for (const auto& c : coupling_elements(train_)) join(c->input, c->output);
-    std::vector<bool> acted_on(part.size());
-    for (const ShaftMotor& m : train_.motors) acted_on[static_cast<std::size_t>(part[m.shaft])] = true;
+    for (const auto& c : coupling_elements(train_)) {
+        act_on(c->input);
+        act_on(c->output);
+    }
+    for (const ShaftMotor& m : train_.motors) act_on(m.shaft);
     for (const auto& e : shaft_elements(train_))
-        if (e->drives()) acted_on[static_cast<std::size_t>(part[static_cast<std::size_t>(e->shaft)])] = true;
-    for (std::size_t s = 0; s < part.size(); ++s)
-        if (train_.shafts[s].loaded) acted_on[static_cast<std::size_t>(part[s])] = true;
-    for (std::size_t s = 0; s < part.size(); ++s)
-        if (!acted_on[static_cast<std::size_t>(part[s])])
+        if (e->drives()) act_on(e->shaft);
+    for (std::size_t s = 0; s < acted_on.size(); ++s)
+        if (!acted_on[s] && !train_.shafts[s].loaded)
             return shaft(static_cast<int>(s)) +
                    " is turned by nothing: no motor, gear or load torque acts on it; join it to the train";
     return {};

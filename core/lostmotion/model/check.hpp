@@ -40,7 +40,8 @@ class TrainCheck {
     // Rigid gears alone: a loop either locks the train or leaves its torques undetermined.
     std::string rigid_loops() const;
 
-    // Does anything act on each part that hangs together?
+    // Does a motor, gear, coupling, spring or load torque act on each shaft? A part without motor and load moves
+    // freely.
     std::string turned() const;
 
     std::string sizes() const;
