@@ -3,6 +3,7 @@
 
 #include <nanobind/nanobind.h>
 
+#include <chrono>
 #include <stdexcept>
 
 #include "lostmotion/simulation/result_names.hpp"
@@ -11,7 +12,13 @@ namespace lostmotion::binding {
 
 namespace nb = nanobind;
 
+// The core polls every few microseconds; taking the lock of the interpreter so often would slow down other threads.
 inline bool poll_signals(void*) {
+    using namespace std::chrono;
+    thread_local steady_clock::time_point asked_at;
+    const steady_clock::time_point now = steady_clock::now();
+    if (now - asked_at < 20ms) return false;
+    asked_at = now;
     nb::gil_scoped_acquire hold;
     return PyErr_CheckSignals() != 0;
 }

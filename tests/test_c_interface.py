@@ -20,7 +20,7 @@ from lostmotion.simulation.train_state import start_values
 
 LIBRARY = ROOT / "build" / "c" / "liblostmotion.so"
 STATES, INPUTS, VARIABLES, CAPACITIES = range(4)
-OK, JAMMED, INVALID = 0, 2, 100
+OK, INTERRUPTED, JAMMED, INVALID = 0, 1, 2, 100
 
 
 class Parameter(c.Structure):

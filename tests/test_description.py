@@ -2,6 +2,7 @@
 
 import ctypes as c
 import math
+import time
 import zlib
 from collections.abc import Iterator
 from typing import Any
@@ -13,7 +14,7 @@ import lostmotion as lm
 from lostmotion.inputs.quantities import NotNegative
 from lostmotion.portable.description import numbers_of
 from lostmotion.portable.parameters import Effect, Parameter, Parameters, parameters_of, predicted
-from test_c_interface import INPUTS, INVALID, OK, STATES, VARIABLES, Signal, doubles, library  # noqa: F401
+from test_c_interface import INPUTS, INTERRUPTED, INVALID, OK, STATES, VARIABLES, Signal, doubles, library  # noqa: F401
 from test_c_interface import Simulation as Stepped
 
 SAMPLES = 0
@@ -366,3 +367,20 @@ def test_given_references_are_inputs(library: c.CDLL) -> None:  # noqa: F811
     described = Scenario(library, lm.description(delayed, parameters=False))
     assert library.lm_scenario_give_references(described.handle, 1) == 100
     assert "has to know the past of its reference" in described.error()
+
+
+@pytest.mark.parametrize("name", ["paper-2dof-nl-small", "worm-lowering"])
+def test_a_function_of_the_caller_ends_a_run_and_a_step(library: c.CDLL, name: str) -> None:  # noqa: F811
+    scenario = lm.load(name, {"simulation.duration": 1e7, "simulation.sample_interval": 1e4})
+    there = Scenario(library, lm.description(scenario))
+    begin = time.perf_counter()
+    asked = c.CFUNCTYPE(c.c_int, c.c_void_p)(lambda _: time.perf_counter() > begin + 0.3)
+    library.lm_scenario_set_interrupt(there.handle, asked, None)
+    result = c.c_void_p(library.lm_scenario_run(there.handle, 1, c.c_size_t(0)))
+    assert library.lm_result_status(result) == INTERRUPTED
+    library.lm_result_free(result)
+    simulation = there.simulation(1e-3)
+    library.lm_set_interrupt(simulation.handle, asked, None)
+    inputs = [0.1] * len(simulation.names(INPUTS))
+    assert simulation.advance(1e7, inputs) == INTERRUPTED
+    assert time.perf_counter() < begin + 1.3

@@ -33,7 +33,7 @@ LM_API int lm_interface_version(void);
 
 enum {
     LM_OK = 0,
-    LM_INTERRUPTED = 1,  /* not by this interface */
+    LM_INTERRUPTED = 1,  /* by the function of lm_scenario_set_interrupt or lm_set_interrupt */
     LM_JAMMED = 2,       /* no combination of contact modes is consistent */
     LM_OUTSIDE = 3,      /* the motion left the data of a law, or the range of the arithmetic */
     LM_ACCUMULATION = 4, /* switching instants accumulate */
@@ -93,6 +93,10 @@ LM_API int lm_scenario_give_references(lm_scenario* scenario, int given);
 /* Which inputs of a simulation follow the signals and references of the scenario in the place of what its calls give:
  * played[n], of the first n inputs. It acts on simulations that are made, or go on, afterwards. */
 LM_API void lm_scenario_play(lm_scenario* scenario, const int* played, size_t n);
+
+/* interrupted(context) is called often, from the thread that runs, in the time between switchings too; a value other
+ * than 0 ends the run with LM_INTERRUPTED within milliseconds. NULL: nothing ends it. */
+LM_API void lm_scenario_set_interrupt(lm_scenario* scenario, int (*interrupted)(void*), void* context);
 
 /* A run in one go. energy: whether to keep the energies. Beyond max_switchings the switchings are only counted. NULL if
  * nothing could run (lm_scenario_error); a motion that has no continuation gives a result with a status and an error.
@@ -251,6 +255,8 @@ LM_API int lm_reset(lm_simulation* simulation, const double* states, const doubl
 /* Advances by interval [s] with each input running in a straight line from its first to its second value. When it
  * fails, the state is left as it was. */
 LM_API int lm_advance(lm_simulation* simulation, double interval, const double* begin, const double* end);
+/* The same as lm_scenario_set_interrupt, for lm_advance and lm_run. */
+LM_API void lm_set_interrupt(lm_simulation* simulation, int (*interrupted)(void*), void* context);
 LM_API double lm_time(const lm_simulation* simulation);
 /* What acts at t = 0, for what is read before the first step; later it changes nothing. */
 LM_API int lm_hold(lm_simulation* simulation, const double* inputs);

@@ -7,6 +7,17 @@
 #include "lostmotion/scenario/simulation.hpp"
 #include "train.hpp"
 
+// What the caller asks to end a run; it goes to the core as a function that returns bool.
+struct Asked {
+    int (*function)(void*) = nullptr;
+    void* context = nullptr;
+
+    static bool ask(void* asked) {
+        const auto* a = static_cast<const Asked*>(asked);
+        return a->function != nullptr && a->function(a->context) != 0;
+    }
+};
+
 struct lm_scenario {
     int changed(std::string wrong) {
         error = std::move(wrong);
@@ -15,6 +26,7 @@ struct lm_scenario {
 
     lostmotion::ScenarioDescription description;
     std::string error;
+    Asked asked;
 };
 
 struct lm_simulation {
@@ -32,6 +44,7 @@ struct lm_simulation {
 
     lostmotion::ScenarioSimulation simulation;
     std::string error;
+    Asked asked;
 };
 
 // A signal, or what is wrong with it.

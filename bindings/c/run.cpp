@@ -15,10 +15,14 @@ struct lm_result {
 
 extern "C" {
 
+void lm_scenario_set_interrupt(lm_scenario* scenario, int (*interrupted)(void*), void* context) {
+    scenario->asked = {interrupted, context};
+}
 lm_result* lm_scenario_run(lm_scenario* scenario, int energy, size_t max_switchings) {
     lm_result* made = nullptr;
     scenario->changed(attempted([&]() -> std::string {
-        made = new lm_result{lm::run_whole(scenario->description.scenario(), {energy != 0, max_switchings})};
+        made = new lm_result{lm::run_whole(scenario->description.scenario(),
+                                           {energy != 0, max_switchings, Asked::ask, &scenario->asked})};
         return made->run.error;
     }));
     return made;
@@ -95,6 +99,8 @@ int lm_run(lm_simulation* simulation, const lm_signal* inputs, const double* sta
     options.samples = samples;
     options.energy = false;
     options.max_switchings = 0;
+    options.interrupted = Asked::ask;
+    options.interrupted_context = &simulation->asked;
     const lm::TrainRun run(train->assembly().train());
     const auto& known = simulation->simulation.names();
     std::vector<double> given = list(states, known.states.size()), held = list(capacities, known.capacities.size());

@@ -121,7 +121,11 @@ int lm_advance(lm_simulation* simulation, double interval, const double* begin, 
     if (!(std::isfinite(interval) && interval > 0.0 && time + interval > time))
         return simulation->failed("the interval must be > 0, finite and longer than the rounding of the time");
     if (n > 0 && !(finite(begin, n) && finite(end, n))) return simulation->failed("an input is missing or not finite");
+    simulation->simulation.with([&](auto& s) { s.set_interrupt(Asked::ask, &simulation->asked); });
     return simulation->ended(simulation->simulation.advance(interval, {begin, n}, {end, n}));
+}
+void lm_set_interrupt(lm_simulation* simulation, int (*interrupted)(void*), void* context) {
+    simulation->asked = {interrupted, context};
 }
 double lm_time(const lm_simulation* simulation) { return simulation->simulation.time(); }
 

@@ -343,20 +343,26 @@ class InputState {
         return bound;
     }
     // The first instant from now on at which an input no longer goes this way, before `limit` and the next breakpoint;
-    // else `limit`. From slope v and curvature a follows v + a s - B s^2/2 <= its slope after s, where B bounds the
-    // third derivative, so that none is stepped over.
-    double turning(int i, double way, double limit) const {
-        double B = 0.0;
+    // else, or if it is interrupted, `limit`. From slope v and curvature a follows v + a s - B s^2/2 <= its slope after
+    // s, where B bounds the third derivative, so that none is stepped over. Where the slope only touches zero, v and a
+    // vanish together, and with them the step: there a slope above -`least`, its rounding, goes on.
+    template <class Interruption>
+    double turning(int i, double way, double limit, Interruption& interruption) const {
+        double B = 0.0, least = std::fabs(slope_[i]);
         for (const Sine& s : (*signals_)[i].sines) {
             const double omega = 2.0 * std::numbers::pi * s.frequency;
             B += std::fabs(s.amplitude) * omega * omega * omega;
+            least += std::fabs(s.amplitude) * omega;
         }
         if (B == 0.0) return limit;
-        for (InputState at = *this; at.time_ < limit;) {
+        least *= 4.0 * std::numeric_limits<double>::epsilon();
+        for (InputState at = *this; at.time_ < limit && !interruption();) {
             const auto u = at.jet<3>();
             const double v = way * u[1][i], a = way * u[2][i];
             if (v < 0.0) return at.time_;
-            const double safe = at.time_ + (a + std::sqrt(a * a + 2.0 * B * v)) / B;
+            double safe = at.time_ + (a + std::sqrt(a * a + 2.0 * B * v)) / B;
+            if (v <= least && a * a <= 4.0 * B * least)
+                safe = std::fmax(safe, at.time_ + (a + std::sqrt(a * a + 2.0 * B * least)) / B);
             at.follow(std::fmax(safe, std::nextafter(at.time_, limit)));
         }
         return limit;

@@ -136,6 +136,12 @@ class Propagator {
         const int k = std::max(0, binary_exponent(s) - binary_exponent(base_));
         return k > 0 && length(k) > s ? k - 1 : k;
     }
+    // The lowest level that is no shorter than s; the longest if all are. Computes no level.
+    int level_above(double s) const {
+        int k = 0;
+        while (k < longest_ && length(k) < s) ++k;
+        return k;
+    }
     // The level of just this length, or -1. Computes no level.
     int level_of(double s) const {
         const int k = binary_exponent(s) - binary_exponent(base_);

@@ -15,6 +15,8 @@ namespace lostmotion {
 struct WholeRunOptions {
     bool energy = true;                   // of the exact solver
     std::size_t max_switchings = 100000;  // kept; all are counted
+    bool (*interrupted)(void*) = nullptr;
+    void* interrupted_context = nullptr;
 };
 
 struct WholeRun {
@@ -42,6 +44,8 @@ Options options_of(const Scenario& s, const WholeRunOptions& given, std::vector<
     o.samples = s.samples();
     o.energy = given.energy;
     o.max_switchings = given.max_switchings;
+    o.interrupted = given.interrupted;
+    o.interrupted_context = given.interrupted_context;
     o.control = s.control;
     if (s.control.present()) {
         control.assign(s.control.axes.size() * static_cast<std::size_t>(s.control.signals()) * o.samples, 0.0);

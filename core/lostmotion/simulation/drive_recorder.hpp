@@ -16,8 +16,7 @@ class Recorder final : public Observer<SwitchedDrive> {
           meter_(drive),
           options_(options),
           report_(report) {
-        sampler_.interrupted = options.interrupted;
-        sampler_.interrupted_context = options.interrupted_context;
+        sampler_.interruption = meter_.interruption() = {options.interrupted, options.interrupted_context};
     }
     void begin(const State& x) { meter_.begin(x); }
     bool segment(const Segment<SwitchedDrive>& s) override {

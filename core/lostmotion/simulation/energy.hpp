@@ -12,15 +12,17 @@ class EnergyMeter {
  public:
     explicit EnergyMeter(const Drive& drive) : drive_(drive) {}
     EnergyLedger ledger;
+    Interruption& interruption() { return integral_.interruption; }
 
     void begin(const State& x) { measure(x, ledger.kinetic_begin, ledger.elastic_begin); }
     void end(const State& x) { measure(x, ledger.kinetic_end, ledger.elastic_end); }
 
+    // False ends the run.
     bool segment(const Segment<SwitchedDrive>& s) {
         if (!(s.end > s.begin)) return true;
         const Regime& r = s.entry.regime;
         if (r.at_rest[input_contact] && r.at_rest[load_contact]) return true;
-        integral_.add(s, factors(r, s.memory));
+        if (!integral_.add(s, factors(r, s.memory))) return false;
         ledger.flow = integral_.flow;
         ledger.turned_over = integral_.turned_over;
         return true;

@@ -35,9 +35,7 @@ class SamplerOf : public Observer<System> {
         listed_ = times.listed;
     }
 
-    // Polled now and then; true ends the run.
-    bool (*interrupted)(void*) = nullptr;
-    void* interrupted_context = nullptr;
+    Interruption interruption;
 
     double left_data_at = std::numeric_limits<double>::infinity();  // first instant outside the loss map's data [s]
 
@@ -109,7 +107,7 @@ class SamplerOf : public Observer<System> {
             write(reader, next, n);
             next += static_cast<std::size_t>(n);
             if (next == p.end) return true;
-            if (next % 4096 == 0 && interrupted != nullptr && interrupted(interrupted_context)) return false;
+            if (interruption()) return false;
             if (level >= 0) p.cursor.move_to(instant(next - 1), stride_.x());
             p.cursor.advance(instant(next) - p.cursor.time());
         }
@@ -129,7 +127,7 @@ class SamplerOf : public Observer<System> {
             write(reader, next, n);
             next += static_cast<std::size_t>(n);
             if (next == p.end) return true;
-            if (interrupted != nullptr && interrupted(interrupted_context)) return false;
+            if (interruption()) return false;
             if ((next - p.first) % (1024 * Instants::max_count) == 0) {  // so that rounding does not add up
                 p.cursor = first;
                 p.cursor.leap_to(instant(next));

@@ -19,8 +19,11 @@ class TrainMeter {
  public:
     explicit TrainMeter(const model::Assembly& a) : assembly_(a) {}
 
-    void segment(const Segment<model::TrainSystem<D>>& s) {
-        if (!(s.end > s.begin)) return;
+    Interruption& interruption() { return integral_.interruption; }
+
+    // False ends the run.
+    bool segment(const Segment<model::TrainSystem<D>>& s) {
+        if (!(s.end > s.begin)) return true;
         typename Integral::Factors factors;
         const model::Layout& n = assembly_.layout();
         for (std::size_t k = 0; k < names_.size(); ++k)
@@ -28,7 +31,7 @@ class TrainMeter {
         for (const model::PowerFlow& f : model::power_flows(assembly_, s.entry.regime.rows))
             factors.set(place(f), model::pack<D>(f.power.torque, n), model::pack<D>(f.power.speed, n));
         factors.hold(s.memory);
-        integral_.add(s, factors);
+        return integral_.add(s, factors);
     }
     void write(TrainReport& report) const {
         for (std::size_t k = 0; k < names_.size(); ++k)
@@ -89,14 +92,12 @@ class TrainRecorder final : public Observer<model::TrainSystem<D>> {
           sampler_(m, options.times(), out, channels_),
           meter_(m.assembly),
           dense_samples_(options.sample_interval, options.samples) {
-        sampler_.interrupted = options.interrupted;
-        sampler_.interrupted_context = options.interrupted_context;
+        sampler_.interruption = meter_.interruption() = {options.interrupted, options.interrupted_context};
     }
 
     bool segment(const Segment<System>& s) override {
         if (watcher_ != nullptr) watcher_->segment(s);
-        if (options_.energy) meter_.segment(s);
-        return sampler_.segment(s);
+        return (!options_.energy || meter_.segment(s)) && sampler_.segment(s);
     }
     bool flush() override { return sampler_.write(); }
     bool wants_switching() const override { return watcher_ != nullptr || keeps_switching(); }

@@ -111,8 +111,7 @@ class AdaptiveSolver {
     AdaptiveSolver(const AdaptiveSolver&) = delete;
     AdaptiveSolver& operator=(const AdaptiveSolver&) = delete;
 
-    bool (*interrupted)(void*) = nullptr;
-    void* interrupted_context = nullptr;
+    Interruption interruption;
 
     double time() const { return time_; }
     const State& state() const { return now_.x; }
@@ -171,7 +170,8 @@ class AdaptiveSolver {
             double limit = std::fmin(t_end, next_breakpoint(signals_, time_));
             if (const Regime& r = cache_.regime(key_); r.driving_input >= 0) {
                 input_.anchor(time_);
-                limit = input_.turning(r.driving_input, r.driving_way, limit);
+                limit = input_.turning(r.driving_input, r.driving_way, limit, interruption);
+                if (interruption.requested()) return Status::interrupted;
             }
             const Guard* fired = nullptr;
             const Status status = run_regime(limit, fired, observer);
@@ -239,8 +239,8 @@ class AdaptiveSolver {
         dense.k[0] = rates(entry.rates, motion.fixed, time_, now_.x);
         evaluate_guards(motion, time_, now_.x, dense.k[0], here);
         while (time_ < limit) {
-            if (++steps_ % 256 == 0 && interrupted != nullptr && interrupted(interrupted_context))
-                return Status::interrupted;
+            ++steps_;
+            if (interruption()) return Status::interrupted;
             h = std::min(h, longest_step_);
             const bool last = h >= limit - time_;
             if (last) h = limit - time_;

@@ -8,6 +8,8 @@
 // is no other step size.
 #pragma once
 
+#include <limits>
+
 #include "../kernel/polynomial.hpp"
 #include "exact_run.hpp"
 
@@ -31,12 +33,13 @@ inline auto ExactSolver<System>::run_regime(const Segment<System>& segment, doub
     Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
     for (int i = 0; i < e.rates.depends_on.inputs; ++i)
         forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
-    int level = std::min(last_level_, p.level_below(limit - time_));
-    const double shortest = 1e-7 * p.length(0);
+    // Every event check leads to a later instant of the clock (docs/theory.md).
+    const double shortest = std::fmax(1e-7 * p.length(0), 4.0 * std::numeric_limits<double>::epsilon() * limit);
+    const int lowest = p.level_above(0.5 * shortest);
+    int level = std::max(lowest, std::min(last_level_, p.level_below(limit - time_)));
     for (long count = 1; time_ < limit; ++count) {
         ++event_checks_;
-        if (event_checks_ % 1024 == 0 && interrupted != nullptr && interrupted(interrupted_context))
-            return Status::interrupted;
+        if (interruption()) return Status::interrupted;
         if (count % 64 == 0) cursor->anchor(time_);
         const State& rate = cursor->rate();
         if (constant_inputs && has_settled(e.regime, rate)) {
@@ -47,6 +50,8 @@ inline auto ExactSolver<System>::run_regime(const Segment<System>& segment, doub
         const Coupled fourth = absolute(cursor->fourth_derivative());
         const double left = limit - time_;
         level = p.bounded_level(level);
+        if (p.length(level) < 0.5 * shortest) [[unlikely]]
+            return Status::outside;
         double h = std::min(p.length(level), left);
         while (true) {
             if (h == p.length(level)) {
@@ -57,8 +62,8 @@ inline auto ExactSolver<System>::run_regime(const Segment<System>& segment, doub
             evaluate(e, constant, *end, *there);
             bound_fourth(e.guards, p.level(level).exponential_bound, fourth + h * forced);
             const Verdict verdict = judge(e, segment.memory, *cursor, *here, *there, h, h < shortest);
-            if (verdict == Verdict::uncertain) {  // below the shortest doubling level, by plain halves
-                h = level > 0 ? std::min(p.length(level = std::max(0, level - halvings_)), left) : 0.5 * h;
+            if (verdict == Verdict::uncertain) {  // below the lowest doubling level, by plain halves
+                h = level > lowest ? std::min(p.length(level = std::max(lowest, level - halvings_)), left) : 0.5 * h;
                 continue;
             }
             if (verdict == Verdict::crossing) {

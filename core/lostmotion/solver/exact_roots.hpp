@@ -9,43 +9,62 @@
 namespace lostmotion {
 
 // The first instant from begin_ on at which a torque that goes along with the limit of a contact turns back, before
-// `limit`; else `limit`. From a slope v and a curvature a of that torque follows v + a s - K s^2/2 <= its slope after
-// s <= h, where K bounds how its third derivative falls, so that no turn is stepped over.
+// `limit`; else, or if it is interrupted, `limit`. From a slope v and a curvature a of that torque follows
+// v + a s - K s^2/2 <= its slope after s <= h, where K bounds how its third derivative falls, so that no turn is
+// stepped over. The slope is known to its noise, and near the turn a step to where the bound is zero is shorter than
+// what would change the state: then the steps grow, up to where the bound is below zero by the noise (docs/theory.md).
 template <class System>
 double ExactSolver<System>::first_turn(Entry& e, double limit) {
     if constexpr (requires { e.regime.drivers; }) {
-        const int level = e.propagator.bounded_level(first_level);
-        const double h = e.propagator.length(level);
+        int level = first_level;
+        double ticks = 1.0;
         Coupled forced{};
         for (int i = 0; i < D::inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
         Cursor at = *begin_;
-        while (at.time() < limit) {
+        while (at.time() < limit && !interruption()) {
+            level = e.propagator.bounded_level(level);
+            const double h = e.propagator.length(level);
             const InstantOf<D> now{at.time(), at.x(), now_.memory, at.input().jet(), at.input().magnitudes()};
             Flow<D> along(e.rates, now);
             State fourth{};
             (e.propagator.level(level).exponential_bound * (absolute(at.fourth_derivative()) + h * forced))
                 .store(fourth.data());
-            double step = std::min(h, limit - at.time());
+            double step = std::min(h, limit - at.time()), longest = step;
             for (const auto& driver : e.regime.drivers) {
                 const LinearForm& torque = driver.torque;
                 const double a = along.rate(torque, 2), b = along.rate(torque, 3);
-                const double noise = 2.0 * along.noise(along.rate_magnitude(torque, 1), a);
-                const double v = along.rate(torque, 1) + noise;
+                const double noise = along.noise(along.rate_magnitude(torque, 1), a);
+                const double v = along.rate(torque, 1) + 2.0 * noise;
                 if (v < 0.0) return at.time();
                 double bound = 0.0;
                 for (int k = 0; k < D::states; ++k) bound += std::fabs(torque.c[k]) * fourth[k];
                 for (int i = 0; i < D::inputs; ++i) bound += std::fabs(torque.c[D::first_input + i]) * input_bound_[i];
                 const double K = std::fmax(0.0, -b) + bound * h / 3.0;
-                if (v + step * (a - 0.5 * K * step) >= 0.0) continue;
-                if (v == 0.0 && a == 0.0) {
+                if (v == 0.0 && a == 0.0 && K > 0.0) {
                     // b s^2/2 - bound s^3/6 at least; without b as well, a torque that changes within rounding so soon.
                     if (b < 0.0) return at.time();
-                    step = std::min(step, b > 0.0 ? 3.0 * b / bound : 0x1p-12 * h);
+                    step = longest = std::min(step, b > 0.0 ? 3.0 * b / bound : 0x1p-12 * h);
                     continue;
                 }
-                step = K > 0.0 ? (a + std::sqrt(a * a + 2.0 * K * v)) / K : -v / a;
+                // Up to where the bound falls to zero from `above`.
+                const auto shorten = [&](double& s, double above) {
+                    if (above + s * (a - 0.5 * K * s) >= 0.0) return;
+                    const double root = std::sqrt(a * a + 2.0 * K * above);
+                    s = a > 0.0 ? (a + root) / K : 2.0 * above / (root - a);
+                };
+                shorten(step, v);
+                shorten(longest, v + noise);
             }
-            at.advance(std::fmax(step, std::nextafter(at.time(), limit) - at.time()));
+            const double tick = std::nextafter(at.time(), limit) - at.time();
+            if (step < 0.5 * longest) {
+                step = std::fmax(step, std::fmin(longest, ticks * tick));
+                ticks *= 2.0;
+            } else {
+                ticks = 1.0;
+                // What is fast dies out: as in an event check, a step with room is followed by one of twice the length.
+                if (step == h && e.propagator.can_double(level, limit - at.time())) ++level;
+            }
+            at.advance(std::fmax(step, tick));
             at.anchor(std::fmin(at.time(), limit));
         }
     }

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "../kernel/cursor.hpp"
+#include "../kernel/interruption.hpp"
 #include "course.hpp"
 #include "regime_cache.hpp"
 #include "switching.hpp"
@@ -60,9 +61,7 @@ class ExactSolver {
     ExactSolver(const ExactSolver&) = delete;
     ExactSolver& operator=(const ExactSolver&) = delete;
 
-    // Polled now and then; true ends the run.
-    bool (*interrupted)(void*) = nullptr;
-    void* interrupted_context = nullptr;
+    Interruption interruption;
 
     double time() const { return time_; }
     const State& state() const { return now_.x; }
@@ -110,6 +109,8 @@ class ExactSolver {
  private:
     static constexpr double converging = 1e-7;  // the next correction is less than the square of the last
     static constexpr int first_level = 6;       // of the first event check
+    // The search for the modes after a switching takes up to that much of the time of an event check.
+    static constexpr unsigned steps_of_a_search = 8;
     static constexpr double settled =
         0x1p-400;  // of a rate [1/s], in natural magnitudes: below it, squares would underflow
     // A third of the length times the error of the slope of a cubic, over the error of its value.
@@ -293,6 +294,7 @@ Status ExactSolver<System>::advance(double t_end, Observer& observer) {
         if (status != Status::done) return status;
     }
     while (true) {
+        if (interruption(steps_of_a_search)) return Status::interrupted;
         Entry& entry = cache_.entry(key_);
         if (!entry.propagator.ready()) entry.prepare(rotations_, scale_);
         Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
@@ -307,9 +309,11 @@ Status ExactSolver<System>::advance(double t_end, Observer& observer) {
         if (!(time_ < breakpoint_)) breakpoint_ = next_breakpoint(signals_, time_);
         double limit = std::min(t_end, breakpoint_);
         if (const Regime& r = entry.regime; r.driving_input >= 0) [[unlikely]]
-            limit = begin_->input().turning(r.driving_input, r.driving_way, limit);
+            limit = begin_->input().turning(r.driving_input, r.driving_way, limit, interruption);
         else if (follows_inputs(r)) [[unlikely]]
             limit = first_turn(entry, limit);
+        if (interruption.requested()) [[unlikely]]
+            return Status::interrupted;
         const Guard* fired = nullptr;
         const Status status = run_regime(segment, limit, fired);
         if (status != Status::done) return status;

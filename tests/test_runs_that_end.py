@@ -1,0 +1,175 @@
+"""Every run ends: by itself, as its adaptive solution says, or within a second of an interruption."""
+
+from __future__ import annotations
+
+import random
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from conftest import ALL_SCENARIOS
+from lostmotion.studies.study import Study
+
+NAMED = {path.stem: path for path in ALL_SCENARIOS}
+FOR_EVER = {"simulation.duration": 1e7, "simulation.sample_interval": 1e4}
+
+
+class AlarmError(Exception):
+    """An alarm has ended the run, by the way of Ctrl-C."""
+
+
+@contextmanager
+def interrupted_after(seconds: float, timer: int = signal.ITIMER_REAL) -> Iterator[None]:
+    def interrupt(_: int, __: FrameType | None) -> None:
+        raise AlarmError
+
+    number = {signal.ITIMER_REAL: signal.SIGALRM, signal.ITIMER_PROF: signal.SIGPROF}[timer]
+    before = signal.signal(number, interrupt)
+    signal.setitimer(timer, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(timer, 0.0)
+        signal.signal(number, before)
+
+
+def latched_clutch(duration: float) -> lm.TrainScenario:
+    """A shaft that slips but is kept at rest by a clutch, whose torque follows a damper and a motor."""
+    return lm.TrainScenario(
+        shafts={
+            "s0": {},
+            "s1": {"inertia": 0.03, "friction_torque": 0.02, "torque": {}},
+            "s2": {"inertia": 0.005441417539413996, "friction_torque": 0.1427285220148735},
+        },
+        motors={
+            "m0": {
+                "shaft": "s0",
+                "kind": "dc",
+                "rotor_inertia": 0.008,
+                "rated_torque": 5.998570434619682,
+                "friction_torque": 0.3,
+                "rated_speed": 265.3055293370166,
+                "electrical_time_constant": 0.00014890440350378697,
+                "armature_voltage_constant": 12.6,
+            }
+        },
+        command={"m0": {"amplitude": 0.02, "frequency": 0.7, "phase": 2.0}},
+        clutches={"x2": {"input": "s1", "output": "s2", "torque": 20.0, "kind": "safety"}},
+        dampers={"x1": {"input": "s0", "output": "s1", "viscous_friction": 1.0421993803316991}},
+        simulation={"duration": duration, "sample_interval": 0.00625},
+    )
+
+
+@pytest.mark.parametrize("duration", [0.0245, 0.0246479, 0.025, 0.028, 0.1])
+def test_a_torque_that_turns_back_within_the_rounding_of_the_state_ends_its_regime(duration: float) -> None:
+    with interrupted_after(10.0, signal.ITIMER_PROF):
+        exact = lm.simulate(latched_clutch(duration))
+    adaptive = lm.simulate(latched_clutch(duration), solver="dormand-prince", relative_tolerance=1e-10)
+    for name in ("s0_speed", "s1_speed", "s2_speed", "m0_torque"):
+        expected = adaptive[name].values
+        assert exact[name].values == pytest.approx(expected, rel=1e-6, abs=1e-7 * float(abs(expected).max() + 1e-9))
+
+
+def test_energies_of_a_motion_through_a_wall_of_losses_are_integrated_in_long_panels() -> None:
+    """The losses fall by 1e7 of their rated value over the load: terms of powers cancel to 1e-9 of themselves."""
+    scenario = lm.load(NAMED["step-to-standstill"], {"gearbox.losses.values.0.1": 1e6})
+    with interrupted_after(10.0, signal.ITIMER_PROF):
+        run = lm.simulate(scenario)
+    energy = lm.energy_of(run)
+    assert abs(energy["residual"]) <= 1e-6 * energy["turned_over"]
+    # What the motor gave, by another rule: the mean of power over many samples.
+    fine = lm.simulate(
+        lm.load(NAMED["step-to-standstill"], {"gearbox.losses.values.0.1": 1e6}), sample_interval=1e-4, energy=False
+    )
+    power = fine["motor_torque"].values * fine["motor_speed"].values
+    assert energy["source"] == pytest.approx(float(np.trapezoid(power, fine["time"].values)), rel=2e-3)
+
+
+def random_train(rng: random.Random) -> lm.TrainScenario:
+    """Shafts in a row with friction, joined by safety clutches and dampers, behind a motor with a tiny time constant."""
+
+    def log(low: float, high: float) -> float:
+        return 10.0 ** rng.uniform(low, high)
+
+    n = rng.choice([2, 3, 3, 4])
+    shafts: dict[str, Any] = {"s0": {}}
+    tables: dict[str, Any] = {"clutches": {}, "dampers": {}}
+    for k in range(1, n):
+        shafts[f"s{k}"] = {"inertia": log(-4.0, -1.0), "friction_torque": log(-3.0, 0.0), "torque": {}}
+        ends = {"input": f"s{k - 1}", "output": f"s{k}"}
+        kind = rng.choice(["clutches", "dampers", "both"])
+        if kind != "dampers":
+            tables["clutches"][f"c{k}"] = ends | {"torque": log(-2.0, 1.5), "kind": "safety"}
+        if kind != "clutches":
+            tables["dampers"][f"d{k}"] = ends | {"viscous_friction": log(-4.0, 1.0)}
+    motor = {
+        "shaft": "s0",
+        "kind": "dc",
+        "rotor_inertia": log(-5.0, -2.0),
+        "rated_torque": log(-1.0, 1.0),
+        "friction_torque": log(-3.0, 0.0),
+        "rated_speed": log(1.5, 2.7),
+        "electrical_time_constant": log(-7.0, -2.5),
+        "armature_voltage_constant": log(0.3, 1.3),
+    }
+    command = {"amplitude": log(-3.0, 0.0), "frequency": log(-1.0, 1.5), "phase": rng.uniform(0.0, 6.3)}
+    duration = rng.choice([0.02, 0.1]) * rng.uniform(0.5, 1.5)
+    interval = duration / rng.choice([1, 2, 4, 7, 33.3])
+    return lm.TrainScenario(
+        shafts=shafts,
+        motors={"m0": motor},
+        command={"m0": command},
+        simulation={"duration": duration, "sample_interval": interval},
+        **{name: table for name, table in tables.items() if table},
+    )
+
+
+@pytest.mark.parametrize("first", range(0, 200, 20))
+def test_random_trains_of_clutches_and_dampers_end(first: int) -> None:
+    for seed in range(first, first + 20):
+        scenario = random_train(random.Random(seed))
+        with interrupted_after(5.0, signal.ITIMER_PROF):
+            lm.simulate(scenario)
+
+
+def sinusoidal() -> lm.Scenario:
+    return lm.load(NAMED["paper-2dof-nl-small"], FOR_EVER)
+
+
+LONG: dict[str, Callable[[], Any]] = {
+    "drive": lambda: lm.simulate(sinusoidal()),
+    "drive, no energies": lambda: lm.simulate(sinusoidal(), energy=False),
+    "drive, adaptive": lambda: lm.simulate(sinusoidal(), solver="dormand-prince"),
+    "train": lambda: lm.simulate(lm.load(NAMED["two-motors-one-ring"], FOR_EVER)),
+    "sampled controllers": lambda: lm.simulate(lm.load(NAMED["field-weakening"], FOR_EVER)),
+}
+
+
+def test_an_interruption_ends_a_study_in_threads_within_a_second(tmp_path: Path) -> None:
+    study = Study(
+        scenario=sinusoidal(),
+        design="sobol",
+        runs=4,
+        vary=[{"key": "load.inertia", "uniform": [1.0, 3.0]}],
+        keep={"peak": "peak(load_speed)"},
+    )
+    begin = time.perf_counter()
+    with interrupted_after(1.0), pytest.raises(AlarmError):
+        lm.study(study, tmp_path / "study")
+    assert time.perf_counter() - begin < 2.0
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_an_interruption_ends_any_run_within_a_second(name: str) -> None:
+    begin = time.perf_counter()
+    with interrupted_after(1.0), pytest.raises(AlarmError):
+        LONG[name]()
+    assert time.perf_counter() - begin < 2.0
