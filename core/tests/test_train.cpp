@@ -4,6 +4,7 @@
 #include "lostmotion/model/check.hpp"
 #include "lostmotion/model/names.hpp"
 #include "lostmotion/model/pack.hpp"
+#include "lostmotion/simulation/train_status.hpp"
 #include "random_trains.hpp"
 #include "round_drives.hpp"
 #include "train_twins.hpp"
@@ -83,6 +84,23 @@ TEST_CASE("states, inputs and contacts of a train have names") {
     CHECK(input_names(a) == std::vector<std::string>{"motor_command", "load_load_torque"});
     CHECK(contact_name(a, 0) == "motor_contact");
     CHECK(contact_name(a, 1) == "gearbox_twist_contact");
+}
+
+TEST_CASE("an accumulation of switchings is reported with its contact or law, if either is known") {
+    const Assembly a(train_of(plain_drive(2.0, 1.0, 1.0)));
+    const auto names = branch_names(a);
+    REQUIRE(!names.empty());
+    const auto text = [&a](int subject) { return train_status_text(a, Status::zeno, 0.5, subject, false); };
+    const std::string rest = "accumulate at t = 0.500000 s: infinitely many in finite time. The model ends here.";
+    CHECK(text(0) == "switching instants of the contact '" + contact_name(a, 0) + "' " + rest);
+    CHECK(text(-2) == "switching instants of the law '" + names[0] + "' " + rest);
+    CHECK(text(-1) == "switching instants " + rest);
+    PackedGuard<WidestTest> guard;
+    CHECK(guard.subject() == -1);
+    guard.branch = 3;
+    CHECK(guard.subject() == -2 - 3);
+    guard.contact = 1;
+    CHECK(guard.subject() == 1);
 }
 
 TEST_CASE("what is wrong with a train is said in one line with the names of its elements") {

@@ -62,6 +62,7 @@ struct Guard {
 
     // Edge of the curve, the map or the amplifier, with a neighbour beyond.
     bool is_edge() const { return kind >= torsion_piece && kind <= amplifier; }
+    Contact subject() const { return contact; }
     // Says whether a contact goes on in its mode.
     bool is_of_contact() const { return kind == speed || kind == capacity || kind == turning; }
 };

@@ -66,6 +66,8 @@ struct PackedGuard {
     double shift = 0.0;
     bool behind = false;
 
+    // The contact; -2 - branch for a law that belongs to no contact.
+    int subject() const { return contact < 0 && branch >= 0 ? -2 - branch : contact; }
     bool is_edge() const { return kind == edge || kind == input_limit; }
     bool is_of_contact() const { return kind == speed || kind == capacity || kind == turning; }
 };

@@ -19,7 +19,7 @@ const std::vector<SwitchingColumn>& switching_columns() {
     return columns;
 }
 
-std::string status_text(Status status, double time, const std::string& contact) {
+std::string status_text(Status status, double time, const std::string& subject) {
     const std::string at = "at t = " + std::to_string(time) + " s";
     switch (status) {
         case Status::done: return "";
@@ -32,7 +32,7 @@ std::string status_text(Status status, double time, const std::string& contact) 
                    ": 1000 times the data of a loss map, or what numbers resolve. "
                    "The drive is unstable, or its data or inputs, such as a stiffness, have a wrong unit.";
         case Status::zeno:
-            return "switching instants of the contact '" + contact + "' accumulate " + at +
+            return "switching instants " + (subject.empty() ? "" : "of " + subject + " ") + "accumulate " + at +
                    ": infinitely many in finite time. The model ends here.";
         case Status::controller: return "the controller failed " + at + ", or its command is no finite number";
         case Status::unseen:

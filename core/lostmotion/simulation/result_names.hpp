@@ -61,11 +61,11 @@ struct SwitchingColumn {
 const std::vector<SwitchingColumn>& switching_columns();
 
 // Why a run has no continuation; empty if it has come to its end.
-// contact: what it is called.
-std::string status_text(Status status, double time, const std::string& contact);
+// subject: the contact or law of the last switching, if it is known.
+std::string status_text(Status status, double time, const std::string& subject);
 
 inline std::string status_text(Status status, double time, Contact contact) {
-    return status_text(status, time, std::string(contact_names[contact].text));
+    return status_text(status, time, "the contact '" + std::string(contact_names[contact].text) + "'");
 }
 
 }  // namespace lostmotion

@@ -55,7 +55,7 @@ struct TrainReport {
     Status status = Status::done;
     std::string message;  // what is wrong with the start; then nothing has run
     double time = 0.0;    // [s] reached
-    int contact = -1;     // at the last switching
+    int contact = -1;     // at the last switching, or -2 - branch of a law that belongs to none
     std::vector<double> x, memory;
     std::vector<TrainSwitching> switchings;
     std::size_t switching_count = 0;

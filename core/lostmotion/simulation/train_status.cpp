@@ -6,8 +6,12 @@ std::string train_status_text(const model::Assembly& a, Status status, double ti
     if (too_many_guards && status != Status::interrupted)
         return "the train has a regime with more conditions than the solver has room for, at t = " +
                std::to_string(time) + " s; use fewer pieces in its laws";
-    const bool known = contact >= 0 && contact < a.layout().contacts;
-    return status_text(status, time, known ? model::contact_name(a, contact) : "");
+    std::string name;
+    if (contact >= 0 && contact < a.layout().contacts)
+        name = "the contact '" + model::contact_name(a, contact) + "'";
+    else if (const int law = -2 - contact; law >= 0 && law < a.layout().branches)
+        name = "the law '" + model::branch_names(a)[static_cast<std::size_t>(law)] + "'";
+    return status_text(status, time, name);
 }
 
 }  // namespace lostmotion

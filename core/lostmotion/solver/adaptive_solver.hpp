@@ -204,7 +204,7 @@ class AdaptiveSolver {
     Status change_regime(const Guard* fired, Observer& observer) {
         if (fired != nullptr) input_.anchor(time_);
         const Status status = switch_regime(system_, cache_, input_, time_, fired, now_, key_, observer);
-        if (fired != nullptr) stopped_at_ = fired->contact;
+        if (fired != nullptr) stopped_at_ = fired->subject();
         if (status != Status::done) return status;
         ++switchings_;
         return accumulation_.add(time_, 1.0) ? Status::zeno : Status::done;

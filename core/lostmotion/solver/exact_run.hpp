@@ -339,7 +339,7 @@ Status ExactSolver<System>::change_regime(const Guard* fired, Observer& observer
     }
     const Key before = key_;
     const Status status = switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, observer);
-    if (fired != nullptr) stopped_at_ = fired->contact;
+    if (fired != nullptr) stopped_at_ = fired->subject();
     if (status != Status::done) return status;
     if (fired == nullptr)
         follow_inputs(before);
