@@ -91,7 +91,7 @@ inline void bind_drives(nb::module_& m) {
     nb::class_<TorsionCurve>(m, "TorsionCurve")
         .def(nb::init<Vector, Vector>(), "breaks"_a, "slopes"_a)
         .def("torque", &TorsionCurve::torque, "twist"_a)
-        .def("energy", &TorsionCurve::energy, "twist"_a);
+        .def("energy", nb::overload_cast<double>(&TorsionCurve::energy, nb::const_), "twist"_a);
     nb::class_<LossMap>(m, "LossMap")
         .def(nb::init<Vector, Vector, Vector>(), "speeds"_a, "loads"_a, "values"_a)
         .def("__call__", &LossMap::operator(), "load"_a, "speed"_a);

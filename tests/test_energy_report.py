@@ -9,6 +9,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ALL_SCENARIOS
+from lostmotion.simulation.sensitivities import as_train
 
 NAMED = {path.stem: path for path in ALL_SCENARIOS}
 
@@ -41,3 +42,33 @@ def test_a_ledger_that_does_not_close_is_reported() -> None:
     good = lm.simulate(lm.load(NAMED["backlash-reversing-load"]))
     assert good.attrs["energy_residual"] < 1e-9
     assert "warning" not in good.attrs
+
+
+@pytest.mark.parametrize("ratio", [1e-3, 1e-4, 1e-5])
+def test_the_motion_of_a_train_tends_to_a_limit_as_its_ratio_goes_to_zero(ratio: float) -> None:
+    """The rotor reflects ratio^2 of its inertia and ratio of its friction: the motion differs from the limit by that."""
+    run, limit = (
+        lm.simulate(as_train(lm.load(NAMED["backlash-reversing-load"], {"gearbox.ratio": r}))) for r in (ratio, 1e-7)
+    )
+    assert run.attrs["energy_residual"] < 1e-12
+    assert "warning" not in run.attrs
+    apart = float(abs(run["load_speed"] - limit["load_speed"]).max())
+    assert 1e-3 * ratio < apart < 1e-2 * ratio
+
+
+@pytest.mark.parametrize("ratio", [1e-2, 1e-4, 1e-6])
+def test_the_ledger_of_a_locked_worm_keeps_changes_far_below_what_it_stores(ratio: float) -> None:
+    """The load stores 0.02 J in the mesh. The motor winds the coupling to T i/k and lets it go down to its friction."""
+    run = lm.simulate(lm.load(NAMED["worm-lowering"], {"gears.coupling.ratio": ratio}))
+    energy = lm.energy_of(run)
+    torque, friction, k = 0.15, 0.01, 500.0
+    wound, left = (torque - friction) / k, friction / k
+    expected = {
+        "motor: motor": torque * wound,
+        "rotor: dry friction": friction * (2.0 * wound - left),
+        "stored_change": 0.5 * k * left**2,
+    }
+    for name, per_square in expected.items():
+        assert energy[name] == pytest.approx(per_square * ratio**2, rel=1e-9), name
+    assert run.attrs["energy_residual"] < 1e-9
+    assert "warning" not in run.attrs

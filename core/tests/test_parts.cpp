@@ -59,6 +59,11 @@ TEST_SUITE("parts") {
         for (int k = 0; k < 100000; ++k) sum += curve.torque((k + 0.5) * 4e-8) * 4e-8;
         CHECK(curve.energy(4e-3) == Approx(sum).epsilon(1e-9));
         CHECK(curve.energy(-4e-3) == curve.energy(4e-3));
+        for (const double from : {-5e-3, -1e-4, 2e-3})
+            for (const double to : {-3e-3, 0.0, 4e-3})
+                CHECK(curve.energy(from, to) ==
+                      Approx(curve.energy(to) - curve.energy(from)).scale(0.1).epsilon(1e-13));
+        CHECK(curve.energy(2e-3, 2e-3 + 1e-15) == Approx(curve.torque(2e-3) * ((2e-3 + 1e-15) - 2e-3)).epsilon(1e-11));
     }
     TEST_CASE("loss map is continuous, takes its nodes, mirrors, and is never negative beyond them") {
         RandomDrives random(5);

@@ -1,11 +1,13 @@
 // Trains shared by the tests.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <unordered_map>
 
 #include "lostmotion/model/modes.hpp"
 #include "lostmotion/model/pack.hpp"
+#include "lostmotion/model/power.hpp"
 #include "support.hpp"
 
 namespace lostmotion::model {
@@ -34,6 +36,14 @@ inline Gear spring(int input, int output, double ratio, const TorsionCurve& curv
     g.law.compliance = Gearbox::torsion_curve;
     g.law.curve = curve;
     return g;
+}
+
+// Kinetic and elastic energy [J].
+template <class X>
+double stored_energy(const Assembly& a, const X& x) {
+    X zero = x;
+    std::fill(zero.begin(), zero.end(), 0.0);
+    return stored_change(a, zero, x);
 }
 
 // The classic drive in the long form.

@@ -19,13 +19,14 @@ struct PowerFlow {
     Power<Row> power;
 };
 
-// Kinetic and elastic energy [J].
+// What kinetic and elastic energy grow by from one state to another [J].
 template <class X>
-double stored_energy(const Assembly& a, const X& x) {
+double stored_change(const Assembly& a, const X& from, const X& to) {
     double sum = 0.0;
-    for (const ShaftPlace& s : a.places().shafts) sum += kinetic_energy(s.inertia, x[s.speed]);
+    for (const ShaftPlace& s : a.places().shafts) sum += kinetic_energy(s.inertia, from[s.speed], to[s.speed]);
     for (std::size_t g = 0; g < a.train().gears.size(); ++g)
-        if (!a.train().gears[g].rigid()) sum += a.train().gears[g].law.curve.energy(x[a.places().gears[g].twist]);
+        if (const int d = a.places().gears[g].twist; !a.train().gears[g].rigid())
+            sum += a.train().gears[g].law.curve.energy(from[d], to[d]);
     return sum;
 }
 

@@ -23,5 +23,9 @@ Power<F> mesh_power(const F& T_1, const F& T_2, double per_input, const F& speed
 
 // [J]
 inline double kinetic_energy(double inertia, double speed) { return 0.5 * inertia * speed * speed; }
+// What it grows by from one speed to another. The difference of two energies would lose the digits of a small change.
+inline double kinetic_energy(double inertia, double from, double to) {
+    return 0.5 * inertia * (to + from) * (to - from);
+}
 
 }  // namespace lostmotion

@@ -43,13 +43,16 @@ class TorsionCurve {
         return slope(p) * d + offset(p);
     }
     // Elastic energy [J] stored at twist d: the integral of P.
-    double energy(double d) const {
-        const double a = std::fabs(d);
-        double sum = 0.0, from = 0.0;
-        for (int k = 0; k <= locate(a); ++k) {
-            const double to = k < outermost_piece() ? std::fmin(a, breaks_[k]) : a;
-            sum += 0.5 * slopes_[k] * (to - from) * (to + from) + offsets_[k] * (to - from);
-            from = to;
+    double energy(double d) const { return energy(0.0, std::fabs(d)); }
+    // What it grows by from one twist to another. The difference of two energies would lose the digits of a small
+    // change.
+    double energy(double from, double to) const {
+        if (from > to) return -energy(to, from);
+        double sum = 0.0;
+        for (int p = locate(from); from < to; ++p) {
+            const double end = p < outermost_piece() ? std::fmin(to, upper(p)) : to;
+            sum += 0.5 * slope(p) * (end - from) * (end + from) + offset(p) * (end - from);
+            from = end;
         }
         return sum;
     }

@@ -15,7 +15,7 @@ double* write_switching(const TrainSwitching& s, int contacts, double* to) {
 }
 
 double TrainReport::residual() const {
-    double sum = stored_begin - stored_end;
+    double sum = -stored_change;
     for (const TrainEnergy& e : energy) sum += e.kind == model::PowerFlow::source ? e.energy : -e.energy;
     return sum;
 }
@@ -35,7 +35,7 @@ Named named_ledger(const TrainReport& report, const model::Assembly& a) {
     Named ledger;
     for (const std::string& name : ledger_names(a)) ledger[name] = 0.0;
     for (const TrainEnergy& e : report.energy) ledger.at(e.name) = e.energy;
-    ledger["stored_change"] = report.stored_end - report.stored_begin;
+    ledger["stored_change"] = report.stored_change;
     ledger["residual"] = report.residual();
     ledger["turned_over"] = report.turned_over;
     return ledger;

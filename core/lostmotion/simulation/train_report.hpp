@@ -60,8 +60,8 @@ struct TrainReport {
     std::vector<TrainSwitching> switchings;
     std::size_t switching_count = 0;
     std::vector<TrainEnergy> energy;
-    double stored_begin = 0.0, stored_end = 0.0, turned_over = 0.0;  // [J]
-    double left_data_at = std::numeric_limits<double>::infinity();   // [s]
+    double stored_change = 0.0, turned_over = 0.0;                  // [J]
+    double left_data_at = std::numeric_limits<double>::infinity();  // [s]
     long steps = 0;
     bool too_many_guards = false;  // a regime has more conditions than the kernel has room for
 

@@ -36,8 +36,7 @@ struct PackedRun {
     template <class System, class Solver>
     void end(TrainReport& report, const System& system, Solver& solver) const {
         report.ended(system, solver);
-        report.stored_begin = model::stored_energy(assembly, start.x);
-        report.stored_end = model::stored_energy(assembly, solver.state());
+        report.stored_change = model::stored_change(assembly, start.x, solver.state());
     }
 
     const model::Assembly& assembly;
