@@ -10,8 +10,7 @@
 using namespace lostmotion::binding;
 
 NB_MODULE(CORE_MODULE, m) {
-    nb::exception<SolverError>(m, "SolverError", PyExc_RuntimeError).attr("__doc__") =
-        "The motion has no continuation; the message names time and contact.";
+    bind_interruption(m);
     bind_names(m);
     bind_elementary(m);
     bind_drives(m);

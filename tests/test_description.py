@@ -369,7 +369,7 @@ def test_given_references_are_inputs(library: c.CDLL) -> None:  # noqa: F811
     assert "has to know the past of its reference" in described.error()
 
 
-@pytest.mark.parametrize("name", ["paper-2dof-nl-small", "worm-lowering"])
+@pytest.mark.parametrize("name", ["paper-2dof-nl-small", "two-motors-one-ring"])
 def test_a_function_of_the_caller_ends_a_run_and_a_step(library: c.CDLL, name: str) -> None:  # noqa: F811
     scenario = lm.load(name, {"simulation.duration": 1e7, "simulation.sample_interval": 1e4})
     there = Scenario(library, lm.description(scenario))

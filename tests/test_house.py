@@ -19,7 +19,7 @@ PACKAGE = ROOT / "src" / "lostmotion"
 LAYERS = [
     {"errors", "_instruction_set"},
     {"_core", "atomic_writer"},
-    {"reproducible"},
+    {"reproducible", "worker_threads"},
     {"units"},
     {"inputs"},
     {"model"},

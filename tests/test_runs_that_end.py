@@ -153,17 +153,36 @@ LONG: dict[str, Callable[[], Any]] = {
 }
 
 
-def test_an_interruption_ends_a_study_in_threads_within_a_second(tmp_path: Path) -> None:
-    study = Study(
-        scenario=sinusoidal(),
-        design="sobol",
-        runs=4,
-        vary=[{"key": "load.inertia", "uniform": [1.0, 3.0]}],
-        keep={"peak": "peak(load_speed)"},
-    )
+def a_study(directory: Path) -> None:
+    vary = [{"key": "load.inertia", "uniform": [1.0, 3.0]}]
+    study = Study(scenario=sinusoidal(), design="sobol", runs=4, vary=vary, keep={"peak": "peak(load_speed)"})
+    lm.study(study, directory / "study")
+
+
+def a_study_row_by_row(directory: Path) -> None:
+    scenario = lm.load(NAMED["field-weakening"], FOR_EVER)
+    motor, shaft = next(iter(scenario.motors)), next(iter(scenario.shafts))
+    vary = [{"key": f"motors.{motor}.rotor_inertia", "uniform": [1e-3, 2e-3]}]
+    study = Study(scenario=scenario, design="sobol", runs=4, vary=vary, keep={"peak": f"peak({shaft}_speed)"})
+    lm.study(study, directory / "study")
+
+
+def a_hunting_map(_: Path) -> None:
+    inertias = [0.5 + 1e-3 * k for k in range(10_000)]
+    lm.hunting_map(lm.load(NAMED["hunting-with-backlash"]), {"load.inertia": inertias}, threads=2)
+
+
+def a_pointing_budget(_: Path) -> None:
+    lm.pointing_budget(lm.load(NAMED["direction-finder"], {"simulation.duration": 1e4}), after=1.0)
+
+
+@pytest.mark.parametrize("in_threads", [a_study, a_study_row_by_row, a_hunting_map, a_pointing_budget])
+def test_an_interruption_ends_runs_in_threads_within_a_second(
+    in_threads: Callable[[Path], None], tmp_path: Path
+) -> None:
     begin = time.perf_counter()
     with interrupted_after(1.0), pytest.raises(AlarmError):
-        lm.study(study, tmp_path / "study")
+        in_threads(tmp_path)
     assert time.perf_counter() - begin < 2.0
 
 

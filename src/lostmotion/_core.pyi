@@ -9,6 +9,13 @@ import numpy.typing
 class SolverError(RuntimeError):
     """The motion has no continuation; the message names time and contact."""
 
+class Stop:
+    def __init__(self) -> None: ...
+
+    def request(self) -> None: ...
+
+    def watch(self) -> None: ...
+
 def channels() -> list[tuple[str, str, str, str]]:
     """Name, symbol, unit, meaning."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +18,7 @@ from ..simulation.pointing_error import pointing_errors, pointing_names
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, in_long_form
+from ..worker_threads import thread_pool
 from .causes import CAUSES, VARIANTS, present, without
 from .robustness import ROBUSTNESS, SPEEDS
 
@@ -145,13 +145,9 @@ def pointing_budget(
     )
     angles = _view(loaded, view or {})
     cases = _cases(loaded, robustness=robustness)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with thread_pool(os.cpu_count()) as pool:
         runs = {case: pool.submit(_case, loaded, list(changes), start, progress) for case, changes in cases.items()}
-        try:
-            found = {case: run.result() for case, run in runs.items()}
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+        found = {case: run.result() for case, run in runs.items()}
     time, errors, measured, whole = found["whole", ""]
     of = {case: errors_of[3] for case, errors_of in found.items()}
 

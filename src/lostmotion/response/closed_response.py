@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from ..model.train import DriveTrain
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.train_variables import signals_of
+from ..worker_threads import thread_pool
 from .closed_loop import AxisSignal, ClosedLoop, Motion, Search, mean_of
 from .plant import Plant
 from .windows import Window, fitting
@@ -97,7 +97,7 @@ def respond_closed(
         return _row(plant, (source, amplitude), window, found, harmonics)
 
     rows = []
-    with ThreadPoolExecutor(1 if law is not None else threads) as pool:  # a law may keep something of its own
+    with thread_pool(1 if law is not None else threads) as pool:  # a law may keep something of its own
         for found in pool.map(row, itertools.product(amplitudes, windows)):
             rows.append(found)
             if progress is not None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +20,7 @@ from ..response.shooting import floquet_multipliers, is_stable, motion_of
 from ..response.standstill import Verdict
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, in_long_form
+from ..worker_threads import thread_pool
 from .motion import PART, at_rest, without_backlash, without_friction
 from .regimes import axis_of
 
@@ -246,7 +246,7 @@ def hunting_map(
             progress(done)
         return result
 
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with thread_pool(threads or os.cpu_count() or 1) as pool:
         rows = list(pool.map(point, np.ndindex(shape)))
     columns = [np.array(column).reshape(shape) for column in zip(*rows, strict=True)]
     names = tuple(key.replace(".", "_") for key in keys)

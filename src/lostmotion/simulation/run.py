@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Literal
 
 from .. import _core
@@ -16,6 +15,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Number
 from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
+from ..worker_threads import thread_pool
 from .results import RawResult, raw_result, variables_of
 from .scenario import Initial, LoadTable, Scenario, SimulationTable
 from .sensitivities import run_sensitivities
@@ -162,7 +162,7 @@ def run(
         result = whole_run(scenario, options, how, control)
         coarse = whole_run(*again)
     else:
-        with ThreadPoolExecutor(1) as beside:
+        with thread_pool(1) as beside:
             waiting = beside.submit(whole_run, *again)
             result = whole_run(scenario, options, how, control)
             coarse = waiting.result()

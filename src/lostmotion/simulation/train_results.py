@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from .. import _core
 from ..control.axis import OPEN_LOOP, Bound
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
+from ..worker_threads import thread_pool
 from .results import RawResult, add_ledger, installed_version, variables_of
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import CONTACTS_OF_TRAIN, packed
@@ -61,7 +61,7 @@ def _core_result(
         if not control[1] or any(c.law for c in scenario.axes().values()) or options[0] > SIDE_BY_SIDE * control[0]:
             results = list(map(solved, parts))
         else:
-            with ThreadPoolExecutor(len(parts) - 1) as beside:
+            with thread_pool(len(parts) - 1) as beside:
                 others = [beside.submit(solved, part) for part in parts[1:]]
                 results = [solved(parts[0]), *(other.result() for other in others)]
         return scenario.core(), joined_results(scenario, parts, results, options[-1])

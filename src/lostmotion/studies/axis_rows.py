@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +28,7 @@ from ..sizing.required_motion import (
     input_demand,
     required_motion,
 )
+from ..worker_threads import thread_pool
 from .axis import FEWEST, REPEATS, AxisTask, reference_of
 from .axis_columns import COLUMNS, change, duty_cycle_of, last_cycle, row_of
 from .check import COLUMNS as CHECKS
@@ -171,7 +171,7 @@ def run_axes(study: Study, parameters: np.ndarray, threads: int) -> Runs:
             return dict(CHECKS)
         return row
 
-    with ThreadPoolExecutor(max_workers=threads) as pool:
+    with thread_pool(threads) as pool:
         for k, row in zip(waiting, pool.map(measure, waiting), strict=True):
             rows[k] = row
     whole = [row or {} for row in rows]

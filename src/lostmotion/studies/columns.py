@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ from ..response.bandwidth import bandwidth
 from ..simulation.results import add_derived
 from ..simulation.scenario import Scenario
 from ..simulation.variables import CHANNEL_NAMES
+from ..worker_threads import thread_pool
 from .records import kind_of_record
 from .runs import Runs
 from .select import SHARES, USE
@@ -133,5 +133,5 @@ def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.nd
             runs.errors[k] = str(error)
             return math.nan
 
-    with ThreadPoolExecutor(max_workers=threads) as pool:
+    with thread_pool(threads) as pool:
         return np.array(list(pool.map(find, range(len(runs.errors)))))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from ..simulation.train_parts import parts_of
 from ..simulation.train_results import add_derived_of_train, core_case
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.windings import bound_values
+from ..worker_threads import thread_pool
 from .check import COLUMNS, check_columns
 from .functions import REDUCTIONS
 from .runs import Runs, spread
@@ -66,12 +66,8 @@ def run_each(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         for k in range(n):
             make(k)
         return runs
-    with ThreadPoolExecutor(max_workers=threads) as pool:
-        try:
-            list(pool.map(make, range(n)))
-        except BaseException:  # Ctrl-C: what has not begun is left
-            pool.shutdown(cancel_futures=True)
-            raise
+    with thread_pool(threads) as pool:
+        list(pool.map(make, range(n)))
     return runs
 
 
