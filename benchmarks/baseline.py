@@ -85,6 +85,7 @@ def section(report: Report, build: Path, builds: list[str]) -> None:
                 ),
             )
             for case in before
+            if case in after
         ],
     )
 

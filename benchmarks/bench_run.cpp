@@ -4,64 +4,75 @@
 // and prints nothing, for counting instructions.
 #include <cstdio>
 #include <cstdlib>
+#include <numeric>
 
 #include "lostmotion/simulation/sampler.hpp"
-#include "lostmotion/simulation/stepping.hpp"
 #include "paper_run.hpp"
 
 using namespace lostmotion;
 
 namespace {
 
-constexpr std::array<int, 2> compared{ch_load_speed, ch_twist};
-
 // The same drive again and again.
+template <class D>
 class Repeated {
  public:
-    Repeated(const PaperRun& paper, std::span<const int> channels)
-        : paper_(paper),
+    using System = model::TrainSystem<D>;
+    using Model = typename TrainReader<D>::Model;
+
+    Repeated(const Model& model, const PaperRun& paper, std::span<const int> channels)
+        : model_(model),
+          paper_(paper),
           channels_(channels),
-          system_(paper.drive),
-          solver_(system_, paper.signals, 1e-3, paper.drive.balanced_scale()),
-          table(n_channels * paper.samples) {}
+          system_(model.assembly),
+          solver_(system_, model::packed_signals<D>(paper.signals), 1e-3, system_.balanced_scale()),
+          table(channels.size() * paper.samples) {}
     void run() {
-        Sampler sampler(paper_.drive, 0.0, 1e-3, paper_.samples, table.data(), channels_);
+        SamplerOf<System, TrainReader<D>, Model> sampler(model_, 0.0, 1e-3, paper_.samples, table.data(), channels_);
         solver_.begin(0.0, {}, {});
         solver_.advance(2.0, sampler);
     }
 
  private:
+    const Model& model_;
     const PaperRun& paper_;
     std::span<const int> channels_;
-    SwitchedDrive system_;
-    ExactSolver<SwitchedDrive> solver_;
+    System system_;
+    ExactSolver<System> solver_;
 
  public:
     Table table;
 };
 
 void compare(const char* map, const PaperRun& paper) {
-    const Drive& drive = paper.drive;
-    RunOptions options = paper.options();
-    Table exact(n_channels * paper.samples), other(n_channels * paper.samples);
-    run_exact(drive, paper.signals, {}, options, exact.data());
-    Repeated repeated(paper, compared), whole(paper, all_channels);
-    const double warm = best_ms(600, [&] { repeated.run(); }), all = best_ms(600, [&] { whole.run(); });
-    std::printf("%s|exact, same drive again|%.6f|0\n", map, warm);
-    std::printf("%s|exact, same drive again, all %d channels|%.6f|%.3g\n", map, static_cast<int>(n_channels), all,
-                paper.error(whole.table, exact));
+    const TrainRun train(paper.train);
+    TrainOptions options = paper.options();
+    const std::size_t channels = paper.channels.size();
+    Table exact(channels * paper.samples), other(channels * paper.samples);
+    train.run(paper.signals, {}, {}, options, exact.data());
+    train.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
+        std::vector<int> numbers(channels);
+        std::iota(numbers.begin(), numbers.end(), 0);
+        Repeated<D> repeated(model, paper, paper.compared), whole(model, paper, numbers);
+        const double warm = best_ms(600, [&] { repeated.run(); }), all = best_ms(600, [&] { whole.run(); });
+        std::printf("%s|exact, same drive again|%.6f|0\n", map, warm);
+        std::printf("%s|exact, same drive again, all %zu channels|%.6f|%.3g\n", map, channels, all,
+                    paper.error(whole.table, exact));
+    });
 
-    options.channels = compared;
+    options.channels = paper.compared;
     for (const bool energy : {false, true}) {
         options.energy = energy;
-        const double cold = best_ms(300, [&] { run_exact(drive, paper.signals, {}, options, other.data()); });
+        const double cold =
+            best_ms(300, [&] { TrainRun(paper.train).run(paper.signals, {}, {}, options, other.data()); });
         std::printf("%s|exact, new drive%s|%.6f|0\n", map, energy ? ", with energy ledger" : "", cold);
     }
 
     options.energy = false;
+    options.channels.reset();
     for (const double tolerance : {1e-6, 1e-8}) {
-        const double time =
-            best_ms(50, [&] { run_adaptive(drive, paper.signals, {}, options, tolerance, other.data()); });
+        options.tolerance = tolerance;
+        const double time = best_ms(50, [&] { train.run(paper.signals, {}, {}, options, other.data()); });
         std::printf("%s|adaptive (Dormand-Prince 5(4)), rtol %g|%.6f|%.3g\n", map, tolerance, time,
                     paper.error(other, exact));
     }
@@ -72,14 +83,17 @@ void compare(const char* map, const PaperRun& paper) {
 int main(int argc, char** argv) {
     if (argc > 1) {
         const PaperRun paper;
-        Repeated repeated(paper, compared);
-        for (int k = std::atoi(argv[1]); k > 0; --k) repeated.run();
+        const TrainRun train(paper.train);
+        train.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
+            Repeated<D> repeated(model, paper, paper.compared);
+            for (int k = std::atoi(argv[1]); k > 0; --k) repeated.run();
+        });
         return 0;
     }
     for (const auto& [map, paper] : PaperRun::both()) compare(map, paper);
 
     const PaperRun paper;
-    Simulation simulation(paper.drive, 1e-3);
+    test::Simulation simulation(paper.drive, 1e-3);
     double t = 0.0;
     const double step = best_ms(20, [&] {
         for (int k = 0; k < 1000; ++k, t += 1e-3) {

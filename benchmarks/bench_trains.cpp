@@ -1,6 +1,6 @@
-// What runs of trains cost, without samples, in the narrowest kernel that holds each; first the classic drive, which
-// the others are compared with. Prints one line a case: name, states, switchings, event checks, time of the same train
-// again and of a new one [ms]. With the number of a train and that of runs: makes them and prints nothing.
+// What runs of trains cost, without samples, in the narrowest kernel that holds each; first the paper's drive,
+// which the others are compared with. Prints one line a case: name, states, switchings, event checks, time of the same
+// train again and of a new one [ms]. With the number of a train and that of runs: makes them and prints nothing.
 #include <cstdio>
 #include <cstdlib>
 
@@ -62,10 +62,6 @@ int main(int argc, char** argv) {
         });
         return 0;
     }
-    const PaperRun paper;
-    const SwitchedDrive drive(paper.drive);
-    time_run("the paper's drive", n_coupled,
-             Run<SwitchedDrive>{drive, paper.signals, {}, paper.drive.balanced_scale(), 2.0});
     const auto time_train = [](const TimedTrain& t, const std::string& name, const auto& in) {
         time_run(name.c_str(), in.assembly.layout().coupled, run_of(in, t));
     };

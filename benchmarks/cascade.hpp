@@ -9,7 +9,7 @@
 namespace lostmotion {
 
 // resolution: of the encoder [rad], 0 for none. amplitude: of the sine of 1 Hz that the load follows [rad].
-inline Control cascade(const Drive& drive, double resolution, double amplitude) {
+inline Control cascade(const test::Drive& drive, double resolution, double amplitude) {
     Control c;
     c.tick = 125e-6;
     ControlledAxis axis;

@@ -6,6 +6,7 @@ import time
 from typing import Any
 
 import numpy as np
+from lostmotion.simulation.train_results import core_case
 from report import Report, best
 
 import lostmotion as lm
@@ -17,7 +18,6 @@ from lostmotion.simulation.sensitivities import (
     run_cases,
     sensitive_case,
 )
-from lostmotion.simulation.train_results import core_case
 
 KEYS = (
     "shafts.rotor.inertia",

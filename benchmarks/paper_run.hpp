@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "../core/tests/support.hpp"
+#include "../core/tests/drive_runs.hpp"
 
 namespace lostmotion {
 
@@ -57,14 +57,17 @@ inline double relative_gap(const double* a, const double* exact, std::size_t sam
 }
 
 struct PaperRun {
-    explicit PaperRun(const LossMap& map = stand_in_map()) : drive(paper_drive(map)) {}
+    explicit PaperRun(const LossMap& map = stand_in_map()) : drive(test::paper_drive(map)) {}
 
-    Drive drive;
-    Signals signals{sine(1.0275, 1.0), Signal{}};
+    test::Drive drive;
+    model::Train train = test::train_of(drive);
+    std::vector<TrainChannel> channels = train_channels(model::Assembly(train));
+    std::vector<int> compared{number(test::load_speed), number(test::twist)};
+    std::vector<Signal> signals{sine(1.0275, 1.0), Signal{}};
     std::size_t samples = 2001;
 
-    RunOptions options() const {
-        RunOptions o;
+    TrainOptions options() const {
+        TrainOptions o;
         o.duration = 2.0;
         o.sample_interval = 1e-3;
         o.samples = samples;
@@ -75,10 +78,11 @@ struct PaperRun {
     static std::vector<std::pair<const char*, PaperRun>> both() {
         return {{"table", PaperRun()}, {"plane", PaperRun(plane_map(0.02, 0.04, 0.06))}};
     }
+    int number(test::Quantity q) const { return static_cast<int>(test::channel_number(channels, q)); }
     // Largest error of load speed and twist, relative to the largest of each.
     double error(const Table& a, const Table& exact) const {
         double worst = 0.0;
-        for (const Channel c : {ch_load_speed, ch_twist})
+        for (const int c : compared)
             worst = std::max(worst, relative_gap(&a[c * samples], &exact[c * samples], samples));
         return worst;
     }

@@ -11,7 +11,6 @@
 #include <stdexcept>
 
 #include "cascade.hpp"
-#include "lostmotion/simulation/drive_control.hpp"
 #include "train_runs.hpp"
 
 using namespace lostmotion;
@@ -81,9 +80,11 @@ struct Task {
     RegimeCache<System>& cache;         // kept from run to run
 };
 
-template <class System>
+template <class System_>
 class Cvode {
  public:
+    using System = System_;
+    using Observer = lostmotion::Observer<System>;
     using D = typename System::Dims;
     using State = StateOf<D>;
     using Guard = typename System::Guard;
@@ -136,8 +137,7 @@ class Cvode {
         enter();
         return Status::done;
     }
-    template <class Observer>
-    Status advance(double t_end, Observer&&) {
+    Status advance(double t_end, Observer&) {
         std::array<int, D::guards> found{};
         while (time_ < t_end) {
             CVodeSetStopTime(memory_, controlled_ ? std::fmin(limit_, t_end) : limit_);
@@ -164,10 +164,7 @@ class Cvode {
         before_ = input_.values();
         signals_[static_cast<std::size_t>(input)].breakpoints[0] = {time_, value, slope};
     }
-    template <class Observer>
-    Status inputs_changed(Observer&&) {
-        return go_on(nullptr, before_) ? Status::done : Status::jammed;
-    }
+    Status inputs_changed(Observer&) { return go_on(nullptr, before_) ? Status::done : Status::jammed; }
     State state() const { return user_.state_of(y_); }
     const typename D::Memory& memory() const { return user_.memory; }
     double time() const { return time_; }
@@ -218,8 +215,7 @@ class Cvode {
     InputsOf<D> before_{};
     double time_ = 0.0;        // [s]
     bool controlled_ = false;  // no step leads across a tick
-    struct {
-    } nothing_;
+    Observer nothing_;
     double limit_ = 0.0;  // [s], of the stretch that has no jump of an input
     SUNContext context_ = nullptr;
     N_Vector y_ = nullptr;
@@ -251,9 +247,7 @@ class Watched {
 
 template <class System>
 Watched exact_run(const Task<System>& task, double interval, std::size_t samples) {
-    struct {
-        bool segment(const Segment<System>&) { return true; }
-    } nothing;
+    Observer<System> nothing;
     Watched out(task.watched, samples);
     ExactSolver<System> solver(task.system, task.signals, interval, task.balanced);
     Status status = solver.begin(0.0, task.start, {});
@@ -288,40 +282,50 @@ void compare(const char* name, const Task<System>& task, double interval, std::s
         }
 }
 
+template <class D>
+Task<model::TrainSystem<D>> task_of(const TrainIn<D>& in, const SignalsOf<D>& signals,
+                                    RegimeCache<model::TrainSystem<D>>& cache) {
+    const model::Places& p = in.assembly.places();
+    return {in.system,
+            signals,
+            in.start,
+            in.system.rated_scale(),
+            in.system.balanced_scale(),
+            in.states(),
+            {p.shafts.back().speed, p.gears.back().twist},
+            cache};
+}
+
 // The drive under the cascade of bench_control.cpp, restarted at each tick; errors against the exact solver.
-void compare_cascade(const Drive& drive) {
-    const SwitchedDrive system(drive);
-    RegimeCache<SwitchedDrive> cache(system);
-    std::vector<int> states(n_states);
-    std::iota(states.begin(), states.end(), 0);
-    const Signals none;
-    const Task<SwitchedDrive> task{
-        system, none, {}, drive.rated_scale(), drive.balanced_scale(), states, {load_speed, twist}, cache};
+template <class D>
+void compare_cascade(const TrainIn<D>& in, const test::Drive& drive) {
+    using System = model::TrainSystem<D>;
+    RegimeCache<System> cache(in.system);
+    const SignalsOf<D> none;
+    const Task<System> task = task_of(in, none, cache);
     const Control control = cascade(drive, 0.0, 0.2);
     const std::vector<control::Axis> laws = control.laws();
-    const ClosedLoop<DriveDims> loop = closed_loop_of(drive, control, laws);
-    struct {
-        bool segment(const Segment<SwitchedDrive>&) { return true; }
-    } nothing;
+    const ClosedLoop<D> loop = closed_loop_of<D>(in.assembly, control, laws);
+    Observer<System> nothing;
     constexpr int instants = 100;
     const auto follow = [&](auto& solver, auto&& keep) {
         ClosedLoopRun run(solver, loop);
         Status status = run.begin({}, {}, nothing);
         for (int k = 1; k <= instants && status == Status::done; ++k) {
-            status = run.advance(static_cast<double>(k) / instants, nothing, [](double) {});
+            status = run.advance(static_cast<double>(k) / instants, nothing, nullptr);
             keep(solver.state());
         }
         return status == Status::done;
     };
     Watched exact(task.watched, instants);
-    ExactSolver<SwitchedDrive> solver(system, none, 1.0 / instants, drive.balanced_scale());
+    ExactSolver<System> solver(in.system, none, 1.0 / instants, task.balanced);
     follow(solver, [&](const auto& x) { exact.keep(x); });
     for (const double tolerance : {1e-6, 1e-8}) {
         Watched other(task.watched, instants);
-        Cvode<SwitchedDrive> cvode(task, CV_ADAMS, tolerance);
+        Cvode<System> cvode(task, CV_ADAMS, tolerance);
         const bool done = follow(cvode, [&](const auto& x) { other.keep(x); });
         const double time = best_ms(done ? 3 : 0, [&] {
-            Cvode<SwitchedDrive> again(task, CV_ADAMS, tolerance);
+            Cvode<System> again(task, CV_ADAMS, tolerance);
             follow(again, [](const auto&) {});
         });
         std::printf("cascade|SUNDIALS CVODE Adams in C, rtol %g|%.6f|%.3g\n", tolerance, time, other.gap(exact));
@@ -331,38 +335,17 @@ void compare_cascade(const Drive& drive) {
 }  // namespace
 
 int main() {
-    compare_cascade(PaperRun().drive);
-    for (const auto& [map, paper] : PaperRun::both()) {
-        const SwitchedDrive system(paper.drive);
-        RegimeCache<SwitchedDrive> cache(system);
-        std::vector<int> states(n_states);
-        std::iota(states.begin(), states.end(), 0);
-        compare(map,
-                Task<SwitchedDrive>{system,
-                                    paper.signals,
-                                    {},
-                                    paper.drive.rated_scale(),
-                                    paper.drive.balanced_scale(),
-                                    states,
-                                    {load_speed, twist},
-                                    cache},
-                1e-3, paper.samples, true);
-    }
     std::vector<TimedTrain> trains = timed_trains();
     trains.resize(3);
-    for (const TimedTrain& t : trains)
+    const test::Drive drive = PaperRun().drive;
+    in_kernel(trains[0], [&](const auto& in) { compare_cascade(in, drive); });
+    const auto compare_train = [](const char* name, const TimedTrain& t, bool sampled) {
         in_kernel(t, [&]<class D>(const TrainIn<D>& in) {
-            const model::Places& p = in.assembly.places();
             RegimeCache<model::TrainSystem<D>> cache(in.system);
-            compare(t.name.c_str(),
-                    Task<model::TrainSystem<D>>{in.system,
-                                                in.signals,
-                                                in.start,
-                                                in.system.rated_scale(),
-                                                in.system.balanced_scale(),
-                                                in.states(),
-                                                {p.shafts.back().speed, p.gears.back().twist},
-                                                cache},
-                    t.duration / (t.samples - 1), static_cast<std::size_t>(t.samples), false);
+            compare(name, task_of(in, in.signals, cache), t.duration / (t.samples - 1),
+                    static_cast<std::size_t>(t.samples), sampled);
         });
+    };
+    for (const auto& [map, paper] : PaperRun::both()) compare_train(map, {map, paper.train, paper.signals}, true);
+    for (const TimedTrain& t : trains) compare_train(t.name.c_str(), t, false);
 }

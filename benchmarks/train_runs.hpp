@@ -1,11 +1,10 @@
-// The runs of trains that are timed: the paper's drive in the long form, and trains of more shafts.
+// The runs of trains that are timed: the paper's drive, and trains of more shafts.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "../core/tests/train_support.hpp"
-#include "lostmotion/model/system.hpp"
+#include "lostmotion/simulation/train_stepping.hpp"
 #include "paper_run.hpp"
 
 namespace lostmotion {
@@ -62,8 +61,7 @@ inline TimedTrain two_motors_one_ring() {
 inline TimedTrain four_shafts() {
     using namespace model;
     const PaperRun paper;
-    TimedTrain t{"the paper's drive with belt and coupling", {}, {paper.signals.begin(), paper.signals.end()}};
-    t.train = train_of(paper.drive);
+    TimedTrain t{"the paper's drive with belt and coupling", paper.train, paper.signals};
     Gear& gearbox = t.train.gears[0];
     std::vector<Shaft>& shafts = t.train.shafts;
     shafts.insert(shafts.begin() + 1, shaft(0.0));  // the input shaft of the gearbox
@@ -78,7 +76,7 @@ inline TimedTrain four_shafts() {
 inline TimedTrain six_shafts() {
     using namespace model;
     TimedTrain t{"chain of 6 shafts", {}, {sine(1.0, 1.0)}, 2.0, 2001};
-    t.train.motors.push_back({"motor", 0, paper_drive(stand_in_map()).motor});
+    t.train.motors.push_back({"motor", 0, test::paper_drive(stand_in_map()).motor});
     const double ratio[] = {2.0, 3.0, 3.0, 5.0, 1.0};
     double to_load = 1.0;  // from the motor up to here
     for (int k = 0; k < 6; ++k) {
@@ -98,12 +96,11 @@ inline TimedTrain six_shafts() {
 }
 inline std::vector<TimedTrain> timed_trains() {
     const PaperRun paper;
-    return {
-        {"the paper's drive as a train", model::train_of(paper.drive), {paper.signals.begin(), paper.signals.end()}},
-        worm_lowering(),
-        two_motors_one_ring(),
-        four_shafts(),
-        six_shafts()};
+    return {{"the paper's drive", paper.train, paper.signals},
+            worm_lowering(),
+            two_motors_one_ring(),
+            four_shafts(),
+            six_shafts()};
 }
 
 // A train in a kernel of these dimensions.

@@ -1,4 +1,4 @@
-"""Runs of drive trains, each in the narrowest kernel that holds it, against the classic drive's and against CVODE."""
+"""Runs of drive trains, each in the narrowest kernel that holds it, against the paper's drive and against CVODE."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def section(report: Report, programs: dict[str, list[list[str]]]) -> None:
     report.section(
         "Drive trains",
         f"Exact solver in C++ ({name.rsplit('_', 1)[1]} build), without samples. The stiffer a train, the more event checks from one\n"
-        "switching to the next; the last column but one sets its time per switching in relation to that of the classic drive.",
+        "switching to the next; the last column but one sets its time per switching in relation to that of the paper's drive.",
     )
     report.table(
         (

@@ -15,8 +15,6 @@
 #include <memory>
 #include <vector>
 
-#include "lostmotion/drive/variables.hpp"
-
 namespace lostmotion::binding {
 
 namespace nb = nanobind;
@@ -24,8 +22,6 @@ using namespace nb::literals;
 
 using Array = nb::ndarray<nb::numpy, double>;
 using Values = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using StateNumbers = std::array<double, n_states>;
-using InputNumbers = std::array<double, n_inputs>;
 
 // Hands data over to Python without a copy.
 inline Array as_array(std::unique_ptr<double[]> data, const std::vector<std::size_t>& shape) {
@@ -49,17 +45,6 @@ Array column(const std::vector<Result>& results, std::vector<std::size_t> shape,
 template <class Result, class F>
 Array numbers(const std::vector<Result>& results, F&& value) {
     return column(results, {}, [&](const Result& r, double* to) { *to = static_cast<double>(value(r)); });
-}
-
-inline State to_state(const StateNumbers& v) {
-    State x{};
-    std::copy(v.begin(), v.end(), x.begin());
-    return x;
-}
-inline StateNumbers from_state(const State& x) {
-    StateNumbers v;
-    std::copy_n(x.begin(), n_states, v.begin());
-    return v;
 }
 
 }  // namespace lostmotion::binding

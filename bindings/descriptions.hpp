@@ -16,35 +16,16 @@ inline std::vector<double> scenario_numbers(Scenario s) {
     return std::move(f.numbers);
 }
 
-inline Scenario scenario_with(const std::string& title, const std::vector<Signal>& inputs, double duration,
-                              double interval, const BoundControl& bound) {
+// start: states by name; capacities: of the hysteresis of gears by name. What is left out is 0.
+inline std::vector<double> describe(const std::string& title, const TrainDescription& description,
+                                    const std::vector<Signal>& inputs, const Named& start, const Named& capacities,
+                                    double duration, double interval, const BoundControl& bound) {
     Scenario s;
     s.title = title;
     s.inputs = inputs;
     s.duration = duration;
     s.sample_interval = interval;
     s.control = control_of(bound);
-    return s;
-}
-
-inline std::vector<double> describe_drive(const std::string& title, const SharedDrive& drive,
-                                          const std::vector<Signal>& inputs, const std::vector<double>& start,
-                                          double capacity, double duration, double interval,
-                                          const BoundControl& bound) {
-    Scenario s = scenario_with(title, inputs, duration, interval, bound);
-    s.drive = drive.drive;
-    s.start = start;
-    s.hysteresis_capacities = {capacity};
-    return scenario_numbers(std::move(s));
-}
-
-// start: states by name; capacities: of the hysteresis of gears by name. What is left out is 0.
-inline std::vector<double> describe_train(const std::string& title, const TrainDescription& description,
-                                          const std::vector<Signal>& inputs, const Named& start,
-                                          const Named& capacities, double duration, double interval,
-                                          const BoundControl& bound) {
-    Scenario s = scenario_with(title, inputs, duration, interval, bound);
-    s.form = Scenario::of_train;
     s.train = description.train;
     for (const std::string& name : model::state_names(model::Assembly(s.train)))
         s.start.push_back(value_of(start, name));
@@ -70,14 +51,9 @@ inline std::vector<double> write_description(const std::vector<double>& scenario
 }
 
 inline void bind_descriptions(nb::module_& m) {
-    m.def("describe_drive", &describe_drive, "title"_a, "drive"_a, "inputs"_a, "start"_a, "hysteresis_capacity"_a,
-          "duration"_a, "interval"_a, "control"_a,
-          nb::sig("def describe_drive(title: str, drive: Drive, inputs: collections.abc.Sequence[Signal], start: "
-                  "collections.abc.Sequence[float], hysteresis_capacity: float, duration: float, interval: float, "
-                  "control: tuple[float, collections.abc.Sequence[tuple[Axis, int, int, int, int]]]) -> list[float]"));
-    m.def("describe_train", &describe_train, "title"_a, "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a,
-          "duration"_a, "interval"_a, "control"_a,
-          nb::sig("def describe_train(title: str, train: Train, inputs: collections.abc.Sequence[Signal], start: "
+    m.def("describe", &describe, "title"_a, "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a, "duration"_a,
+          "interval"_a, "control"_a,
+          nb::sig("def describe(title: str, train: Train, inputs: collections.abc.Sequence[Signal], start: "
                   "collections.abc.Mapping[str, float], hysteresis_capacities: collections.abc.Mapping[str, float], "
                   "duration: float, interval: float, control: tuple[float, "
                   "collections.abc.Sequence[tuple[Axis, int, int, int, int]]]) -> list[float]"));

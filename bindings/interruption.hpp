@@ -8,8 +8,6 @@
 #include <memory>
 #include <stdexcept>
 
-#include "lostmotion/simulation/result_names.hpp"
-
 namespace lostmotion::binding {
 
 namespace nb = nanobind;
@@ -65,13 +63,6 @@ inline bool poll_signals(void*) {
 struct SolverError : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
-
-// Turns a status into an exception; the signal's own exception is already set when a run was interrupted.
-inline void check(Status status, double time, Contact contact) {
-    if (status == Status::done) return;
-    if (status == Status::interrupted) throw nb::python_error();
-    throw SolverError(status_text(status, time, contact));
-}
 
 // Polls for Ctrl-C and reports progress while other threads work.
 class Watch {

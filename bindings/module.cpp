@@ -3,7 +3,6 @@
 #include "elementary.hpp"
 #include "names.hpp"
 #include "responses.hpp"
-#include "runs.hpp"
 #include "sensitivities.hpp"
 #include "stepping.hpp"
 
@@ -13,8 +12,7 @@ NB_MODULE(CORE_MODULE, m) {
     bind_interruption(m);
     bind_names(m);
     bind_elementary(m);
-    bind_drives(m);
-    bind_runs(m);
+    bind_curves(m);
     bind_control(m);
     bind_train(m);
     bind_sensitivities(m);

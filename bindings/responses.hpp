@@ -1,4 +1,4 @@
-// Periodic motions and responses, of drives and of trains.
+// Periodic motions and responses.
 #pragma once
 
 #include "lostmotion/analysis/respond.hpp"
@@ -9,17 +9,17 @@ namespace lostmotion::binding {
 // A signal for each input, the period, components at the start by name; those left out are 0.
 using Point = std::tuple<std::vector<Signal>, double, Named>;
 
-// respond(points, watch): by a drive or a train.
-template <class Respond>
-nb::dict respond(const std::vector<Point>& asked, const ResponseSpec& spec, const nb::object& progress,
-                 Respond&& respond) {
+inline nb::dict respond(const TrainDescription& train, const std::vector<Point>& asked, std::size_t samples,
+                        int harmonics, int max_periods, double tolerance, bool keep_table, bool limit_cycle,
+                        unsigned threads, const nb::object& progress) {
+    const ResponseSpec spec{samples, harmonics, max_periods, tolerance, keep_table, limit_cycle};
     std::vector<ResponseRequest> points;
     for (const auto& [inputs, period, start] : asked) points.push_back({inputs, period, start});
     ResponseTable t;
     Watch watch(progress);
     {
         nb::gil_scoped_release release;
-        t = respond(points, std::ref(watch));
+        t = respond_train(*train.run(), points, spec, threads, std::ref(watch));
     }
     watch.check();
     const std::size_t count = points.size(), n = t.components.size(), c = t.channels;
@@ -46,40 +46,13 @@ nb::dict respond(const std::vector<Point>& asked, const ResponseSpec& spec, cons
     return out;
 }
 
-inline nb::dict respond_of_drive(SharedDrive& drive, const std::vector<Point>& points, std::size_t samples,
-                                 int harmonics, int max_periods, double tolerance, bool keep_table, bool limit_cycle,
-                                 unsigned threads, const nb::object& progress) {
-    const ResponseSpec spec{samples, harmonics, max_periods, tolerance, keep_table, limit_cycle};
-    return respond(points, spec, progress, [&](const auto& asked, const Waiting& waiting) {
-        return respond_drive(drive, asked, spec, threads, waiting);
-    });
-}
-
-inline nb::dict respond_of_train(const TrainDescription& description, const std::vector<Point>& points,
-                                 std::size_t samples, int harmonics, int max_periods, double tolerance, bool keep_table,
-                                 bool limit_cycle, unsigned threads, const nb::object& progress) {
-    const TrainRun run(description.train);
-    const ResponseSpec spec{samples, harmonics, max_periods, tolerance, keep_table, limit_cycle};
-    return respond(points, spec, progress, [&](const auto& asked, const Waiting& waiting) {
-        return respond_train(run, asked, spec, threads, waiting);
-    });
-}
-
 inline void bind_responses(nb::module_& m) {
-    static const std::string arguments =
-        ", points: collections.abc.Sequence[tuple[collections.abc.Sequence[Signal], float, "
-        "collections.abc.Mapping[str, float]]], samples: int, harmonics: int, max_periods: int, tolerance: float, "
-        "keep_table: bool, limit_cycle: bool, threads: int, progress: collections.abc.Callable[[int], None] | None = "
-        "None) -> "
-        "dict[str, typing.Any]";
-    static const std::string drive = "def respond(drive: Drive" + arguments,
-                             train = "def respond(train: Train" + arguments;
-    m.def("respond", &respond_of_drive, "drive"_a, "points"_a, "samples"_a, "harmonics"_a, "max_periods"_a,
-          "tolerance"_a, "keep_table"_a, "limit_cycle"_a, "threads"_a, "progress"_a = nb::none(),
-          nb::sig(drive.c_str()));
-    m.def("respond", &respond_of_train, "train"_a, "points"_a, "samples"_a, "harmonics"_a, "max_periods"_a,
-          "tolerance"_a, "keep_table"_a, "limit_cycle"_a, "threads"_a, "progress"_a = nb::none(),
-          nb::sig(train.c_str()));
+    m.def("respond", &respond, "train"_a, "points"_a, "samples"_a, "harmonics"_a, "max_periods"_a, "tolerance"_a,
+          "keep_table"_a, "limit_cycle"_a, "threads"_a, "progress"_a = nb::none(),
+          nb::sig("def respond(train: Train, points: collections.abc.Sequence[tuple[collections.abc.Sequence[Signal], "
+                  "float, collections.abc.Mapping[str, float]]], samples: int, harmonics: int, max_periods: int, "
+                  "tolerance: float, keep_table: bool, limit_cycle: bool, threads: int, progress: "
+                  "collections.abc.Callable[[int], None] | None = None) -> dict[str, typing.Any]"));
 }
 
 }  // namespace lostmotion::binding

@@ -75,7 +75,7 @@ inline nb::list run_sensitive_trains(const std::vector<SensitiveNumbers>& cases,
                                   as_array(std::move(r.derivatives), {parameters, channels.size(), samples}),
                                   as_array(std::move(r.signals), {axes, shown, samples}),
                                   as_array(std::move(r.signal_derivatives), {parameters, axes, shown, samples}),
-                                  r.end_state, r.ends_at, r.ends_by));
+                                  in_order(r.end_state), r.ends_at, r.ends_by));
     }
     return out;
 }
@@ -84,9 +84,7 @@ inline void bind_sensitivities(nb::module_& m) {
     nb::class_<ComposedTrain>(m, "ComposedTrain")
         .def(
             "__init__",
-            [](ComposedTrain* self, const TrainDescription& train) {
-                new (self) ComposedTrain{std::make_shared<const TrainRun>(train.train)};
-            },
+            [](ComposedTrain* self, const TrainDescription& train) { new (self) ComposedTrain{train.run()}; },
             "train"_a);
     m.def("run_sensitive_trains", &run_sensitive_trains, "cases"_a, "channels"_a, "signals"_a, "threads"_a,
           nb::sig("def run_sensitive_trains(cases: collections.abc.Sequence[tuple[object, ...]], channels: "

@@ -14,11 +14,6 @@ void check_size(const std::vector<T>& given, std::size_t count) {
     if (given.size() != count) throw nb::type_error("a state of another simulation");
 }
 
-inline Numbers from_memory(const Memory& m) { return {m.hysteresis_capacity, m.locked_torque}; }
-inline void to_memory(const Numbers& v, Memory& m) {
-    check_size(v, 2);
-    m = {v[0], v[1]};
-}
 template <std::size_t n>
 Numbers from_memory(const std::array<double, n>& m) {
     return {m.begin(), m.end()};
@@ -30,17 +25,6 @@ void to_memory(const Numbers& v, std::array<double, n>& m) {
 }
 
 // The modes of the contacts, and which pieces of the laws hold.
-inline std::vector<int> from_key(const RegimeKey& k) {
-    return {k.modes[0], k.modes[1], k.modes[2], k.amplifier, k.piece, k.cell, k.cell_back};
-}
-inline void to_key(const std::vector<int>& v, RegimeKey& key) {
-    check_size(v, n_contacts + 4);
-    for (std::size_t c = 0; c < n_contacts; ++c) key.modes[c] = static_cast<std::int8_t>(v[c]);
-    key.amplifier = static_cast<std::int8_t>(v[3]);
-    key.piece = static_cast<std::int16_t>(v[4]);
-    key.cell = v[5];
-    key.cell_back = v[6];
-}
 inline std::vector<int> from_key(const model::Key& k) {
     std::vector<int> v(k.modes.begin(), k.modes.end());
     v.insert(v.end(), k.branch.begin(), k.branch.end());

@@ -1,8 +1,11 @@
-// Drive trains and their runs.
+// Trains and their runs, one and many, with the GIL released.
 #pragma once
 
 #include <nanobind/stl/optional.h>
 
+#include <algorithm>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -10,7 +13,7 @@
 #include <vector>
 
 #include "control.hpp"
-#include "drives.hpp"
+#include "curves.hpp"
 #include "interruption.hpp"
 #include "lostmotion/analysis/steady_regime.hpp"
 #include "lostmotion/analysis/train_batch.hpp"
@@ -18,6 +21,17 @@
 #include "lostmotion/scenario/fields.hpp"
 
 namespace lostmotion::binding {
+
+// Parameters by their keys in scenario files, of which a motor or a gear is taken.
+inline model::Train with_parameters(const std::map<std::string, double>& values) {
+    model::Train t = model::drive_train();
+    for (const auto& [key, value] : values) {
+        const model::Parameter* p = model::find_parameter(key);
+        if (p == nullptr) throw nb::value_error(("a drive has no parameter " + key).c_str());
+        p->in(t) = value;
+    }
+    return t;
+}
 
 // Fields of an element, by name.
 class NamedFields {
@@ -34,6 +48,65 @@ class NamedFields {
 
  private:
     const nb::dict& values_;
+};
+
+// Name, symbol, unit, meaning.
+using ChannelRow = std::tuple<std::string, std::string, std::string, std::string>;
+inline std::vector<ChannelRow> channel_rows(const std::vector<TrainChannel>& channels) {
+    std::vector<ChannelRow> rows;
+    for (const TrainChannel& c : channels)
+        rows.emplace_back(c.name, c.symbol, c.unit.empty() ? "1" : c.unit, c.meaning);
+    return rows;
+}
+
+// Idle workspaces.
+class Workspaces {
+ public:
+    std::unique_ptr<AnyWorkspace> take() {
+        const std::lock_guard<std::mutex> hold(mutex_);
+        if (idle_.empty()) return nullptr;
+        std::unique_ptr<AnyWorkspace> one = std::move(idle_.back());
+        idle_.pop_back();
+        return one;
+    }
+    void give_back(std::unique_ptr<AnyWorkspace> one) {
+        const std::lock_guard<std::mutex> hold(mutex_);
+        if (one && idle_.size() < max_idle) idle_.push_back(std::move(one));
+    }
+
+ private:
+    static constexpr std::size_t max_idle = 8;
+
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<AnyWorkspace>> idle_;
+};
+
+// A composed train with what its runs leave for the next ones. Each run takes a workspace for itself.
+class SharedRun : public TrainRun {
+ public:
+    explicit SharedRun(const model::Train& train) : TrainRun(train) {}
+    SharedRun(const SharedRun&) = delete;
+    SharedRun& operator=(const SharedRun&) = delete;
+    ~SharedRun() {
+        for (std::unique_ptr<AnyWorkspace> w = own_.take(); w; w = own_.take()) {
+            w->leave();
+            spare_->give_back(std::move(w));
+        }
+    }
+    std::unique_ptr<AnyWorkspace> take() const {
+        std::unique_ptr<AnyWorkspace> w = own_.take();
+        return w ? std::move(w) : spare_->take();
+    }
+    void give_back(std::unique_ptr<AnyWorkspace> w) const { own_.give_back(std::move(w)); }
+
+ private:
+    // Of trains that are gone, the one of this module.
+    static const std::shared_ptr<Workspaces>& store() {
+        static const auto all = std::make_shared<Workspaces>();
+        return all;
+    }
+    mutable Workspaces own_;
+    std::shared_ptr<Workspaces> spare_ = store();
 };
 
 // As Python describes a train.
@@ -55,14 +128,23 @@ class TrainDescription : public model::TrainDescription {
     }
     void add_motor(const std::string& name, const std::string& shaft, const Named& parameters, bool torque_source,
                    double torque_limit) {
-        const Motor law = make_drive(parameters, torque_source, nullptr, nullptr).motor;
+        Motor law = with_parameters(parameters).motors[0].law;
+        law.kind = torque_source ? Motor::torque_source : Motor::dc;
         model::TrainDescription::add_motor(name, shaft, law, torque_limit);
     }
     void add_gear(const std::string& name, const std::string& input, const std::string& output, const Named& parameters,
                   const TorsionCurve* curve, const LossMap* map,
                   const std::optional<std::pair<double, double>>& efficiencies, double mesh_damping,
                   const model::PeriodicCurve* transmission_error) {
-        const Gearbox law = make_drive(parameters, false, curve, map).gearbox;
+        Gearbox law = with_parameters(parameters).gears[0].law;
+        if (curve != nullptr) {
+            law.compliance = Gearbox::torsion_curve;
+            law.curve = *curve;
+        }
+        if (map != nullptr) {
+            law.losses = Gearbox::loss_map;
+            law.map = *map;
+        }
         model::TrainDescription::add_gear(name, input, output, law, efficiencies, mesh_damping, transmission_error);
     }
 
@@ -106,26 +188,27 @@ class TrainDescription : public model::TrainDescription {
         model::TrainDescription::add_controller(std::move(c), motor);
     }
 
-    std::string check() const { return TrainRun(train).error(); }
+    // Composed once, when it is first wanted; nothing may be added afterwards.
+    const std::shared_ptr<const SharedRun>& run() const {
+        if (!run_) run_ = std::make_shared<const SharedRun>(train);
+        return run_;
+    }
+    std::string check() const { return run()->error(); }
     std::string check_start(const std::vector<double>& speeds) const { return model::check_start(train, speeds); }
     // The train must have passed the check.
-    std::vector<std::tuple<std::string, std::string, std::string>> channels() const {
-        std::vector<std::tuple<std::string, std::string, std::string>> out;
-        for (const TrainChannel& c : train_channels(model::Assembly(train)))
-            out.emplace_back(c.name, c.unit, c.meaning);
-        return out;
-    }
-    std::vector<std::string> ledger_names() const { return lostmotion::ledger_names(model::Assembly(train)); }
-    std::vector<std::string> input_names() const { return model::input_names(model::Assembly(train)); }
+    std::vector<ChannelRow> channels() const { return channel_rows(run()->channels()); }
+    std::vector<std::string> ledger_names() const { return lostmotion::ledger_names(run()->assembly()); }
+    std::vector<std::string> input_names() const { return model::input_names(run()->assembly()); }
+    std::vector<std::string> switching_columns() const { return lostmotion::switching_columns(run()->assembly()); }
     std::vector<std::string> contact_names() const {
-        const model::Assembly a(train);
+        const model::Assembly& a = run()->assembly();
         std::vector<std::string> names;
         for (int c = 0; c < a.layout().contacts; ++c) names.push_back(model::contact_name(a, c));
         return names;
     }
     // (J [kg m2], holding friction [N m]) of each shaft, with what is on it; brakes are open.
     std::vector<std::pair<double, double>> shafts() const {
-        const model::Assembly a(train);
+        const model::Assembly& a = run()->assembly();
         std::vector<std::pair<double, double>> out;
         for (std::size_t s = 0; s < train.shafts.size(); ++s) {
             const model::ShaftPlace& p = a.places().shafts[s];
@@ -154,6 +237,8 @@ class TrainDescription : public model::TrainDescription {
         element.describe(named);
         return element;
     }
+    mutable std::shared_ptr<const SharedRun> run_;
+
     model::LinearController::Signal controller_signal(const ControllerSignal& s) const {
         using Signal = model::LinearController::Signal;
         const auto& [kind, shaft] = s;
@@ -163,19 +248,16 @@ class TrainDescription : public model::TrainDescription {
     }
 };
 
-// What ended a regime; -1: an input jumped.
-inline std::vector<std::pair<int, std::string>> train_causes() {
-    return {{input_changed, input_changed_name},
-            {model::Guard::speed, "came to rest"},
-            {model::Guard::capacity, "broke away"},
-            {model::Guard::edge, "piece or cell of a law"},
-            {model::Guard::input_limit, "limit of a command"},
-            {model::Guard::turning, "driving torque turned"}};
+// By name, in their order.
+inline nb::dict in_order(const NamedInOrder& values) {
+    nb::dict out;
+    for (const auto& [name, value] : values) out[name.c_str()] = value;
+    return out;
 }
 
-inline Array train_switching_table(const TrainReport& report, int contacts) {
-    return column(report.switchings, {2 + 2 * static_cast<std::size_t>(contacts)},
-                  [&](const TrainSwitching& s, double* to) { write_switching(s, contacts, to); });
+inline Array switching_table(const TrainReport& report, const model::Assembly& a) {
+    return column(report.switchings, {switching_columns(a).size()},
+                  [&](const TrainSwitching& s, double* to) { write_switching(a, s, to); });
 }
 
 inline void check_train_run(const TrainReport& report, const model::Assembly& a) {
@@ -196,12 +278,11 @@ inline TrainOptions train_options(double duration, double interval, std::size_t 
 }
 
 // start: states by name; capacities: of the hysteresis of gears by name. What is left out is 0.
-inline nb::dict run_train(const TrainDescription& description, const std::vector<Signal>& inputs, const Named& start,
-                          const Named& capacities, double duration, double interval, std::size_t samples, bool energy,
-                          double tolerance, std::size_t max_switchings, const BoundControl& bound) {
-    const TrainRun run(description.train);
+inline nb::dict run(const TrainDescription& description, const std::vector<Signal>& inputs, const Named& start,
+                    const Named& capacities, double duration, double interval, std::size_t samples, bool energy,
+                    double tolerance, std::size_t max_switchings, const BoundControl& bound) {
+    const SharedRun& run = *description.run();
     const model::Assembly& a = run.assembly();
-    const model::Layout& n = a.layout();
     TrainOptions options = train_options(duration, interval, samples, energy, max_switchings);
     options.tolerance = tolerance;
     options.interrupted = poll_signals;
@@ -211,39 +292,48 @@ inline nb::dict run_train(const TrainDescription& description, const std::vector
     TrainReport report;
     {
         nb::gil_scoped_release release;
-        report = run.run(inputs, {start, capacities}, options, data.get());
+        std::unique_ptr<AnyWorkspace> workspace = run.take();
+        report = run.run(inputs, {start, capacities}, options, data.get(), workspace);
+        run.give_back(std::move(workspace));
     }
     raise_again(bound);
     check_train_run(report, a);
     nb::dict out;
     out["control"] = as_array(std::move(signals), control_shape(options));
     out["values"] = as_array(std::move(data), {run.channels().size(), samples});
-    out["switchings"] = train_switching_table(report, n.contacts);
+    out["switchings"] = switching_table(report, a);
     out["switching_count"] = report.switching_count;
-    out["energy"] = named_ledger(report, a);
-    out["end_state"] = named_end(report, a);
+    out["energy"] = in_order(named_ledger(report, a));
+    out["end_state"] = in_order(named_end(report, a));
     out["left_data_at"] = report.left_data_at;
     out["steps"] = report.steps;
     return out;
 }
 
-// Each case: train, inputs, start, hysteresis capacities. Of each run the text of its error, empty if it has none;
-// switchings; the energies; and the samples, or what is kept of them.
-using CaseOfTrain = std::tuple<TrainDescription, std::vector<Signal>, Named, Named>;
-inline nb::tuple run_train_batch(const std::vector<CaseOfTrain>& cases, double duration, double interval,
-                                 std::size_t samples, const std::vector<std::string>& energies,
-                                 const std::vector<std::string>& channels,
-                                 const std::vector<std::pair<std::size_t, int>>& kept, unsigned threads) {
-    TrainBatch batch{{}, train_options(duration, interval, samples, !energies.empty(), 0), channels, {}, energies};
+// Each case: train, inputs, start, hysteresis capacities. fields, values: of one case, what differs from run to run,
+// runs x fields. Of each run the text of its error, empty if it has none; switchings; the energies; and the samples, or
+// what is kept of them.
+using CaseOfTrain = std::tuple<const TrainDescription*, std::vector<Signal>, Named, Named>;
+inline nb::tuple run_batch(const std::vector<CaseOfTrain>& cases, const std::vector<int>& fields, const Values& values,
+                           double duration, double interval, std::size_t samples,
+                           const std::vector<std::string>& energies, const std::vector<std::string>& channels,
+                           const std::vector<std::pair<std::size_t, int>>& kept, unsigned threads,
+                           const nb::object& progress) {
+    TrainBatch batch{{},
+                     train_options(duration, interval, samples, !energies.empty(), 0),
+                     channels,
+                     {},
+                     energies,
+                     fields,
+                     {values.data(), values.size()}};
     for (const auto& [train, inputs, start, capacities] : cases)
-        batch.cases.push_back({train.train, inputs, {start, capacities}});
+        batch.cases.push_back({train->train, inputs, {start, capacities}});
     for (const auto& [channel, how] : kept) batch.kept.push_back({channel, static_cast<Reduction>(how)});
-    std::vector<std::size_t> shape{cases.size(), kept.size()};
-    if (kept.empty()) shape = {cases.size(), channels.size(), samples};
-    auto data = std::make_unique_for_overwrite<double[]>(cases.size() * batch.width());
+    std::vector<std::size_t> shape{batch.runs(), kept.size()};
+    if (kept.empty()) shape = {batch.runs(), channels.size(), samples};
+    auto data = std::make_unique_for_overwrite<double[]>(batch.runs() * batch.width());
     std::vector<TrainRow> rows;
-    const nb::object nobody = nb::none();
-    Watch watch(nobody);
+    Watch watch(progress);
     {
         nb::gil_scoped_release release;
         rows = run_trains(batch, data.get(), threads, std::ref(watch));
@@ -254,6 +344,14 @@ inline nb::tuple run_train_batch(const std::vector<CaseOfTrain>& cases, double d
     return nb::make_tuple(
         as_array(std::move(data), shape), errors, numbers(rows, [](const TrainRow& r) { return r.switchings; }),
         column(rows, {energies.size()}, [](const TrainRow& r, double* to) { std::ranges::copy(r.energies, to); }));
+}
+
+// A reduction of each row.
+inline Array reduce_rows(int how, const Values& values) {
+    const std::size_t rows = values.shape(0), n = values.shape(1);
+    auto data = std::make_unique_for_overwrite<double[]>(rows);
+    for (std::size_t k = 0; k < rows; ++k) data[k] = reduce(static_cast<Reduction>(how), values.data() + k * n, n);
+    return as_array(std::move(data), {rows});
 }
 
 inline void bind_train(nb::module_& m) {
@@ -271,8 +369,6 @@ inline void bind_train(nb::module_& m) {
             return std::make_pair(mesh.driving(), mesh.overrunning());
         },
         "lead_angle"_a, "friction_angle"_a);
-    m.def("train_causes", &train_causes, nb::sig("def train_causes() -> list[tuple[int, str]]"),
-          "Of switchings of a train: number and name.");
     m.def("quadratic_drag", &model::Shaft::quadratic_drag, "coefficient"_a, "max_speed"_a, "error"_a);
     m.def(
         "stribeck_curve",
@@ -303,12 +399,17 @@ inline void bind_train(nb::module_& m) {
         .def("add_controller", &TrainDescription::add_controller, "motor"_a, "signals"_a, "compared"_a, "states"_a,
              "A"_a, "B"_a, "C"_a, "D"_a, "back_calculation"_a, "limit"_a)
         .def("check", &TrainDescription::check)
-        .def("kernel", [](const TrainDescription& t) { return TrainRun(t.train).kernel(); })
+        .def_prop_rw(
+            "short_form", [](const TrainDescription& t) { return t.train.short_form; },
+            [](TrainDescription& t, bool v) { t.train.short_form = v; },
+            "Whether results have the names of a drive: `twist`, not `gearbox_twist`.")
+        .def("kernel", [](const TrainDescription& t) { return t.run()->kernel(); })
         .def("check_start", &TrainDescription::check_start, "speeds"_a)
-        .def("channels", &TrainDescription::channels, nb::sig("def channels(self) -> list[tuple[str, str, str]]"),
-             "Name, unit, meaning.")
+        .def("channels", &TrainDescription::channels, nb::sig("def channels(self) -> list[tuple[str, str, str, str]]"),
+             "Name, symbol, unit, meaning.")
         .def("ledger_names", &TrainDescription::ledger_names)
         .def("input_names", &TrainDescription::input_names)
+        .def("switching_columns", &TrainDescription::switching_columns)
         .def("shafts", &TrainDescription::shafts,
              "Inertia [kg m2] and friction that holds at rest [N m] of each shaft.")
         .def("mesh_loss", &TrainDescription::mesh_loss, "gear"_a, "driven"_a, "speed"_a)
@@ -316,21 +417,26 @@ inline void bind_train(nb::module_& m) {
              nb::sig("def steady_regime(self, speeds: collections.abc.Sequence[float], torques: "
                      "collections.abc.Sequence[float]) -> tuple[list[str], numpy.typing.NDArray[numpy.float64], bool]"))
         .def("contact_names", &TrainDescription::contact_names);
-    m.def("run_train", &run_train, "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a, "duration"_a,
-          "interval"_a, "samples"_a, "energy"_a, "tolerance"_a, "max_switchings"_a, "control"_a,
-          nb::sig("def run_train(train: Train, inputs: collections.abc.Sequence[Signal], start: "
+    m.def("run", &run, "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a, "duration"_a, "interval"_a,
+          "samples"_a, "energy"_a, "tolerance"_a, "max_switchings"_a, "control"_a,
+          nb::sig("def run(train: Train, inputs: collections.abc.Sequence[Signal], start: "
                   "collections.abc.Mapping[str, float], hysteresis_capacities: collections.abc.Mapping[str, float], "
                   "duration: float, interval: float, samples: int, energy: bool, tolerance: float, max_switchings: "
                   "int, control: tuple[float, "
                   "collections.abc.Sequence[tuple[Axis, int, int, int, int]]]) -> dict[str, typing.Any]"));
-    m.def("run_trains", &run_train_batch, "cases"_a, "duration"_a, "interval"_a, "samples"_a, "energies"_a,
-          "channels"_a, "kept"_a, "threads"_a,
-          nb::sig("def run_trains(cases: collections.abc.Sequence[tuple[Train, collections.abc.Sequence[Signal], "
-                  "collections.abc.Mapping[str, float], collections.abc.Mapping[str, float]]], duration: float, "
+    m.def("run_batch", &run_batch, "cases"_a, "fields"_a, "values"_a, "duration"_a, "interval"_a, "samples"_a,
+          "energies"_a, "channels"_a, "kept"_a, "threads"_a, "progress"_a = nb::none(),
+          nb::sig("def run_batch(cases: collections.abc.Sequence[tuple[Train, collections.abc.Sequence[Signal], "
+                  "collections.abc.Mapping[str, float], collections.abc.Mapping[str, float]]], fields: "
+                  "collections.abc.Sequence[int], values: numpy.typing.NDArray[numpy.float64], duration: float, "
                   "interval: float, samples: int, energies: collections.abc.Sequence[str], channels: "
-                  "collections.abc.Sequence[str], kept: collections.abc.Sequence[tuple[int, int]], threads: int) -> "
+                  "collections.abc.Sequence[str], kept: collections.abc.Sequence[tuple[int, int]], threads: int, "
+                  "progress: collections.abc.Callable[[int], None] | None = None) -> "
                   "tuple[numpy.typing.NDArray[numpy.float64], list[str], numpy.typing.NDArray[numpy.float64], "
                   "numpy.typing.NDArray[numpy.float64]]"));
+    m.def("reduce_rows", &reduce_rows, "how"_a, "values"_a,
+          nb::sig("def reduce_rows(how: int, values: numpy.typing.NDArray[numpy.float64]) -> "
+                  "numpy.typing.NDArray[numpy.float64]"));
 }
 
 }  // namespace lostmotion::binding

@@ -12,6 +12,7 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion import _core
 from lostmotion.model.drive import Drive
+from lostmotion.simulation.variables import CONTACTS
 from lostmotion.studies.in_core import core_can
 from lostmotion.studies.table import read_table
 from lostmotion.units.conversion import Unit
@@ -58,7 +59,7 @@ def test_every_number_of_a_drive_is_a_parameter_of_the_core_with_the_same_unit()
 
 def test_a_drive_of_the_core_refuses_a_parameter_that_it_does_not_know() -> None:
     with pytest.raises(ValueError, match=r"a drive has no parameter motor\.mass"):
-        _core.Drive({"motor.mass": 1.0}, torque_source=False, torsion_curve=None, loss_map=None)
+        _core.Train().add_motor("m", "motor", {"motor.mass": 1.0}, torque_source=False, torque_limit=1.0)
 
 
 def test_the_states_are_variables_and_what_a_run_can_start_from() -> None:
@@ -98,8 +99,8 @@ def test_a_cause_s_number_goes_with_what_the_contacts_do() -> None:
     assert len(flags) == len(meanings)
     of = dict(zip(meanings, flags, strict=False))
     rest = s["cause"].values == of["came_to_rest"]
-    before = np.stack([s[f"{c}_before"].values for c in _core.contacts()])
-    after = np.stack([s[f"{c}_after"].values for c in _core.contacts()])
+    before = np.stack([s[f"{c}_before"].values for c in CONTACTS])
+    after = np.stack([s[f"{c}_after"].values for c in CONTACTS])
     # Where a contact has come to rest one was slipping before; where one has broken away one was stuck.
     assert rest.any() and (np.abs(before[:, rest]) == 1).any(axis=0).all()
     free = s["cause"].values == of["broke_away"]

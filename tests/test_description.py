@@ -144,11 +144,7 @@ def test_an_explanation_is_that_of_python(library: c.CDLL, name: str) -> None:  
     assert told[0].keys() == contacts.keys()
     for contact, values in contacts.items():
         assert told[0][contact] == pytest.approx(values, rel=1e-11, abs=1e-12)
-    commands = (
-        {"motor": [wanted.command_forward, wanted.command_backward]}
-        if isinstance(wanted, lm.Explanation)
-        else {m.name: [m.command_forward, m.command_backward] for m in wanted.motors}
-    )
+    commands = {m.name: [m.command_forward, m.command_backward] for m in wanted.motors}
     assert told[1].keys() == commands.keys()
     for motor, values in commands.items():
         assert told[1][motor] == pytest.approx(values, rel=1e-11)

@@ -71,7 +71,8 @@ def test_an_axis_begins_on_its_reference() -> None:
     drive, train = one_axis(), two_axes()
     r = lm.simulate(drive, duration=5e-3, energy=False)
     angle, speed, *_ = drive.controller.reference.at(0.0)
-    assert (r.load_angle[0], r.load_speed[0]) == (angle, speed)
+    assert r.load_angle[0] == angle
+    assert r.load_speed[0] == pytest.approx(speed, rel=1e-15)  # the rigid gear ties it to the motor
     assert r.motor_speed[0] == pytest.approx(speed * drive.gearbox.ratio, rel=1e-15)
     r = lm.simulate(train, duration=5e-3, energy=False)
     for axis in ("traverse", "elevation"):

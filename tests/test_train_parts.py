@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.simulation import train_results
+from lostmotion.simulation import core_runs
 from lostmotion.simulation.train_parts import parts_of
 
 MASSES: dict[str, Any] = {
@@ -36,7 +36,7 @@ MASSES: dict[str, Any] = {
 def both_ways(scenario: lm.TrainScenario, monkeypatch: pytest.MonkeyPatch, **how: Any) -> tuple[Any, Any]:
     """The run by its parts, and of all at once."""
     by_parts = lm.simulate(scenario, **how)
-    monkeypatch.setattr(train_results, "parts_of", lambda whole: [whole])
+    monkeypatch.setattr(core_runs, "parts_of", lambda whole: [whole])
     return by_parts, lm.simulate(scenario, **how)
 
 
@@ -106,5 +106,5 @@ def test_speeds_are_shown_in_terms_of_the_last_shaft_of_their_own_part() -> None
 def test_bits_do_not_depend_on_whether_parts_run_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = lm.load("direction-finder", {"simulation.duration": 0.2})
     beside = lm.simulate(scenario)
-    monkeypatch.setattr(train_results, "SIDE_BY_SIDE", 0)
+    monkeypatch.setattr(core_runs, "SIDE_BY_SIDE", 0)
     assert lm.simulate(scenario).identical(beside)

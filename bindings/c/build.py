@@ -37,7 +37,7 @@ def room(*names: str) -> list[Path]:
 
 # What is called at each tick, at each new regime, and now and then.
 TICKS, REGIMES = room("control"), room("elements", "model", "simulation")
-REST = [*(CORE / "analysis" / f"{name}.cpp" for name in ("breakaway", "explain", "train_explain", "train_linear"))]
+REST = [*(CORE / "analysis" / f"{name}.cpp" for name in ("breakaway", "train_explain", "train_linear"))]
 REST += room("scenario")
 INTERFACE = [HERE / f"{name}.cpp" for name in ("run", "simulation", "explanation", "scenario", "train", "freestanding")]
 CORE_FLAGS = (

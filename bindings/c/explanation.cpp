@@ -27,7 +27,7 @@ lm_explanation* lm_scenario_explain(lm_scenario* scenario, double time) {
         const lm::Explanation found = lm::explain(scenario->description.scenario(), time);
         if (!found.error.empty()) return found.error;
         made = new lm_explanation;
-        for (const lm::NamedContact& c : found.contacts)
+        for (const lm::ContactReport& c : found.contacts)
             made->contacts.push_back(
                 {c.name, {static_cast<double>(c.mode), c.speed, c.torque, c.capacity_forward, c.capacity_backward}});
         for (const lm::MotorReport& m : found.motors)

@@ -81,8 +81,6 @@ const double* lm_result_values(const lm_result* result, lm_part part) {
 int lm_run(lm_simulation* simulation, const lm_signal* inputs, const double* states, const double* capacities,
            double duration, double interval, size_t samples, double* variables) {
     const std::vector<std::string>& names = simulation->simulation.names().inputs;
-    lm::TrainSimulation* train = simulation->simulation.train();
-    if (train == nullptr) return simulation->failed("lm_run is for trains; use lm_scenario_run");
     if (!(std::isfinite(duration) && duration > 0.0 && std::isfinite(interval) && interval > 0.0))
         return simulation->failed("duration and interval must be > 0 and finite");
     if (samples > 0 && variables == nullptr) return simulation->failed("there is no place for the samples");
@@ -101,7 +99,7 @@ int lm_run(lm_simulation* simulation, const lm_signal* inputs, const double* sta
     options.max_switchings = 0;
     options.interrupted = Asked::ask;
     options.interrupted_context = &simulation->asked;
-    const lm::TrainRun run(train->assembly().train());
+    const lm::TrainRun run(simulation->simulation.train().assembly().train());
     const auto& known = simulation->simulation.names();
     std::vector<double> given = list(states, known.states.size()), held = list(capacities, known.capacities.size());
     given.resize(known.states.size());

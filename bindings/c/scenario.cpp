@@ -31,7 +31,7 @@ lm_scenario* lm_scenario_read(const double* numbers, size_t n, char* error, size
     const std::string wrong = attempted([&]() -> std::string {
         if (numbers == nullptr && n > 0) return "there are no numbers";
         lm::ScenarioDescription description({numbers, n});
-        if (description.error().empty()) made = new lm_scenario{description, {}};
+        if (description.error().empty()) made = new lm_scenario{description, {}, {}};
         return description.error();
     });
     if (error != nullptr && error_size > 0) {

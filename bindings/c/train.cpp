@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "lostmotion/drive/parameters.hpp"
+#include "lostmotion/model/short_form.hpp"
 
 namespace lm = lostmotion;
 
@@ -78,10 +78,10 @@ std::string read(const lm_loss_map& m, const std::string& what, lm::LossMap& to)
     return {};
 }
 
-// A drive with these parameters, of which a motor or gear is taken.
-std::string read(const lm_parameter* parameters, std::size_t n, const std::string& what, lm::Drive& to) {
+// A train with these parameters, of which a motor or gear is taken.
+std::string read(const lm_parameter* parameters, std::size_t n, const std::string& what, lm::model::Train& to) {
     for (std::size_t k = 0; k < n; ++k) {
-        const lm::Parameter* p = lm::find_parameter(text(parameters[k].key));
+        const lm::model::Parameter* p = lm::model::find_parameter(text(parameters[k].key));
         if (p == nullptr) return what + ": there is no parameter '" + text(parameters[k].key) + "'";
         if (!std::isfinite(parameters[k].value)) return what + ": " + text(parameters[k].key) + " must be finite";
         p->in(to) = parameters[k].value;
@@ -106,9 +106,9 @@ extern "C" {
 
 int lm_interface_version(void) { return LM_INTERFACE_VERSION; }
 
-size_t lm_parameter_count(void) { return std::size(lm::parameters); }
-const char* lm_parameter_key(size_t k) { return k < lm_parameter_count() ? lm::parameters[k].key : nullptr; }
-const char* lm_parameter_unit(size_t k) { return k < lm_parameter_count() ? lm::parameters[k].unit : nullptr; }
+size_t lm_parameter_count(void) { return std::size(lm::model::parameters); }
+const char* lm_parameter_key(size_t k) { return k < lm_parameter_count() ? lm::model::parameters[k].key : nullptr; }
+const char* lm_parameter_unit(size_t k) { return k < lm_parameter_count() ? lm::model::parameters[k].unit : nullptr; }
 
 lm_train* lm_train_new(void) { return new (std::nothrow) lm_train; }
 void lm_train_free(lm_train* train) { delete train; }
@@ -135,11 +135,11 @@ int lm_add_motor(lm_train* train, const char* name, const char* shaft, const lm_
                  int torque_source, double torque_limit) {
     return train->attempt([&] {
         std::string wrong = name_error(*train, name);
-        lm::Drive drive;
+        lm::model::Train drive = lm::model::drive_train();
         if (wrong.empty()) wrong = read(parameters, n, "motor '" + text(name) + "'", drive);
         if (!wrong.empty()) return wrong;
-        drive.motor.kind = torque_source != 0 ? lm::Motor::torque_source : lm::Motor::dc;
-        train->description.add_motor(name, text(shaft), drive.motor, torque_limit);
+        drive.motors[0].law.kind = torque_source != 0 ? lm::Motor::torque_source : lm::Motor::dc;
+        train->description.add_motor(name, text(shaft), drive.motors[0].law, torque_limit);
         return wrong;
     });
 }
@@ -150,23 +150,24 @@ int lm_add_gear(lm_train* train, const char* name, const char* input, const char
     return train->attempt([&] {
         const std::string what = "gear '" + text(name) + "'";
         std::string wrong = name_error(*train, name);
-        lm::Drive drive;
+        lm::model::Train drive = lm::model::drive_train();
+        lm::Gearbox& law = drive.gears[0].law;
         lm::model::PeriodicCurve error;
         if (wrong.empty()) wrong = read(parameters, n, what, drive);
         if (wrong.empty() && stiffness != nullptr) {
-            drive.gearbox.compliance = lm::Gearbox::torsion_curve;
-            wrong = read(*stiffness, what + ": stiffness", drive.gearbox.curve);
+            law.compliance = lm::Gearbox::torsion_curve;
+            wrong = read(*stiffness, what + ": stiffness", law.curve);
         }
         if (wrong.empty() && losses != nullptr) {
-            drive.gearbox.losses = lm::Gearbox::loss_map;
-            wrong = read(*losses, what + ": losses", drive.gearbox.map);
+            law.losses = lm::Gearbox::loss_map;
+            wrong = read(*losses, what + ": losses", law.map);
         }
         if (wrong.empty() && transmission_error != nullptr)
             wrong = read(*transmission_error, what + ": transmission error", error);
         if (!wrong.empty()) return wrong;
         std::optional<std::pair<double, double>> both;
         if (efficiencies != nullptr) both.emplace(efficiencies[0], efficiencies[1]);
-        train->description.add_gear(name, text(input), text(output), drive.gearbox, both, mesh_damping,
+        train->description.add_gear(name, text(input), text(output), law, both, mesh_damping,
                                     transmission_error == nullptr ? nullptr : &error);
         return wrong;
     });

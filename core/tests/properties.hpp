@@ -5,7 +5,7 @@
 
 #include "drive_runs.hpp"
 
-namespace lostmotion {
+namespace lostmotion::test {
 
 // Random drives whose worm-like gear locks: it needs more torque to lower a load than the load brings. No friction but
 // that of the mesh, so that what it can hold vanishes with the load.
@@ -101,12 +101,13 @@ inline Signals that_end(Signals s, double at, bool in_zero) {
 
 // Largest difference of the coupled states at the end, in units of each one's largest magnitude in a run (or a
 // billionth of its rated size, if it hardly moves). Speeds of input and load are one quantity seen from two sides.
-inline double difference_at_end(const Drive& drive, const Samples& run, const State& other) {
-    constexpr std::array<Channel, n_coupled> channels{ch_motor_torque, ch_motor_speed, ch_load_speed, ch_twist};
+template <class State>
+double difference_at_end(const Drive& drive, const Samples& run, const State& other) {
     std::array<double, n_coupled> size{};
     for (int k = 0; k < n_coupled; ++k) {
         size[k] = 1e-9 * drive.rated_scale()[k];
-        for (std::size_t n = 0; n < run.count; ++n) size[k] = std::fmax(size[k], std::fabs(run(channels[k], n)));
+        for (std::size_t n = 0; n < run.samples; ++n)
+            size[k] = std::fmax(size[k], std::fabs(run(static_cast<Quantity>(k), n)));
     }
     size[load_speed] = std::fmax(size[load_speed], size[motor_speed] / drive.gearbox.ratio);
     double worst = 0.0;
@@ -145,11 +146,34 @@ struct Splitting {
 };
 
 // A run in one go against the same run that looks at its contacts anew at an instant.
-Splitting split_run(const Drive& drive, const Signals& signals, double duration, double at);
+inline Splitting split_run(const Drive& drive, const Signals& signals, double duration, double at) {
+    Splitting out;
+    const double interval = duration / 200.0;
+    const Samples whole = run(drive, signals, duration, interval);
+    out.status = whole.report.status;
+    out.time = whole.report.time;
+    if (out.status != Status::done) return out;
+    whole.run.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
+        const model::TrainSystem<D> system(model.assembly);
+        ExactSolver<model::TrainSystem<D>> solver(system, model::packed_signals<D>({signals.begin(), signals.end()}),
+                                                  interval, system.balanced_scale());
+        Observer<model::TrainSystem<D>> nothing;
+        out.split = solver.begin(0.0, {}, {});
+        if (out.split == Status::done) out.split = solver.advance(at, nothing);
+        if (out.split == Status::done) out.split = solver.inputs_changed();
+        if (out.split == Status::done) out.split = solver.advance(duration, nothing);
+        if (out.split == Status::done) out.gap = difference_at_end(drive, whole, solver.state());
+    });
+    if (out.gap > 1e-10) {
+        const Samples other = run(drive, perturbed(signals), duration, interval);
+        out.amplification = other.report.status == Status::done ? difference_at_end(drive, whole, other.report.x) : 1.0;
+    }
+    return out;
+}
 
 // Rounding, as far as the motion amplifies it.
 inline bool same_beyond_rounding(const Splitting& s) {
     return s.status == Status::done && s.split == Status::done && s.gap <= std::fmax(1e-9, 10.0 * s.amplification);
 }
 
-}  // namespace lostmotion
+}  // namespace lostmotion::test

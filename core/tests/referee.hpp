@@ -8,17 +8,16 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "lostmotion/drive/variables.hpp"
 #include "referee_motion.hpp"
 
-namespace lostmotion::referee {
+namespace lostmotion::test::referee {
 
 struct Case {
-    DriveParts drive;
+    Drive drive;
     Signals signals;
-    std::array<double, n_states> start{};  // M_D, w_M, w, d, phi
-    double duration = 1.0;                 // [s]
-    double sample_interval = 1e-3;         // [s]
+    State start{};                  // M_D, w_M, w, d, phi
+    double duration = 1.0;          // [s]
+    double sample_interval = 1e-3;  // [s]
     std::size_t max_switchings = 100000;
 };
 
@@ -40,10 +39,10 @@ struct Switch {
 struct Result {
     Outcome outcome = Outcome::done;
     std::string details;
-    double time = 0.0;                                  // [s] reached
-    std::array<double, n_states> x{};                   // there
-    std::vector<std::array<double, n_states>> samples;  // at k * sample_interval; right limits
-    std::vector<double> output_torque;                  // T_2 [N m], likewise
+    double time = 0.0;                  // [s] reached
+    State x{};                          // there
+    std::vector<State> samples;         // at k * sample_interval; right limits
+    std::vector<double> output_torque;  // T_2 [N m], likewise
     std::vector<Switch> switchings;
     long steps = 0, combinations_tried = 0;
 };
@@ -105,8 +104,8 @@ class Referee {
     Inputs inputs_at(Quad t) const { return {series(case_.signals[0], t), series(case_.signals[1], t)}; }
 
     void begin() {
-        const auto& x = case_.start;
-        x_ = {x[motor_torque], x[motor_speed], x[load_speed], x[twist], x[load_angle]};
+        const auto [M_D, w_M, w, d, phi] = case_.start;
+        x_ = {M_D, w_M, w, d, phi};
         if (model_.rigid) x_.w = x_.w_M / model_.i;
         T_2_ = model_.spring_torque(x_.d);
     }
@@ -416,4 +415,4 @@ class Referee {
 
 inline Result referee_run(const Case& c) { return Referee(c).run(); }
 
-}  // namespace lostmotion::referee
+}  // namespace lostmotion::test::referee

@@ -7,14 +7,14 @@
 #include "drive_runs.hpp"
 #include "referee.hpp"
 
-namespace lostmotion::referee {
+namespace lostmotion::test::referee {
 
 inline Case case_of(const Drive& drive, const Signals& signals, double duration, double interval,
                     const Start& start = {}) {
     Case c;
-    c.drive = {drive.motor, drive.gearbox, drive.load};
+    c.drive = drive;
     c.signals = signals;
-    std::copy(start.x.begin(), start.x.end(), c.start.begin());
+    c.start = start.x;
     c.duration = duration;
     c.sample_interval = interval;
     return c;
@@ -24,9 +24,8 @@ inline Case case_of(const Drive& drive, const Signals& signals, double duration,
 // run. Speeds of input and load are one quantity seen from two sides and share a unit, as do twist and load angle.
 // value(c, k): component c of the other run at sample k.
 template <class Value>
-std::array<double, n_states> differences(const Drive& drive, const Value& value, std::size_t count,
-                                         const Result& truth) {
-    std::array<double, n_states> gap{}, size{};
+State differences(const Drive& drive, const Value& value, std::size_t count, const Result& truth) {
+    State gap{}, size{};
     count = std::min(count, truth.samples.size());
     for (std::size_t c = 0; c < n_states; ++c)
         for (std::size_t k = 0; k < count; ++k) {
@@ -42,10 +41,9 @@ std::array<double, n_states> differences(const Drive& drive, const Value& value,
     for (std::size_t c = 0; c < n_states; ++c) gap[c] /= std::fmax(size[c], 1e-9 * rated[c]);
     return gap;
 }
-inline std::array<double, n_states> differences(const Drive& drive, const Samples& run, const Result& truth) {
-    constexpr std::array<Channel, n_states> channels{ch_motor_torque, ch_motor_speed, ch_load_speed, ch_twist,
-                                                     ch_load_angle};
-    return differences(drive, [&](std::size_t c, std::size_t k) { return run(channels[c], k); }, run.count, truth);
+inline State differences(const Drive& drive, const Samples& run, const Result& truth) {
+    const auto value = [&](std::size_t c, std::size_t k) { return run(static_cast<Quantity>(c), k); };
+    return differences(drive, value, run.samples, truth);
 }
 // Between two runs of the referee.
 inline double spread(const Drive& drive, const Result& other, const Result& truth) {
@@ -55,7 +53,7 @@ inline double spread(const Drive& drive, const Result& other, const Result& trut
 }
 
 struct Agreement {
-    std::array<double, n_states> gap{};  // M_D, w_M, w, d, phi, relative
+    State gap{};  // M_D, w_M, w, d, phi, relative
     double worst = 0.0;
     Result truth;
 };
@@ -68,9 +66,9 @@ inline bool referee_agrees(const Drive& drive, const Signals& signals, double du
     a.gap = differences(drive, run, a.truth);
     a.worst = *std::max_element(a.gap.begin(), a.gap.end());
     const bool agrees = a.truth.outcome == Outcome::done && run.report.status == Status::done &&
-                        a.truth.samples.size() == run.count && a.worst <= tolerance;
+                        a.truth.samples.size() == run.samples && a.worst <= tolerance;
     if (out) *out = a;
     return agrees;
 }
 
-}  // namespace lostmotion::referee
+}  // namespace lostmotion::test::referee

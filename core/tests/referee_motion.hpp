@@ -5,21 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "lostmotion/parts/load.hpp"
-#include "lostmotion/parts/motor.hpp"
+#include "drive.hpp"
 #include "referee_parts.hpp"
 
-namespace lostmotion::referee {
-
-struct DriveParts {
-    Motor motor;
-    Gearbox gearbox;
-    Load load;
-};
+namespace lostmotion::test::referee {
 
 // The parameters in quadruple precision, and what follows from them.
 struct Model {
-    explicit Model(const DriveParts& p)
+    explicit Model(const Drive& p)
         : is_dc(p.motor.kind == Motor::dc),
           limits_voltage(is_dc && std::isfinite(p.motor.voltage_limit)),
           rigid(p.gearbox.compliance == Gearbox::rigid),
@@ -423,4 +416,4 @@ class MotionBuilder {
     const Model& m_;
 };
 
-}  // namespace lostmotion::referee
+}  // namespace lostmotion::test::referee

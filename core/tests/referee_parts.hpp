@@ -7,7 +7,7 @@
 #include "lostmotion/parts/gearbox.hpp"
 #include "referee_polynomial.hpp"
 
-namespace lostmotion::referee {
+namespace lostmotion::test::referee {
 
 // lower <= x <= upper, where an end that does not exist is `open`.
 struct Range {
@@ -199,4 +199,4 @@ inline Series series(const Signal& signal, Quad t) {
     return c;
 }
 
-}  // namespace lostmotion::referee
+}  // namespace lostmotion::test::referee

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-namespace lostmotion::referee {
+namespace lostmotion::test::referee {
 
 __extension__ typedef __float128 Quad;
 
@@ -173,4 +173,4 @@ class FirstZero {
     Quad tolerance_;
 };
 
-}  // namespace lostmotion::referee
+}  // namespace lostmotion::test::referee

@@ -6,7 +6,7 @@
 
 #include "drive_runs.hpp"
 
-namespace lostmotion {
+namespace lostmotion::test {
 
 class RoundDrives {
  public:
@@ -130,4 +130,4 @@ class RoundDrives {
     std::mt19937_64 random_;
 };
 
-}  // namespace lostmotion
+}  // namespace lostmotion::test

@@ -9,7 +9,7 @@
 #include "referee_compare.hpp"
 #include "round_drives.hpp"
 
-using namespace lostmotion;
+namespace lostmotion::test {
 
 namespace {
 
@@ -23,7 +23,7 @@ struct Tally {
     }
 };
 
-bool jams(const Drive& d) { return d.rigid() && d.min_rigid_inertia() <= 0.0; }
+bool jams(const Drive& d) { return d.jams(); }
 
 // The exact run of a drive against the referee's.
 void adjudicate(Tally& t, const std::string& which, const Drive& drive, const Signals& signals, double duration,
@@ -139,7 +139,11 @@ Tally trains(const char* what, long count, unsigned seed, Check check) {
 
 }  // namespace
 
+}  // namespace lostmotion::test
+
 int main(int argc, char** argv) {
+    using namespace lostmotion;
+    using namespace test;
     const long count = argc > 1 ? std::atol(argv[1]) : 100000;
     const unsigned seed = argc > 2 ? static_cast<unsigned>(std::strtoul(argv[2], nullptr, 10)) : 1;
     std::setvbuf(stdout, nullptr, _IOLBF, 0);

@@ -1,4 +1,4 @@
-// Drives shared by the tests.
+// Signals and drives shared by the tests.
 #pragma once
 
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "lostmotion/simulation/run.hpp"
+#include "drive.hpp"
 
 namespace lostmotion {
 
@@ -21,31 +21,6 @@ inline double share_of_cases() {
 inline int cases(int all) { return static_cast<int>(std::ceil(all * share_of_cases())); }
 // At least nine tenths of what all cases give are to be found in that share.
 inline int share(int of_all) { return static_cast<int>(0.9 * of_all * share_of_cases()); }
-
-// The published drive, with omega_DR = 345.6 rad/s and n_1R = 3630 rpm exactly.
-inline Drive paper_drive(const LossMap& map) {
-    Drive d;
-    d.motor.rotor_inertia = 80e-7;
-    d.motor.friction_torque = 0.016;
-    d.motor.rated_torque = 0.521;
-    d.motor.rated_speed = 345.6;
-    d.motor.electrical_time_constant = 0.1286e-3;
-    d.motor.armature_voltage_constant = 3.1169;
-    d.gearbox.ratio = 90.0;
-    d.gearbox.inertia = 67e-7;
-    d.gearbox.compliance = Gearbox::torsion_curve;
-    d.gearbox.curve = TorsionCurve({0.6e-3, 3e-3}, {2.65e3, 21.2e3, 26.5e3});
-    d.gearbox.hysteresis_efficiency = 0.93;
-    d.gearbox.losses = Gearbox::loss_map;
-    d.gearbox.map = map;
-    d.gearbox.rated_input_speed = 3630.0 * pi / 30.0;
-    d.gearbox.rated_output_torque = 51.6;
-    const double k_20 = 0.65 * 26.5e3, J_MR = 147e-7;
-    d.gearbox.viscous_friction = 2.0 * 0.02 * std::sqrt(k_20 / (90.0 * 90.0 * 0.9 * J_MR)) * J_MR;
-    d.load.inertia = 2.0;
-    d.load.viscous_friction = 2.0 * 0.02 * std::sqrt(k_20 / 2.0) * 2.0;
-    return d;
-}
 
 // m_2B = at_zero + per_speed v + per_load |mu|.
 inline LossMap plane_map(double at_zero, double per_speed, double per_load) {
@@ -70,6 +45,33 @@ inline Signal lines(std::vector<Breakpoint> breakpoints) {
     Signal s;
     s.breakpoints = std::move(breakpoints);
     return s;
+}
+
+namespace test {
+
+// The published drive, with omega_DR = 345.6 rad/s and n_1R = 3630 rpm exactly.
+inline Drive paper_drive(const LossMap& map) {
+    Drive d;
+    d.motor.rotor_inertia = 80e-7;
+    d.motor.friction_torque = 0.016;
+    d.motor.rated_torque = 0.521;
+    d.motor.rated_speed = 345.6;
+    d.motor.electrical_time_constant = 0.1286e-3;
+    d.motor.armature_voltage_constant = 3.1169;
+    d.gearbox.ratio = 90.0;
+    d.gearbox.inertia = 67e-7;
+    d.gearbox.compliance = Gearbox::torsion_curve;
+    d.gearbox.curve = TorsionCurve({0.6e-3, 3e-3}, {2.65e3, 21.2e3, 26.5e3});
+    d.gearbox.hysteresis_efficiency = 0.93;
+    d.gearbox.losses = Gearbox::loss_map;
+    d.gearbox.map = map;
+    d.gearbox.rated_input_speed = 3630.0 * pi / 30.0;
+    d.gearbox.rated_output_torque = 51.6;
+    const double k_20 = 0.65 * 26.5e3, J_MR = 147e-7;
+    d.gearbox.viscous_friction = 2.0 * 0.02 * std::sqrt(k_20 / (90.0 * 90.0 * 0.9 * J_MR)) * J_MR;
+    d.load.inertia = 2.0;
+    d.load.viscous_friction = 2.0 * 0.02 * std::sqrt(k_20 / 2.0) * 2.0;
+    return d;
 }
 
 // A torque source on an input shaft, rigidly or through a curve on a load; no losses, no friction.
@@ -181,4 +183,5 @@ class RandomDrives {
     std::mt19937_64 random_;
 };
 
+}  // namespace test
 }  // namespace lostmotion

@@ -9,14 +9,14 @@
 #include "lostmotion/scenario/simulation.hpp"
 #include "random_trains.hpp"
 
-using namespace lostmotion;
+namespace lostmotion::test {
 
 namespace {
 
 Scenario paper_scenario() {
     Scenario s;
     s.title = "paper";
-    s.drive = paper_drive(plane_map(0.02, 0.04, 0.06));
+    s.train = train_of(paper_drive(plane_map(0.02, 0.04, 0.06)));
     s.inputs = {sine(0.3, 1.0), constant(0.0)};
     s.start.assign(n_states, 0.0);
     s.hysteresis_capacities = {0.0};
@@ -39,7 +39,6 @@ Scenario paper_scenario() {
 Scenario train_scenario(const model::Train& train) {
     const model::Assembly a(train);
     Scenario s;
-    s.form = Scenario::of_train;
     s.train = train;
     for (int i = 0; i < a.layout().inputs; ++i) s.inputs.push_back(constant(0.01 * (i + 1)));
     s.start.assign(static_cast<std::size_t>(a.layout().states), 0.0);
@@ -60,10 +59,10 @@ bool same(const std::vector<double>& a, const std::vector<double>& b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
 }
 
-ScenarioParameter load_inertia(const std::vector<double>& numbers, const Drive& drive) {
-    ScenarioParameter p{"load.inertia", "kg*m^2", drive.load.inertia, {}};
+ScenarioParameter load_inertia(const std::vector<double>& numbers, double inertia) {
+    ScenarioParameter p{"load.inertia", "kg*m^2", inertia, {}};
     for (std::size_t k = ScenarioDescription::head; k < numbers.size(); ++k)
-        if (numbers[k] == drive.load.inertia) {
+        if (numbers[k] == inertia) {
             p.effects = {{static_cast<int>(k - ScenarioDescription::head), Effect::proportional, 0.0, 1.0}};
             break;
         }
@@ -100,23 +99,23 @@ TEST_SUITE("description") {
     }
     TEST_CASE("a parameter changes what it says, and nothing else") {
         Scenario s = paper_scenario();
-        s.drive.load.inertia = 2.125;  // no other number is the same
+        s.train.shafts[1].inertia = 2.125;  // no other number is the same
         const std::vector<double> plain = ScenarioDescription::write(s);
-        ScenarioDescription d(ScenarioDescription::write(s, {load_inertia(plain, s.drive)}));
+        ScenarioDescription d(ScenarioDescription::write(s, {load_inertia(plain, 2.125)}));
         REQUIRE(d.error() == "");
         CHECK(d.set(0, 3.5) == "");
         Scenario changed = s;
-        changed.drive.load.inertia = 3.5;
+        changed.train.shafts[1].inertia = 3.5;
         CHECK(same(ScenarioDescription::write(d.scenario()), ScenarioDescription::write(changed)));
-        CHECK(d.set(0, -1.0) == "parameter load.inertia: drive.load.inertia is -1; it must be finite and > 0");
-        CHECK(d.scenario().drive.load.inertia == 3.5);
+        CHECK(d.set(0, -1.0) == "parameter load.inertia: train.shafts[1].inertia is -1; it must be finite and >= 0");
+        CHECK(d.scenario().train.shafts[1].inertia == 3.5);
         CHECK(d.set(0, 2.125) == "");
         CHECK(same(ScenarioDescription::write(d.scenario()), plain));
     }
     TEST_CASE("a parameter keeps to its range") {
         Scenario s = paper_scenario();
-        s.drive.load.inertia = 2.125;  // no other number is the same
-        ScenarioParameter p = load_inertia(ScenarioDescription::write(s), s.drive);
+        s.train.shafts[1].inertia = 2.125;  // no other number is the same
+        ScenarioParameter p = load_inertia(ScenarioDescription::write(s), 2.125);
         p.range = {1e-3, 0.5, 8.0};
         ScenarioDescription d(ScenarioDescription::write(s, {p}));
         REQUIRE(d.error() == "");
@@ -124,10 +123,10 @@ TEST_SUITE("description") {
         CHECK(d.set(0, 0.4) == "parameter load.inertia: 0.4 must be at least 0.5");
         CHECK(d.set(0, 8.5) == "parameter load.inertia: 8.5 must be at most 8");
         CHECK(d.set(0, std::nan("")) == "parameter load.inertia: it must be finite");
-        CHECK(d.scenario().drive.load.inertia == s.drive.load.inertia);
+        CHECK(d.scenario().train.shafts[1].inertia == 2.125);
         CHECK(d.set(0, 8.0) == "");
         CHECK(d.set(0, 0.5) == "");
-        CHECK(d.scenario().drive.load.inertia == 0.5);
+        CHECK(d.scenario().train.shafts[1].inertia == 0.5);
     }
     TEST_CASE("the checksum is that of ISO 3309") {
         Checksum sum;
@@ -212,3 +211,5 @@ TEST_SUITE("description") {
             if (std::isfinite(b[k])) CHECK(a[k] == doctest::Approx(b[k]).epsilon(1e-9).scale(1e-3));
     }
 }
+
+}  // namespace lostmotion::test

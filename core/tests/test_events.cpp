@@ -6,7 +6,7 @@
 #include "drive_runs.hpp"
 #include "lostmotion/solver/adaptive_solver.hpp"
 
-using namespace lostmotion;
+namespace lostmotion::test {
 using doctest::Approx;
 
 namespace {
@@ -14,7 +14,7 @@ namespace {
 // Counts the torsion-piece switchings of a run.
 int piece_switchings(const Samples& s) {
     int n = 0;
-    for (const Switching& w : s.report.switchings) n += w.kind == Guard::torsion_piece;
+    for (const TrainSwitching& w : s.report.switchings) n += w.kind == model::Guard::edge;
     return n;
 }
 
@@ -32,36 +32,44 @@ Samples swinging(double at, double duration, double interval) {
 
 // A ball that loses half its speed at each bounce: switchings accumulate at a known time.
 struct BouncingBall {
-    using Dims = DriveDims;
-    using Key = RegimeKey;
-    using Regime = lostmotion::Regime;
-    using Guard = lostmotion::Guard;
+    using Dims = model::Widest;
+    using Key = model::Key;
+    using Regime = model::PackedRegime<Dims>;
+    using Guard = model::PackedGuard<Dims>;
+    using Form = LinearFormOf<Dims>;
+    enum { height, speed };  // its states
+    static constexpr int ground = 2;
 
     static int n_twists() { return 0; }
-    static int twist_state(int) { return twist; }
-    static const LinearForm& torque_at_load(const Regime& r) { return r.output_torque; }
+    static int twist_state(int) { return height; }
+    static const Form& torque_at_load(const Regime& r) { return r.output_torque[0]; }
 
-    // Its height is held by the twist, its speed by that of the load.
     double restitution = 0.5;
-    Regime build(const RegimeKey& key) const {
+    Regime build(const Key& key) const {
         Regime r;
         r.key = key;
-        r.rate[twist] = LinearForm::unit(load_speed);
-        r.rate[load_speed] = LinearForm::unit(one, -9.81);
-        r.guards[r.n_guards++] = Guard{LinearForm::unit(twist), Guard::speed, load_contact, 0};
+        r.rate[height] = Form::unit(speed);
+        r.rate[speed] = Form::unit(Dims::one, -9.81);
+        r.guards[r.n_guards++] = Guard{Form::unit(height), Guard::speed, ground};
         return r;
     }
     template <class Cache>
-    Found start(Cache&, Instant&, RegimeKey&) const {
+    Found start(Cache&, InstantOf<Dims>&, Key&) const {
         return Found::yes;
     }
     template <class Cache>
-    Found next(Cache&, Instant& now, const Guard*, RegimeKey&, const std::array<double, n_inputs>&) const {
-        now.x[twist] = 0.0;
-        now.x[load_speed] *= -restitution;
+    Found next(Cache&, InstantOf<Dims>& now, const Guard*, Key&, const InputsOf<Dims>&) const {
+        now.x[height] = 0.0;
+        now.x[speed] *= -restitution;
         return Found::yes;
     }
 };
+
+StateOf<model::Widest> ones() {
+    StateOf<model::Widest> x;
+    x.fill(1.0);
+    return x;
+}
 
 }  // namespace
 
@@ -84,8 +92,8 @@ TEST_SUITE("events") {
     }
     TEST_CASE("grazing changes nothing in the motion") {
         const Samples touching = swinging(1e-3, 1.0, 1e-3), free = swinging(1.0, 1.0, 1e-3);
-        for (std::size_t k = 0; k < free.count; ++k)
-            CHECK(touching(ch_twist, k) == Approx(free(ch_twist, k)).epsilon(1e-10).scale(1e-3));
+        for (std::size_t k = 0; k < free.samples; ++k)
+            CHECK(touching(twist, k) == Approx(free(twist, k)).epsilon(1e-10).scale(1e-3));
     }
     // A locked input, an undamped load on a spring k with hysteresis, a load torque that grows as a t. The twist rate
     // is (a/k)(1 - cos(Omega t)): after each period T it touches zero without changing sign. There (16) sets h anew,
@@ -103,9 +111,10 @@ TEST_SUITE("events") {
                 REQUIRE(s.report.status == Status::done);
                 REQUIRE(s.report.switchings.size() >= 8);
                 for (int n = 1; n <= 4; ++n) {
-                    const Switching &stop = s.report.switchings[2 * n - 2], &go = s.report.switchings[2 * n - 1];
-                    CHECK(stop.after.modes[twist_contact] == 0);
-                    CHECK(stop.before.modes[twist_contact] == go.after.modes[twist_contact]);
+                    const TrainSwitching &stop = s.report.switchings[2 * n - 2], &go = s.report.switchings[2 * n - 1];
+                    const int contact = s.contact(twist_contact);
+                    CHECK(stop.after[contact] == 0);
+                    CHECK(stop.before[contact] == go.after[contact]);
                     // A double zero is located to the root of what one zero is.
                     CHECK(std::fabs(stop.time - (n * T + (n - 1) * stands)) < 1e-5 * T);
                     CHECK(std::fabs(go.time - n * (T + stands)) < 1e-9 * T);
@@ -162,20 +171,20 @@ TEST_SUITE("events") {
     }
     TEST_CASE("accumulating switchings end in a report of time and contact, not in a hang") {
         const BouncingBall ball;
-        const Signals none;
-        ExactSolver<BouncingBall> solver(ball, none, 1e-3, {1, 1, 1, 1, 1});
+        const SignalsOf<model::Widest> none;
+        ExactSolver<BouncingBall> solver(ball, none, 1e-3, ones());
         struct : Observer<BouncingBall> {
             int count = 0;
             bool wants_switching() const override { return true; }
             void switching(const SwitchingOf<BouncingBall>&) override { ++count; }
         } counter;
-        State x{};
-        x[twist] = 1.0;
+        StateOf<model::Widest> x{};
+        x[BouncingBall::height] = 1.0;
         REQUIRE(solver.begin(0.0, x, {}) == Status::done);
         CHECK(solver.advance(10.0, counter) == Status::zeno);
         const double fall = std::sqrt(2.0 / 9.81);
         CHECK(solver.time() == Approx(fall * (1.0 + 2.0 * 0.5 / (1.0 - 0.5))).epsilon(1e-12));
-        CHECK(solver.stopped_at() == load_contact);
+        CHECK(solver.stopped_at() == BouncingBall::ground);
         CHECK(counter.count < 500);
     }
     TEST_CASE("one hour at 1 Hz keeps its phase") {
@@ -189,21 +198,24 @@ TEST_SUITE("events") {
     }
     TEST_CASE("the adaptive solver takes a nonlinear remainder: a pendulum under gravity") {
         // J w' = -m g l sin(phi), small friction none: period 4 K(sin(a/2)) / omega_0.
+        using System = model::TrainSystem<model::Widest>;
+        constexpr int load_angle = model::Widest::coupled;
         Drive d = plain_drive(1.0, 1e-3, 1.0);
         struct Gravity {
-            void operator()(double, const State& x, State& rate) const {
+            void operator()(double, const System::State& x, System::State& rate) const {
                 const double a = -25.0 * std::sin(x[load_angle]) / 1.001;
                 rate[load_speed] += a;
                 rate[motor_speed] += a;
             }
         };
-        const SwitchedDrive system(d);
-        const Signals none;
-        AdaptiveSolver<SwitchedDrive, Gravity> solver(system, none, 1e-11, {1, 1, 1, 1, 1});
-        State x{};
+        const model::Assembly assembly(train_of(d));
+        const System system(assembly);
+        const SignalsOf<model::Widest> none;
+        AdaptiveSolver<System, Gravity> solver(system, none, 1e-11, ones());
+        System::State x{};
         x[load_angle] = 1.0;
         REQUIRE(solver.begin(0.0, x, {}) == Status::done);
-        Observer<SwitchedDrive> nothing;
+        Observer<System> nothing;
         const double period = 4.0 * std::comp_ellint_1(std::sin(0.5)) / std::sqrt(25.0 / 1.001);
         REQUIRE(solver.advance(period, nothing) == Status::done);
         CHECK(solver.state()[load_angle] == Approx(1.0).epsilon(1e-8));
@@ -211,8 +223,11 @@ TEST_SUITE("events") {
         // A pendulum that 100 N m of friction holds against 25 N m of gravity must not gain speed.
         Drive held = d;
         held.load.friction_torque = 100.0;
-        const SwitchedDrive held_system(held);
-        AdaptiveSolver<SwitchedDrive, Gravity> refusing(held_system, none, 1e-11, {1, 1, 1, 1, 1});
+        const model::Assembly held_assembly(train_of(held));
+        const System held_system(held_assembly);
+        AdaptiveSolver<System, Gravity> refusing(held_system, none, 1e-11, ones());
         CHECK(refusing.begin(0.0, x, {}) == Status::unseen);
     }
 }
+
+}  // namespace lostmotion::test

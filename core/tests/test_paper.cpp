@@ -3,7 +3,7 @@
 
 #include "drive_runs.hpp"
 
-using namespace lostmotion;
+namespace lostmotion::test {
 
 namespace {
 
@@ -17,7 +17,7 @@ constexpr EndState large{1.0275, 0.700518217, -114.514141, -1.28593174, 2.291877
 constexpr EndState small{0.025,   -6.296271e-5, 0.0,   6.2675017e-3, -1.83029358e-4, -5.9571e-5,
                          5.0e-12, 1e-300,       5e-11, 6e-13,        5e-10};
 
-void check(const EndState& expected, const State& x, double slack) {
+void check(const EndState& expected, const std::vector<double>& x, double slack) {
     CHECK(std::fabs(x[motor_torque] / 0.521 - expected.m_D) <= slack * expected.m_D_digit);
     CHECK(std::fabs(x[motor_speed] - expected.w_M) <= slack * expected.w_M_digit);
     CHECK(std::fabs(x[load_speed] - expected.w) <= slack * expected.w_digit);
@@ -50,13 +50,13 @@ TEST_SUITE("paper") {
         const Drive drive = paper_drive(plane_map(0.02, 0.04, 0.06));
         const Signals signals{sine(1.0275, 1.0), Signal{}};
         const Samples fine = run(drive, signals, 2.0, 1e-4), coarse = run(drive, signals, 2.0, 0.05);
-        for (std::size_t k = 0; k < coarse.count; ++k)
-            for (int c = 0; c < n_channels; ++c) {
-                const auto channel = static_cast<Channel>(c);
+        for (std::size_t k = 0; k < coarse.samples; ++k)
+            for (const TrainChannel& c : fine.run.channels())
                 // 1e-11 of the size: some hundred switchings, each located to rounding, lie between.
-                CHECK(
-                    fine(channel, 500 * k) ==
-                    doctest::Approx(coarse(channel, k)).epsilon(1e-11).scale(channel == ch_motor_speed ? 300.0 : 1.0));
-            }
+                CHECK(fine.channel(c.name)[500 * k] == doctest::Approx(coarse.channel(c.name)[k])
+                                                           .epsilon(1e-11)
+                                                           .scale(c.name == quantity_names[motor_speed] ? 300.0 : 1.0));
     }
 }
+
+}  // namespace lostmotion::test

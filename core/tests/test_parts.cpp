@@ -7,40 +7,66 @@
 #include "lostmotion/analysis/reduction.hpp"
 #include "lostmotion/solver/adaptive_solver.hpp"
 
-using namespace lostmotion;
+namespace lostmotion::test {
 using doctest::Approx;
 
 namespace {
 
 using Long = long double;
-using LongMatrix = std::array<std::array<Long, n_states>, n_states>;  // [row][column]
+template <std::size_t n>
+using LongMatrix = std::array<std::array<Long, n>, n>;  // [row][column]
 
 // exp(A t) by a plain Taylor series of many short steps in extended precision.
-LongMatrix reference_exponential(const Regime& r, Long t) {
+template <class Form, std::size_t n>
+LongMatrix<n> reference_exponential(const std::array<Form, n>& rate, Long t) {
+    using Matrix = LongMatrix<n>;
     constexpr int steps = 1 << 14;
     const Long h = t / steps;
-    LongMatrix step{}, term{};
-    for (int i = 0; i < n_states; ++i) step[i][i] = term[i][i] = 1.0L;
-    const auto multiply = [](const LongMatrix& a, const LongMatrix& b) {
-        LongMatrix c{};
-        for (int i = 0; i < n_states; ++i)
-            for (int k = 0; k < n_states; ++k)
-                for (int j = 0; j < n_states; ++j) c[i][j] += a[i][k] * b[k][j];
+    Matrix step{}, term{};
+    for (std::size_t i = 0; i < n; ++i) step[i][i] = term[i][i] = 1.0L;
+    const auto multiply = [](const Matrix& a, const Matrix& b) {
+        Matrix c{};
+        for (std::size_t i = 0; i < n; ++i)
+            for (std::size_t k = 0; k < n; ++k)
+                for (std::size_t j = 0; j < n; ++j) c[i][j] += a[i][k] * b[k][j];
         return c;
     };
-    LongMatrix A{};
-    for (int i = 0; i < n_states; ++i)
-        for (int j = 0; j < n_states; ++j) A[i][j] = r.rate[i].c[j] * h;
+    Matrix A{};
+    for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = 0; j < n; ++j) A[i][j] = rate[i].c[j] * h;
     for (int k = 1; k < 30; ++k) {
         term = multiply(term, A);
         for (auto& row : term)
             for (Long& v : row) v /= k;
-        for (int i = 0; i < n_states; ++i)
-            for (int j = 0; j < n_states; ++j) step[i][j] += term[i][j];
+        for (std::size_t i = 0; i < n; ++i)
+            for (std::size_t j = 0; j < n; ++j) step[i][j] += term[i][j];
     }
-    LongMatrix power = step;
+    Matrix power = step;
     for (int k = 0; k < 14; ++k) power = multiply(power, power);
     return power;
+}
+
+// use(propagator of a regime of a drive, its rates, sizes of the states) in the kernel of the drive. slipping: of all
+// contacts; else the regime at rest.
+template <class Use>
+void with_propagator(const Drive& drive, bool slipping, const Use& use) {
+    const TrainRun run(train_of(drive));
+    run.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
+        const model::TrainSystem<D> system(model.assembly);
+        RegimeCache<model::TrainSystem<D>> cache(system);
+        InstantOf<D> now;
+        model::Key key;
+        REQUIRE(system.start(cache, now, key) == Found::yes);
+        const auto& contacts = model.assembly.places().contacts;
+        for (std::size_t c = 0; slipping && c < contacts.size(); ++c)
+            if (key.modes[c] == 0 && !contacts[c].bilateral) key.modes[c] = 1;
+        const auto regime = system.build(key);
+        Propagator<D> p;
+        PhaseRotations turns(1e-3, input_basis(SignalsOf<D>{}));
+        const LinearRatesOf<D> rates(regime.rate);
+        p.prepare(rates, turns, system.balanced_scale());
+        use(p, rates, regime.rate, system.balanced_scale());
+    });
 }
 
 }  // namespace
@@ -117,55 +143,38 @@ TEST_SUITE("parts") {
     TEST_CASE("propagation agrees with an exponential in extended precision, over nine decades of time") {
         RandomDrives random(3);
         for (int n = 0; n < 12; ++n) {
-            const Drive drive = random.drive();
-            const SwitchedDrive system(drive);
-            RegimeCache<SwitchedDrive> cache(system);
-            Instant now;
-            RegimeKey key;
-            REQUIRE(system.start(cache, now, key) == Found::yes);
-            for (int c = 0; c < n_contacts; ++c)
-                if (key.modes[c] == 0 && !(c == twist_contact && drive.rigid())) key.modes[c] = 1;
-            const Regime r = drive.build(key);
-            Propagator<DriveDims> p;
-            PhaseRotations turns(1e-3, input_basis(Signals{}));
-            const LinearRates rates(r.rate);
-            p.prepare(rates, turns, drive.balanced_scale());
-            const State scale = drive.balanced_scale();
-            for (int level = 0; p.length(level) < 1.0; level += 2) {
-                const auto& step = p.level(level);
-                const LongMatrix expected = reference_exponential(r, p.length(level));
-                for (int i = 0; i < n_states; ++i)
-                    for (int j = 0; j < n_states; ++j) {
-                        const double e = static_cast<double>(expected[i][j]) - (i == j ? 1.0 : 0.0);
-                        // In balanced units; doubling adds about one rounding a doubling level.
-                        const double change = j == load_angle ? 0.0
-                                              : i == load_angle
-                                                  ? rates.angle_coefficient[0] * step.integral.coupled(load_speed, j)
-                                                  : step.change(i, j);
-                        CHECK(std::fabs(change - e) * scale[j] / scale[i] < 1e-10);
-                    }
-            }
+            const auto compare = [&]<class D>(Propagator<D>& p, const LinearRatesOf<D>& rates, const auto& rate,
+                                              const StateOf<D>& scale) {
+                for (int level = 0; p.length(level) < 1.0; level += 2) {
+                    const auto& step = p.level(level);
+                    const auto expected = reference_exponential(rate, p.length(level));
+                    for (int i = 0; i < D::states; ++i)
+                        for (int j = 0; j < D::states; ++j) {
+                            const double e = static_cast<double>(expected[i][j]) - (i == j ? 1.0 : 0.0);
+                            // In balanced units; doubling adds about one rounding a doubling level.
+                            const double change = j >= D::coupled   ? 0.0
+                                                  : i >= D::coupled ? rates.angle_coefficient[i - D::coupled] *
+                                                                          step.integral.coupled(load_speed, j)
+                                                                    : step.change(i, j);
+                            CHECK(std::fabs(change - e) * scale[j] / scale[i] < 1e-10);
+                        }
+                }
+            };
+            with_propagator(random.drive(), true, compare);
         }
     }
     TEST_CASE("a guard's exponential_bound bound really bounds the exponential") {
         RandomDrives random(4);
         for (int n = 0; n < 20; ++n) {
-            const Drive drive = random.drive();
-            const SwitchedDrive system(drive);
-            RegimeCache<SwitchedDrive> cache(system);
-            Instant now;
-            RegimeKey key;
-            REQUIRE(system.start(cache, now, key) == Found::yes);
-            Propagator<DriveDims> p;
-            PhaseRotations turns(1e-3, input_basis(Signals{}));
-            const LinearRates rates(drive.build(key).rate);
-            p.prepare(rates, turns, drive.balanced_scale());
-            for (int level = 3; level < 9; ++level)
-                for (int inner = 0; inner <= level; ++inner)
-                    for (int j = 0; j < n_coupled; ++j)
-                        for (int i = 0; i < n_coupled; ++i)
-                            CHECK(std::fabs(p.level(inner).change(i, j) + (i == j ? 1.0 : 0.0)) <=
-                                  p.level(level).exponential_bound(i, j) * (1.0 + 1e-9) + 1e-300);
+            with_propagator(random.drive(), false,
+                            []<class D>(Propagator<D>& p, const auto&, const auto&, const auto&) {
+                                for (int level = 3; level < 9; ++level)
+                                    for (int inner = 0; inner <= level; ++inner)
+                                        for (int j = 0; j < D::coupled; ++j)
+                                            for (int i = 0; i < D::coupled; ++i)
+                                                CHECK(std::fabs(p.level(inner).change(i, j) + (i == j ? 1.0 : 0.0)) <=
+                                                      p.level(level).exponential_bound(i, j) * (1.0 + 1e-9) + 1e-300);
+                            });
         }
     }
     TEST_CASE("reductions are what they are called, for any number of samples") {
@@ -230,3 +239,5 @@ TEST_SUITE("parts") {
         }
     }
 }
+
+}  // namespace lostmotion::test

@@ -1,82 +1,19 @@
-// The equations that the elements of a train compose, against the classic drive's and closed forms.
+// Names, checks and packed regimes of trains.
 #include <doctest/doctest.h>
 
+#include "drive_runs.hpp"
 #include "lostmotion/model/check.hpp"
 #include "lostmotion/model/names.hpp"
 #include "lostmotion/model/pack.hpp"
 #include "lostmotion/simulation/train_status.hpp"
 #include "random_trains.hpp"
-#include "round_drives.hpp"
-#include "train_twins.hpp"
 
 TEST_SUITE_BEGIN("train");
 
 namespace lostmotion::model {
-namespace {
-
-// All combinations of modes, with pieces and cells drawn at random.
-template <class Random>
-int compare_all(const Drive& d, Random& random) {
-    const Twins twins(d);
-    const auto pick = [&random](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
-    int compared = 0;
-    std::array<std::vector<std::int8_t>, 3> modes;
-    for (int c = 0; c < 3; ++c) {
-        const auto contact = static_cast<Contact>(c);
-        if (!d.has(contact))
-            modes[c] = {absent};
-        else if (contact == twist_contact && d.rigid())
-            modes[c] = {0};
-        else
-            modes[c] = {0, 1, -1};
-    }
-    for (const auto a : modes[0])
-        for (const auto b : modes[1])
-            for (const auto c : modes[2]) {
-                RegimeKey k;
-                k.modes = {a, b, c};
-                if (d.motor.limits_voltage()) k.amplifier = static_cast<std::int8_t>(pick(-1, 1));
-                if (!d.rigid()) {
-                    const int n = d.gearbox.curve.outermost_piece();
-                    k.piece = static_cast<std::int16_t>(pick(-n, n));
-                }
-                if (d.gearbox.losses == Gearbox::loss_map) {
-                    const LossMap& map = d.gearbox.map;
-                    k.cell = a == 0 ? pick(0, map.load_intervals() - 1) : pick(0, map.triangles() - 1);
-                    k.cell_back = a == 0 ? pick(0, map.load_intervals() - 1) : 0;
-                }
-                compared += twins.compare(k);
-            }
-    return compared;
-}
-
-}  // namespace
-
-TEST_CASE("the classic drive as a train has the same equations and guards, to the last bit") {
-    std::mt19937_64 random(1);
-    RandomDrives drives(2);
-    RoundDrives round(3);
-    int compared = 0;
-    for (int n = 0; n < cases(300); ++n) compared += compare_all(drives.drive(), random);
-    for (int n = 0; n < cases(300); ++n) compared += compare_all(round.next(1.0).drive, random);
-    CHECK(compared > share(3000));
-}
-
-TEST_CASE("the classic drive as a train has the same natural sizes, to the last bit") {
-    RandomDrives drives(4);
-    for (int n = 0; n < cases(200); ++n) {
-        const Drive d = drives.drive();
-        const Assembly a(train_of(d));
-        std::array<double, 5> balanced{}, rated{};
-        balanced_scale(a, balanced, a.layout().coupled);
-        rated_scale(a, rated);
-        for (int k = 0; k < 5; ++k) CHECK(balanced[static_cast<std::size_t>(k)] == d.balanced_scale()[k]);
-        for (int k = 0; k < 4; ++k) CHECK(rated[static_cast<std::size_t>(k)] == d.rated_scale()[k]);
-    }
-}
 
 TEST_CASE("states, inputs and contacts of a train have names") {
-    Drive d = plain_drive(2.0, 1.0, 1.0);
+    test::Drive d = test::plain_drive(2.0, 1.0, 1.0);
     d.motor.friction_torque = 0.1;
     const Assembly a(train_of(d));
     CHECK(state_names(a) ==
@@ -86,8 +23,31 @@ TEST_CASE("states, inputs and contacts of a train have names") {
     CHECK(contact_name(a, 1) == "gearbox_twist_contact");
 }
 
+TEST_CASE("all quantities and energies of a drive have the names that the tests use, its states in their order") {
+    test::Drive d = test::paper_drive(plane_map(0.02, 0.04, 0.06));
+    d.load.friction_torque = 0.1;
+    const lostmotion::TrainRun run(train_of(d));
+    const auto& names = test::quantity_names;
+    for (int q = 0; q < test::n_quantities; ++q)
+        CHECK(run.channels()[test::channel_number(run.channels(), static_cast<test::Quantity>(q))].name == names[q]);
+    CHECK(state_names(run.assembly()) == std::vector<std::string>(names.begin(), names.begin() + test::n_states));
+    const std::vector<PowerFlow> flows = all_flows(run.assembly());
+    REQUIRE(flows.size() == test::flows.size());
+    for (std::size_t k = 0; k < flows.size(); ++k) CHECK(flows[k].name == test::flows[k]);
+}
+
+TEST_CASE("the rated sizes of the states of a drive are those of its data") {
+    test::RandomDrives drives(4);
+    for (int n = 0; n < cases(200); ++n) {
+        const test::Drive d = drives.drive();
+        test::State rated{};
+        rated_scale(Assembly(train_of(d)), rated);
+        for (int k = 0; k < test::n_coupled; ++k) CHECK(rated[k] == d.rated_scale()[k]);
+    }
+}
+
 TEST_CASE("an accumulation of switchings is reported with its contact or law, if either is known") {
-    const Assembly a(train_of(plain_drive(2.0, 1.0, 1.0)));
+    const Assembly a(test::train_of(test::paper_drive(plane_map(0.02, 0.04, 0.06))));
     const auto names = branch_names(a);
     REQUIRE(!names.empty());
     const auto text = [&a](int subject) { return train_status_text(a, Status::zeno, 0.5, subject, false); };

@@ -1,119 +1,16 @@
-// Which regime of a train follows at an event: against the classic drive's search, and against all combinations.
+// Which regime of a train follows at an event: by independent principles, and against all combinations.
 #include <doctest/doctest.h>
 
 #include "gauss_principle.hpp"
 #include "lostmotion/model/check.hpp"
-#include "properties.hpp"
 #include "random_trains.hpp"
 #include "referee_polynomial.hpp"
-#include "round_drives.hpp"
 #include "train_run.hpp"
-#include "train_twins.hpp"
 
 TEST_SUITE_BEGIN("train_modes");
 
 namespace lostmotion::model {
 namespace {
-
-// The classic drive, with the train's search run beside its own at every event.
-struct Shadowed {
-    using Dims = DriveDims;
-    using Key = RegimeKey;
-    using Regime = lostmotion::Regime;
-    using Guard = lostmotion::Guard;
-
-    explicit Shadowed(const Drive& d) : drive(d), classic(drive), twins(d), train(twins.assembly), cache_(train) {}
-
-    lostmotion::Regime build(const RegimeKey& key) const { return classic.build(key); }
-    static int n_twists() { return SwitchedDrive::n_twists(); }
-    static int twist_state(int t) { return SwitchedDrive::twist_state(t); }
-    static const LinearForm& torque_at_load(const Regime& r) { return SwitchedDrive::torque_at_load(r); }
-    void near_event(const GuardTable& g, GuardTable::Values& out) const { classic.near_event(g, out); }
-    void stop(State& x, std::array<bool, n_contacts>& at_rest) const { classic.stop(x, at_rest); }
-
-    template <class Cache>
-    lostmotion::Found start(Cache& cache, lostmotion::Instant& now, RegimeKey& key) const {
-        Instant mine = instant(now);
-        model::Key my_key;
-        const Found found = train.start(cache_, mine, my_key);
-        const lostmotion::Found expected = classic.start(cache, now, key);
-        compare(expected, now, key, found, mine, my_key, "start");
-        return expected;
-    }
-    template <class Cache>
-    lostmotion::Found next(Cache& cache, lostmotion::Instant& now, const lostmotion::Guard* fired, RegimeKey& key,
-                           const std::array<double, n_inputs>& input) const {
-        Instant mine = instant(now);
-        model::Key my_key = twins.key(key);
-        const model::Guard* my_guard = nullptr;
-        if (fired != nullptr)
-            my_guard = &cache_.regime(my_key).guards[static_cast<std::size_t>(fired - cache.regime(key).guards.data())];
-        const Found found = train.next(cache_, mine, my_guard, my_key, left(mine, input));
-        const lostmotion::Found expected = classic.next(cache, now, fired, key, input);
-        compare(expected, now, key, found, mine, my_key, fired == nullptr ? "input" : "guard");
-        return expected;
-    }
-
-    Instant instant(const lostmotion::Instant& now) const {
-        Instant out;
-        out.time = now.time;
-        for (int k = 0; k < lostmotion::n_states; ++k) out.x[twins.term[k]] = now.x[k];
-        set(out, hysteresis_capacity, now.memory.hysteresis_capacity);
-        set(out, locked_torque, now.memory.locked_torque);
-        for (int k = 0; k < lostmotion::n_derivatives; ++k)
-            for (int i = 0; i < lostmotion::n_inputs; ++i) out.input[k][i] = now.input[k][i];
-        for (int i = 0; i < lostmotion::n_inputs; ++i) out.input_magnitudes[i] = now.input_magnitudes[i];
-        return out;
-    }
-    static std::array<double, max_inputs> left(const Instant& now, const std::array<double, n_inputs>& input) {
-        auto out = now.input[0];
-        std::copy(input.begin(), input.end(), out.begin());
-        return out;
-    }
-    void set(Instant& out, Term term, double value) const {
-        if (twins.term[term] != nowhere)
-            out.memory[static_cast<std::size_t>(twins.term[term] - train.sizes().first_memory)] = value;
-    }
-    void compare(lostmotion::Found expected, const lostmotion::Instant& now, const RegimeKey& key, Found found,
-                 const Instant& mine, const model::Key& my_key, const char* what) const {
-        ++events;
-        CAPTURE(what);
-        CAPTURE(now.time);
-        CHECK(static_cast<int>(expected) == static_cast<int>(found));
-        if (expected != lostmotion::Found::yes || found != Found::yes) return;
-        const model::Key expected_key = twins.key(key);
-        bool same = expected_key.modes == my_key.modes;
-        for (int b = 0; b < train.assembly().layout().branches; ++b)
-            same = same && (expected_key.branch[b] == my_key.branch[b]);
-        differing += !same;
-        const Instant after = instant(now);
-        if (same) CHECK(after.x == mine.x);
-        if (same && twins.term[hysteresis_capacity] != nowhere) CHECK(after.memory[0] == mine.memory[0]);
-        if (same && twins.term[locked_torque] != nowhere) {
-            const auto m = static_cast<std::size_t>(twins.term[locked_torque] - train.sizes().first_memory);
-            if (key.modes == Modes{0, 0, 0}) CHECK(after.memory[m] == mine.memory[m]);
-        }
-    }
-
-    Drive drive;
-    SwitchedDrive classic;
-    Twins twins;
-    SwitchedTrain<> train;
-    mutable MapCache cache_;
-    mutable long events = 0, differing = 0;
-};
-
-struct Count {
-    long events = 0, differing = 0;
-    void run(const Drive& d, const Signals& signals, const Start& start, double duration) {
-        const Shadowed system(d);
-        ExactSolver<Shadowed> solver(system, signals, 1e-3, d.balanced_scale());
-        Observer<Shadowed> nothing;
-        if (solver.begin(0.0, start.x, start.memory) == Status::done) solver.advance(duration, nothing);
-        events += system.events;
-        differing += system.differing;
-    }
-};
 
 Train row_of_shafts(const std::vector<double>& inertia, const std::vector<double>& friction) {
     Train t;
@@ -128,7 +25,7 @@ Train row_of_shafts(const std::vector<double>& inertia, const std::vector<double
 // Accelerations of shafts that rigid gears tie together, from all balances and ties at once in four times the digits:
 // full pivoting, no division by an inertia.
 std::vector<double> tied_accelerations(const Train& t, const std::vector<double>& torque) {
-    using referee::Quad;
+    using test::referee::Quad;
     const std::size_t shafts = t.shafts.size(), n = shafts + t.gears.size();
     std::vector<std::vector<Quad>> A(n, std::vector<Quad>(n + 1));
     for (std::size_t s = 0; s < shafts; ++s) {
@@ -153,7 +50,8 @@ std::vector<double> tied_accelerations(const Train& t, const std::vector<double>
         std::size_t row = k, at = k;
         for (std::size_t r = k; r < n; ++r)
             for (std::size_t c = k; c < n; ++c)
-                if (referee::magnitude(A[r][column[c]]) > referee::magnitude(A[row][column[at]])) row = r, at = c;
+                if (test::referee::magnitude(A[r][column[c]]) > test::referee::magnitude(A[row][column[at]]))
+                    row = r, at = c;
         std::swap(A[k], A[row]);
         std::swap(column[k], column[at]);
         for (std::size_t r = 0; r < n; ++r) {
@@ -208,27 +106,6 @@ TEST_CASE("light shafts that rigid gears tie to heavy ones lose no digits, down 
         ++compared;
     }
     CHECK(compared > share(1000));
-}
-
-TEST_CASE("at every event of random classic drives the train's search finds what the drive's does") {
-    Count count;
-    RandomDrives random(11);
-    for (int n = 0; n < cases(150); ++n) {
-        const Drive d = random.drive();
-        count.run(d, random.signals(d, 0.5), {}, 0.5);
-    }
-    RoundDrives round(12);
-    for (int n = 0; n < cases(300); ++n) {
-        const RoundDrives::Run r = round.next(2.0);
-        count.run(r.drive, r.signals, r.start, 2.0);
-    }
-    SelfLockingDrives locking(13, true);
-    for (int n = 0; n < 60; ++n) {
-        const Drive d = locking.drive();
-        count.run(d, locking.reversing(d), {}, 0.5);
-    }
-    CHECK(count.events > share(5000));
-    CHECK(count.differing == 0);
 }
 
 TEST_CASE("accelerations of random trains are those of the principle of least constraint") {

@@ -3,7 +3,6 @@
 
 #include <cstdio>
 
-#include "lostmotion/analysis/drive_response.hpp"
 #include "lostmotion/analysis/train_response.hpp"
 #include "lostmotion/model/check.hpp"
 #include "random_trains.hpp"

@@ -1,40 +1,11 @@
-// Whole runs of trains: the exact solver against the drive's, the adaptive solver and the ledger.
+// Whole runs of trains: the exact solver against the adaptive one and closed forms, and the ledger.
 #include <doctest/doctest.h>
 
-#include "drive_runs.hpp"
 #include "random_train_runs.hpp"
 
 TEST_SUITE_BEGIN("train_runs");
 
 namespace lostmotion::model {
-
-TEST_CASE("the classic drive as a train has the same samples, to the last bit") {
-    RandomDrives random(31);
-    int compared = 0;
-    for (int n = 0; n < cases(200); ++n) {
-        const Drive d = random.drive();
-        const Signals signals = random.signals(d, 0.3);
-        const Samples classic = lostmotion::run(d, signals, 0.3);
-        if (classic.report.status != Status::done) continue;
-        const Recorded train(train_of(d), {signals[0], signals[1]}, 0.3, 1e-3);
-        REQUIRE(train.samples == classic.count);
-        CAPTURE(n);
-        REQUIRE(train.report.status == Status::done);
-        ++compared;
-        const auto same = [&](Channel classic_channel, const char* name) {
-            const double *a = &classic.data[classic_channel * classic.count], *b = train.channel(name);
-            CAPTURE(name);
-            CHECK(std::equal(a, a + classic.count, b));
-        };
-        same(ch_motor_speed, "motor_speed");
-        same(ch_load_speed, "load_speed");
-        same(ch_load_angle, "load_angle");
-        same(ch_output_torque, "gearbox_output_torque");
-        same(ch_motor_torque, "motor_torque");
-        if (!d.rigid()) same(ch_twist, "gearbox_twist");
-    }
-    CHECK(compared > share(150));
-}
 
 TEST_CASE("solvers agree and the laws that every run obeys hold on random trains with dampers") {
     RandomTrains random(35, false, true);

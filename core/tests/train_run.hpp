@@ -186,15 +186,17 @@ class TrainRun {
                                     0.906179845938663993},
                          weight[5] = {0.236926885056189088, 0.478628670499366468, 0.568888888888888889,
                                       0.478628670499366468, 0.236926885056189088};
-        const std::vector<PowerFlow> flows = power_flows(assembly, r);
+        const std::vector<NumberedPower> flows = power_flows(assembly, r);
+        const std::vector<PowerFlow> all = all_flows(assembly);
         for (int k = 0; k < 5; ++k) {
             const Instant x = at(0.5 * h * (1.0 + node[k]));
-            for (const PowerFlow& f : flows) {
+            for (const NumberedPower& f : flows) {
+                const PowerFlow::Kind kind = all[static_cast<std::size_t>(f.flow)].kind;
                 const double E =
                     0.5 * h * weight[k] * evaluate(layout(), f.power.torque, x) * evaluate(layout(), f.power.speed, x);
-                gained += f.kind == PowerFlow::source ? E : -E;
+                gained += kind == PowerFlow::source ? E : -E;
                 turned_over += std::fabs(E);
-                if (f.kind == PowerFlow::loss) least_loss = std::min(least_loss, E);
+                if (kind == PowerFlow::loss) least_loss = std::min(least_loss, E);
             }
         }
     }

@@ -135,7 +135,6 @@ if TYPE_CHECKING:
     from .simulation.explanation import ContactState as ContactState
     from .simulation.explanation import Explanation as Explanation
     from .simulation.explanation import MotorState as MotorState
-    from .simulation.explanation import TrainExplanation as TrainExplanation
     from .simulation.explanation import explain as explain
     from .simulation.result_files import open_result as open_result
     from .simulation.result_files import save as save
@@ -230,7 +229,7 @@ _HOMES = {
     "response.harmonic": ("frequency_response", "to_control"),
     "response.linear": ("LinearModel", "RigidConstants", "linearize", "rigid_constants"),
     "response.shooting": ("periodic_motion", "periodic_motions"),
-    "simulation.explanation": ("ContactState", "Explanation", "MotorState", "TrainExplanation", "explain"),
+    "simulation.explanation": ("ContactState", "Explanation", "MotorState", "explain"),
     "simulation.result_files": ("open_result", "save"),
     "simulation.results": ("energy_of", "scenario_of"),
     "simulation.run": ("simulate",),

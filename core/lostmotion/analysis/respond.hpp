@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "../simulation/train_run.hpp"
-#include "../simulation/workspace.hpp"
 
 namespace lostmotion {
 
@@ -47,8 +46,6 @@ struct ResponseTable {
 using Waiting = std::function<bool(std::size_t)>;
 
 // Compiled once for each kernel, by core/kernels.
-ResponseTable respond_drive(WorkspacePool& drive, const std::vector<ResponseRequest>& points, const ResponseSpec& spec,
-                            unsigned threads, const Waiting& waiting);
 template <class D>
 ResponseTable respond_train_in(const typename TrainReader<D>::Model& model, const std::vector<ResponseRequest>& points,
                                const ResponseSpec& spec, unsigned threads, const Waiting& waiting);

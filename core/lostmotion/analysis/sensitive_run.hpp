@@ -37,7 +37,7 @@ struct SensitiveRow {
     std::string problem, error;                             // of what is asked for, of the motion, or empty
     std::unique_ptr<double[]> values, derivatives;          // channels x samples; parameters x channels x samples
     std::unique_ptr<double[]> signals, signal_derivatives;  // of the controllers: (axes x signals) x samples, as above
-    Named end_state;                                        // of a run that has ended well
+    NamedInOrder end_state;                                 // of a run that has ended well
     double ends_at = std::numeric_limits<double>::infinity();  // [s] from where the derivatives do not exist, and why
     std::string ends_by;
 };

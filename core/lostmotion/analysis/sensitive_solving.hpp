@@ -17,7 +17,7 @@ std::string check_derivatives(const Control& control, const std::vector<Variatio
 template <class D>
 class SensitiveRuns {
  public:
-    explicit SensitiveRuns(const typename TrainReader<D>::Model& model) : model_(model), workspace_(model.assembly) {}
+    explicit SensitiveRuns(const typename TrainReader<D>::Model& model) : model_(model) {}
 
     // out: values, as TrainRun::run; output: derivatives of the same channels and instants.
     // The error of the variations in the message of the report.
@@ -25,7 +25,7 @@ class SensitiveRuns {
                            SensitivityOutput& output) {
         const auto [x, memory] = c.run->in_layout(c.start);
         if (c.variations.empty())
-            return run_train_exactly_in<D>(model_, c.inputs, x, memory, options, out, nullptr, &workspace_);
+            return run_train_exactly_in<D>(model_, c.inputs, x, memory, options, out, nullptr, workspace_);
         TrainReport failed;
         const auto trains = std::make_shared<const VariedTrain>(*c.run, c.variations);
         const auto tangents = std::make_shared<const InputTangents>(c.run->assembly().layout(), c.inputs, c.variations);
@@ -37,12 +37,12 @@ class SensitiveRuns {
         if (!regimes_ || !regimes_->serve(*trains, *tangents, output.channels))
             regimes_.emplace(trains, tangents, output.channels);
         TrainSensitivity<D> watcher(*trains, *tangents, *regimes_, c.variations, c.start, options.control, output);
-        return run_train_exactly_in<D>(model_, c.inputs, x, memory, options, out, &watcher, &workspace_);
+        return run_train_exactly_in<D>(model_, c.inputs, x, memory, options, out, &watcher, workspace_);
     }
 
  private:
     const typename TrainReader<D>::Model& model_;
-    TrainWorkspace<D> workspace_;
+    std::unique_ptr<AnyWorkspace> workspace_;
     std::optional<RegimeTangents> regimes_;
 };
 

@@ -87,11 +87,14 @@ class TickTangent {
     template <class D>
     static model::Row unpacked(const LinearFormOf<D>& f, const model::Layout& n) {
         model::Row out;
-        std::copy_n(f.c.begin(), n.coupled, out.c.begin());
-        std::copy_n(f.c.begin() + D::coupled, n.angles, out.c.begin() + n.coupled);
-        out.c[static_cast<std::size_t>(n.one)] = f.c[D::one];
-        std::copy_n(f.c.begin() + D::first_memory, n.memory, out.c.begin() + n.first_memory);
-        std::copy_n(f.c.begin() + D::first_input, n.inputs, out.c.begin() + n.first_input);
+        const auto copy = [&](int from, int count, int to) {
+            for (int k = 0; k < count; ++k) out.c[to + k] = f.c[static_cast<std::size_t>(from + k)];
+        };
+        copy(0, n.coupled, 0);
+        copy(D::coupled, n.angles, n.coupled);
+        copy(D::one, 1, n.one);
+        copy(D::first_memory, n.memory, n.first_memory);
+        copy(D::first_input, n.inputs, n.first_input);
         return out;
     }
     template <class D>

@@ -2,6 +2,48 @@
 
 namespace lostmotion {
 
+namespace {
+
+void add_signal_fields(std::vector<BatchField>& fields, const std::string& prefix, std::size_t input) {
+    const auto first_sine = [input](TrainCase& c) -> Sine& {
+        std::vector<Sine>& sines = c.inputs[input].sines;
+        return sines.empty() ? sines.emplace_back() : sines.front();
+    };
+    fields.push_back({prefix + ".mean", [=](TrainCase& c, double v) { c.inputs[input].breakpoints[0].value = v; }});
+    fields.push_back({prefix + ".amplitude", [=](TrainCase& c, double v) { first_sine(c).amplitude = v; }});
+    fields.push_back({prefix + ".frequency", [=](TrainCase& c, double v) { first_sine(c).frequency = v; }});
+    fields.push_back({prefix + ".phase", [=](TrainCase& c, double v) { first_sine(c).phase = v; }});
+}
+
+}  // namespace
+
+const std::vector<BatchField>& batch_fields() {
+    static const std::vector<BatchField> all = [] {
+        std::vector<BatchField> fields;
+        for (const model::Parameter& p : model::parameters)
+            fields.push_back({p.key, [in = p.in](TrainCase& c, double v) { in(c.train) = v; }});
+        // A factor on what the drive has, not the value itself.
+        fields.push_back({"gearbox.stiffness.slopes", [](TrainCase& c, double v) {
+                              Gearbox& law = c.train.gears[0].law;
+                              law.curve = law.curve.scaled(v);
+                          }});
+        add_signal_fields(fields, "command", 0);
+        add_signal_fields(fields, "load.torque", 1);
+        for (const std::string& s : model::state_names(model::Assembly(model::drive_train())))
+            fields.push_back({"initial." + s, [s](TrainCase& c, double v) { c.start.states[s] = v; }});
+        return fields;
+    }();
+    return all;
+}
+
+const TrainCase& TrainBatch::row(std::size_t k, TrainCase& room) const {
+    if (fields.empty()) return cases[k];
+    room = cases[0];
+    for (std::size_t f = 0; f < fields.size(); ++f)
+        batch_fields()[static_cast<std::size_t>(fields[f])].set(room, values[k * fields.size() + f]);
+    return room;
+}
+
 std::string find_channels(const TrainRun& run, const std::vector<std::string>& names, std::vector<int>& found) {
     const std::vector<TrainChannel>& all = run.channels();
     for (const std::string& name : names) {
@@ -12,7 +54,8 @@ std::string find_channels(const TrainRun& run, const std::vector<std::string>& n
     return "";
 }
 
-TrainRow run_case(const TrainCase& one, const TrainBatch& batch, TrainOptions options, double* samples, double* out) {
+TrainRow run_case(const TrainCase& one, const TrainBatch& batch, TrainOptions options, double* samples, double* out,
+                  std::unique_ptr<AnyWorkspace>& workspace) {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     TrainRow row;
     row.energies.assign(batch.energies.size(), nan);
@@ -22,7 +65,8 @@ TrainRow run_case(const TrainCase& one, const TrainBatch& batch, TrainOptions op
     row.error = run.error();
     if (row.error.empty()) row.error = find_channels(run, batch.channels, options.channels.emplace());
     if (!row.error.empty()) return row;
-    const TrainReport report = run.run(one.inputs, one.start, options, batch.kept.empty() ? out : samples);
+    const TrainReport report = run.run(one.inputs, one.start, options, batch.kept.empty() ? out : samples, workspace);
+    if (workspace) workspace->leave();
     row.error = error_text(report, run.assembly());
     if (!row.error.empty()) {
         std::ranges::fill(numbers, nan);
@@ -31,21 +75,23 @@ TrainRow run_case(const TrainCase& one, const TrainBatch& batch, TrainOptions op
     reduce_all(batch.kept, samples, options.samples, out);
     row.switchings = static_cast<double>(report.switching_count);
     if (batch.energies.empty()) return row;
-    const Named ledger = named_ledger(report, run.assembly());
+    const NamedInOrder ledger = named_ledger(report, run.assembly());
     for (std::size_t k = 0; k < batch.energies.size(); ++k) row.energies[k] = value_of(ledger, batch.energies[k]);
     return row;
 }
 
 std::vector<TrainRow> run_trains(const TrainBatch& batch, double* out, unsigned threads,
                                  const std::function<bool(std::size_t)>& waiting) {
-    std::vector<TrainRow> rows(batch.cases.size());
+    std::vector<TrainRow> rows(batch.runs());
     distribute(rows.size(), threads, waiting, [&](auto next, std::atomic<bool>& stop) {
         TrainOptions options = batch.options;
         options.interrupted = [](void* flag) { return static_cast<std::atomic<bool>*>(flag)->load(); };
         options.interrupted_context = &stop;
         std::vector<double> samples(batch.kept.empty() ? 0 : batch.channels.size() * options.samples);
+        TrainCase room;
+        std::unique_ptr<AnyWorkspace> workspace;
         for (std::size_t k = next(); k < rows.size() && !stop; k = next())
-            rows[k] = run_case(batch.cases[k], batch, options, samples.data(), out + k * batch.width());
+            rows[k] = run_case(batch.row(k, room), batch, options, samples.data(), out + k * batch.width(), workspace);
     });
     return rows;
 }

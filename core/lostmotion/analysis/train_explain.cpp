@@ -2,15 +2,14 @@
 
 namespace lostmotion {
 
-std::vector<TrainContactReport> explain_contacts(const model::Assembly& a, const TrainPoint& p) {
+std::vector<ContactReport> explain_contacts(const model::Assembly& a, const TrainPoint& p) {
     const model::Regime r = a.build(p.key);
     std::vector<double> T_2;
     for (const model::Row& T : r.output_torque) T_2.push_back(model::evaluate(a.layout(), T, p.now));
-    std::vector<TrainContactReport> all;
+    std::vector<ContactReport> all;
     for (int c = 0; c < a.layout().contacts; ++c) {
-        TrainContactReport report;
-        report.name = model::contact_name(a, c);
-        report.present = true;
+        ContactReport report;
+        report.name = model::contact_text(a, c);
         report.mode = r.at_rest[c] ? 0 : r.key.modes[c];
         report.speed = r.at_rest[c] ? 0.0 : model::evaluate(a.layout(), a.contact_speed(c), p.now);
         report.torque = model::evaluate(a.layout(), r.contact_torque[c], p.now);

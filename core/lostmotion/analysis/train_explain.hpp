@@ -7,16 +7,20 @@
 #include "../model/names.hpp"
 #include "../simulation/train_point.hpp"
 #include "breakaway.hpp"
-#include "explain.hpp"
 
 namespace lostmotion {
 
-struct TrainContactReport : ContactReport {
+struct ContactReport {
     std::string name;
+    int mode = 0;                              // -1, 0, +1
+    double speed = 0.0;                        // [rad/s]
+    double torque = 0.0;                       // what the contact holds or takes [N m]
+    double capacity_forward = 0.0;             // largest torque it holds before it slips forward [N m]
+    double capacity_backward = 0.0;            // ... and backward, as a magnitude [N m]
     std::vector<model::CapacityShare> shares;  // of its capacities, by element
 };
 
-std::vector<TrainContactReport> explain_contacts(const model::Assembly& a, const TrainPoint& p);
+std::vector<ContactReport> explain_contacts(const model::Assembly& a, const TrainPoint& p);
 
 struct MotorReport {
     std::string name;

@@ -38,6 +38,24 @@ LinearRegime linearize(const model::Assembly& a, const std::vector<TrainChannel>
         total.back() += shared.value();
         return total;
     };
+    const auto loss_coefficient = [&](std::size_t k) {
+        const model::Gear& gear = a.train().gears[k];
+        const auto value = [&](const model::Row& f) { return model::evaluate(n, f, p.now); };
+        const SharedTorque shared = shared_torque(a, r, k, value);
+        const double rated = gear.law.rated_output_torque;
+        if (shared.margin != nullptr) {  // what it holds at rest, in the direction of what the contact holds
+            const model::MeshLoss loss = gear.loss(shared.driven, 0.0);
+            const double slope = (shared.held >= 0.0 ? 1.0 : -1.0) * loss.per_torque / rated;
+            std::vector<double> total = row(slope * *shared.output);
+            total.back() += loss.torque / rated - slope * value(*shared.output);
+            return total;
+        }
+        const model::ShaftPlace& input = a.places().shafts[static_cast<std::size_t>(gear.input)];
+        const double way = gear.has_dry_losses()        ? p.key.modes[static_cast<std::size_t>(input.contact)]
+                           : p.now.x[input.speed] < 0.0 ? -1.0
+                                                        : 1.0;
+        return row(way / rated * (gear.law.ratio * r.input_torque[k] - r.output_torque[k]));
+    };
     LinearRegime out;
     for (std::size_t k = 0; k < names.size(); ++k) {
         if (!moves[k]) continue;
@@ -54,9 +72,9 @@ LinearRegime linearize(const model::Assembly& a, const std::vector<TrainChannel>
         if (c.kind == Channel::state) add(c, model::Row::unit(static_cast<int>(first(k))));
         if (c.kind == Channel::motor_torque) add(c, r.motor_torque[k]);
         if (c.kind == Channel::output_torque) add(c, r.output_torque[k]);
-        if (c.kind == Channel::input_torque) {
+        if (c.kind == Channel::input_torque || c.kind == Channel::loss_coefficient) {
             out.outputs.push_back(c.name);
-            out.output.push_back(input_torque(k));
+            out.output.push_back(c.kind == Channel::input_torque ? input_torque(k) : loss_coefficient(k));
         }
         if (c.kind == Channel::contact_torque) add(c, r.contact_torque[k]);
         if (c.kind == Channel::output) add(c, a.controller_command(c.index, p.key));

@@ -3,7 +3,7 @@
 
 #include "../model/components.hpp"
 #include "../simulation/sampler.hpp"
-#include "../simulation/train_reader.hpp"
+#include "../simulation/train_solving.hpp"
 #include "../simulation/train_status.hpp"
 #include "response.hpp"
 
@@ -17,19 +17,26 @@ std::vector<NamedComponent> train_components(const model::Assembly& a) {
     std::vector<NamedComponent> out;
     const std::vector<bool> moves = model::moved_states(a);
     for (int k = 0; k < a.layout().coupled; ++k)
-        out.push_back({states[static_cast<std::size_t>(k)], k, !moves[static_cast<std::size_t>(k)]});
+        out.push_back({states[static_cast<std::size_t>(k)], k, !t.short_form && !moves[static_cast<std::size_t>(k)]});
     for (int part = 0; part < a.layout().angles; ++part)
         if (p.shafts[p.last_shaft[part]].angle == model::nowhere)
             out.push_back({t.shafts[p.last_shaft[part]].name + "_angle", D::coupled + part, true});
+    if (t.short_form) {  // both torques, whether there are such or not
+        const int locked =
+            p.gears[0].contact == model::nowhere ? model::nowhere : p.contacts[p.gears[0].contact].locked;
+        out.push_back({"hysteresis_capacity", D::states + (locked == 0 ? 1 : 0), false});
+        out.push_back({"locked_torque", D::states + (locked == 0 ? 0 : 1), false});
+        return out;
+    }
     for (std::size_t g = 0; g < t.gears.size(); ++g)
         if (p.gears[g].hysteresis != model::nowhere)
-            out.push_back({t.gears[g].name + "_hysteresis_capacity", D::states + p.gears[g].hysteresis, false});
+            out.push_back({model::gear_result(t, g, "hysteresis_capacity"), D::states + p.gears[g].hysteresis, false});
     for (const model::ContactPlace& c : p.contacts)
         if (c.locked != model::nowhere)
-            out.push_back(
-                {(c.kind == model::ContactPlace::gear ? t.gears[c.element].name : p.couplings[c.element]->name) +
-                     "_locked_torque",
-                 D::states + c.locked, false});
+            out.push_back({c.kind == model::ContactPlace::gear
+                               ? model::gear_result(t, static_cast<std::size_t>(c.element), "locked_torque")
+                               : p.couplings[c.element]->name + "_locked_torque",
+                           D::states + c.locked, false});
     return out;
 }
 
@@ -39,13 +46,7 @@ template <class D>
 class TrainPlant {
  public:
     using System = model::TrainSystem<D>;
-    struct Workspace {
-        explicit Workspace(const model::Assembly& a) : system(a), cache(system) {}
-        StateOf<D> balanced_scale() const { return system.balanced_scale(); }
-
-        System system;
-        RegimeCache<System> cache;
-    };
+    using Workspace = TrainWorkspace<D>;
     using Model = typename TrainReader<D>::Model;
 
     explicit TrainPlant(const Model& m) : model_(m), powers_(power_channels(m.assembly, m.channels)) {

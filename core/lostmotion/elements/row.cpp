@@ -17,17 +17,19 @@ auto Row::unit(int term, double factor) -> Row {
 }
 
 auto Row::operator+=(const Row& o) -> Row& {
-    for (int k = 0; k < max_columns; ++k) c[k] += o.c[k];
+    c.reach(o.c.size());
+    std::transform(o.c.begin(), o.c.end(), c.begin(), c.data(), [](double b, double a) { return a + b; });
     return *this;
 }
 
 auto Row::operator-=(const Row& o) -> Row& {
-    for (int k = 0; k < max_columns; ++k) c[k] -= o.c[k];
+    c.reach(o.c.size());
+    std::transform(o.c.begin(), o.c.end(), c.begin(), c.data(), [](double b, double a) { return a - b; });
     return *this;
 }
 
 auto Row::operator*=(double a) -> Row& {
-    for (int k = 0; k < max_columns; ++k) c[k] *= a;
+    std::transform(c.begin(), c.end(), c.data(), [a](double v) { return v * a; });
     return *this;
 }
 

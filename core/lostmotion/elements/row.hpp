@@ -1,7 +1,9 @@
 // Linear forms of a train while it is composed: run-time layout, fixed storage, so that nothing is allocated.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 
 namespace lostmotion::model {
 
@@ -17,9 +19,48 @@ struct Layout {
     void arrange();
 };
 
+// Coefficients of a form, as many as have been asked for: what lies beyond is zero.
+class Coefficients {
+ public:
+    Coefficients() {}
+    Coefficients(const Coefficients& o) : size_(o.size_) { std::copy_n(o.c_.begin(), size_, c_.begin()); }
+    Coefficients& operator=(const Coefficients& o) {
+        size_ = o.size_;
+        std::copy_n(o.c_.begin(), size_, c_.begin());
+        return *this;
+    }
+
+    std::size_t size() const { return size_; }
+    // Makes room for as many and, so that loops need no remainder, up to three more.
+    void reach(std::size_t size) {
+        if (size <= size_) return;
+        const std::size_t whole = (size + 3) / 4 * 4;
+        std::fill(c_.begin() + static_cast<std::ptrdiff_t>(size_), c_.begin() + static_cast<std::ptrdiff_t>(whole),
+                  0.0);
+        size_ = whole;
+    }
+    template <class Index>
+    double operator[](Index k) const {
+        return static_cast<std::size_t>(k) < size_ ? c_[static_cast<std::size_t>(k)] : 0.0;
+    }
+    template <class Index>
+    double& operator[](Index k) {
+        reach(static_cast<std::size_t>(k) + 1);
+        return c_[static_cast<std::size_t>(k)];
+    }
+    const double* begin() const { return c_.data(); }
+    const double* end() const { return c_.data() + size_; }
+    double* data() { return c_.data(); }
+
+ private:
+    std::size_t size_ = 0;
+    std::array<double, max_columns> c_;  // as far as size_
+};
+static_assert(max_columns % 4 == 0);
+
 // sum_k c[k] * term[k]
 struct Row {
-    std::array<double, max_columns> c{};
+    Coefficients c;
 
     static Row unit(int term, double factor = 1.0);
     Row& operator+=(const Row& o);

@@ -6,22 +6,16 @@
 
 namespace lostmotion {
 
-// Which coupled speed each angle follows: known when compiled, or from run to run.
+// Which coupled speed each angle follows.
 template <class D>
 struct AngleSpeeds {
     std::array<int, static_cast<std::size_t>(D::angles)> state{};
     int operator[](int angle) const { return state[static_cast<std::size_t>(angle)]; }
     void set(int angle, int speed) { state[static_cast<std::size_t>(angle)] = speed; }
 };
-template <class D>
-    requires requires { D::first_angle_speed; }
-struct AngleSpeeds<D> {
-    constexpr int operator[](int angle) const { return D::first_angle_speed + angle; }
-    void set(int, int) {}
-};
 
-// How many of the inputs and of the memory, from the first on, the equations of a regime depend on: known when
-// compiled, or from regime to regime, since few trains have as many as there is room for.
+// How many of the inputs and of the memory, from the first on, the equations of a regime depend on: where there is room
+// for many, few trains have as many.
 template <class D>
 struct DependsOn {
     int inputs = 1, memory = 1;
@@ -29,7 +23,7 @@ struct DependsOn {
     void see_memory(int k, double coefficient) { memory = coefficient != 0.0 && k >= memory ? k + 1 : memory; }
 };
 template <class D>
-    requires requires { D::first_angle_speed; }
+    requires(D::inputs <= 2 && D::memory <= 2)
 struct DependsOn<D> {
     static constexpr int inputs = D::inputs, memory = D::memory;
     void see_input(int, double) {}
@@ -47,7 +41,6 @@ constexpr bool holds(Kernel k) {
     return built == Kernel::all || built == k ||
            (built == Kernel::drive_and_wide && (k == Kernel::drive || k == Kernel::wide));
 }
-inline constexpr bool holds_trains = built != Kernel::drive;
 
 template <int coupled_, int angles_, int inputs_, int memory_, int contacts_, int guards_>
 struct Dims {

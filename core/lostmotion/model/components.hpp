@@ -136,8 +136,14 @@ class ComponentLaws<model::TrainSystem<D>> {
                 assembly_.train().gears[g].law.hysteresis_capacity_slope(r.x[p.twist]);
         }
         ResetRatesOf<D> rates;
-        for (const model::ContactPlace& c : contacts())
-            if (c.locked != model::nowhere) jump.row[D::states + c.locked] = {};
+        bool some_locked = false;
+        for (const model::ContactPlace& c : contacts()) {
+            if (c.locked == model::nowhere) continue;
+            jump.row[D::states + c.locked] = {};
+            some_locked = true;
+        }
+        // The short form shows such a torque whether there is one or not.
+        if (!some_locked && assembly_.train().short_form) jump.row[D::states + 1] = {};
         hold(r, jump, rates);
         return rates;
     }

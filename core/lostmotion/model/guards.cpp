@@ -128,11 +128,15 @@ void RegimeGuards::add_turning() {
     const Driver<Row>& only = regime_.drivers[0];
     const auto is_zero = [](double v) { return v == 0.0; };
     if (!std::all_of(only.rate.c.begin(), only.rate.c.end(), is_zero)) return;
-    const auto inputs = only.torque.c.begin() + layout_.first_input;
-    if (std::count_if(inputs, inputs + layout_.inputs, is_zero) != layout_.inputs - 1) return;
-    const auto input = std::find_if_not(inputs, inputs + layout_.inputs, is_zero);
-    regime_.driving_input = static_cast<int>(input - inputs);
-    regime_.driving_way = *input > 0.0 ? 1.0 : -1.0;
+    int driving = nowhere;
+    for (int i = 0; i < layout_.inputs; ++i) {
+        const double share = only.torque.c[layout_.first_input + i];
+        if (share == 0.0) continue;
+        if (driving != nowhere) return;
+        driving = i;
+        regime_.driving_way = share > 0.0 ? 1.0 : -1.0;
+    }
+    regime_.driving_input = driving;
 }
 
 void RegimeGuards::add_driver(int contact) {

@@ -2,6 +2,16 @@
 
 namespace lostmotion::model {
 
+std::string gear_result(const Train& t, std::size_t gear, const char* what) {
+    return t.short_form ? what : t.gears[gear].name + "_" + what;
+}
+std::string command_of(const Train& t, std::size_t motor) {
+    return t.short_form ? "command" : t.motors[motor].name + "_command";
+}
+std::string load_torque_of(const Train& t, std::size_t shaft) {
+    return t.short_form ? "load_torque" : t.shafts[shaft].name + "_load_torque";
+}
+
 std::vector<std::string> state_names(const Assembly& a) {
     const Train& t = a.train();
     const Places& p = a.places();
@@ -14,7 +24,7 @@ std::vector<std::string> state_names(const Assembly& a) {
         set(p.shafts[k].speed, t.shafts[k].name + "_speed");
         set(p.shafts[k].angle, t.shafts[k].name + "_angle");
     }
-    for (std::size_t k = 0; k < t.gears.size(); ++k) set(p.gears[k].twist, t.gears[k].name + "_twist");
+    for (std::size_t k = 0; k < t.gears.size(); ++k) set(p.gears[k].twist, gear_result(t, k, "twist"));
     for (std::size_t k = 0; k < t.controllers.size(); ++k)
         for (std::size_t j = 0; j < t.controllers[k].states.size(); ++j)
             set(p.controllers[k].first_state + static_cast<int>(j),
@@ -47,8 +57,8 @@ std::vector<std::string> input_names(const Assembly& a) {
     const auto set = [&names](int input, const std::string& name) {
         if (input != nowhere) names[static_cast<std::size_t>(input)] = name;
     };
-    for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].command, t.motors[k].name + "_command");
-    for (std::size_t k = 0; k < t.shafts.size(); ++k) set(p.shafts[k].load, t.shafts[k].name + "_load_torque");
+    for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].command, command_of(t, k));
+    for (std::size_t k = 0; k < t.shafts.size(); ++k) set(p.shafts[k].load, load_torque_of(t, k));
     for (const auto& e : p.acting) set(e->command, e->name + "_command");
     for (const auto& c : p.couplings) set(c->command, c->name + "_command");
     for (std::size_t k = 0; k < t.controllers.size(); ++k) {
@@ -62,10 +72,17 @@ std::string contact_name(const Assembly& a, int contact) {
     const ContactPlace& c = a.places().contacts[static_cast<std::size_t>(contact)];
     const auto k = static_cast<std::size_t>(c.element);
     switch (c.kind) {
-        case ContactPlace::shaft: return a.train().shafts[k].name + "_contact";
-        case ContactPlace::gear: return a.train().gears[k].name + "_twist_contact";
+        case ContactPlace::shaft:
+            return a.train().short_form && k == 0 ? "input_contact" : a.train().shafts[k].name + "_contact";
+        case ContactPlace::gear: return gear_result(a.train(), k, "twist_contact");
         default: return a.places().couplings[k]->name + "_contact";
     }
+}
+
+std::string contact_text(const Assembly& a, int contact) {
+    const ContactPlace& c = a.places().contacts[static_cast<std::size_t>(contact)];
+    if (!a.train().short_form) return contact_name(a, contact);
+    return c.kind == ContactPlace::gear ? "twist of the gear" : c.element == 0 ? "input shaft" : "load bearing";
 }
 
 std::vector<std::string> branch_names(const Assembly& a) {

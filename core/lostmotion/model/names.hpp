@@ -8,6 +8,11 @@
 
 namespace lostmotion::model {
 
+// NAME_WHAT of an element; in the short form what a gear has stands alone.
+std::string gear_result(const Train& t, std::size_t gear, const char* what);
+std::string command_of(const Train& t, std::size_t motor);
+std::string load_torque_of(const Train& t, std::size_t shaft);
+
 // Of the coupled states, then the angles.
 std::vector<std::string> state_names(const Assembly& a);
 
@@ -18,6 +23,8 @@ std::vector<bool> moved_states(const Assembly& a);
 std::vector<std::string> input_names(const Assembly& a);
 
 std::string contact_name(const Assembly& a, int contact);
+// The same in a sentence.
+std::string contact_text(const Assembly& a, int contact);
 
 // The piecewise laws, by their place in a key.
 std::vector<std::string> branch_names(const Assembly& a);

@@ -24,10 +24,21 @@ void each_size(const Train& train, const Layout& n, Use&& use) {
     use(static_cast<int>(train.gears.size()), D::contacts, "gears");
 }
 
+// Has it nothing but motors, gears and shafts with plain friction? Then 16 conditions end each regime at most.
+inline bool is_plain(const Train& t) {
+    bool plain = t.motors.size() <= 1 && t.gears.size() <= 1 && t.controllers.empty();
+    const auto none = [&](const char*, const char*, const auto& elements) { plain = plain && elements.empty(); };
+    Train::each_kind(t, none);
+    Train::each_coupling_kind(t, none);
+    for (const Shaft& s : t.shafts) plain = plain && s.friction.speeds.empty() && !s.has_drag();
+    for (const Gear& g : t.gears) plain = plain && !g.transmission_error.present() && !g.parts_flanks();
+    return plain;
+}
+
 // Does a train fit into a kernel of these dimensions?
 template <class D>
 bool fits(const Train& train, const Layout& n) {
-    bool all = true;
+    bool all = D::guards >= 32 || is_plain(train);
     each_size<D>(train, n, [&](int count, int most, const char*) { all = all && count <= most; });
     return all;
 }
@@ -38,11 +49,14 @@ using PackedForm = LinearFormOf<D>;
 template <class D, class F = PackedForm<D>>
 F pack(const Row& f, const Layout& n) {
     F out{};
-    std::copy_n(f.c.begin(), n.coupled, out.c.begin());
-    std::copy_n(f.c.begin() + n.coupled, n.angles, out.c.begin() + D::coupled);
-    out.c[D::one] = f.c[n.one];
-    std::copy_n(f.c.begin() + n.first_memory, n.memory, out.c.begin() + D::first_memory);
-    std::copy_n(f.c.begin() + n.first_input, n.inputs, out.c.begin() + D::first_input);
+    const auto copy = [&](int from, int count, int to) {
+        for (int k = 0; k < count; ++k) out.c[static_cast<std::size_t>(to + k)] = f.c[from + k];
+    };
+    copy(0, n.coupled, 0);
+    copy(n.coupled, n.angles, D::coupled);
+    copy(n.one, 1, D::one);
+    copy(n.first_memory, n.memory, D::first_memory);
+    copy(n.first_input, n.inputs, D::first_input);
     return out;
 }
 
@@ -77,6 +91,8 @@ struct PackedRegime {
     Key key;
     std::array<PackedForm<D>, D::states> rate{};
     std::array<PackedForm<D>, D::contacts> output_torque{};   // of each gear [N m]
+    std::array<PackedForm<D>, D::contacts> input_torque{};    // of each gear, with dry losses while it turns [N m]
+    std::array<PackedForm<D>, D::contacts> mesh_loss{};       // of each gear, i T_1 - T_2 [N m]
     std::array<PackedForm<D>, D::contacts> contact_torque{};  // of each contact [N m]
     std::array<PackedGuard<D>, D::guards> guards{};
     int n_guards = 0;
@@ -96,7 +112,11 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
     PackedRegime<D> out;
     out.key = r.key;
     for (int k = 0; k < n.states; ++k) out.rate[k < n.coupled ? k : D::coupled + k - n.coupled] = pack<D>(r.rate[k], n);
-    for (std::size_t g = 0; g < r.output_torque.size(); ++g) out.output_torque[g] = pack<D>(r.output_torque[g], n);
+    for (std::size_t g = 0; g < r.output_torque.size(); ++g) {
+        out.output_torque[g] = pack<D>(r.output_torque[g], n);
+        out.input_torque[g] = pack<D>(r.input_torque[g], n);
+        out.mesh_loss[g] = pack<D>(a.train().gears[g].law.ratio * r.input_torque[g] - r.output_torque[g], n);
+    }
     for (std::size_t c = 0; c < r.contact_torque.size(); ++c) out.contact_torque[c] = pack<D>(r.contact_torque[c], n);
     out.complete = r.guards.size() <= static_cast<std::size_t>(D::guards);
     for (const Guard& g : r.guards) {

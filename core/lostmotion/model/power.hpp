@@ -1,6 +1,7 @@
 // Power flows of a regime, as products of two linear forms, and the stored energies.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,23 +17,36 @@ struct PowerFlow {
         output,  // to the load
     } kind;
     std::string name;  // of the element, and what it is: "drum: viscous friction"
-    Power<Row> power;
 };
 
 // What kinetic and elastic energy grow by from one state to another [J].
+struct StoredChange {
+    double kinetic = 0.0, elastic = 0.0, all = 0.0;
+
+    void add(double StoredChange::* part, double energy) {
+        this->*part += energy;
+        all += energy;
+    }
+};
 template <class X>
-double stored_change(const Assembly& a, const X& from, const X& to) {
-    double sum = 0.0;
-    for (const ShaftPlace& s : a.places().shafts) sum += kinetic_energy(s.inertia, from[s.speed], to[s.speed]);
+StoredChange stored_change(const Assembly& a, const X& from, const X& to) {
+    StoredChange sum;
+    for (const ShaftPlace& s : a.places().shafts)
+        sum.add(&StoredChange::kinetic, kinetic_energy(s.inertia, from[s.speed], to[s.speed]));
     for (std::size_t g = 0; g < a.train().gears.size(); ++g)
         if (const int d = a.places().gears[g].twist; !a.train().gears[g].rigid())
-            sum += a.train().gears[g].law.curve.energy(from[d], to[d]);
+            sum.add(&StoredChange::elastic, a.train().gears[g].law.curve.energy(from[d], to[d]));
     return sum;
 }
 
-std::vector<PowerFlow> power_flows(const Assembly& a, const Regime& r);
+// Of the flows of a regime: its number among all that there can be, and the power.
+struct NumberedPower {
+    int flow;
+    Power<Row> power;
+};
+std::vector<NumberedPower> power_flows(const Assembly& a, const Regime& r);
 
-// Of all flows that there can be: those of a regime in which every contact slips.
-std::vector<std::string> flow_names(const Assembly& a);
+// All flows that there can be: kind and name.
+std::vector<PowerFlow> all_flows(const Assembly& a);
 
 }  // namespace lostmotion::model

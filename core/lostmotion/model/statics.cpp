@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <numeric>
+#include <type_traits>
 #include <utility>
 
 namespace lostmotion::model {
@@ -19,7 +20,8 @@ constexpr double much_lighter = 1e3;
 template <class F, class R>
 void subtract(F& f, double factor, const R& row, bool two_shafts) {
     constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
-    for (std::size_t k = 0; k < f.c.size(); ++k) {
+    const std::size_t columns = std::is_same_v<F, R> ? row.c.size() : static_cast<std::size_t>(max_columns);
+    for (std::size_t k = 0; k < columns; ++k) {
         const double a = f.c[k], b = factor * row.c[k];
         f.c[k] = !two_shafts && std::fabs(a - b) <= few_roundings * std::fabs(a) ? 0.0 : a - b;
     }

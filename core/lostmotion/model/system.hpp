@@ -1,7 +1,9 @@
 // A train as the solvers see it: a switched linear system of compile-time dimensions.
 #pragma once
 
+#include <optional>
 #include <type_traits>
+#include <vector>
 
 #include "modes.hpp"
 #include "pack.hpp"
@@ -12,14 +14,23 @@ namespace lostmotion::model {
 // Dimensions of the kernel for trains, which takes the narrowest that holds one. Guards are 64 at most: the solver
 // keeps them as bits of a word. Every input that there is room for costs time at every event check, so there is room
 // for few.
+using Least = Dims<4, 1, 2, 2, 3, 16>;  // motor, gear and load, as the paper has them
 using Narrow = Dims<4, 1, 4, 6, 8, 32>;
 using Middle = Dims<8, 2, 6, 10, 12, 64>;
 using Wide = Dims<16, 4, 16, 20, 24, 64>;
-using Widest = std::conditional_t<holds(Kernel::wide), Wide, std::conditional_t<holds(Kernel::middle), Middle, Narrow>>;
+using Widest = std::conditional_t<
+    holds(Kernel::wide), Wide,
+    std::conditional_t<holds(Kernel::middle), Middle, std::conditional_t<holds(Kernel::narrow), Narrow, Least>>>;
 
 template <class D>
 struct TrainRegime : PackedRegime<D> {
     model::Regime rows;  // as composed: torques and power flows of the elements
+    // The flows of power by their number, once they have been asked for.
+    struct Flow {
+        int number;
+        PackedForm<D> torque, speed;
+    };
+    std::optional<std::vector<Flow>> flows = std::nullopt;
 };
 
 template <class D>

@@ -19,6 +19,8 @@
 namespace lostmotion::model {
 
 struct Train {
+    // The drive of the paper: shafts `motor` and `load`, motor `motor`, gear `gearbox`. Its results have shorter names.
+    bool short_form = false;
     std::vector<Shaft> shafts;
     std::vector<ShaftMotor> motors;
     std::vector<Gear> gears;

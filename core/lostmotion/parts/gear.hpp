@@ -80,6 +80,10 @@ struct Gear {
         const Plane m = v == 0.0 ? loss_at_standstill(load_interval(mu)) : loss_plane(loss_cell(mu, v));
         return {T_2R * (m.at_zero + m.per_speed * v + m.per_load * mu), m.per_load};
     }
+    // The same torque at rest.
+    double loss_at_rest(double driven) const {
+        return efficiencies ? loss(driven, 0.0).torque : law.loss_at_rest(driven);
+    }
     // Bounds of an interval of the load axis, infinite where there is none.
     double load_lower(int j) const {
         if (efficiencies) return j == 0 ? -std::numeric_limits<double>::infinity() : 0.0;

@@ -36,11 +36,10 @@ struct Gearbox {
         return P == 0.0 ? 0.0 : hysteresis_capacity(d) / P * curve.slope(curve.locate(d));
     }
 
-    // Torque M_2B [N m at the output] of (12) that a loss map takes while the input shaft turns with speed w_M in
-    // direction s, or that it holds at most at rest before it turns that way.
-    double loss_torque(double T_2, double w_M, int s) const {
-        if (losses != loss_map) return 0.0;
-        return rated_output_torque * map(s * T_2 / rated_output_torque, std::fabs(w_M) / rated_input_speed);
+    // Torque M_2B [N m at the output] of (12) that a loss map holds at most at rest before the input shaft turns;
+    // driven: T_2 [N m] in that direction.
+    double loss_at_rest(double driven) const {
+        return losses == loss_map ? rated_output_torque * map(driven / rated_output_torque, 0.0) : 0.0;
     }
     // The same as forms.
     template <class F>

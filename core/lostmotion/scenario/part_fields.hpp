@@ -1,7 +1,6 @@
 // The parts of drives and trains, field by field, in the order of a description.
 #pragma once
 
-#include "../drive/drive.hpp"
 #include "../kernel/inputs.hpp"
 #include "../model/train.hpp"
 #include "fields.hpp"
@@ -112,24 +111,6 @@ void describe(F& f, Gearbox& g) {
 }
 
 template <class F>
-void describe(F& f, Load& l) {
-    f.number("inertia", l.inertia, Range::positive);
-    f.number("viscous_friction", l.viscous_friction, Range::not_negative);
-    f.number("friction_torque", l.friction_torque, Range::not_negative);
-}
-
-template <class F>
-void describe(F& f, Drive& d) {
-    f.part("motor", [&] { describe(f, d.motor); });
-    f.part("gearbox", [&] { describe(f, d.gearbox); });
-    f.part("load", [&] { describe(f, d.load); });
-    if constexpr (F::reads) {
-        if (f.well() && !(d.motor.rotor_inertia + d.gearbox.inertia > 0.0))
-            f.wrong("motor.rotor_inertia", "and gearbox.inertia must not both be 0");
-    }
-}
-
-template <class F>
 void describe(F& f, Sine& s) {
     f.number("amplitude", s.amplitude);
     f.number("frequency", s.frequency, Range::positive);
@@ -229,6 +210,7 @@ void describe(F& f, LinearController& c) {
 template <class F>
 void describe(F& f, Train& t) {
     const auto element = [&](auto& e) { describe(f, e); };
+    f.flag("short_form", t.short_form);
     f.each("shafts", t.shafts, element);
     f.each("motors", t.motors, element);
     f.each("gears", t.gears, element);

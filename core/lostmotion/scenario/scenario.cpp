@@ -2,12 +2,6 @@
 
 namespace lostmotion {
 
-std::string check_build(Scenario::Form form) {
-    if (form == Scenario::of_drive ? holds(Kernel::drive) : holds_trains) return {};
-    return form == Scenario::of_drive ? "this core was built for trains; the scenario is of a drive in the short form"
-                                      : "this core was built for drives in the short form; the scenario is of a train";
-}
-
 TrainStart train_start(const model::Assembly& a, std::span<const double> states, std::span<const double> capacities) {
     TrainStart start;
     const std::vector<std::string> names = model::state_names(a);
@@ -24,16 +18,11 @@ double value_at_start(const Signal& s) {
 }
 
 std::vector<FreeInput> free_inputs(const Scenario& s) {
-    std::vector<std::string> names{"command", "load_torque"};
-    std::vector<std::size_t> commands{0};
-    if (!s.is_of_drive()) {
-        const model::Assembly a(s.train);
-        names = model::input_names(a);
-        commands.clear();
-        for (const model::MotorPlace& m : a.places().motors) commands.push_back(static_cast<std::size_t>(m.command));
-    }
+    const model::Assembly a(s.train);
+    const std::vector<std::string> names = model::input_names(a);
     std::vector<bool> controlled(names.size());
-    for (const ControlledAxis& axis : s.control.axes) controlled[commands[static_cast<std::size_t>(axis.motor)]] = true;
+    for (const ControlledAxis& axis : s.control.axes)
+        controlled[static_cast<std::size_t>(a.places().motors[static_cast<std::size_t>(axis.motor)].command)] = true;
     std::vector<FreeInput> out;
     for (std::size_t k = 0; k < names.size(); ++k)
         if (!controlled[k]) out.push_back({names[k], k});
@@ -49,25 +38,19 @@ std::string check_given_references(const Scenario& s) {
 }
 
 std::string check(const Scenario& s) {
-    if (std::string error = check_build(s.form); !error.empty()) return error;
     if (!(s.duration / s.sample_interval <= max_samples)) return "sample_interval is too short for the duration";
     const auto counted = [](const char* what, std::size_t given, std::size_t wanted) {
         return given == wanted ? std::string()
                                : std::string(what) + ": there are " + std::to_string(given) + "; there must be " +
                                      std::to_string(wanted);
     };
-    std::size_t motors = 1, shafts = 2, states = n_states, inputs = n_inputs, gears = 1;
-    if (!s.is_of_drive()) {
-        const TrainRun run(s.train);
-        if (!run.error().empty()) return run.error();
-        motors = s.train.motors.size();
-        shafts = s.train.shafts.size();
-        gears = s.train.gears.size();
-        states = static_cast<std::size_t>(run.assembly().layout().states);
-        inputs = static_cast<std::size_t>(run.assembly().layout().inputs);
-    }
-    for (std::string error : {counted("inputs", s.inputs.size(), inputs), counted("start", s.start.size(), states),
-                              counted("hysteresis_capacities", s.hysteresis_capacities.size(), gears)})
+    const TrainRun run(s.train);
+    if (!run.error().empty()) return run.error();
+    const std::size_t motors = s.train.motors.size(), shafts = s.train.shafts.size();
+    const model::Layout& n = run.assembly().layout();
+    for (std::string error : {counted("inputs", s.inputs.size(), static_cast<std::size_t>(n.inputs)),
+                              counted("start", s.start.size(), static_cast<std::size_t>(n.states)),
+                              counted("hysteresis_capacities", s.hysteresis_capacities.size(), s.train.gears.size())})
         if (!error.empty()) return error;
     std::vector<bool> turned(motors);
     for (const ControlledAxis& axis : s.control.axes) {
@@ -79,18 +62,15 @@ std::string check(const Scenario& s) {
         if (turned[m]) return "two controllers turn the same motor";
         turned[m] = true;
         for (const model::LinearController& c : s.train.controllers)
-            if (!s.is_of_drive() && c.motor == axis.motor) return "two controllers turn the same motor";
-        const Motor& law = !s.is_of_drive() ? s.train.motors[m].law : s.drive.motor;
-        if (axis.law.field_orientation && law.kind != Motor::torque_source)
+            if (c.motor == axis.motor) return "two controllers turn the same motor";
+        if (axis.law.field_orientation && s.train.motors[m].law.kind != Motor::torque_source)
             return "a motor under field-oriented control must be a torque source";
     }
-    if (!s.is_of_drive()) {
-        const TrainRun run(s.train);
-        if (std::string error = check_control(run.assembly(), s.control); !error.empty()) return error;
-        return check_start(run.assembly(), s.start);
-    }
-    if (s.drive.rigid() && s.start[twist] != 0.0) return "the gearbox is rigid, but the start has a twist";
-    return {};
+    for (std::size_t g = 0; g < s.train.gears.size(); ++g)
+        if (const int twist = run.assembly().places().gears[g].twist;
+            s.train.gears[g].rigid() && twist != model::nowhere && s.start[static_cast<std::size_t>(twist)] != 0.0)
+            return "gear '" + s.train.gears[g].name + "' is rigid, but the start has a twist";
+    return check_run(run.assembly(), s.start, s.control);
 }
 
 }  // namespace lostmotion

@@ -1,4 +1,4 @@
-// All that a run takes: a drive or a train, what acts on it, its controllers, its state at t = 0, and how long.
+// All that a run takes: a train, what acts on it, its controllers, its state at t = 0, and how long.
 #pragma once
 
 #include <span>
@@ -12,8 +12,6 @@ namespace lostmotion {
 
 struct Scenario {
     std::string title;
-    enum Form { of_drive, of_train } form = of_drive;
-    Drive drive;
     model::Train train;
     std::vector<Signal> inputs;                 // of each input, in their order; those of controllers are not looked at
     std::vector<double> start;                  // states, in their order
@@ -25,24 +23,19 @@ struct Scenario {
     std::vector<bool> played;
     double duration = 1.0, sample_interval = 1e-3;  // [s]
 
-    // Known beforehand in a build for one form alone, once it has passed `check_build`.
-    bool is_of_drive() const { return holds(Kernel::drive) && (!holds_trains || form == of_drive); }
+    // Before the names of what a controller shows.
+    std::string prefix(const ControlledAxis& axis) const {
+        return train.short_form ? "" : train.motors[static_cast<std::size_t>(axis.motor)].name + "_";
+    }
     std::size_t samples() const { return static_cast<std::size_t>(duration / sample_interval * (1.0 + 1e-12)) + 1; }
 };
 
 inline constexpr double max_samples = 1e8;
 
-// What is wrong where a build holds no kernel for a scenario, or empty.
-std::string check_build(Scenario::Form form);
-
 template <class F>
 void describe(F& f, Scenario& s) {
     f.text("title", s.title);
-    f.choice("form", s.form, 2);
-    if (s.form == Scenario::of_drive)
-        f.part("drive", [&] { describe(f, s.drive); });
-    else
-        f.part("train", [&] { model::describe(f, s.train); });
+    f.part("train", [&] { model::describe(f, s.train); });
     f.each("inputs", s.inputs, [&](Signal& signal) { describe(f, signal); });
     f.list("start", s.start);
     f.list("hysteresis_capacities", s.hysteresis_capacities, Range::not_negative);

@@ -3,13 +3,9 @@
 namespace lostmotion {
 
 ScenarioSimulation::ScenarioSimulation(const Scenario& scenario, double step)
-    : control_(scenario.control), variables_(scenario) {
-    if (scenario.is_of_drive()) {
-        if constexpr (holds(Kernel::drive))
-            drive_ = std::make_unique<Simulation>(scenario.drive, step, control_, played_sines(scenario));
-    } else if constexpr (holds_trains) {
-        train_ = std::make_unique<TrainSimulation>(scenario.train, step, control_, played_sines(scenario));
-    }
+    : train_(scenario.train, step, scenario.control, played_sines(scenario)),
+      control_(scenario.control),
+      variables_(scenario) {
     laws_ = control_.laws();
     name_all(scenario);
     reset(scenario.start, scenario.hysteresis_capacities);
@@ -29,26 +25,13 @@ double ScenarioSimulation::played_input(std::size_t k) const {
 }
 
 std::string ScenarioSimulation::text(Status status) const {
-    return with([&]<class S>(const S& s) {
-        if constexpr (std::is_same_v<S, Simulation>)
-            return status_text(status, s.time(), s.stopped_at());
-        else
-            return train_status_text(train_->assembly(), status, s.time(), s.stopped_at(), s.too_many_guards());
+    return with([&](const auto& s) {
+        return train_status_text(train_.assembly(), status, s.time(), s.stopped_at(), s.too_many_guards());
     });
 }
 
 std::string ScenarioSimulation::reset(std::span<const double> states, std::span<const double> capacities) {
-    return with([&]<class S>(S& s) -> std::string {
-        if constexpr (std::is_same_v<S, Simulation>) {
-            Simulation::Snapshot start;
-            std::copy(states.begin(), states.end(), start.x.begin());
-            start.memory = {capacities[0], 0.0};
-            s.restore(start);
-            return "";
-        } else {
-            return train_->reset(train_start(states, capacities));
-        }
-    });
+    return train_.reset(train_start(states, capacities));
 }
 
 auto ScenarioSimulation::advance(double interval, std::span<const double> begin, std::span<const double> end)
@@ -146,12 +129,7 @@ auto ScenarioSimulation::settle() -> Status {
 auto ScenarioSimulation::read(double* out) -> Status {
     const Status status = with([](auto& s) { return s.find_regime(); });
     if (status != Status::done) return status;
-    with([&]<class S>(S& s) {
-        if constexpr (std::is_same_v<S, Simulation>)
-            std::ranges::copy(s.reading().value, out);
-        else
-            std::ranges::copy(s.values(), out);
-    });
+    with([&](auto& s) { std::ranges::copy(s.values(), out); });
     if (!laws_.empty()) with([&](const auto& in) { read_controllers(in.snapshot(), out); });
     variables_.derive(out, 1, 0);
     return status;
@@ -225,7 +203,6 @@ double ScenarioSimulation::next_breakpoint(double time) const {
 
 auto ScenarioSimulation::of_train(const model::Train& train) -> Scenario {
     Scenario s;
-    s.form = Scenario::of_train;
     s.train = train;
     const model::Assembly a(train);
     s.start.resize(static_cast<std::size_t>(a.layout().states));
@@ -234,13 +211,8 @@ auto ScenarioSimulation::of_train(const model::Train& train) -> Scenario {
 }
 
 void ScenarioSimulation::name_all(const Scenario& scenario) {
-    if (drive_) {
-        for (const StateName& s : state_names) names_.states.emplace_back(s.name);
-        names_.capacities.emplace_back("gearbox");
-    } else {
-        names_.states = model::state_names(train_->assembly());
-        for (const model::Gear& g : scenario.train.gears) names_.capacities.push_back(g.name);
-    }
+    names_.states = model::state_names(train_.assembly());
+    for (const model::Gear& g : scenario.train.gears) names_.capacities.push_back(g.name);
     for (const std::string& name : names_.states)
         first_.push_back(static_cast<std::size_t>(std::find(names_.states.begin(), names_.states.end(), name) -
                                                   names_.states.begin()));
@@ -255,13 +227,11 @@ void ScenarioSimulation::name_all(const Scenario& scenario) {
         name_reference(scenario, control_.axes[a]);
         own_reference_.push_back(k < scenario.played.size() && scenario.played[k]);
     }
-    begin_.resize(scenario.is_of_drive() ? std::size_t{n_inputs}
-                                         : static_cast<std::size_t>(train_->assembly().layout().inputs));
+    begin_.resize(static_cast<std::size_t>(train_.assembly().layout().inputs));
     end_ = begin_;
     for (const ControlledAxis& axis : control_.axes) {
         const auto m = static_cast<std::size_t>(axis.motor);
-        const std::string motor = scenario.is_of_drive() ? "motor" : scenario.train.motors[m].name;
-        torques_.push_back(static_cast<std::size_t>(variables_.place(motor + "_torque")));
+        torques_.push_back(static_cast<std::size_t>(variables_.place(scenario.train.motors[m].name + "_torque")));
     }
     identity_ = 0xcbf29ce484222325u;
     for (const auto* list : {&names_.states, &names_.inputs})
@@ -269,8 +239,7 @@ void ScenarioSimulation::name_all(const Scenario& scenario) {
 }
 
 void ScenarioSimulation::name_reference(const Scenario& scenario, const ControlledAxis& axis) {
-    const auto m = static_cast<std::size_t>(axis.motor);
-    const std::string of = scenario.is_of_drive() ? "" : scenario.train.motors[m].name + "_";
+    const std::string of = scenario.prefix(axis);
     const control::Axis::Mode mode = axis.law.mode;
     names_.references.push_back({of + "reference",
                                  mode == control::Axis::position_mode ? "rad"

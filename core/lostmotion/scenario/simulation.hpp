@@ -1,4 +1,4 @@
-// A scenario, a drive or a train step by step, whichever kernel it takes.
+// A scenario step by step, whichever kernel it takes.
 #pragma once
 
 #include <algorithm>
@@ -25,21 +25,9 @@ template <class Snapshot, class Use>
 void each_number_of_snapshot(Snapshot& s, int slots, Use&& use) {
     use(s.time);
     for (auto& x : s.x) use(x);
-    if constexpr (requires { s.memory.hysteresis_capacity; }) {
-        use(s.memory.hysteresis_capacity);
-        use(s.memory.locked_torque);
-    } else {
-        for (auto& m : s.memory) use(m);
-    }
+    for (auto& m : s.memory) use(m);
     for (auto& m : s.key.modes) use(m);
-    if constexpr (requires { s.key.branch; }) {
-        for (auto& b : s.key.branch) use(b);
-    } else {
-        use(s.key.amplifier);
-        use(s.key.piece);
-        use(s.key.cell);
-        use(s.key.cell_back);
-    }
+    for (auto& b : s.key.branch) use(b);
     for (auto& u : s.input) use(u);
     use(s.started);
     use(s.steady);
@@ -77,17 +65,13 @@ class ScenarioSimulation {
     // use(simulation) with that of its kernel.
     template <class Use>
     decltype(auto) with(Use&& use) {
-        if constexpr (holds(Kernel::drive))
-            if (!holds_trains || drive_) return use(*drive_);
-        if constexpr (holds_trains) return train_->with(use);
+        return train_.with(use);
     }
     template <class Use>
     decltype(auto) with(Use&& use) const {
-        if constexpr (holds(Kernel::drive))
-            if (!holds_trains || drive_) return use(std::as_const(*drive_));
-        if constexpr (holds_trains) return std::as_const(*train_).with(use);
+        return train_.with(use);
     }
-    TrainSimulation* train() { return train_.get(); }
+    TrainSimulation& train() { return train_; }
 
     double time() const {
         return with([](const auto& s) { return s.time(); });
@@ -98,7 +82,7 @@ class ScenarioSimulation {
     // To t = 0, with the contacts still to be found. Returns what is wrong with the start, or nothing.
     std::string reset(std::span<const double> states, std::span<const double> capacities);
     TrainStart train_start(std::span<const double> states, std::span<const double> capacities) const {
-        return lostmotion::train_start(train_->assembly(), states, capacities);
+        return lostmotion::train_start(train_.assembly(), states, capacities);
     }
 
     // Each input of names().inputs runs in a straight line from its first to its second value, or follows its signal,
@@ -175,8 +159,7 @@ class ScenarioSimulation {
     // Of a state, by its number among the names, that in the kernel.
     template <class D>
     std::size_t place_of(std::size_t k) const {
-        if (drive_) return k;
-        const auto coupled = static_cast<std::size_t>(train_->assembly().layout().coupled);
+        const auto coupled = static_cast<std::size_t>(train_.assembly().layout().coupled);
         return k < coupled ? k : k - coupled + static_cast<std::size_t>(D::coupled);
     }
 
@@ -205,8 +188,7 @@ class ScenarioSimulation {
     // Of the bits of numbers, as a number without a fraction.
     double sum(const double* first, const double* end) const;
 
-    std::unique_ptr<Simulation> drive_;
-    std::unique_ptr<TrainSimulation> train_;
+    TrainSimulation train_;
     Control control_;
     std::vector<control::Axis> laws_;
     std::vector<std::size_t> torques_;  // variables of the motors that the laws turn

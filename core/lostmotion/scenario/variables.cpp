@@ -2,15 +2,23 @@
 
 namespace lostmotion {
 
-Variables::Variables(const Scenario& s) {
-    if (s.is_of_drive())
-        add_drive(s.drive);
-    else
-        add_train(s.train);
+Variables::Variables(const Scenario& s) : train_(s.train) {
+    for (const TrainChannel& c : train_channels(model::Assembly(train_)))
+        all_.push_back({c.name, c.unit.empty() ? "1" : c.unit, c.meaning});
+    channels_ = all_.size();
+    if (train_.short_form) {
+        add_efficiency();
+    } else {
+        for (const model::Gear& g : train_.gears)
+            if (place(g.name + "_twist") < 0) {
+                derived_.push_back({Derived::nothing});
+                all_.push_back({g.name + "_twist", "rad", "angle of input/ratio less that of output"});
+            }
+        add_angles();
+    }
     for (std::size_t a = 0; a < s.control.axes.size(); ++a) {
         const control::Axis& law = s.control.axes[a].law;
-        const auto motor = static_cast<std::size_t>(s.control.axes[a].motor);
-        const std::string prefix = s.is_of_drive() ? "" : s.train.motors[motor].name + "_";
+        const std::string prefix = s.prefix(s.control.axes[a]);
         const auto add = [&](int signal, const control::AxisSignalName& named) {
             shown_.push_back({static_cast<int>(a), signal});
             all_.push_back({prefix + named.name, named.unit, named.meaning});
@@ -52,27 +60,11 @@ bool Variables::shows(const control::Axis& a, int signal) {
     }
 }
 
-void Variables::add_drive(const Drive& drive) {
-    ratio_ = drive.gearbox.ratio;
-    for (const ChannelName& c : channel_names) all_.push_back({c.name, c.unit, c.meaning});
-    channels_ = all_.size();
-    derived_.push_back({Derived::efficiency, place("output_torque"), place("motor_speed"), place("input_torque")});
+void Variables::add_efficiency() {
+    derived_.push_back({Derived::efficiency, place("output_torque"), place("motor_speed"), place("input_torque"), 0});
     all_.push_back({"efficiency", "1", "useful torque / torque fed in, undefined at standstill"});
     derived_.push_back({Derived::product, place("motor_torque"), place("motor_speed")});
     all_.push_back({"motor_power", "W", "mechanical power of the motor"});
-}
-
-void Variables::add_train(const model::Train& train) {
-    train_ = train;
-    for (const TrainChannel& c : train_channels(model::Assembly(train)))
-        all_.push_back({c.name, c.unit.empty() ? "1" : c.unit, c.meaning});
-    channels_ = all_.size();
-    for (const model::Gear& g : train.gears)
-        if (place(g.name + "_twist") < 0) {
-            derived_.push_back({Derived::nothing});
-            all_.push_back({g.name + "_twist", "rad", "angle of input/ratio less that of output"});
-        }
-    add_angles();
 }
 
 void Variables::add_angles() {
@@ -102,7 +94,7 @@ double Variables::rate(const Derived& d, const double* x, const double* dx) cons
         case Derived::nothing: return 0.0;
         case Derived::product: return dx[d.a] * x[d.b] + x[d.a] * dx[d.b];
         case Derived::efficiency: {
-            const double eta = efficiency(x[d.a], x[d.b], x[d.c]);
+            const double eta = efficiency(x[d.a], x[d.b], ratio(d) * x[d.c]);
             if (eta == 0.0) return 0.0;
             const double relative = dx[d.a] / x[d.a] - dx[d.c] / x[d.c];
             return x[d.a] * x[d.b] >= 0.0 ? eta * relative : -eta * relative;
@@ -116,9 +108,9 @@ double Variables::rate(const Derived& d, const double* x, const double* dx) cons
     return dx[d.a] / gear.law.ratio - dx[d.b] - slope * dx[d.a];
 }
 
-double Variables::efficiency(double T_2, double w_M, double T_1) const {
+double Variables::efficiency(double T_2, double w_M, double i_T_1) {
     if (w_M == 0.0) return std::numeric_limits<double>::quiet_NaN();
-    const double s = w_M > 0.0 ? 1.0 : -1.0, driving = T_2 * s, fed_in = ratio_ * T_1 * s;
+    const double s = w_M > 0.0 ? 1.0 : -1.0, driving = T_2 * s, fed_in = i_T_1 * s;
     if (driving >= 0.0) return driving / fed_in;
     return fed_in < 0.0 ? fed_in / driving : 0.0;
 }

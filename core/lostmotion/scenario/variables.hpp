@@ -6,8 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "../simulation/channels.hpp"
-#include "../simulation/result_names.hpp"
 #include "description.hpp"
 
 namespace lostmotion {
@@ -51,8 +49,7 @@ class Variables {
 
     static bool shows(const control::Axis& a, int signal);
 
-    void add_drive(const Drive& drive);
-    void add_train(const model::Train& train);
+    void add_efficiency();
     // Angles that the solver does not integrate follow through gears whose housing stands.
     void add_angles();
 
@@ -61,7 +58,7 @@ class Variables {
         switch (d.kind) {
             case Derived::nothing: return 0.0;
             case Derived::product: return at(d.a) * at(d.b);
-            case Derived::efficiency: return efficiency(at(d.a), at(d.b), at(d.c));
+            case Derived::efficiency: return efficiency(at(d.a), at(d.b), ratio(d) * at(d.c));
             default: break;
         }
         const model::Gear& gear = train_.gears[static_cast<std::size_t>(d.gear)];
@@ -71,13 +68,13 @@ class Variables {
     }
     double rate(const Derived& d, const double* x, const double* dx) const;
     // Driving (T_2 has the sign of w_M) it is T_2/(i T_1), overrunning i T_1/T_2; 0 where both sides feed the losses.
-    double efficiency(double T_2, double w_M, double T_1) const;
+    static double efficiency(double T_2, double w_M, double i_T_1);
+    double ratio(const Derived& d) const { return train_.gears[static_cast<std::size_t>(d.gear)].law.ratio; }
 
     std::vector<Variable> all_;
     std::size_t channels_ = 0;
     std::vector<Derived> derived_;
     std::vector<Shown> shown_;
-    double ratio_ = 1.0;
     model::Train train_;
 };
 

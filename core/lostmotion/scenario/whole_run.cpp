@@ -18,8 +18,7 @@ void add_signals(const Scenario& s, const Variables& variables, const std::vecto
     for (std::size_t a = 0; a < s.control.axes.size(); ++a) {
         const ControlledAxis& axis = s.control.axes[a];
         if (!axis.law.field_orientation) continue;
-        const std::string motor = s.is_of_drive() ? "motor" : s.train.motors[static_cast<std::size_t>(axis.motor)].name;
-        const int place = variables.place(motor + "_torque");
+        const int place = variables.place(s.train.motors[static_cast<std::size_t>(axis.motor)].name + "_torque");
         const std::size_t first = control::n_axis_signals;
         const double *i_d = recorded(a, first + control::direct_current),
                      *i_q = recorded(a, first + control::quadrature_current);
@@ -34,14 +33,10 @@ void add_signals(const Scenario& s, const Variables& variables, const std::vecto
 namespace lostmotion {
 
 WholeRun run_whole(const Scenario& s, const WholeRunOptions& options) {
-    return whole_run::run(
-        s, options,
-        [](const Drive& drive, const Signals& signals, const Start& start, const RunOptions& o, double* out) {
-            return run_exact(drive, signals, start, o, out);
-        },
-        [](const TrainRun& run, const std::vector<Signal>& signals, const std::vector<double>& x,
-           const std::vector<double>& memory, const TrainOptions& o,
-           double* out) { return run.run_exactly(signals, x, memory, o, out); });
+    return whole_run::run(s, options,
+                          [](const TrainRun& run, const std::vector<Signal>& signals, const std::vector<double>& x,
+                             const std::vector<double>& memory, const TrainOptions& o,
+                             double* out) { return run.run_exactly(signals, x, memory, o, out); });
 }
 
 }  // namespace lostmotion

@@ -2,23 +2,6 @@
 
 namespace lostmotion {
 
-const std::vector<SwitchingColumn>& switching_columns() {
-    static const std::vector<SwitchingColumn> columns = [] {
-        std::vector<SwitchingColumn> all{
-            {"instant", [](const Switching& s) { return s.time; }},
-            {"cause", [](const Switching& s) { return double(s.input_jump ? input_changed : int(s.kind)); }},
-        };
-        for (const auto& [when, key] : {std::pair{"_before", &Switching::before}, {"_after", &Switching::after}})
-            for (const ContactName& c : contact_names)
-                all.push_back({c.name + std::string(when),
-                               [c, key](const Switching& s) { return double((s.*key).modes[c.value]); }});
-        all.push_back({"output_torque_before", [](const Switching& s) { return s.torque_before; }});
-        all.push_back({"output_torque_after", [](const Switching& s) { return s.torque_after; }});
-        return all;
-    }();
-    return columns;
-}
-
 std::string status_text(Status status, double time, const std::string& subject) {
     const std::string at = "at t = " + std::to_string(time) + " s";
     switch (status) {

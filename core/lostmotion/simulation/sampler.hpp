@@ -9,10 +9,8 @@
 #include <span>
 #include <utility>
 
-#include "../drive/contact.hpp"
 #include "../kernel/stride.hpp"
 #include "../solver/exact_solver.hpp"
-#include "reader.hpp"
 #include "sample_times.hpp"
 
 namespace lostmotion {
@@ -185,14 +183,6 @@ class SamplerOf : public Observer<System> {
     std::size_t n_pieces_ = 0;  // that have been collected
     Stride<D> stride_;
     Instants instants_;
-};
-
-// Of the drive.
-class Sampler : public SamplerOf<SwitchedDrive, Reader, Drive> {
- public:
-    Sampler(const Drive& drive, double begin, double interval, std::size_t count, double* out,
-            std::span<const int> channels = all_channels)
-        : SamplerOf(drive, begin, interval, count, out, channels) {}
 };
 
 }  // namespace lostmotion

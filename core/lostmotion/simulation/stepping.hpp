@@ -5,10 +5,8 @@
 #include <cstddef>
 #include <optional>
 
-#include "../drive/contact.hpp"
 #include "../solver/exact_solver.hpp"
-#include "drive_control.hpp"
-#include "reader.hpp"
+#include "closed_loop.hpp"
 
 namespace lostmotion {
 
@@ -194,32 +192,5 @@ auto SimulationOf<System>::regime() -> const Regime& {
     find_regime();
     return solver_.regime(now_.key);
 }
-
-// What a simulation of a drive owns.
-struct OwnDrive {
-    explicit OwnDrive(const Drive& d) : own_drive(d) {}
-    Drive own_drive;
-    SwitchedDrive own_system{own_drive};
-};
-
-class Simulation : private OwnDrive, public SimulationOf<SwitchedDrive> {
- public:
-    Simulation(const Drive& drive, double step, const Control& control = {}, const InputSines& sines = {});
-
-    const Drive& drive() const { return own_drive; }
-    using SimulationOf::advance;
-    Status advance(double interval, double command_begin, double command_end, double load_begin, double load_end) {
-        return advance(interval, {command_begin, load_begin}, {command_end, load_end});
-    }
-    // Variables at the present instant, with the inputs at their last values.
-    Reading reading() {
-        const Regime& r = regime();
-        return Reader(drive(), r, snapshot().memory)(snapshot().x, inputs());
-    }
-};
-
-// Compiled once, by core/kernels/drive.cpp.
-extern template class ExactSolver<SwitchedDrive>;
-extern template class SimulationOf<SwitchedDrive>;
 
 }  // namespace lostmotion

@@ -24,10 +24,41 @@ void add_controller_channels(const model::Assembly& a, int controller, std::vect
             {C::state, p.first_state + static_cast<int>(j), c.name + "_" + c.states[j], "", "state of the controller"});
 }
 
+namespace {
+
+// In the order and the words of the paper.
+std::vector<TrainChannel> short_channels(const model::Assembly& a) {
+    using C = TrainChannel;
+    const model::Places& p = a.places();
+    const auto contact = [](int place, C::Kind sign, int index, const char* name, const char* meaning) {
+        return place == model::nowhere ? C{sign, index, name, "1", meaning}
+                                       : C{C::contact_mode, place, name, "1", meaning};
+    };
+    return {
+        {C::input, p.motors[0].command, "command", "1", "control signal, relative armature voltage", "E_C"},
+        {C::input, p.shafts[1].load, "load_torque", "N*m", "disturbance torque on the load", "M_Z"},
+        {C::motor_torque, 0, "motor_torque", "N*m", "torque of the motor", "M_D"},
+        {C::state, p.shafts[0].speed, "motor_speed", "rad/s", "speed of rotor and input shaft", "w_M"},
+        {C::state, p.shafts[1].speed, "load_speed", "rad/s", "speed of the load", "w"},
+        {C::state, a.layout().coupled, "load_angle", "rad", "angle of the load", "phi"},
+        {C::state, p.gears[0].twist, "twist", "rad", "torsion of the gearbox, input angle / ratio - output angle", "d"},
+        {C::output_torque, 0, "output_torque", "N*m", "torque of the gearbox on the load", "T_2"},
+        {C::input_torque, 0, "input_torque", "N*m", "torque of the gearbox on the input shaft", "T_1"},
+        {C::loss_coefficient, 0, "loss_coefficient", "1",
+         "torque lost in the gearbox, at the output, / rated output torque", "m_2B"},
+        contact(p.shafts[0].contact, C::shaft_sign, 0, "input_contact", "input shaft: +1 or -1 slipping, 0 stuck"),
+        contact(p.gears[0].contact, C::twist_sign, 0, "twist_contact", "twist: +1 or -1 slipping, 0 stuck"),
+        contact(p.shafts[1].contact, C::shaft_sign, 1, "load_contact", "load bearing: +1 or -1 slipping, 0 stuck"),
+    };
+}
+
+}  // namespace
+
 std::vector<TrainChannel> train_channels(const model::Assembly& a) {
     using C = TrainChannel;
     const model::Train& t = a.train();
     const model::Places& p = a.places();
+    if (t.short_form) return short_channels(a);
     std::vector<C> out;
     const auto inputs = model::input_names(a);
     for (std::size_t k = 0; k < inputs.size(); ++k) {

@@ -21,12 +21,15 @@ struct TrainChannel {
         output_torque,
         input_torque,
         contact_torque,
+        loss_coefficient,
         contact_mode,
+        shaft_sign,  // of the speed: what shows how a contact slips that the train does not have
+        twist_sign,
         output,
         error
     } kind;
-    int index;  // of the input, state, motor, gear, contact or controller
-    std::string name, unit, meaning;
+    int index;  // of the input, state, motor, gear, contact, shaft or controller
+    std::string name, unit, meaning, symbol = {};
 };
 
 // The inputs from this one on are those of the controllers.
@@ -45,7 +48,7 @@ class TrainReader {
     // What a reader is made for.
     struct Model {
         const model::Assembly& assembly;
-        std::vector<TrainChannel> channels;
+        const std::vector<TrainChannel>& channels;
     };
 
     TrainReader(const Model& m, const model::TrainRegime<D>& r, const Memory& memory)
@@ -73,18 +76,22 @@ class TrainReader {
             }
             case TrainChannel::motor_torque: form(row(regime_.rows.motor_torque[index])); return;
             case TrainChannel::output_torque: form(regime_.output_torque[index]); return;
-            case TrainChannel::input_torque: {
-                form(row(regime_.rows.input_torque[index]));
-                const model::Gear& gear = model_.assembly.train().gears[index];
-                const auto contact = static_cast<std::size_t>(
-                    model_.assembly.places().shafts[static_cast<std::size_t>(gear.input)].contact);
-                if (gear.has_dry_losses() && regime_.key.modes[contact] == 0)
-                    each([&](int k) { return load(out + k) + shared_torque(gear, index, contact, at, k); });
+            case TrainChannel::input_torque:
+                form(regime_.input_torque[index]);
+                if (shares(index)) {
+                    const auto friction = row(model_.assembly.held_friction(gear(index).input, regime_.key));
+                    each([&](int k) { return load(out + k) + shared_torque(index, friction, at, k); });
+                }
                 return;
-            }
+            case TrainChannel::loss_coefficient:
+                form(regime_.mesh_loss[index]);
+                each([&](int k) { return loss_coefficient(index, load(out + k), at, k); });
+                return;
             case TrainChannel::output: form(row(model_.assembly.controller_command(c.index, regime_.key))); return;
             case TrainChannel::error: form(row(model_.assembly.controller_error(c.index))); return;
             case TrainChannel::contact_torque: form(regime_.contact_torque[index]); return;
+            case TrainChannel::shaft_sign: each([&](int k) { return signs(speed(c.index, at, k)); }); return;
+            case TrainChannel::twist_sign: each([&](int k) { return signs(twist_rate(index, at, k)); }); return;
             default: std::fill_n(out, n, regime_.at_rest[index] ? 0.0 : static_cast<double>(regime_.key.modes[index]));
         }
     }
@@ -105,26 +112,68 @@ class TrainReader {
     }
 
  private:
-    // Of an input shaft at rest, the torque that its contact holds is shared by what is dry there as the capacities
-    // are: what is added to the torque on the gear.
+    const model::Gear& gear(std::size_t k) const { return model_.assembly.train().gears[k]; }
+    const model::ShaftPlace& place(int shaft) const {
+        return model_.assembly.places().shafts[static_cast<std::size_t>(shaft)];
+    }
     template <class Instants>
-    Vec shared_torque(const model::Gear& gear, std::size_t index, std::size_t contact, const Instants& at,
-                      int k) const {
-        const Vec T_2 = evaluate(regime_.output_torque[index], at, k),
-                  F = evaluate(regime_.contact_torque[contact], at, k);
-        Vec margin[2];  // until it slips backward, forward
-        for (int g = 0; g < regime_.n_guards; ++g)
-            if (const auto& guard = regime_.guards[static_cast<std::size_t>(g)];
-                guard.kind == model::Guard::capacity && guard.contact == static_cast<int>(contact))
-                margin[guard.neighbour > 0] = evaluate(guard.form, at, k);
-        Vec shared{};
-        for (int lane = 0; lane < vec_width; ++lane) {
-            const int s = F[lane] >= 0.0 ? 1 : -1;
-            const double capacity = margin[s > 0][lane] + s * F[lane];
-            if (capacity > 0.0)
-                shared[lane] = F[lane] * gear.loss(s * T_2[lane], 0.0).torque / gear.law.ratio / capacity;
+    Vec speed(int shaft, const Instants& at, int k) const {
+        return load(&at.x[static_cast<std::size_t>(place(shaft).speed)][k]);
+    }
+    template <class Instants>
+    Vec twist_rate(std::size_t k, const Instants& at, int n) const {
+        return speed(gear(k).input, at, n) / gear(k).law.ratio - speed(gear(k).output, at, n);
+    }
+    static Vec signs(Vec v) {
+        const Vec zero{}, one = zero + 1.0;
+        return (v > zero ? one : zero) - (v < zero ? one : zero);
+    }
+
+    // Of an input shaft at rest, the torque that its contact holds is shared by what is dry there as the capacities
+    // are.
+    bool shares(std::size_t k) const {
+        return gear(k).has_dry_losses() &&
+               regime_.key.modes[static_cast<std::size_t>(place(gear(k).input).contact)] == 0;
+    }
+    template <class Instants>
+    Vec held(std::size_t k, const Instants& at, int n) const {
+        return evaluate(regime_.contact_torque[static_cast<std::size_t>(place(gear(k).input).contact)], at, n);
+    }
+    // What is added to the torque on the gear. friction: that its input shaft holds, without gears.
+    template <class Instants>
+    Vec shared_torque(std::size_t index, const LinearFormOf<D>& friction, const Instants& at, int k) const {
+        const Vec F = held(index, at, k);
+        Vec capacity = evaluate(friction, at, k), own{};
+        for (std::size_t g = 0; g < model_.assembly.train().gears.size(); ++g) {
+            if (gear(g).input != gear(index).input || !gear(g).has_dry_losses()) continue;
+            const Vec loss = loss_at_rest(g, F, at, k) / gear(g).law.ratio;
+            capacity += loss;
+            if (g == index) own = loss;
         }
+        Vec shared{};
+        for (int lane = 0; lane < vec_width; ++lane)
+            if (capacity[lane] > 0.0) shared[lane] = F[lane] * own[lane] / capacity[lane];
         return shared;
+    }
+    // What a gear at rest holds at most at its output in the direction of F, the torque that is held.
+    template <class Instants>
+    Vec loss_at_rest(std::size_t index, Vec F, const Instants& at, int k) const {
+        Vec loss = evaluate(regime_.output_torque[index], at, k);
+        for (int lane = 0; lane < vec_width; ++lane)
+            loss[lane] = gear(index).loss_at_rest(F[lane] >= 0.0 ? loss[lane] : -loss[lane]);
+        return loss;
+    }
+    // From the loss of a speed forward.
+    template <class Instants>
+    Vec loss_coefficient(std::size_t index, Vec lost, const Instants& at, int k) const {
+        const int shaft = gear(index).input;
+        if (shares(index))
+            lost = loss_at_rest(index, held(index, at, k), at, k);
+        else if (gear(index).has_dry_losses())
+            lost *= static_cast<double>(regime_.key.modes[static_cast<std::size_t>(place(shaft).contact)]);
+        else
+            lost *= signs(speed(shaft, at, k));
+        return lost / gear(index).law.rated_output_torque;
     }
 
     LinearFormOf<D> row(const model::Row& r) const { return model::pack<D>(r, model_.assembly.layout()); }

@@ -1,6 +1,8 @@
 // The record of a run of a train: samples, switchings and energies.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -17,46 +19,66 @@ namespace lostmotion {
 template <class D>
 class TrainMeter {
  public:
-    explicit TrainMeter(const model::Assembly& a) : assembly_(a) {}
+    explicit TrainMeter(const model::Assembly& a) : assembly_(a) {
+        place_.fill(-1);
+        if (a.train().short_form)
+            for (const int number : in_words_of_paper) place(number);
+    }
 
     Interruption& interruption() { return integral_.interruption; }
 
     // False ends the run.
     bool segment(const Segment<model::TrainSystem<D>>& s) {
+        model::TrainRegime<D>& r = s.entry.regime;
         if (!(s.end > s.begin)) return true;
+        if (!r.flows) find_flows(r);
+        for (const auto& f : *r.flows) place(f.number);
+        if (std::ranges::all_of(assembly_.places().shafts, [&](const model::ShaftPlace& p) {
+                return r.resting[static_cast<std::size_t>(p.speed)];
+            }))
+            return true;
         typename Integral::Factors factors;
-        const model::Layout& n = assembly_.layout();
-        for (std::size_t k = 0; k < names_.size(); ++k)
-            factors.set(static_cast<int>(k), {}, {});  // none in this regime
-        for (const model::PowerFlow& f : model::power_flows(assembly_, s.entry.regime.rows))
-            factors.set(place(f), model::pack<D>(f.power.torque, n), model::pack<D>(f.power.speed, n));
+        const int rows = max_flows <= 8 ? max_flows : static_cast<int>(order_.size());
+        for (int k = 0; k < rows; ++k) factors.set(k, {}, {});  // none in this regime
+        for (const auto& f : *r.flows) factors.set(place(f.number), f.torque, f.speed);
         factors.hold(s.memory);
         return integral_.add(s, factors);
     }
     void write(TrainReport& report) const {
-        for (std::size_t k = 0; k < names_.size(); ++k)
-            report.energy.push_back({names_[k], kinds_[k], integral_.flow[k]});
+        const std::vector<model::PowerFlow> all = model::all_flows(assembly_);
+        for (std::size_t k = 0; k < order_.size(); ++k) {
+            const auto& flow = all[static_cast<std::size_t>(order_[k])];
+            report.energy.push_back({flow.name, flow.kind, integral_.flow[k]});
+        }
         report.turned_over = integral_.turned_over;
     }
 
  private:
-    static constexpr int max_flows = 96;
+    static constexpr int max_flows = D::guards <= 16 ? 8 : 96;
     using Integral = PowerIntegral<D, max_flows>;
+    // Motor, viscous and dry friction of its shaft, mesh, hysteresis, the same friction of the load, load torque.
+    static constexpr int in_words_of_paper[] = {0, 1, 2, 6, 7, 3, 5, 4};
 
-    // Its row, which it keeps from regime to regime.
-    int place(const model::PowerFlow& f) {
-        const std::string& name = f.name;
-        for (std::size_t k = 0; k < names_.size(); ++k)
-            if (names_[k] == name) return static_cast<int>(k);
-        names_.push_back(name);
-        kinds_.push_back(f.kind);
-        return static_cast<int>(names_.size()) - 1;
+    [[gnu::cold]] void find_flows(model::TrainRegime<D>& r) const {
+        const model::Layout& n = assembly_.layout();
+        auto& flows = r.flows.emplace();
+        for (const model::NumberedPower& f : model::power_flows(assembly_, r.rows))
+            flows.push_back({f.flow, model::pack<D>(f.power.torque, n), model::pack<D>(f.power.speed, n)});
+    }
+    // The row of a flow, which it keeps from regime to regime.
+    int place(int number) {
+        int& place = place_[static_cast<std::size_t>(number)];
+        if (place < 0) {
+            place = static_cast<int>(order_.size());
+            order_.push_back(number);
+        }
+        return place;
     }
 
     const model::Assembly& assembly_;
     Integral integral_;
-    std::vector<std::string> names_;
-    std::vector<model::PowerFlow::Kind> kinds_;
+    std::array<int, 96> place_;
+    std::vector<int> order_;
 };
 
 // What follows a run of the exact solver beside the record: each stretch of time, each switching, each tick of the
@@ -111,12 +133,8 @@ class TrainRecorder final : public Observer<model::TrainSystem<D>> {
     void switching(const SwitchingOf<System>& s) override {
         if (watcher_ != nullptr) watcher_->switching(s);
         if (!keeps_switching()) return;
-        int branch = -1;
-        if (s.guard >= 0) {
-            for (int b = 0; b < model_.assembly.layout().branches; ++b)
-                if (s.before.branch[b] != s.after.branch[b]) branch = b;
-        }
-        report_.switchings.push_back({s.time, s.input_jump, s.kind, s.contact, branch, s.before, s.after});
+        report_.switchings.push_back({s.time, s.input_jump, s.kind, s.contact, s.branch, s.before.modes, s.after.modes,
+                                      s.torque_before, s.torque_after});
     }
     // Of the adaptive solver.
     template <class Solver>

@@ -1,7 +1,9 @@
 // What a run of a train is given and what it gives.
 #pragma once
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <optional>
@@ -18,8 +20,11 @@ namespace lostmotion {
 
 // By name; what is left out is 0.
 using Named = std::map<std::string, double>;
+using NamedInOrder = std::vector<std::pair<std::string, double>>;
 
+// 0 where there is none of that name.
 double value_of(const Named& values, const std::string& name);
+double value_of(const NamedInOrder& values, const std::string& name);
 
 struct TrainStart {
     Named states;
@@ -39,11 +44,21 @@ struct TrainSwitching {
     bool input_jump = false;
     model::Guard::Kind kind = model::Guard::speed;
     int contact = -1, branch = -1;  // that it was about, if any
-    model::Key before, after;
+    using Modes = std::array<std::int8_t, model::max_contacts>;
+    Modes before{}, after{};                         // of the contacts
+    double torque_before = 0.0, torque_after = 0.0;  // T_2 [N m] of the last gear, left and right limit
 };
 
-// Time, cause, the modes of all contacts before and after.
-double* write_switching(const TrainSwitching& s, int contacts, double* to);
+// What ended a regime: number and name.
+struct SwitchingCause {
+    int number;
+    const char* name;
+};
+std::vector<SwitchingCause> switching_causes(bool short_form);
+// Names of the columns of a table of switchings: instant, cause, the modes of all contacts before and after; in the
+// short form also the torque of the gearbox, and contacts that it has not, whose modes are 2.
+std::vector<std::string> switching_columns(const model::Assembly& a);
+double* write_switching(const model::Assembly& a, const TrainSwitching& s, double* to);
 
 struct TrainEnergy {
     std::string name;
@@ -60,7 +75,8 @@ struct TrainReport {
     std::vector<TrainSwitching> switchings;
     std::size_t switching_count = 0;
     std::vector<TrainEnergy> energy;
-    double stored_change = 0.0, turned_over = 0.0;                  // [J]
+    model::StoredChange stored_change;
+    double turned_over = 0.0;                                       // [J]
     double left_data_at = std::numeric_limits<double>::infinity();  // [s]
     long steps = 0;
     bool too_many_guards = false;  // a regime has more conditions than the kernel has room for
@@ -74,11 +90,8 @@ struct TrainReport {
         switching_count = solver.switchings();
         too_many_guards = system.overflowed();
         x.resize(static_cast<std::size_t>(n.states));
-        // Speeds that are tied may have drifted apart by rounding.
         const auto& r = solver.regime();
-        auto state = solver.state();
-        auto at_rest = r.at_rest;
-        system.stop(state, at_rest);
+        const auto state = solver.state();
         model::unpack_state<typename System::Dims>(state, n, x.begin());
         memory.assign(solver.memory().begin(), solver.memory().begin() + n.memory);
         const auto input = solver.input_before(time, state);
@@ -101,9 +114,11 @@ std::string error_text(const TrainReport& report, const model::Assembly& a);
 
 // The energy ledger by name [J], also of flows that there have not been.
 std::vector<std::string> ledger_names(const model::Assembly& a);
-Named named_ledger(const TrainReport& report, const model::Assembly& a);
+NamedInOrder named_ledger(const TrainReport& report, const model::Assembly& a);
 
-// States, and capacities of the hysteresis of gears [N m].
-Named named_end(const TrainReport& report, const model::Assembly& a);
+// Of the hysteresis of gears [N m], from the memory by the layout; in the short form also where there is none.
+NamedInOrder capacities_at(const model::Assembly& a, const double* memory);
+// States, and these capacities.
+NamedInOrder named_end(const TrainReport& report, const model::Assembly& a);
 
 }  // namespace lostmotion

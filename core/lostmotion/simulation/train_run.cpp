@@ -17,14 +17,20 @@ std::string check_run(const model::Assembly& a, std::span<const double> start, c
 TrainRun::TrainRun(const model::Train& train) : error_(model::check(train)) {
     if (!error_.empty()) return;
     assembly_ = std::make_unique<model::Assembly>(train);
-    channels_ = train_channels(*assembly_);
-    error_ = too_large(train, model::Places(train, true).layout);
+    channels_ = std::make_unique<const std::vector<TrainChannel>>(train_channels(*assembly_));
+    const model::Layout n = model::Places(train, true).layout;
+    error_ = too_large(train, n);
+    if (error_.empty() && !model::fits<model::Widest>(train, n))
+        error_ = "this core was built for a motor, a gear and a load alone; the train has more";
 }
 
 const char* TrainRun::kernel() const {
     const model::Train& train = assembly_->train();
     const model::Layout& n = assembly_->layout();
-    return model::fits<model::Narrow>(train, n) ? "narrow" : model::fits<model::Middle>(train, n) ? "middle" : "wide";
+    return model::fits<model::Least>(train, n)    ? "drive"
+           : model::fits<model::Narrow>(train, n) ? "narrow"
+           : model::fits<model::Middle>(train, n) ? "middle"
+                                                  : "wide";
 }
 
 }  // namespace lostmotion

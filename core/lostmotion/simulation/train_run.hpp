@@ -23,18 +23,26 @@ std::string check_run(const model::Assembly& a, std::span<const double> start, c
 
 template <class D>
 class TrainWatcher;
-template <class D>
-struct TrainWorkspace;
+// What runs of a train leave for the next ones: the regimes that they have met. Runs of another train take the memory.
+struct AnyWorkspace {
+    explicit AnyWorkspace(const void* kernel) : kernel(kernel) {}
+    virtual ~AnyWorkspace() = default;
+    // Forgets the regimes of a train that is gone.
+    virtual void leave() = 0;
+
+    const void* const kernel;
+    const model::Assembly* of = nullptr;  // nullptr: of a train that is gone
+};
 
 // These are compiled once for each kernel, by core/kernels.
 
-// By the exact solver. start: the states by the layout of the assembly, or nothing for rest. workspace: of the train,
-// for several runs with the same sample interval.
+// By the exact solver. start: the states by the layout of the assembly, or nothing for rest. workspace: of this train
+// or one that is gone, made where there is none of this kernel.
 template <class D>
 TrainReport run_train_exactly_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
                                  std::span<const double> start, std::span<const double> memory,
-                                 const TrainOptions& options, double* out, TrainWatcher<D>* watcher = nullptr,
-                                 TrainWorkspace<D>* workspace = nullptr);
+                                 const TrainOptions& options, double* out, TrainWatcher<D>* watcher,
+                                 std::unique_ptr<AnyWorkspace>& workspace);
 // By the adaptive solver, to options.tolerance.
 template <class D>
 TrainReport run_train_adaptively_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
@@ -70,7 +78,7 @@ class TrainRun {
     explicit TrainRun(const model::Train& train);
     const std::string& error() const { return error_; }
     const model::Assembly& assembly() const { return *assembly_; }
-    const std::vector<TrainChannel>& channels() const { return channels_; }
+    const std::vector<TrainChannel>& channels() const { return *channels_; }
 
     // The narrowest kernel that holds the train.
     const char* kernel() const;
@@ -84,9 +92,11 @@ class TrainRun {
         const model::Train& train = assembly.train();
         const model::Layout& n = assembly.layout();
         const auto in = [&]<class D>(D) {
-            const typename TrainReader<D>::Model model{assembly, channels_};
+            const typename TrainReader<D>::Model model{assembly, *channels_};
             return use.template operator()<D>(model);
         };
+        if constexpr (holds(Kernel::drive))
+            if (model::fits<model::Least>(train, n)) return in(model::Least{});
         if constexpr (holds(Kernel::narrow))
             if (model::fits<model::Narrow>(train, n)) return in(model::Narrow{});
         if constexpr (holds(Kernel::middle))
@@ -99,27 +109,35 @@ class TrainRun {
         return lostmotion::in_layout(*assembly_, start);
     }
 
-    // inputs: one signal each, as model::input_names. out: channels x samples, channel by channel.
+    // inputs: one signal each, as model::input_names. out: channels x samples, channel by channel. workspace: as of
+    // run_train_exactly_in, of the exact solver.
     TrainReport run(const std::vector<Signal>& inputs, const TrainStart& start, const TrainOptions& options,
-                    double* out) const {
+                    double* out, std::unique_ptr<AnyWorkspace>& workspace) const {
         const auto [x, memory] = in_layout(start);
-        return run(inputs, x, memory, options, out);
-    }
-    TrainReport run(const std::vector<Signal>& inputs, std::span<const double> start, std::span<const double> memory,
-                    const TrainOptions& options, double* out) const {
-        if (!(options.tolerance > 0.0)) return run_exactly(inputs, start, memory, options, out);
+        if (!(options.tolerance > 0.0)) return run_exactly(inputs, x, memory, options, out, workspace);
         // The adaptive solver takes smooth laws as they are.
         return in_kernel(model::Assembly(assembly_->train(), true),
-                         [&]<class D>(const typename TrainReader<D>::Model& model) {
-                             return run_train_adaptively_in<D>(model, inputs, start, memory, options, out);
+                         [&, &x = x, &memory = memory]<class D>(const typename TrainReader<D>::Model& model) {
+                             return run_train_adaptively_in<D>(model, inputs, x, memory, options, out);
                          });
+    }
+    TrainReport run(const std::vector<Signal>& inputs, const TrainStart& start, const TrainOptions& options,
+                    double* out) const {
+        std::unique_ptr<AnyWorkspace> own;
+        return run(inputs, start, options, out, own);
     }
     // By the exact solver, whatever the tolerance.
     TrainReport run_exactly(const std::vector<Signal>& inputs, std::span<const double> start,
-                            std::span<const double> memory, const TrainOptions& options, double* out) const {
+                            std::span<const double> memory, const TrainOptions& options, double* out,
+                            std::unique_ptr<AnyWorkspace>& workspace) const {
         return in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
-            return run_train_exactly_in<D>(model, inputs, start, memory, options, out);
+            return run_train_exactly_in<D>(model, inputs, start, memory, options, out, nullptr, workspace);
         });
+    }
+    TrainReport run_exactly(const std::vector<Signal>& inputs, std::span<const double> start,
+                            std::span<const double> memory, const TrainOptions& options, double* out) const {
+        std::unique_ptr<AnyWorkspace> own;
+        return run_exactly(inputs, start, memory, options, out, own);
     }
 
     TrainReport reach(const std::vector<Signal>& inputs, const TrainStart& start, const TrainOptions& options,
@@ -144,22 +162,23 @@ class TrainRun {
 
     std::string error_;
     std::unique_ptr<model::Assembly> assembly_;
-    std::vector<TrainChannel> channels_;
+    std::unique_ptr<const std::vector<TrainChannel>> channels_;  // readers refer to it, wherever this is moved
 };
 
 // Compiled once for each kernel, by core/kernels. TEMPLATE: `extern template` to declare, `template` to compile.
-#define LOSTMOTION_TRAIN_RUNS(TEMPLATE, D)                                                                            \
-    TEMPLATE TrainReport run_train_exactly_in<D>(const TrainReader<D>::Model&, const std::vector<Signal>&,            \
-                                                 std::span<const double>, std::span<const double>,                    \
-                                                 const TrainOptions&, double*, TrainWatcher<D>*, TrainWorkspace<D>*); \
-    TEMPLATE TrainReport reach_train_in<D>(const TrainReader<D>::Model&, const std::vector<Signal>&,                  \
-                                           std::span<const double>, std::span<const double>, const TrainOptions&,     \
+#define LOSTMOTION_TRAIN_RUNS(TEMPLATE, D)                                                                          \
+    TEMPLATE TrainReport run_train_exactly_in<D>(                                                                   \
+        const TrainReader<D>::Model&, const std::vector<Signal>&, std::span<const double>, std::span<const double>, \
+        const TrainOptions&, double*, TrainWatcher<D>*, std::unique_ptr<AnyWorkspace>&);                            \
+    TEMPLATE TrainReport reach_train_in<D>(const TrainReader<D>::Model&, const std::vector<Signal>&,                \
+                                           std::span<const double>, std::span<const double>, const TrainOptions&,   \
                                            TrainPoint&);
 #define LOSTMOTION_ADAPTIVE_RUNS(TEMPLATE, D)                                                                 \
     TEMPLATE TrainReport run_train_adaptively_in<D>(const TrainReader<D>::Model&, const std::vector<Signal>&, \
                                                     std::span<const double>, std::span<const double>,         \
                                                     const TrainOptions&, double*);
 #define LOSTMOTION_EACH_KERNEL(DECLARE, TEMPLATE) \
+    DECLARE(TEMPLATE, model::Least)               \
     DECLARE(TEMPLATE, model::Narrow)              \
     DECLARE(TEMPLATE, model::Middle)              \
     DECLARE(TEMPLATE, model::Wide)

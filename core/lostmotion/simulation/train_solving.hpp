@@ -1,7 +1,7 @@
 // Runs of a train in one kernel by the exact solver. Only core/kernels takes it.
 #pragma once
 
-#include <optional>
+#include <memory>
 
 #include "stepping.hpp"
 #include "train_recorder.hpp"
@@ -9,12 +9,30 @@
 
 namespace lostmotion {
 
+template <class D>
+inline constexpr char kernel_of = 0;  // its address tells kernels apart
+
 // A train with the regimes that its runs have met.
 template <class D>
-struct TrainWorkspace {
-    explicit TrainWorkspace(const model::Assembly& assembly) : system(assembly), cache(system) {}
+struct TrainWorkspace final : AnyWorkspace {
+    explicit TrainWorkspace(const model::Assembly& assembly)
+        : AnyWorkspace(&kernel_of<D>), system(assembly), cache(system) {
+        of = &assembly;
+    }
+    StateOf<D> balanced_scale() const { return system.balanced_scale(); }
+    void leave() override {
+        cache.forget(most_kept);
+        of = nullptr;
+    }
+    void serve(const model::Assembly& assembly) {
+        if (of == &assembly) return;
+        std::destroy_at(&system);
+        std::construct_at(&system, assembly);
+        of = &assembly;
+    }
 
-    const model::TrainSystem<D> system;
+    static constexpr std::size_t most_kept = 1000;  // regimes: of the memory, a few megabytes
+    model::TrainSystem<D> system;
     RegimeCache<model::TrainSystem<D>> cache;
 };
 
@@ -49,17 +67,19 @@ template <class D>
 TrainReport run_train_exactly_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
                                  std::span<const double> start, std::span<const double> memory,
                                  const TrainOptions& options, double* out, TrainWatcher<D>* watcher,
-                                 TrainWorkspace<D>* workspace) {
+                                 std::unique_ptr<AnyWorkspace>& workspace) {
     TrainReport report;
     report.message = check_run(model.assembly, start, options.control);
     if (!report.message.empty()) return report;
     const PackedRun<D> c(model.assembly, inputs, start, memory, options);
     TrainRecorder<D> recorder(model, options, out, report, watcher);
-    std::optional<TrainWorkspace<D>> own;
-    if (workspace == nullptr) workspace = &own.emplace(model.assembly);
-    const model::TrainSystem<D>& system = workspace->system;
+    if (!workspace || workspace->kernel != &kernel_of<D>)
+        workspace = std::make_unique<TrainWorkspace<D>>(model.assembly);
+    auto& own = static_cast<TrainWorkspace<D>&>(*workspace);
+    own.serve(model.assembly);
+    const model::TrainSystem<D>& system = own.system;
     ExactSolver<model::TrainSystem<D>> solver(system, c.signals, options.sample_interval, system.balanced_scale(),
-                                              &workspace->cache);
+                                              &own.cache);
     if (watcher != nullptr) watcher->begin(solver);
     report.status = run_recorded(solver, c.start, options, recorder, c.in_train());
     recorder.end();

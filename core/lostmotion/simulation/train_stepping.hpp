@@ -86,7 +86,10 @@ class TrainSimulation {
     using In = std::variant<std::unique_ptr<TrainSimulationIn<D>>...>;
 
     TrainRun run_;
-    std::conditional_t<built == Kernel::all, In<model::Narrow, model::Middle, model::Wide>, In<model::Widest>> in_;
+    std::conditional_t<
+        built == Kernel::all, In<model::Least, model::Narrow, model::Middle, model::Wide>,
+        std::conditional_t<built == Kernel::drive_and_wide, In<model::Least, model::Wide>, In<model::Widest>>>
+        in_;
 };
 
 // Compiled once for each kernel, by core/kernels.

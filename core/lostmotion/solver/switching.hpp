@@ -21,6 +21,7 @@ struct SwitchingOf {
     typename D::Contact contact{};
     bool input_jump = false;  // an input changed its value or slope; kind and contact mean nothing
     int guard = -1;           // its number among those of the regime before; -1: an input jumped
+    int branch = -1;          // the law whose branch it has left, if any
     typename System::Key before, after;
     StateOf<D> x{};
     typename D::Memory memory{};                     // after it, as x
@@ -82,6 +83,7 @@ Status switch_regime(const System& system, Cache& cache, InputState<D>& input, d
         if (fired != nullptr) {
             s.kind = fired->kind;
             s.contact = fired->contact;
+            s.branch = fired->branch;
             s.guard = static_cast<int>(fired - old.guards.data());
         }
     }

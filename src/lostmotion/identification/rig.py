@@ -16,7 +16,6 @@ from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import find_scenario, load
 from ..simulation.sensitivities import channels_of
 from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form
-from ..simulation.train_state import start_capacities
 from .formulas import Formula, names_in
 from .prepare import Prepared
 from .shaft_angles import angle_terms
@@ -37,7 +36,7 @@ class Built:
     @cached_property
     def names(self) -> list[str]:
         """Of the channels of a run."""
-        return [str(channel) for channel, _, _ in self.core.channels()]
+        return [str(channel) for channel, *_ in self.core.channels()]
 
     @cached_property
     def smooth(self) -> list[str]:
@@ -68,7 +67,7 @@ class Built:
     @cached_property
     def start(self) -> tuple[dict[str, float], dict[str, float]]:
         """State and hysteresis capacities at the start, by name."""
-        return self.scenario.start(), start_capacities(self.scenario.initial)
+        return self.scenario.start(), self.scenario.capacities()
 
 
 class Rig:
@@ -145,7 +144,7 @@ class Rig:
         return [*self.scenario.signals(), *(f"{name}_reference" for name in self.scenario.axes())]
 
     def _units(self) -> dict[str, str]:
-        units = {str(name): str(unit) for name, unit, _ in self.scenario.core().channels()}
+        units = {str(name): str(unit) for name, _, unit, _ in self.scenario.core().channels()}
         kinds = {"position": "rad", "speed": "rad/s", "torque": "N*m"}
         units |= {f"{name}_angle": "rad" for name in self.scenario.shafts if angle_terms(self.scenario, name, units)}
         return units | {f"{name}_reference": kinds[c.reference.kind] for name, c in self.scenario.axes().items()}
@@ -213,7 +212,7 @@ class Rig:
             data = {"initial": built.scenario.initial.model_dump()}
             set_values(data, given.items())
             initial = TrainInitial(**data["initial"])
-            log.cache[key] = built.scenario.start(initial), start_capacities(initial)
+            log.cache[key] = built.scenario.start(initial), built.scenario.capacities(initial)
         return log.cache[key]  # type: ignore[no-any-return]
 
     @staticmethod

@@ -44,7 +44,7 @@ def drawn_drive(scenario: Scenario) -> dict[str, Any]:
 
 def drawn_train(scenario: TrainScenario) -> dict[str, Any]:
     """Of a scenario in the long form."""
-    names = [name for name, _, _ in scenario.core().channels()]
+    names = [name for name, *_ in scenario.core().channels()]
 
     def known(name: str) -> str | None:
         return name if name in names else None

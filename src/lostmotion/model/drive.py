@@ -14,7 +14,7 @@ from .gearbox import Gearbox
 from .load import Load
 from .losses import LossMap
 from .motor import Motor, ShaftMotor
-from .parameters import MotorLaw, numbers
+from .parameters import MotorLaw
 from .shaft import Shaft
 from .torsion import Rigid
 from .train import DriveTrain
@@ -34,7 +34,7 @@ class Drive(Part):
     def _can_be_simulated(self) -> Self:
         if self.motor.rotor_inertia + self.gearbox.inertia <= 0.0:
             raise ValueError("has no inertia on the input shaft; give motor.rotor_inertia or gearbox.inertia")
-        if isinstance(self.gearbox.stiffness, Rigid) and _core_drive(self, None).min_rigid_inertia() <= 0.0:
+        if isinstance(self.gearbox.stiffness, Rigid) and self._least_rigid_inertia() <= 0.0:
             raise ValueError(
                 "jams: the gearbox is rigid and so lossy when overrunning that with this load inertia there are instants "
                 "with no motion or several (the paradox of rigid friction); give gearbox.stiffness a compliance"
@@ -51,19 +51,22 @@ class Drive(Part):
             gears={"gearbox": Gear.of(self.gearbox, input="motor", output="load")},
         )
 
-    def core(self, law: MotorLaw | None = None) -> _core.Drive:
-        """The solver's drive, its motor as a current loop may make it; the last ones are kept for equal parts."""
+    def core(self, law: MotorLaw | None = None) -> _core.Train:
+        """The solver's train, its motor as a current loop may make it; the last ones are kept for equal parts."""
         return _core_drive(self, law)
+
+    def _least_rigid_inertia(self) -> float:
+        """The smallest inertia [kg·m²] of the rigidly coupled drive at its input, over all cells of a loss map.
+
+        If it is not positive, rigid friction jams (Painlevé): there are instants with no motion or with several.
+        """
+        gearbox, losses = self.gearbox, self.gearbox.losses
+        least = 1.0 + losses.core().least_slope_over_load() if isinstance(losses, LossMap) else 1.0 / losses.efficiency
+        return self.motor.rotor_inertia + gearbox.inertia + least * self.load.inertia / (gearbox.ratio * gearbox.ratio)
 
 
 @lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes
-def _core_drive(drive: Drive, law: MotorLaw | None) -> _core.Drive:
-    changes, torque_source = law or ((), drive.motor.kind == "torque_source")
-    values = numbers(drive.motor.as_dc(), "motor") | numbers(drive.gearbox, "gearbox") | numbers(drive.load, "load")
-    stiffness, losses = drive.gearbox.stiffness, drive.gearbox.losses
-    return _core.Drive(
-        values | dict(changes),
-        torque_source=torque_source,
-        torsion_curve=None if isinstance(stiffness, Rigid) else stiffness.core(),
-        loss_map=losses.core() if isinstance(losses, LossMap) else None,
-    )
+def _core_drive(drive: Drive, law: MotorLaw | None) -> _core.Train:
+    core = drive.train().core(("load",), {"motor": law})
+    core.short_form = True
+    return core

@@ -10,16 +10,15 @@ from .. import _core
 from ..control.axis import OPEN_LOOP
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..simulation.run import core_inputs
+from ..simulation.core_runs import core_case
 from ..simulation.scenario import Scenario
-from ..simulation.train_results import core_case
 from ..simulation.train_scenario import TrainScenario
 from .parameters import Parameter, parameters_of
 
 
 def kernel_of(scenario: Scenario | TrainScenario) -> str:
     """The kernel of the core that a scenario takes: ``"drive"``, or the narrowest that holds its train."""
-    return "drive" if isinstance(scenario, Scenario) else scenario.core().kernel()
+    return scenario.core().kernel()
 
 
 @checked
@@ -78,9 +77,4 @@ def numbers_of(scenario: Scenario | TrainScenario) -> np.ndarray:
     table = scenario.simulation
     times = table.duration, table.sample_interval
     control = scenario.control() if scenario.axes() else OPEN_LOOP
-    if isinstance(scenario, TrainScenario):
-        core, inputs, start, capacities = core_case(scenario)
-        return np.array(_core.describe_train(scenario.title, core, inputs, start, capacities, *times, control))
-    _, command, load_torque, state, capacity = core_inputs(scenario)
-    inputs = [command, load_torque]
-    return np.array(_core.describe_drive(scenario.title, scenario.core(), inputs, state, capacity, *times, control))
+    return np.array(_core.describe(scenario.title, *core_case(scenario), *times, control))

@@ -15,17 +15,16 @@ import numpy as np
 
 from .. import _core
 from ..atomic_writer import write_whole
-from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from ..model.signals import CommandSignal, Signal
 from ..reproducible import sin, total
+from ..simulation.results import variables_of
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
-from ..simulation.train_variables import axis_variables, train_variables
-from ..simulation.variables import VARIABLES
+from ..simulation.train_variables import axis_variables
 from . import fmi2, fmi3
 from .checkout import made_here
 from .description import kernel_of, numbers_of, written
@@ -55,7 +54,7 @@ PLATFORMS: Mapping[int, Mapping[str, str]] = {
 }
 LIBRARIES = Path(__file__).parents[1] / "fmu_libraries"
 # How many guards the kernels of the core have room for; event indicators beyond those of a regime are 1.
-GUARDS = {Scenario: 16, TrainScenario: 64}
+GUARDS = {"drive": 16, "narrow": 32, "middle": 64, "wide": 64}
 
 
 @checked
@@ -216,25 +215,17 @@ def _model(
     scenario: Scenario | TrainScenario, parameters: tuple[Parameter, ...], guid: str, references_given: bool
 ) -> Model:
     """What modelDescription.xml says."""
-    signals: Mapping[str, Signal[Any]]
-    axes = scenario.axes() if isinstance(scenario, TrainScenario) else _unnamed(scenario)
+    core, signals, axes = scenario.core(), scenario.signals(), scenario.by_prefix()
     shown = {v.name for v in axis_variables(axes)}
-    if isinstance(scenario, TrainScenario):
-        core = scenario.core()
-        variables = (*train_variables(scenario.train(), core), *axis_variables(axes))
-        controlled = {f"{motor}_command" for motor in axes}
-        names, signals = core.input_names(), scenario.signals()
-    else:
-        variables = (*VARIABLES, *axis_variables(axes))
-        controlled = set() if scenario.controller is None else {"command"}
-        names, signals = ["command", "load_torque"], {"command": scenario.command, "load_torque": scenario.load.torque}
+    controlled = {f"{prefix}command" for prefix in axes}
+    names, variables = core.input_names(), variables_of(scenario)
     sizes, states = _sizes(scenario)
     inputs = [name for name in names if name not in controlled]
     # From tick to tick, or from one switching to the next. Where there is no contact, its variable follows a sign.
-    held = controlled | shown | set(scenario.core().contact_names())
+    held = controlled | shown | set(core.contact_names())
     by_name = {v.name: Declared(v.name, v.unit, v.meaning, sizes.get(v.name, 0.0), v.name in held) for v in variables}
     windings = any(c.current.kind == "field_oriented" for c in axes.values())
-    given = {f"{motor}_reference" if motor else "reference": c for motor, c in axes.items() if references_given}
+    given = {f"{prefix}reference": c for prefix, c in axes.items() if references_given}
     references = [Declared(name, *_REFERENCES[c.reference.kind], 0.0) for name, c in given.items()]
     return Model(
         title=scenario.title or "drive",
@@ -255,16 +246,11 @@ def _model(
         if windings
         else [_fine(by_name.get(s) or Declared(s, "1", "state of a controller", 0.0)) for s in states],
         state_starts=[] if windings else [_start_of(scenario, s) for s in states],
-        indicators=GUARDS[type(scenario)],
+        indicators=GUARDS[core.kernel()],
         parameters=list(parameters),
         references_given=references_given,
-        note=scenario.gearbox.note if isinstance(scenario, Scenario) else "",
+        note=scenario.note(),
     )
-
-
-def _unnamed(scenario: Scenario) -> dict[str, Controller]:
-    """The controller of a drive, whose variables do not bear the name of a motor."""
-    return {} if scenario.controller is None else {"": scenario.controller}
 
 
 def _at_start(signal: Signal[Any]) -> float:
@@ -281,8 +267,6 @@ def _fine(state: Declared) -> Declared:
 
 def _start_of(scenario: Scenario | TrainScenario, state: str) -> float:
     """A state at t = 0; those of controllers begin at 0."""
-    if isinstance(scenario, Scenario):
-        return float(getattr(scenario.start(), state, 0.0))
     return float(scenario.start().get(state, 0.0))
 
 

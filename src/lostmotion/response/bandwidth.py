@@ -11,6 +11,7 @@ from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Frequency, Number, Torque
 from ..model.drive import Drive
+from ..simulation.explanation import smallest_commands
 from ..simulation.scenario import Scenario, drive_of
 from ..simulation.train_scenario import TrainScenario
 from .harmonic import of_output
@@ -53,10 +54,8 @@ def characteristics(
     crossover = [_falls_through(frequencies, np.degrees(np.unwrap(np.angle(curve))), -180.0) for curve in values]
     dead_zone = {}
     if isinstance(drive, Drive) or (isinstance(drive, Scenario) and drive.controller is None):
-        core = drive_of(drive).core()
-        dead_zone = {
-            f"dead_zone_{way}": core.smallest_command(0.0, 0.0, s) for way, s in (("forward", +1), ("backward", -1))
-        }
+        forward, backward = smallest_commands(drive_of(drive))
+        dead_zone = {"dead_zone_forward": forward, "dead_zone_backward": backward}
     return xr.Dataset(
         {
             "bandwidth": ("amplitude", bandwidth, {"units": "Hz", "long_name": "-3 dB against the lowest frequency"}),

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _core
 from ..errors import InputError
-from ..simulation.train_results import core_case, core_run
+from ..simulation.core_runs import core_case, core_run
 from ..simulation.train_scenario import TrainScenario
 from .shooting import PERIODICITY, SAMPLES_PER_PERIOD, reason_of
 from .standstill import FOREVER, NOTHING_MOVES, Outlook, Verdict, Watch, frequency_of
@@ -88,7 +88,7 @@ class Loop:
             constants.append(_core.Signal([(0.0, value, 0.0)], []))
         controlled, last = scenario.continuous(), list(scenario.shafts)[-1]
         watched = f"{next(iter(controlled))}_error" if controlled else f"{last}_speed"
-        channels = tuple(name for name, _, _ in core.channels())
+        channels = tuple(name for name, *_ in core.channels())
         return cls(core, inputs, constants, start, capacities, settled, watched, channels, scenario)
 
     def run(self, duration: float, samples: int) -> dict[str, Any]:

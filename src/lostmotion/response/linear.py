@@ -18,12 +18,12 @@ from ..model.drive import Drive
 from ..model.losses import ConstantEfficiency
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
-from ..simulation.run import core_inputs, start_state
-from ..simulation.scenario import Initial, Scenario, drive_of
+from ..simulation.core_runs import core_case
+from ..simulation.scenario import Initial, Scenario, capacities_of, drive_of, state_of
 from ..simulation.stepping import Simulation
-from ..simulation.train_results import core_case
+from ..simulation.train_parts import NO_CONTACT
 from ..simulation.train_scenario import TrainInitial, TrainScenario, loaded_train, need_open_loop
-from ..simulation.train_state import start_capacities, start_values
+from ..simulation.train_state import start_values
 from ..simulation.train_variables import angle_through, angles_through_gears, train_variables
 from ..simulation.variables import CONTACTS, STATES, VARIABLES
 
@@ -218,8 +218,9 @@ def linearize(
             _why_several_regimes(drive), "Initial(motor_speed=100, load_speed=1, twist=2e-3) [SI], or Initial()"
         )
         state = Initial()
-    signals = _ramp(command, rates["command_rate"]), _ramp(load_torque, rates["load_torque_rate"])
-    return _drive_model(*_core.linearize_at(drive.core(), *signals, start_state(state), state.hysteresis_capacity, 0.0))
+    ramps = [_ramp(command, rates["command_rate"]), _ramp(load_torque, rates["load_torque_rate"])]
+    core = drive.core()
+    return _model(drive.train(), core, *_core.linearize_at(core, ramps, state_of(state), capacities_of(state), 0.0))
 
 
 def _refuse(given: dict[str, bool], why: str) -> None:
@@ -242,9 +243,7 @@ def _ramp(value: float, rate: float) -> _core.Signal:
 def _model_now(simulation: Simulation) -> LinearModel:
     with simulation._turn:
         rows = simulation._idle().linearize()
-    if isinstance(simulation.drive, DriveTrain):
-        return train_model(simulation.drive, simulation._core_train or simulation.drive.core(()), *rows)
-    return _drive_model(*rows)
+    return _model(simulation._train, simulation._core_train, *rows)
 
 
 def _model_of_run(what: Any, time: float) -> LinearModel:
@@ -253,9 +252,8 @@ def _model_of_run(what: Any, time: float) -> LinearModel:
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     need_open_loop(what, "linearize at a time")
-    if isinstance(what, Scenario):
-        return _drive_model(*_core.linearize_at(*core_inputs(what), time))
-    return train_model(what.train(), what.core(), *_core.linearize_train_at(*core_case(what), time))
+    case = core_case(what)
+    return _model(what.train(), case[0], *_core.linearize_at(*case, time))
 
 
 def _model_of_train(
@@ -286,33 +284,58 @@ def _model_of_train(
         for name in names
     ]
     start = what.start(state) if isinstance(what, TrainScenario) else start_values(train, state)
-    return train_model(train, core, *_core.linearize_train_at(core, ramps, start, start_capacities(state), 0.0))
+    return _model(train, core, *_core.linearize_at(core, ramps, start, dict(state.hysteresis_capacities), 0.0))
+
+
+def _model(
+    train: DriveTrain,
+    core: _core.Train,
+    states: dict[str, float],
+    capacities: dict[str, float],
+    inputs: dict[str, float],
+    rates: np.ndarray,
+    outputs: list[str],
+    rows: np.ndarray,
+    contacts: dict[str, int],
+) -> LinearModel:
+    """The linear model, from what the solver says of one of its regimes."""
+    if core.short_form:
+        return _drive_model(states, capacities, inputs, rates, dict(zip(outputs, rows, strict=True)), contacts)
+    return train_model(train, core, states, capacities, inputs, rates, outputs, rows, contacts)
 
 
 def _drive_model(
-    x: list[float],
-    capacity: float,
-    u: list[float],
+    states: dict[str, float],
+    capacities: dict[str, float],
+    inputs: dict[str, float],
     rates: np.ndarray,
-    torques: dict[str, np.ndarray],
-    modes: list[int],
+    rows: dict[str, np.ndarray],
+    contacts: dict[str, int],
 ) -> LinearModel:
-    n = len(STATES)
-    A, B = rates[:, :n], rates[:, n : n + 2]
-    C, D, offset = np.eye(len(OUTPUTS), n), np.zeros((len(OUTPUTS), 2)), np.zeros(len(OUTPUTS))
-    for name, values in torques.items():
-        row = OUTPUTS.index(name)
-        C[row], D[row], offset[row] = values[:n], values[n : n + 2], values[-1]
-    contacts = dict(zip(CONTACTS, modes, strict=True))
-    point = dict(zip(STATES, x, strict=True)) | {"hysteresis_capacity": capacity} | dict(zip(INPUTS, u, strict=True))
+    """With all states and outputs of a drive: those that this one does not have are 0."""
+    n, own = len(STATES), [STATES.index(name) for name in states]
+
+    def whole(row: np.ndarray) -> np.ndarray:
+        out = np.zeros(n + 3)
+        out[[*own, n, n + 1, n + 2]] = row
+        return out
+
+    of = np.zeros((n, n + 3))
+    of[own] = [whole(row) for row in rates]
+    out = np.array([whole(rows[name]) if name in rows else np.zeros(n + 3) for name in OUTPUTS])
+    modes = {name: contacts.get(name, int(NO_CONTACT)) for name in CONTACTS}
+    point = dict.fromkeys(STATES, 0.0) | states | capacities | inputs
     units = {v.name: v.unit for v in VARIABLES if v.name in (*INPUTS, *OUTPUTS)}
-    return LinearModel(A, B, C, D, rates[:, -1], offset, contacts, point, units)
+    return LinearModel(
+        of[:, :n], of[:, n : n + 2], out[:, :n], out[:, n : n + 2], of[:, -1], out[:, -1], modes, point, units
+    )
 
 
 def train_model(
     train: DriveTrain,
     core: _core.Train,
     states: dict[str, float],
+    capacities: dict[str, float],
     inputs: dict[str, float],
     rates: np.ndarray,
     outputs: list[str],
@@ -338,7 +361,7 @@ def train_model(
         rate=rates[:, -1],
         offset=whole[:, -1],
         contacts=contacts,
-        point=states | inputs,
+        point=states | capacities | inputs,
         units=units,
         states=tuple(states),
         inputs=tuple(inputs),

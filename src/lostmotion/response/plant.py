@@ -15,9 +15,8 @@ from ..errors import InputError
 from ..inputs.validation import shown
 from ..model.drive import Drive
 from ..model.signals import CommandSignal, Signal, TorqueSignal
-from ..simulation.results import add_derived
+from ..simulation.results import add_angles, add_efficiency
 from ..simulation.scenario import Initial, Scenario, mean_inputs
-from ..simulation.train_results import add_derived_of_train
 from ..simulation.train_scenario import TrainInitial, TrainScenario, need_open_loop
 from ..simulation.train_variables import axis_variables, train_variables
 from ..simulation.variables import CHANNELS, STATES, VARIABLES, Variable
@@ -31,7 +30,7 @@ UNITS = {"position": "rad", "speed": "rad/s", "torque": "N*m"}
 class Plant:
     """A drive or a train as the search for periodic motions takes it: with commands, or with controllers and their references."""
 
-    core: _core.Drive | _core.Train
+    core: _core.Train
     signals: Mapping[str, Signal[Any]]
     """by the name of their variable; of open loops in the order of the core"""
     source: str | None
@@ -134,12 +133,9 @@ def plant_or_loop(what: Drive | Scenario | TrainScenario) -> Plant:
     if not isinstance(what, Scenario | TrainScenario) or not what.axes():
         return plant
     axes = what.axes()
-    prefix = "{}_" if isinstance(what, TrainScenario) else ""
-    references = {f"{prefix.format(motor)}reference": c.reference for motor, c in axes.items()}
-    commands = [f"{prefix.format(motor)}command" for motor in axes]
-    shown_by = [
-        v for v in axis_variables(axes if prefix else {"": what.axes()["motor"]}) if v.unit != "J"
-    ]  # which add up
+    references = {f"{what.prefix(motor)}reference": c.reference for motor, c in axes.items()}
+    commands = [f"{what.prefix(motor)}command" for motor in axes]
+    shown_by = [v for v in axis_variables(what.by_prefix()) if v.unit != "J"]  # which add up
     first, controller = next(iter(axes.items()))
     measured = {"position": "measured_position", "speed": "measured_speed", "torque": "torque"}[
         controller.reference.kind
@@ -155,7 +151,7 @@ def plant_or_loop(what: Drive | Scenario | TrainScenario) -> Plant:
         source=next(iter(references)) if len(references) == 1 else None,
         channels=(*plant.channels, *(v.name for v in own)),
         variables=(*plant.variables, *own),
-        output=f"{first}_torque" if measured == "torque" else prefix.format(first) + measured,
+        output=f"{first}_torque" if measured == "torque" else what.prefix(first) + measured,
         closed=what,
     )
 
@@ -180,7 +176,7 @@ def _plant_of(what: Drive | Scenario | TrainScenario) -> Plant:
         start_of=_start_of_drive,
         channels=tuple(v.name for v in CHANNELS),
         variables=VARIABLES,
-        derive=lambda data, _: add_derived(data, g.ratio),
+        derive=lambda data, _: add_efficiency(data, g.ratio),
         output="load_speed",
         angle="load_angle",
         floors={"motor_speed": speed, "load_speed": speed / g.ratio, "output_torque": torque, "twist": 0.0},
@@ -222,9 +218,9 @@ def _plant_of_train(scenario: TrainScenario) -> Plant:
         start=start_of(scenario.initial),
         rest=start_of(TrainInitial(angles=scenario.initial.angles, twists=scenario.initial.twists)),
         start_of=start_of,
-        channels=tuple(name for name, _, _ in core.channels()),
+        channels=tuple(name for name, *_ in core.channels()),
         variables=variables,
-        derive=partial(add_derived_of_train, train),
+        derive=partial(add_angles, train),
         output=f"{last}_speed",
         angle=f"{last}_angle",
         floors=floors,

@@ -168,7 +168,7 @@ def _replaced(signals: Mapping[str, Signal[Any]], given: Mapping[str, Any]) -> d
 
 
 def _start(plant: Plant, start: Initial | TrainInitial) -> Mapping[str, float]:
-    wanted = Initial if isinstance(plant.core, _core.Drive) else TrainInitial
+    wanted = Initial if plant.core.short_form else TrainInitial
     if not isinstance(start, wanted):
         raise InputError(f"start: {type(start).__name__} does not fit; it must be of the kind {wanted.__name__}")
     return plant.start_of(start)

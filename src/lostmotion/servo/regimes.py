@@ -19,7 +19,7 @@ from ..model.torsion import Rigid
 from ..response.linear import LinearModel, train_model
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form
-from ..simulation.train_state import start_capacities, start_values
+from ..simulation.train_state import start_values
 from .winding import OrientedWinding
 
 if TYPE_CHECKING:
@@ -168,9 +168,9 @@ def regimes(axis: Axis) -> list[Regime]:
 def _model(axis: Axis, state: TrainInitial) -> LinearModel:
     scenario = axis.scenario
     core = scenario.core()
-    values, capacities = start_values(axis.train, state), start_capacities(state)
+    values, capacities = start_values(axis.train, state), dict(state.hysteresis_capacities)
     ramps = [_core.Signal([(0.0, 0.0, 0.0)], []) for _ in core.input_names()]
-    rows = _core.linearize_train_at(core, ramps, values, capacities, 0.0)
+    rows = _core.linearize_at(core, ramps, values, capacities, 0.0)
     return train_model(axis.train, core, *rows)
 
 

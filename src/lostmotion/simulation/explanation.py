@@ -14,12 +14,10 @@ from ..inputs.quantities import Time
 from ..model.drive import Drive
 from ..model.self_locking import SelfLocking, self_locking
 from ..model.train import DriveTrain
-from .run import core_inputs
+from .core_runs import core_case
 from .scenario import Scenario
 from .stepping import Simulation
-from .train_results import core_case
 from .train_scenario import TrainScenario, need_open_loop
-from .variables import CHANNEL_NAMES
 
 
 @dataclass(frozen=True)
@@ -60,35 +58,6 @@ class ContactState:
 
 
 @dataclass(frozen=True)
-class Explanation:
-    """The contacts of a drive at one instant, and the commands that would move its load."""
-
-    time: float  # [s]
-    values: dict[str, float]  # result variables at this instant
-    contacts: tuple[ContactState, ...]
-    command_forward: float  # E_C above which the load moves forward
-    command_backward: float  # E_C below which it moves backward
-    command_limit: float  # |E_C| that the amplifier can follow
-    self_locking: SelfLocking  # of the gearbox under the present load torque, or where there is none, the rated one
-
-    def __str__(self) -> str:
-        v = self.values
-        lines = [
-            f"t = {self.time:.6g} s: command {v['command']:.4g}, motor {v['motor_torque']:.4g} N·m at "
-            f"{v['motor_speed']:.4g} rad/s, output {v['output_torque']:.4g} N·m, load {v['load_speed']:.4g} rad/s",
-            *(f"  {contact}" for contact in self.contacts),
-            "  from rest at this output torque the load moves forward with a constant command above "
-            f"{self.command_forward:.4g}, backward below {self.command_backward:.4g}",
-        ]
-        beyond = [c for c in (self.command_forward, self.command_backward) if abs(c) > self.command_limit]
-        if beyond:
-            lines.append(f"  but the amplifier ends at {self.command_limit:.4g}: it cannot reach {beyond[0]:.4g}")
-        if self.self_locking.notable:
-            lines.append(f"  {self.self_locking}")
-        return "\n".join(lines)
-
-
-@dataclass(frozen=True)
 class MotorState:
     """One motor of a train at one instant, and the constant commands from which on its shaft goes on turning.
 
@@ -114,14 +83,18 @@ class MotorState:
             elif math.isinf(command):
                 turns.append(f"{way} at no command (a gear locks itself, or something holds without limit)")
             else:
-                limit = f", but it ends at {self.command_limit:.4g}" if abs(command) > self.command_limit else ""
+                limit = (
+                    f", but it ends at {self.command_limit:.4g} and cannot reach that"
+                    if abs(command) > self.command_limit
+                    else ""
+                )
                 turns.append(f"{way} with a constant command {beyond} {command:.4g}{limit}")
         return f"motor {self.name}: its shaft turns {', '.join(turns)}"
 
 
 @dataclass(frozen=True)
-class TrainExplanation:
-    """The contacts of a train at one instant, and the commands that would turn its motors."""
+class Explanation:
+    """The contacts of a drive or a train at one instant, and the commands that would turn its motors."""
 
     time: float  # [s]
     values: dict[str, float]  # channels at this instant
@@ -131,6 +104,24 @@ class TrainExplanation:
     self_locking: tuple[
         SelfLocking, ...
     ]  # of the gears that lock or chatter under their present torque, or the rated one
+
+    @property
+    def command_forward(self) -> float:
+        """The command above which the only motor turns forward."""
+        (motor,) = self.motors
+        return motor.command_forward
+
+    @property
+    def command_limit(self) -> float:
+        """The command that the only motor can follow."""
+        (motor,) = self.motors
+        return motor.command_limit
+
+    @property
+    def command_backward(self) -> float:
+        """The command below which the only motor turns backward."""
+        (motor,) = self.motors
+        return motor.command_backward
 
     def __str__(self) -> str:
         motors = [f"{m.name} {m.torque:.4g} N·m at command {m.command:.4g}" for m in self.motors]
@@ -146,7 +137,7 @@ class TrainExplanation:
 
 
 @checked
-def explain(what: Scenario | Simulation | TrainScenario, time: Time | None = None) -> Explanation | TrainExplanation:
+def explain(what: Scenario | Simulation | TrainScenario, time: Time | None = None) -> Explanation:
     """The state of the contacts of a drive or a train at one instant.
 
     Parameters
@@ -158,9 +149,8 @@ def explain(what: Scenario | Simulation | TrainScenario, time: Time | None = Non
 
     Returns
     -------
-    Explanation or, of a train, TrainExplanation
-        Print it, or read its numbers. The commands that would move the load leave inertia out: the motor is thought
-        to wind up the gear slowly from its present output torque until the load is free; of a train see `MotorState`.
+    Explanation
+        Print it, or read its numbers. The commands that would turn a motor leave inertia out; see `MotorState`.
 
     Raises
     ------
@@ -172,40 +162,32 @@ def explain(what: Scenario | Simulation | TrainScenario, time: Time | None = Non
             raise InputError("a simulation is explained at its present time; leave time out")
         with what._turn:
             now, found = what.time, what._idle().explain()
-        if isinstance(what.drive, DriveTrain):
-            return _of_train(what.drive, what._core_train or what.drive.core(()), now, *found)
-        return _explanation(what.drive, now, *found)
+        return _explanation(what._train, what._core_train, now, *found)
     if time is None:
         raise InputError(f"time is missing; give one between 0 and the duration, {what.simulation.duration} s")
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     need_open_loop(what, "explain")
-    if isinstance(what, TrainScenario):
-        case = core_case(what)
-        return _of_train(what.train(), case[0], time, *_core.explain_train_at(*case, time))
-    return _explanation(what.drive(), time, *_core.explain_at(*core_inputs(what), time))
+    case = core_case(what)
+    return _explanation(what.train(), case[0], time, *_core.explain_at(*case, time))
 
 
-def _explanation(drive: Drive, time: float, values: list[float], contacts: list[tuple[Any, ...]]) -> Explanation:
-    named = dict(zip(CHANNEL_NAMES, values, strict=True))
-    forward, backward = (
-        drive.core().smallest_command(named["output_torque"], named["load_torque"], s) for s in (+1, -1)
-    )
-    limit = drive.motor.command_limit
-    states = tuple(ContactState(*contact) for contact in contacts)
-    verdict = self_locking(drive.train(), "gearbox", named["load_torque"] or drive.gearbox.rated_output_torque)
-    return Explanation(time, named, states, forward, backward, math.inf if limit is None else limit, verdict)
+def smallest_commands(drive: Drive, load_torque: float = 0.0) -> tuple[float, float]:
+    """Constant commands beyond which the load moves from rest, forward and backward, against a load torque [N·m]."""
+    inputs = [_core.Signal([(0.0, 0.0, 0.0)], []), _core.Signal([(0.0, load_torque, 0.0)], [])]
+    _, _, ((_, forward, backward),) = _core.explain_at(drive.core(), inputs, {}, {}, 0.0)
+    return forward, backward
 
 
-def _of_train(
+def _explanation(
     train: DriveTrain,
     core: _core.Train,
     time: float,
     values: list[float],
     contacts: list[tuple[Any, ...]],
     motors: list[tuple[str, float, float]],
-) -> TrainExplanation:
-    named = dict(zip((name for name, _, _ in core.channels()), values, strict=True))
+) -> Explanation:
+    named = dict(zip((name for name, *_ in core.channels()), values, strict=True))
     states = []
     for name, mode, speed, torque, forward, backward, elements in contacts:
         shares = {element: (one, other) for element, one, other in elements}
@@ -215,15 +197,16 @@ def _of_train(
         motor = train.motors[name]
         limits = (motor.command_limit, None if motor.torque_limit is None else motor.torque_limit / motor.rated_torque)
         limit = min(limit for limit in (*limits, math.inf) if limit is not None)
-        turned.append(MotorState(name, named[f"{name}_command"], named[f"{name}_torque"], forward, backward, limit))
-    verdicts = tuple(_verdicts(train, named))
-    return TrainExplanation(time, named, tuple(states), tuple(turned), tuple(train.shafts), verdicts)
+        command = named["command" if core.short_form else f"{name}_command"]
+        turned.append(MotorState(name, command, named[f"{name}_torque"], forward, backward, limit))
+    locking = tuple(_verdicts(train, named, short=core.short_form))
+    return Explanation(time, named, tuple(states), tuple(turned), tuple(train.shafts), locking)
 
 
-def _verdicts(train: DriveTrain, named: dict[str, float]) -> Iterator[SelfLocking]:
+def _verdicts(train: DriveTrain, named: dict[str, float], *, short: bool) -> Iterator[SelfLocking]:
     if train.fixed_gears() != train.gears:
         return
     for name, gear in train.gears.items():
-        torque = abs(named[f"{name}_output_torque"]) or gear.rated_output_torque
+        torque = (named["load_torque"] if short else abs(named[f"{name}_output_torque"])) or gear.rated_output_torque
         if torque and (verdict := self_locking(train, name, torque)).notable:
             yield verdict

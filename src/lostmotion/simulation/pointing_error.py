@@ -17,7 +17,7 @@ def pointing_names(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, st
     """Of each axis that follows a position its motor, and what its error is called."""
     for motor, controller in scenario.axes().items():
         if controller.reference.kind == "position":
-            yield motor, NAME if isinstance(scenario, Scenario) else f"{motor}_{NAME}"
+            yield motor, f"{scenario.prefix(motor)}{NAME}"
 
 
 def pointing_errors(scenario: Scenario | TrainScenario, result: RawResult) -> dict[str, np.ndarray]:

@@ -15,12 +15,14 @@ from .. import _core
 from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..model.torsion import Rigid
+from ..model.train import DriveTrain
 from .scenario import Scenario
 from .switchings import ATTRIBUTE as SWITCHINGS
-from .switchings import packed
+from .switchings import CONTACTS_OF_TRAIN, packed
 from .train_scenario import TrainScenario, is_train
-from .train_variables import axis_variables, named_signals, train_variables
-from .variables import CHANNEL_NAMES, STATES, VARIABLES, Variable
+from .train_variables import angle_through, angles_through_gears, axis_variables, named_signals, train_variables
+from .variables import VARIABLES, Variable
 from .windings import set_torques
 
 if TYPE_CHECKING:
@@ -60,37 +62,40 @@ class RawResult:
         return labelled(self.time, self.values, self.attrs, self.variables)
 
 
-def raw_result(scenario: Scenario, result: Any, solver: str, *, ledger: bool) -> RawResult:
+def raw_result(
+    scenario: Scenario | TrainScenario, core: _core.Train, result: dict[str, Any], solver: str, *, ledger: bool
+) -> RawResult:
     """What the solver returned, with all that belongs to it."""
-    table, switchings, count, energy, state, capacity, left_data_at, steps, signals = result
-    data = dict(zip(CHANNEL_NAMES, table, strict=True))
-    if scenario.controller is not None:
-        data |= named_signals({"": scenario.controller}, signals)
-    set_torques(scenario, data)
-    add_derived(data, scenario.gearbox.ratio)
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
+    data = dict(zip((name for name, *_ in core.channels()), result["values"], strict=True))
+    data |= named_signals(scenario.by_prefix(), result["control"])
+    set_torques(scenario, data)
+    add_derived(scenario, data, time)
     attributes = {
         "title": scenario.title,
         "scenario": scenario.to_json(),
         "solver": solver,
         "lostmotion_version": installed_version(),
-        "switching_count": int(count),
-        "end_state": json.dumps(dict(zip(STATES, state, strict=True)) | {"hysteresis_capacity": capacity}),
-        "steps": int(steps),
-        SWITCHINGS: packed(switchings),
+        "switching_count": int(result["switching_count"]),
+        "end_state": json.dumps(result["end_state"]),
+        "steps": int(result["steps"]),
+        SWITCHINGS: packed(result["switchings"]),
     }
+    if not core.short_form:
+        attributes[CONTACTS_OF_TRAIN] = " ".join(core.contact_names())
     warnings = []
-    if np.isfinite(left_data_at):
+    if np.isfinite(result["left_data_at"]):
+        losses = "gearbox.losses" if core.short_form else "the losses of the gear"
         warnings.append(
-            f"from t = {left_data_at:.6g} s on the loss map is used outside its data; there it continues with the slope "
-            "of its edge. Extend gearbox.losses."
+            f"from t = {result['left_data_at']:.6g} s on a loss map is used outside its data; there it continues with the slope "
+            f"of its edge. Extend {losses}."
         )
     if ledger:
-        add_ledger(attributes, dict(zip(ENERGY, energy, strict=True)), warnings)
+        add_ledger(attributes, result["energy"], warnings)
     if warnings:
         attributes["warning"] = " ".join(warnings)
-    if scenario.gearbox.note:
-        attributes["note"] = scenario.gearbox.note
+    if note := scenario.note():
+        attributes["note"] = note
     return RawResult(time, data, attributes, variables_of(scenario))
 
 
@@ -131,9 +136,8 @@ def is_train_result(result: xarray.Dataset | RawResult) -> bool:
 
 def variables_of(scenario: Scenario | TrainScenario) -> tuple[Variable, ...]:
     """The variables that a result of this scenario may have."""
-    if isinstance(scenario, Scenario):
-        return _variables_of_drive(scenario.controller)
-    return (*train_variables(scenario.train(), scenario.core()), *axis_variables(scenario.axes()))
+    own = VARIABLES if isinstance(scenario, Scenario) else train_variables(scenario.train(), scenario.core())
+    return (*own, *axis_variables(scenario.by_prefix()))
 
 
 def recorded_variables(attributes: Mapping[str, Any]) -> tuple[Variable, ...]:
@@ -142,17 +146,33 @@ def recorded_variables(attributes: Mapping[str, Any]) -> tuple[Variable, ...]:
     if is_train(tables):
         return variables_of(TrainScenario(**tables))
     controller = tables.get("controller")
-    return _variables_of_drive(None if controller is None else Controller(**controller))
+    axes = {} if controller is None else {"": Controller(**controller)}
+    return (*VARIABLES, *axis_variables(axes))
 
 
-def _variables_of_drive(controller: Controller | None) -> tuple[Variable, ...]:
-    return VARIABLES if controller is None else (*VARIABLES, *axis_variables({"": controller}))
-
-
-def add_derived(data: dict[str, Any], ratio: Any) -> None:
+def add_derived(scenario: Scenario | TrainScenario, data: dict[str, Any], time: Any) -> None:
     """Adds the variables that follow from those of the solver."""
+    if isinstance(scenario, Scenario):
+        add_efficiency(data, scenario.gearbox.ratio)
+    else:
+        add_angles(scenario.train(), data, time)
+
+
+def add_efficiency(data: dict[str, Any], ratio: Any) -> None:
+    """Adds the variables of a drive that follow from those of the solver."""
     data["efficiency"] = gear_efficiency(data, ratio)
     data["motor_power"] = data["motor_torque"] * data["motor_speed"]
+
+
+def add_angles(train: DriveTrain, data: dict[str, Any], time: Any) -> None:
+    """Adds what the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
+    for name, gear in train.gears.items():
+        if isinstance(gear.stiffness, Rigid):
+            data.setdefault(f"{name}_twist", np.zeros_like(time))
+    known = [name for name in train.shafts if f"{name}_angle" in data]
+    for shaft, source, name, forward in angles_through_gears(train, known):
+        angle, twist = data[f"{source}_angle"], data[f"{name}_twist"]
+        data[f"{shaft}_angle"] = angle_through(train.gears[name], angle, twist, forward=forward)
 
 
 def gear_efficiency(data: dict[str, Any], ratio: Any) -> Any:

@@ -7,7 +7,6 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-from .. import _core
 from ..control.axis import Bound
 from ..control.law import as_laws
 from ..errors import InputError
@@ -16,13 +15,12 @@ from ..inputs.quantities import Number
 from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from ..worker_threads import thread_pool
+from .core_runs import core_result
 from .results import RawResult, raw_result, variables_of
 from .scenario import Initial, LoadTable, Scenario, SimulationTable
 from .sensitivities import run_sensitivities
 from .train_parts import SIDE_BY_SIDE
-from .train_results import run_train
 from .train_scenario import TrainScenario
-from .variables import STATES
 from .windings import ATTRIBUTE as ERROR_BOUND
 from .windings import coarser, error_bound, oriented, too_slow
 
@@ -178,13 +176,17 @@ def _warned(scenario: Scenario | TrainScenario, result: RawResult) -> RawResult:
 
 
 def whole_run(scenario: Scenario | TrainScenario, options: tuple[Any, ...], how: str, control: Bound) -> RawResult:
-    """One run of the core."""
-    ledger = options[3]
-    if isinstance(scenario, TrainScenario):
-        return run_train(scenario, options, how, control, ledger=ledger)
-    _, command, load_torque, state, capacity = core_inputs(scenario)
-    result = _core.run(scenario.core(), command, load_torque, state, capacity, *(*options, control))
-    return raw_result(scenario, result, how, ledger=ledger)
+    """One run of the core. Parts of a train that nothing joins are solved apart; under controllers side by side, unless one of
+    these is a function in Python.
+
+    Parameters
+    ----------
+    options
+        Duration [s], sample interval [s], samples, whether to keep the energy ledger, relative tolerance (0: exact), and how
+        many switchings are kept.
+    """
+    core, result = core_result(scenario, options, control)
+    return raw_result(scenario, core, result, how, ledger=options[3])
 
 
 def check_memory(samples: int, width: int = BYTES_PER_SAMPLE) -> None:
@@ -250,23 +252,6 @@ def as_scenario(
     if initial is not None:
         changes["initial"] = initial
     return Scenario(**changes)
-
-
-def core_inputs(scenario: Scenario) -> tuple[_core.Drive, _core.Signal, _core.Signal, list[float], float]:
-    """What every run of the core begins with: drive, command, load torque, state, hysteresis capacity."""
-    start = scenario.start()
-    return (
-        scenario.drive().core(),
-        scenario.command.core(),
-        scenario.load.torque.core(),
-        start_state(start),
-        start.hysteresis_capacity,
-    )
-
-
-def start_state(initial: Initial) -> list[float]:
-    """The solver's state vector."""
-    return [getattr(initial, name) for name in STATES]
 
 
 def _signal(value: Any, kind: Any) -> Any:

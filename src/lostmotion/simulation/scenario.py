@@ -20,10 +20,12 @@ from ..model.drive import Drive
 from ..model.gearbox import Gearbox
 from ..model.load import Load
 from ..model.motor import Motor
-from ..model.signals import CommandSignal, TorqueSignal
+from ..model.signals import CommandSignal, Signal, TorqueSignal
 from ..model.task import Task
 from ..model.torsion import Rigid
+from ..model.train import DriveTrain
 from .keys import set_values
+from .variables import STATES
 
 MAX_SAMPLES = 100_000_000
 
@@ -51,6 +53,16 @@ class Initial(Part):
     """h, which the last turning point before t = 0 left behind"""
     on_reference: Switch = False
     """angle and speeds are those of the controller's reference at t = 0"""
+
+
+def state_of(initial: Initial) -> dict[str, float]:
+    """The state by the names of its variables."""
+    return {name: getattr(initial, name) for name in STATES}
+
+
+def capacities_of(initial: Initial) -> dict[str, float]:
+    """Hysteresis capacities [N·m] by gear."""
+    return {"gearbox": initial.hysteresis_capacity}
 
 
 def check_on_reference(initial: Any, controllers: Mapping[str, Controller], keys: Sequence[str]) -> None:
@@ -122,7 +134,7 @@ class Scenario(Part):
     def _consistent(self) -> Self:
         drive = self.drive()
         check_on_reference(self.initial, self.axes(), ("load_angle", "load_speed", "motor_speed"))
-        start = self.start()
+        start = self.begin()
         if isinstance(drive.gearbox.stiffness, Rigid):
             if start.twist != 0.0:
                 raise ValueError(f"has initial.twist = {start.twist} rad, but the gearbox is rigid; leave it out")
@@ -143,7 +155,41 @@ class Scenario(Part):
         """The controller by the name of its motor, if there is one."""
         return {} if self.controller is None else {"motor": self.controller}
 
-    def start(self) -> Initial:
+    def by_prefix(self) -> dict[str, Controller]:
+        """The controller, by what the names of its variables begin with."""
+        return {} if self.controller is None else {"": self.controller}
+
+    def prefix(self, motor: str) -> str:  # noqa: ARG002
+        """What the names of the variables of a motor's controller begin with."""
+        return ""
+
+    def note(self) -> str:
+        """What the sheet of the gearbox says beside its numbers."""
+        return self.gearbox.note
+
+    def continuous(self) -> dict[str, ContinuousController]:
+        """The continuous controllers: a drive in the short form has none."""
+        return {}
+
+    def start(self, initial: Initial | None = None) -> dict[str, float]:
+        """State at t = 0 by the names of its variables.
+
+        Parameters
+        ----------
+        initial
+            In place of that of the scenario.
+        """
+        return state_of(self.begin() if initial is None else initial)
+
+    def capacities(self, initial: Initial | None = None) -> dict[str, float]:
+        """Hysteresis capacities at t = 0 [N·m] by gear."""
+        return capacities_of(initial or self.initial)
+
+    def signals(self) -> dict[str, Signal[Any]]:
+        """All that acts on the drive, by the name of its result variable."""
+        return {"command": self.command, "load_torque": self.load.torque}
+
+    def begin(self) -> Initial:
         """State at t = 0, with what the reference says of it."""
         if not self.initial.on_reference or self.controller is None:
             return self.initial
@@ -155,11 +201,21 @@ class Scenario(Part):
 
     def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
         """The solver's controllers."""
-        return core_control(self.drive().train(), self.axes(), "controller.", laws)
+        return core_control(self.train(), self.axes(), "controller.", laws)
 
-    def core(self) -> _core.Drive:
-        """The solver's drive, its motor as the current loop makes it."""
-        return self.drive().core(None if self.controller is None else driven(self.controller))
+    def core(self, *, sampled: bool = True) -> _core.Train:
+        """The solver's train, its motor as the current loop makes it.
+
+        Parameters
+        ----------
+        sampled
+            Whether with that of a sampled controller.
+        """
+        return self.drive().core(None if self.controller is None or not sampled else driven(self.controller))
+
+    def train(self) -> DriveTrain:
+        """The drive as a train: shafts `motor` and `load`, joined by the gear `gearbox`, and on the first the motor `motor`."""
+        return self.drive().train()
 
     def drive(self) -> Drive:
         """The drive without its surroundings."""

@@ -17,12 +17,13 @@ from .. import _core
 from ..control.axis import Bound
 from ..errors import InputError
 from ..inputs.validation import shown
+from .core_runs import core_case
 from .keys import list_index
 from .results import add_derived
 from .scenario import Scenario
-from .train_results import add_derived_of_train, core_case
-from .train_scenario import TrainScenario, in_long_form
-from .train_variables import axis_variables, named_signals
+from .train_scenario import TrainScenario
+from .train_variables import named_signals
+from .variables import CONTACTS
 
 if TYPE_CHECKING:
     import xarray
@@ -35,19 +36,6 @@ ONE_SIDED = ((1, 4.0), (2, -3.0), (3, 4 / 3), (4, -1 / 4))
 
 SUFFIX = "_sensitivity"
 ENDS_AT, ENDS_BY = "sensitivities_end_at", "sensitivities_end_by"
-
-# The variables of a drive by those of the same drive as a train.
-OF_DRIVE = {
-    "motor_command": "command",
-    "load_load_torque": "load_torque",
-    "motor_torque": "motor_torque",
-    "motor_speed": "motor_speed",
-    "load_speed": "load_speed",
-    "load_angle": "load_angle",
-    "gearbox_twist": "twist",
-    "gearbox_output_torque": "output_torque",
-    "gearbox_input_torque": "input_torque",
-}
 
 AnyScenario = Scenario | TrainScenario
 
@@ -118,28 +106,23 @@ def _is_signal(scenario: AnyScenario, key: str) -> bool:
     return isinstance(node, Mapping) and "mean" in node
 
 
-def as_train(scenario: AnyScenario) -> TrainScenario:
-    """A scenario in the long form, in which the core takes derivatives."""
-    return in_long_form(scenario) if isinstance(scenario, Scenario) else scenario
-
-
 _INPUT = re.compile(r"(command|(load|shafts\.[^.]+)\.torque)(\..*)?")
 
 
-def core_variation(scenario: TrainScenario, key: str, beside: Sequence[Neighbour]) -> tuple[str, list[Any]]:
+def core_variation(scenario: AnyScenario, key: str, beside: Sequence[Neighbour]) -> tuple[str, list[Any]]:
     """A parameter as the core takes it: of its neighbours what may differ from the scenario itself."""
     of_start, of_inputs = key.startswith("initial."), _INPUT.fullmatch(key) is not None
     out = []
     for n in beside:
-        other = as_train(n.scenario)
+        other = n.scenario
         core, inputs, start, capacities = core_case(other)
-        control = other.control() if scenario.controllers and not (of_start or of_inputs) else None
+        control = other.control() if scenario.axes() and not (of_start or of_inputs) else None
         train = None if of_start or of_inputs else _core.ComposedTrain(core)
         out.append((n.offset, n.weight, train, None if of_start else inputs, (start, capacities), control))
     return key, out
 
 
-def sensitive_case(scenario: TrainScenario, variations: Sequence[Any], control: Bound) -> tuple[Any, ...]:
+def sensitive_case(scenario: AnyScenario, variations: Sequence[Any], control: Bound) -> tuple[Any, ...]:
     """A run as the core takes it."""
     core, inputs, start, capacities = core_case(scenario)
     table = scenario.simulation
@@ -158,9 +141,9 @@ def sensitive_case(scenario: TrainScenario, variations: Sequence[Any], control: 
 
 
 def channels_of(core: _core.Train) -> list[str]:
-    """Names of the channels that have a derivative: all but the modes of the contacts."""
-    modes = set(core.contact_names())
-    return [name for name, _, _ in core.channels() if name not in modes]
+    """Names of the channels that have a derivative: all but the modes of the contacts and the loss coefficient."""
+    without = {*core.contact_names(), *(CONTACTS if core.short_form else ()), "loss_coefficient"}
+    return [name for name, *_ in core.channels() if name not in without]
 
 
 @dataclass(frozen=True)
@@ -251,32 +234,21 @@ def run_sensitivities(scenario: AnyScenario, keys: Sequence[str]) -> Sensitiviti
     if not keys or len(set(keys)) < len(keys):
         raise InputError(f"sensitivities: {shown(keys)}; give keys of the scenario, such as load.inertia, each once")
     beside = {key: neighbours(scenario, key) for key in keys}
-    train = as_train(scenario)
-    variations = [core_variation(train, key, beside[key]) for key in keys]
-    channels = channels_of(train.core())
-    (found,) = run_cases([sensitive_case(train, variations, train.control())], channels)
+    variations = [core_variation(scenario, key, beside[key]) for key in keys]
+    channels = channels_of(scenario.core())
+    (found,) = run_cases([sensitive_case(scenario, variations, scenario.control())], channels)
     if found.error:
         raise _core.SolverError(found.error)
-    names = _own_names(scenario, train)
-    data = {names[c]: v for c, v in zip(channels, found.values, strict=True) if c in names}
-    derivatives = {names[c]: found.derivatives[:, k, :] for k, c in enumerate(channels) if c in names}
-    data |= {names[c]: v for c, v in named_signals(train.axes(), found.signals).items()}
-    for name, of_parameter in _of_signals(train, found.signal_derivatives).items():
-        derivatives[names[name]] = of_parameter
+    data = dict(zip(channels, found.values, strict=True))
+    derivatives = {name: found.derivatives[:, k, :] for k, name in enumerate(channels)}
+    data |= named_signals(scenario.by_prefix(), found.signals)
+    derivatives |= _of_signals(scenario, found.signal_derivatives)
     _add_derived(scenario, data, derivatives, [beside[key] for key in keys])
     return Sensitivities(tuple(keys), derivatives, found.ends_at, found.ends_by)
 
 
-def _own_names(scenario: AnyScenario, train: TrainScenario) -> dict[str, str]:
-    """What the scenario calls the variables of its train; of a drive, those of them that it has."""
-    signals = [variable.name for variable in axis_variables(train.axes())]
-    if isinstance(scenario, TrainScenario):
-        return {name: name for name in (*channels_of(train.core()), *signals)}
-    return OF_DRIVE | {name: name.removeprefix("motor_") for name in signals}
-
-
-def _of_signals(train: TrainScenario, signals: np.ndarray) -> dict[str, np.ndarray]:
-    rows = [named_signals(train.axes(), of_parameter) for of_parameter in signals]
+def _of_signals(scenario: AnyScenario, signals: np.ndarray) -> dict[str, np.ndarray]:
+    rows = [named_signals(scenario.by_prefix(), of_parameter) for of_parameter in signals]
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
@@ -301,10 +273,5 @@ def _add_derived(
 def _derived(scenario: AnyScenario, data: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Those variables alone."""
     out = dict(data)
-    some = next(iter(data.values()))
-    if isinstance(scenario, TrainScenario):
-        add_derived_of_train(scenario.train(), out, some)
-    else:
-        out.setdefault("twist", np.zeros_like(some))
-        add_derived(out, scenario.gearbox.ratio)
+    add_derived(scenario, out, next(iter(data.values())))
     return {name: v for name, v in out.items() if name not in data}

@@ -24,11 +24,10 @@ from ..model.couplings import FULL_COMMAND
 from ..model.drive import Drive
 from ..model.synchronous_motor import PhaseValues
 from ..model.train import DriveTrain
-from .run import start_state
-from .scenario import Initial, Scenario, drive_of
+from .scenario import Initial, Scenario, capacities_of, drive_of, state_of
 from .step_bound import StepBound
 from .train_scenario import TrainInitial, TrainScenario, loaded_train
-from .train_state import start_capacities, start_values
+from .train_state import start_values
 from .train_variables import (
     ALL_SIGNALS,
     WINDING_SIGNALS,
@@ -38,14 +37,13 @@ from .train_variables import (
     signals_of,
     train_variables,
 )
-from .variables import CHANNEL_NAMES, VARIABLES, Variable
+from .variables import VARIABLES, Variable
 from .windings import bounded, coarser, oriented
 
 MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 """Of a step [s]: below, it is lost in the rounding of the time; above, in that of a motion's phase."""
 
 _GIVE: Any = object()  # in the place of what has no default
-_CHANNEL = {name: k for k, name in enumerate(CHANNEL_NAMES)}
 
 Ramp = float | str | tuple[float | str, float | str]
 Derived = Callable[[list[float]], float]
@@ -120,37 +118,36 @@ class Simulation:
         self._stepping = False
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
             raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
-        self._drive: Drive | DriveTrain
-        self._core: _core.Simulation | _core.TrainSimulation
-        self._input_places: dict[str, int] | None = None  # of a train
-        self._loaded: tuple[str, ...] = ()
-        self._shares: set[str] = set()  # inputs that are commands of brakes and clutches
-        self._scenario: TrainScenario | None = None
-        self._core_train: _core.Train | None = None
-        self._variables: tuple[Variable, ...] = VARIABLES
-        self._signals: dict[str, int] = {}  # of the controllers
-        self._channel = _CHANNEL
-        self._derived: dict[str, Derived]
-        self._initial: Initial | TrainInitial
         scenario = drive if isinstance(drive, Scenario | TrainScenario) else None
+        self._scenario = scenario
         self._controllers = dict(scenario.axes()) if scenario is not None else {}
         laws = as_laws(law, self._controllers)
         self._control = self._exchanging(scenario.control(laws)) if scenario is not None else OPEN_LOOP
         self._bound: StepBound | None = None
-        if isinstance(drive, DriveTrain | TrainScenario):
-            self._of_train(drive, step, loaded)
-        elif loaded is not None:
-            raise InputError("loaded: is for trains; a drive has one load torque, on its load")
-        else:
-            self._drive = drive_of(drive)
-            core = scenario.core() if isinstance(scenario, Scenario) else self._drive.core()
-            self._core = _core.Simulation(core, step, self._control, self._acting_always(("command", "load_torque")))
+        self._signals: dict[str, int] = {}  # of the controllers
+        self._drive, self._train, core, self._loaded, self._initial = _parts(drive, loaded)
+        self._core_train = core
+        self._short = core.short_form
+        names = core.input_names()
+        self._core = _core.Simulation(core, step, self._control, self._acting_always(names))
+        self._input_places = {name: k for k, name in enumerate(names) if name not in self._controlled()}
+        self._inputs = len(names)
+        self._required = [name for name in self._input_places if not name.endswith("load_torque")]
+        channels = core.channels()
+        self._channel = {name: k for k, (name, *_) in enumerate(channels)}
+        self._input_units = {name: unit.removeprefix("1") for name, _, unit, _ in channels}
+        # Inputs that are commands of brakes and clutches.
+        self._shares = {f"{name}_command" for name in self._train.commanded() if name not in self._train.motors}
+        self._variables: tuple[Variable, ...] = VARIABLES if self._short else train_variables(self._train, core)
+        self._derived: dict[str, Derived]
+        if self._short:
             self._derived = {"efficiency": self._efficiency, "motor_power": self._motor_power}
-            self._initial = drive.start() if isinstance(drive, Scenario) else Initial()
+        else:
+            self._derived = self._derived_of(self._train)
         self._add_signals(scenario)
         if error_bound:
-            names = {} if scenario is None else bounded(scenario)
-            if not names:
+            of_windings = {} if scenario is None else bounded(scenario)
+            if not of_windings:
                 raise InputError(
                     'error_bound: is for controllers with current.kind = "field_oriented", and there is none; leave it out'
                 )
@@ -158,17 +155,15 @@ class Simulation:
                 raise InputError(
                     "error_bound: needs a law that may be called again; give lm.Law(function, repeatable=True)"
                 )
-            self._bound = StepBound(_Coarser(drive, step=step, loaded=loaded, law=law), names)
+            self._bound = StepBound(_Coarser(drive, step=step, loaded=loaded, law=law), of_windings)
         self.reset(initial)
 
     def _add_signals(self, scenario: Scenario | TrainScenario | None) -> None:
         """What the controllers show, and in the place of the straight line that drives the mechanics the torque of a winding."""
         if scenario is None or not self._controllers:
             return
-        short = isinstance(scenario, Scenario)
         names = (*ALL_SIGNALS, *WINDING_SIGNALS)
-        for k, (motor, controller) in enumerate(self._controllers.items()):
-            prefix = "" if short else f"{motor}_"
+        for k, (prefix, controller) in enumerate(scenario.by_prefix().items()):
             shown_here = set(signals_of(controller))
             self._signals |= {
                 f"{prefix}{name}": k * len(names) + n for n, name in enumerate(names) if name in shown_here
@@ -176,8 +171,7 @@ class Simulation:
         for prefix, _, phase in oriented(scenario):
             self._derived[f"{prefix or 'motor_'}torque"] = self._torque_of(prefix, phase)
             self._channel = {n: c for n, c in self._channel.items() if n != f"{prefix or 'motor_'}torque"}
-        named = {"" if short else name: c for name, c in self._controllers.items()}
-        self._variables += axis_variables(named)
+        self._variables += axis_variables(scenario.by_prefix())
 
     def _torque_of(self, prefix: str, phase: PhaseValues) -> Derived:
         def torque(values: list[float]) -> float:
@@ -192,24 +186,6 @@ class Simulation:
         for name, derived in self._derived.items():
             if name.endswith("_torque") and name not in self._channel:
                 yield channels[name], derived
-
-    def _of_train(self, what: DriveTrain | TrainScenario, step: float, loaded: Sequence[str] | None) -> None:
-        train, shafts = loaded_train(what, loaded)
-        scenario = what if isinstance(what, TrainScenario) else None
-        core = train.core(shafts) if scenario is None else scenario.core(loaded=shafts)
-        self._drive, self._scenario, self._core_train = train, scenario, core
-        self._input_places = {name: k for k, name in enumerate(core.input_names())}
-        self._core = _core.TrainSimulation(core, step, self._control, self._acting_always(core.input_names()))
-        self._loaded = tuple(shafts)
-        given = {f"{name}_load_torque" for name in shafts} | self._controlled()
-        self._required = {name for name in core.input_names() if name not in given}
-        units = {name: unit for name, unit, _ in core.channels()}
-        self._input_units = {name: units[name] for name in core.input_names()}
-        self._shares = {f"{name}_command" for name in train.commanded() if name not in train.motors}
-        self._variables = train_variables(train, core)
-        self._channel = {name: k for k, (name, _, _) in enumerate(core.channels())}
-        self._derived = self._derived_of(train)
-        self._initial = what.begin() if isinstance(what, TrainScenario) else TrainInitial()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For copies, which go on by themselves from the present state, and for pickling."""
@@ -244,16 +220,19 @@ class Simulation:
             self._reset(self._initial if initial is None else initial)
 
     def _reset(self, start: Initial | TrainInitial) -> None:
-        if isinstance(self._core, _core.TrainSimulation):
-            if not isinstance(start, TrainInitial) or not isinstance(self._drive, DriveTrain):
-                raise InputError("initial: is the state of a drive; that of a train is a TrainInitial")
-            scenario = self._scenario
-            values = start_values(self._drive, start) if scenario is None else scenario.start(start)
-            self._core.reset(values, start_capacities(start))
+        if isinstance(start, Initial) != self._short:
+            raise InputError(
+                "initial: is the state of a train; that of a drive is an Initial"
+                if self._short
+                else "initial: is the state of a drive; that of a train is a TrainInitial"
+            )
+        scenario: Any = self._scenario  # whose kind has just been checked
+        if isinstance(start, Initial):
+            self._core.reset(state_of(start), capacities_of(start))
+        elif scenario is not None:
+            self._core.reset(scenario.start(start), scenario.capacities(start))
         else:
-            if not isinstance(start, Initial):
-                raise InputError("initial: is the state of a train; that of a drive is an Initial")
-            self._core.reset(start_state(start), start.hysteresis_capacity)
+            self._core.reset(start_values(self._train, start), dict(start.hysteresis_capacities))
         self._initial = start
         if self._bound is not None:
             self._bound.coarse.reset(start)
@@ -286,14 +265,14 @@ class Simulation:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of what is given to `advance`."""
-        if self._input_places is None:
-            return ("load_torque",) if self._controllers else ("command", "load_torque")
-        return tuple(name for name in self._input_places if name not in self._controlled())
+        return tuple(self._input_places)
 
     def _all_controllers(self) -> dict[str, Controller | ContinuousController]:
         return {**self._controllers, **(self._scenario.continuous() if self._scenario is not None else {})}
 
     def _controlled(self) -> set[str]:
+        if self._short:
+            return {"command"} if self._controllers else set()
         return {f"{motor}_command" for motor in self._controllers}
 
     @property
@@ -322,25 +301,11 @@ class Simulation:
         SolverError
             The motion has no continuation; the message names the contact. The state stays as it was.
         """
-        if self._input_places is not None:
-            self._advance_train(interval, command, load_torque, inputs)
-            return
-        if self._controllers and command is _GIVE:
-            command = 0.0
-        elif self._controllers:
-            raise InputError("command: the controller of the scenario turns the motor; leave it out")
-        if inputs or command is _GIVE:
-            problem = "missing a required argument: 'command'"
-            raise misfit("Simulation.advance", ("interval", "command", "load_torque"), inputs, problem)
-        c0, c1 = _ramp("command", command, "")
-        m0, m1 = _ramp("load_torque", load_torque, "N*m")
-        self._step(interval, c0, c1, m0, m1)
-
-    def _advance_train(self, interval: float | str, command: Any, load_torque: Any, inputs: dict[str, Ramp]) -> None:
-        places = self._input_places or {}
-        if command is not _GIVE or _ramp("load_torque", load_torque, "N*m") != (0.0, 0.0):
-            raise InputError(f"a train takes its inputs by name: {', '.join(places)}")
-        begin, end = [0.0] * len(places), [0.0] * len(places)
+        if self._short:
+            inputs = self._of_drive(command, load_torque, inputs)
+        elif command is not _GIVE or _ramp("load_torque", load_torque, "N*m") != (0.0, 0.0):
+            raise InputError(f"a train takes its inputs by name: {', '.join(self._input_places)}")
+        places, begin, end = self._input_places, [0.0] * self._inputs, [0.0] * self._inputs
         for name, value in inputs.items():
             if name in self._controlled():
                 raise InputError(f"{name}: a controller of the scenario turns this motor; leave it out")
@@ -349,9 +314,20 @@ class Simulation:
             ramp = begin[places[name]], end[places[name]] = _ramp(name, value, self._input_units[name])
             if name in self._shares and max(ramp) > FULL_COMMAND:
                 raise InputError(f"{name} {shown(value)} is a share, and 1 is the full torque; give at most that")
-        if missing := self._required - inputs.keys():
+        if missing := [name for name in self._required if name not in inputs]:
             raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
         self._step(interval, begin, end)
+
+    def _of_drive(self, command: Ramp, load_torque: Ramp, others: dict[str, Ramp]) -> dict[str, Ramp]:
+        """The inputs of a drive by name."""
+        if others or (command is _GIVE and not self._controllers):
+            problem = "missing a required argument: 'command'"
+            raise misfit("Simulation.advance", ("interval", "command", "load_torque"), others, problem)
+        if not self._controllers:
+            return {"command": command, "load_torque": load_torque}
+        if command is not _GIVE:
+            raise InputError("command: the controller of the scenario turns the motor; leave it out")
+        return {"load_torque": load_torque}
 
     @staticmethod
     def _exchanging(control: Bound) -> Bound:
@@ -402,7 +378,7 @@ class Simulation:
 
     def _no_input(self, name: str) -> InputError:
         shaft = name.removesuffix("_load_torque")
-        if shaft != name and isinstance(self._drive, DriveTrain) and shaft in self._drive.shafts:
+        if shaft != name and shaft in self._train.shafts:
             return InputError(f'{name}: no load torque acts on this shaft; make the simulation with loaded=["{shaft}"]')
         meant = did_you_mean(name, self.inputs, f"the inputs are {', '.join(self.inputs)}")
         return InputError(f"{name}: is no input of this train; {meant}")
@@ -444,14 +420,14 @@ class Simulation:
     # The array functions of `results` take ten times as long for a single number.
 
     def _motor_power(self, values: list[float]) -> float:
-        return self._value("motor_torque", values) * values[_CHANNEL["motor_speed"]]
+        return self._value("motor_torque", values) * values[self._channel["motor_speed"]]
 
     def _efficiency(self, values: list[float]) -> float:
-        speed = values[_CHANNEL["motor_speed"]]
-        if speed == 0.0 or not isinstance(self._drive, Drive):
+        speed = values[self._channel["motor_speed"]]
+        if speed == 0.0:
             return math.nan
-        driving = math.copysign(1.0, speed) * values[_CHANNEL["output_torque"]]
-        fed_in = math.copysign(1.0, speed) * values[_CHANNEL["input_torque"]] * self._drive.gearbox.ratio
+        driving = math.copysign(1.0, speed) * values[self._channel["output_torque"]]
+        fed_in = math.copysign(1.0, speed) * values[self._channel["input_torque"]] * self._train.gears["gearbox"].ratio
         if driving >= 0.0:
             return driving / fed_in if fed_in != 0.0 else math.nan if driving == 0.0 else math.inf
         return fed_in / driving if fed_in < 0.0 else 0.0
@@ -497,6 +473,21 @@ class Simulation:
             raise InputError(f"{shown(state)} is no state of a simulation; give what `state` returned") from None
         if not same:
             raise InputError(f"{shown(state)} is the state of another drive, with other parameters or controllers")
+
+
+def _parts(
+    what: Drive | Scenario | DriveTrain | TrainScenario, loaded: Sequence[str] | None
+) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], Initial | TrainInitial]:
+    """What is simulated, the same as a train, the solver's train, the shafts that a load torque may act on, and the start."""
+    if isinstance(what, DriveTrain | TrainScenario):
+        train, shafts = loaded_train(what, loaded)
+        if isinstance(what, DriveTrain):
+            return train, train, train.core(shafts), tuple(shafts), TrainInitial()
+        return train, train, what.core(loaded=shafts), tuple(shafts), what.begin()
+    if loaded is not None:
+        raise InputError("loaded: is for trains; a drive has one load torque, on its load")
+    start = what.begin() if isinstance(what, Scenario) else Initial()
+    return drive_of(what), what.train(), what.core(), (), start
 
 
 def _remade(kind: Any, made: Mapping[str, Any], sines: Any, initial: Any, state: SimulationState) -> Any:

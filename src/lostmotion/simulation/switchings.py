@@ -15,9 +15,9 @@ from ..inputs.arguments import checked
 if TYPE_CHECKING:
     import xarray
 
-CAUSES = dict(_core.causes())
+CAUSES = dict(_core.causes(short_form=True))
 """what ended a regime, by its number"""
-TRAIN_CAUSES = dict(_core.train_causes())
+TRAIN_CAUSES = dict(_core.causes(short_form=False))
 """the same of a drive train"""
 
 ATTRIBUTE = "switchings"

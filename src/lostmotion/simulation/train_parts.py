@@ -125,7 +125,7 @@ def joined_results(
     }
     ledgers = [r["energy"] for r in results]
     return {
-        "values": [rows[name] for name, _, _ in core.channels()],
+        "values": [rows[name] for name, *_ in core.channels()],
         "control": [signals[name] for name in whole.axes()],
         "switchings": _joined_switchings(core.contact_names(), rows, results)[:most],
         "switching_count": sum(r["switching_count"] for r in results),

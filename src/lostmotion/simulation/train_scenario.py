@@ -123,6 +123,22 @@ class TrainScenario(TrainElements):
         """The continuous controllers by the names of their motors."""
         return {name: c for name, c in self.controllers.items() if isinstance(c, ContinuousController)}
 
+    def by_prefix(self) -> dict[str, Controller]:
+        """The sampled controllers, by what the names of their variables begin with."""
+        return {self.prefix(name): c for name, c in self.axes().items()}
+
+    def note(self) -> str:
+        """What the sheets of the gears say beside their numbers."""
+        return " ".join(f"{name}: {gear.note}" for name, gear in self.gears.items() if gear.note)
+
+    def prefix(self, motor: str) -> str:
+        """What the names of the variables of a motor's controller begin with."""
+        return f"{motor}_"
+
+    def capacities(self, initial: TrainInitial | None = None) -> dict[str, float]:
+        """Hysteresis capacities at t = 0 [N·m] by gear; what is not among them is 0."""
+        return {name: h for name, h in (initial or self.initial).hysteresis_capacities.items() if h}
+
     def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
         """The solver's controllers."""
         return core_control(self.train(), self.axes(), laws=laws)

@@ -42,11 +42,6 @@ def start_values(train: DriveTrain, initial: Any) -> dict[str, float]:
     return values
 
 
-def start_capacities(initial: Any) -> dict[str, float]:
-    """Hysteresis capacities at t = 0 by gear; what is not among them is 0."""
-    return {name: h for name, h in initial.hysteresis_capacities.items() if h}
-
-
 def _check(key: str, given: Iterable[str], known: Iterable[str], what: str) -> None:
     known = list(known)
     for name in given:

@@ -23,7 +23,7 @@ def train_variables(train: DriveTrain, core: _core.Train) -> tuple[Variable, ...
     core
         The solver's train, with what acts on it.
     """
-    channels = [Variable(name, "", unit or "1", meaning) for name, unit, meaning in core.channels()]
+    channels = [Variable(*row) for row in core.channels()]
     known = {channel.name for channel in channels}
     integrated = [name for name in train.shafts if f"{name}_angle" in known]
     following = {shaft for shaft, *_ in angles_through_gears(train, integrated)}
@@ -66,10 +66,10 @@ def signals_of(controller: Controller) -> Iterator[str]:
 
 
 def axis_variables(controllers: Mapping[str, Controller]) -> tuple[Variable, ...]:
-    """What the controllers of a run show, after the names of their motors; that of a drive alone without."""
+    """What the controllers of a run show, by what its names begin with."""
     return tuple(
-        Variable(f"{motor}_{name}" if motor else name, "", unit, meaning)
-        for motor, controller in controllers.items()
+        Variable(f"{prefix}{name}", "", unit, meaning)
+        for prefix, controller in controllers.items()
         for name, unit, meaning in (*_core.axis_signals(), *_core.winding_signals())
         if name in signals_of(controller)
     )
@@ -78,8 +78,8 @@ def axis_variables(controllers: Mapping[str, Controller]) -> tuple[Variable, ...
 def named_signals(controllers: Mapping[str, Controller], values: Any) -> dict[str, np.ndarray]:
     """What the core has recorded of the controllers, axis by axis and signal by signal, as `axis_variables` calls it."""
     return {
-        f"{motor}_{name}" if motor else name: row
-        for (motor, controller), rows in zip(controllers.items(), values, strict=True)
+        f"{prefix}{name}": row
+        for (prefix, controller), rows in zip(controllers.items(), values, strict=True)
         for name, row in zip((*ALL_SIGNALS, *WINDING_SIGNALS), rows, strict=False)
         if name in signals_of(controller)
     }
@@ -129,7 +129,10 @@ def check_names(train: DriveTrain, core: _core.Train, controllers: Mapping[str, 
     InputError
     """
     seen = {"time"}
-    for variable in (*train_variables(train, core), *axis_variables(controllers)):
+    for variable in (
+        *train_variables(train, core),
+        *axis_variables({f"{name}_": c for name, c in controllers.items()}),
+    ):
         if variable.name in seen:
             tables = ("shafts", *TrainElements.model_fields)
             keys = [f"{table}.{name}" for table in tables for name in getattr(train, table)]

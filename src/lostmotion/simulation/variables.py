@@ -34,5 +34,5 @@ VARIABLES = (
 )
 
 CHANNEL_NAMES = tuple(v.name for v in CHANNELS)
-CONTACTS = tuple(_core.contacts())
+CONTACTS = tuple(name for name in CHANNEL_NAMES if name.endswith("_contact"))
 STATES = tuple(_core.states())

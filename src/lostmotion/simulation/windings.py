@@ -25,10 +25,8 @@ def oriented(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str, Pha
     for name, controller in scenario.axes().items():
         if controller.current.kind != "field_oriented":
             continue
-        if isinstance(scenario, Scenario):
-            prefix, shaft, motor = "", "motor", scenario.motor
-        else:
-            prefix, shaft, motor = f"{name}_", scenario.motors[name].shaft, scenario.motors[name]
+        motor = scenario.train().motors[name]
+        prefix, shaft = scenario.prefix(name), motor.shaft
         assert motor.winding is not None
         yield prefix, shaft, motor.winding.phase_values()
 

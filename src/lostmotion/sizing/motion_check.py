@@ -9,6 +9,7 @@ from .. import _core
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..model.torsion import Rigid
+from ..simulation.explanation import smallest_commands
 from ..simulation.scenario import Scenario
 from ..test_rig.rig import TestRig
 from .finding import Finding, Verdict
@@ -82,7 +83,7 @@ def resonance(scenario: Scenario) -> list[Finding]:
 def dead_zone(scenario: Scenario, result: xarray.Dataset) -> Finding:
     """The commands that move the load from rest."""
     against = float(result["load_torque"][0])
-    forward, backward = (scenario.drive().core().smallest_command(0.0, against, s) for s in (+1, -1))
+    forward, backward = smallest_commands(scenario.drive(), against)
     peak = float(abs(result["command"]).max())
     value = f"the load moves above a command of {forward:.4g} and below {backward:.4g}"
     moves = bool((result["motor_speed"] != 0.0).any())

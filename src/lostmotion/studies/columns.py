@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..response.bandwidth import bandwidth
-from ..simulation.results import add_derived
+from ..simulation.results import add_efficiency
 from ..simulation.scenario import Scenario
 from ..simulation.variables import CHANNEL_NAMES
 from ..worker_threads import thread_pool
@@ -64,7 +64,7 @@ def _with_derived(study: Study, runs: Runs) -> dict[str, np.ndarray]:
         return runs.samples
     samples = study.scenario.simulation.samples
     whole = runs.samples | {c: runs.samples.get(c, np.zeros((len(runs.errors), samples))) for c in CHANNEL_NAMES}
-    add_derived(whole, runs.ratio[:, None])
+    add_efficiency(whole, runs.ratio[:, None])
     return {name: whole[name] for name in wanted | set(runs.samples)}
 
 

@@ -9,10 +9,9 @@ import numpy as np
 from .. import _core
 from ..errors import InputError
 from ..model.torsion import Rigid
+from ..simulation.core_runs import core_case
 from ..simulation.results import ENERGY
-from ..simulation.run import core_inputs
 from ..simulation.scenario import Scenario
-from ..simulation.variables import CHANNEL_NAMES
 from .functions import REDUCTIONS
 from .runs import Runs, spread
 from .study import Study
@@ -70,14 +69,14 @@ def run_in_core(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     errors = _out_of_range(study, parameters)
     where = np.flatnonzero([e == "" for e in errors])
     made, texts, switchings, energies = _core.run_batch(
-        *core_inputs(s),
+        [core_case(s)],
         [_fields()[key] for key, _, _ in keys],
         np.ascontiguousarray(values[where]),
         s.simulation.duration,
         s.simulation.sample_interval,
         s.simulation.samples,
-        asks_for(study, "energy"),
-        [CHANNEL_NAMES.index(c) for c in sampled],
+        ENERGY if asks_for(study, "energy") else (),
+        sampled,
         [(sampled.index(variable), REDUCTIONS.index(how)) for how, variable in reduced.values()],
         threads,
     )
@@ -89,7 +88,7 @@ def run_in_core(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         parameters=parameters,
         samples={} if reduced else {c: spread(made[:, k], where, n) for k, c in enumerate(sampled)},
         kept={name: spread(made[:, k], where, n) for k, name in enumerate(reduced)},
-        energy={e: spread(energies[:, k], where, n) for k, e in enumerate(ENERGY)},
+        energy={e: spread(energies[:, k], where, n) for k, e in enumerate(ENERGY)} if energies.shape[1] else {},
         checks={},
         switchings=np.nan_to_num(spread(switchings, where, n)),
         errors=errors,

@@ -8,11 +8,12 @@ import numpy as np
 
 from .. import _core
 from ..errors import InputError
+from ..simulation.core_runs import core_case
 from ..simulation.pointing_error import pointing_errors
+from ..simulation.results import add_derived
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
 from ..simulation.train_parts import parts_of
-from ..simulation.train_results import add_derived_of_train, core_case
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.windings import bound_values
 from ..worker_threads import thread_pool
@@ -90,8 +91,10 @@ def run_trains(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         except InputError as error:
             errors[k] = str(error)
     where = np.array(list(trains), dtype=int)
-    made, texts, switchings, energies = _core.run_trains(
+    made, texts, switchings, energies = _core.run_batch(
         [core_case(scenario) for scenario in trains.values()],
+        [],
+        np.empty((0, 0)),
         table.duration,
         table.sample_interval,
         table.samples,
@@ -148,7 +151,7 @@ def _samples(
         if errors[k]:
             continue
         data = {name: values[place] for name, values in made.items()}
-        add_derived_of_train(scenario.train(), data, time)
+        add_derived(scenario, data, time)
         for name in wanted:
             out[name][k] = data[name]
     return out
