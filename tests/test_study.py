@@ -427,6 +427,31 @@ def test_damaged_parts_are_named_and_made_again(tmp_path: Path, harm, said: str)
     assert read_table(directory).equals(whole)
 
 
+@pytest.mark.parametrize("name", [*SWAPPED[:2], "_checksums.txt", "_study.json"])
+@pytest.mark.parametrize("what", ["device", "directory", "link to nothing", "link to itself"])
+def test_what_is_no_file_is_named_and_not_read(tmp_path: Path, name: str, what: str):
+    study = make(design="random", runs=CHUNK + 1)
+    directory = lm.study(study, tmp_path / "s")
+    whole = read_table(directory)
+    path = directory / name
+    path.unlink()
+    if what == "directory":
+        path.mkdir()
+    else:
+        path.symlink_to({"device": "/dev/zero", "link to nothing": "none", "link to itself": name}[what])
+    begin = time.process_time()
+    with pytest.raises(InputError, match="holds no study" if name == "_study.json" else name):
+        read_table(directory)
+    done = CliRunner().invoke(app, ["study", "resume", str(directory), "--repair"])
+    assert time.process_time() - begin < 10.0
+    if done.exit_code == 0:
+        assert read_table(directory).equals(whole)
+    else:
+        assert isinstance(done.exception, InputError), done.output
+        assert name in str(done.exception)
+    assert done.exit_code == 0 or name.startswith("_") or what == "directory"
+
+
 def test_only_damaged_parts_are_made_again(tmp_path: Path):
     study = make(design="random", runs=2 * CHUNK + 1)
     directory = lm.study(study, tmp_path / "s")
