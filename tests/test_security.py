@@ -9,6 +9,7 @@ import sqlite3
 import struct
 import subprocess
 import sys
+import tracemalloc
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +21,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
+from lostmotion.identification import csv_log, servo_json
 from lostmotion.identification.conversions import conversion_of
 from lostmotion.identification.readers import TABLES, read_log
 from lostmotion.inputs.limits import memory_limit, size_of
@@ -431,6 +433,54 @@ def test_chunks_of_bags_are_bounded(tmp_path: Path, method: str) -> None:
 def test_logs_longer_than_the_limit_are_refused(tmp_path: Path, ending: str) -> None:
     (tmp_path / f"log{ending}").write_bytes(bytes(3_000_000))
     refused(tmp_path / f"log{ending}", "needs .* MB of memory")
+
+
+TEXTS = {
+    "short lines": ("log.csv", "t,a\n", "1,2\n", ""),
+    "empty values": ("log.csv", "t," + ",".join(f"c{k}" for k in range(100)) + "\n", "1" + "," * 100 + "\n", ""),
+    "usual lines": ("log.csv", "t,a,b\n", "1.234567,12.345678,-0.123456\n", ""),
+    "wide characters": ("log.csv", "# \U0001f600\nt,a\n", "1,2\n", ""),
+    "entries": ("log.json", '{"entries": [{"timestamp": 0, "p": 1}', ', {"timestamp": 1.25, "p": 2.125}', "]}"),
+    "empty lists": ("log.json", '{"x": [0', ",[]", '], "entries": [{"timestamp": 1, "p": 2}]}'),
+    "empty objects": ("log.json", '{"x": [0', ",{}", '], "entries": [{"timestamp": 1, "p": 2}]}'),
+    "objects": ("log.json", '{"x": [0', ',{"a": 1}', '], "entries": [{"timestamp": 1, "p": 2}]}'),
+}
+
+
+@pytest.mark.parametrize("what", TEXTS)
+def test_the_memory_of_logs_in_text_is_not_underestimated(tmp_path: Path, what: str) -> None:
+    name, begin, line, end = TEXTS[what]
+    path = tmp_path / name
+    path.write_text(begin + line * (60_000 // len(line)) + end)
+    read_log(path)  # what is imported and kept once
+    tracemalloc.start(1)
+    try:
+        read_log(path)
+        _, taken = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    estimate = []
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (csv_log, servo_json):
+            patch.setattr(module, "check_memory", lambda needed, *_: estimate.append(needed))
+        read_log(path)
+    assert 0.95 * taken < max(estimate) < 4.0 * taken
+
+
+def test_a_log_that_is_cut_off_says_so(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    path = tmp_path / "log.tdms"
+    with nptdms.TdmsWriter(path) as writer:
+        channel = nptdms.ChannelObject(
+            "run", "position", TIME, properties={"wf_increment": 0.01, "wf_start_offset": 0.0}
+        )
+        writer.write_segment([channel])
+    assert read_log(path).notes == ()
+    path.write_bytes(path.read_bytes()[:-80])
+    log = read_log(path)
+    assert len(log.time) == len(TIME) - 10
+    assert "may be cut off or damaged" in log.notes[0]
+    assert capfd.readouterr() == ("", "")
 
 
 def test_channels_of_tdms_files_are_bounded(tmp_path: Path, small_limit: int) -> None:

@@ -17,7 +17,7 @@ from ..inputs.hdf5_files import datasets
 from ..inputs.limits import check_memory, memory_limit
 from ..inputs.validation import did_you_mean
 from .conversions import conversion_of
-from .logs import Channel, Log, as_number
+from .logs import Channel, Log, as_number, reason, warnings_of
 from .mdf_blocks import check_mdf_blocks
 
 MATLAB_NUMBERS = {*(f"{u}int{n}" for u in ("", "u") for n in (8, 16, 32, 64)), "double", "single", "char", "logical"}
@@ -25,6 +25,7 @@ COMPRESSED = 15  # type of an element of a MATLAB file
 PIECE = 2**20  # [bytes] that are decompressed at once
 ALGEBRAIC = 3  # type of a conversion of MDF 4
 MDF_NUMBERS = range(6)  # data types of MDF 4: integers and floating-point numbers of both byte orders
+WAVEFORM = {"wf_increment", "wf_start_offset"}  # properties of a TDMS channel that holds its time
 TIME_NAMES = ("time", "t", "timestamp", "times", "tm")
 
 
@@ -61,7 +62,7 @@ def _mat5_variables(path: Path) -> dict[str, Any]:
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not a MATLAB file ({error}); save it with -v7 or -v7.3") from None
+        raise InputError(f"{path}: is not a MATLAB file ({reason(error)}); save it with -v7 or -v7.3") from None
     return {name: value for name, value in data.items() if not name.startswith("__")}
 
 
@@ -102,7 +103,7 @@ def _hdf5_variables(path: Path) -> dict[str, Any]:
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not a MATLAB 7.3 file ({error})") from None
+        raise InputError(f"{path}: is not a MATLAB 7.3 file ({reason(error)})") from None
     return found
 
 
@@ -132,7 +133,7 @@ def read_parquet_log(path: Path, *, time: str = "") -> Log:
             check_memory(16.0 * len(names) * file.metadata.num_rows, str(path))
             table = file.read(names)
     except (OSError, pa.ArrowException) as error:
-        raise InputError(f"{path}: is not a Parquet file ({error})") from None
+        raise InputError(f"{path}: is not a Parquet file ({reason(error)})") from None
     units = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in schema}
     header = {k.decode(): v.decode() for k, v in (schema.metadata or {}).items() if not k.startswith(b"ARROW")}
     columns: dict[str, Any] = {}
@@ -171,7 +172,7 @@ def read_mdf_log(path: Path, *, time: str = "") -> Log:
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not an MDF file that asammdf reads ({error})") from None
+        raise InputError(f"{path}: is not an MDF file that asammdf reads ({reason(error)})") from None
     numbers = [signal for signal in signals if signal.samples.dtype.kind in "biuf" and signal.samples.ndim == 1]
     if not numbers:
         raise InputError(f"{path}: has no channel of numbers")
@@ -254,21 +255,22 @@ def read_tdms_log(path: Path, *, time: str = "") -> Log:
     variables: dict[str, Any] = {}
     units = {}
     try:
-        with path.open("rb") as stream, nptdms.TdmsFile.open(stream) as file:
+        with warnings_of("nptdms") as said, path.open("rb") as stream, nptdms.TdmsFile.open(stream) as file:
             channels = [c for group in file.groups() for c in group.channels() if c.dtype.kind in "biuf"]
             check_memory(sum(float(len(c)) * (c.dtype.itemsize + 8.0) for c in channels), str(path))
             for channel in channels:
                 variables[channel.name] = np.asarray(channel[:])
                 units[channel.name] = str(channel.properties.get("unit_string", ""))
-                if "wf_increment" in channel.properties and not any(name in variables for name in TIME_NAMES):
+                if channel.properties.keys() >= WAVEFORM and not any(name in variables for name in TIME_NAMES):
                     variables["time"] = channel.time_track()
             properties = file.properties
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not a TDMS file ({error})") from None
+        raise InputError(f"{path}: is not a TDMS file ({reason(error)})") from None
     variables |= {name: value for name, value in properties.items() if isinstance(value, int | float | str)}
-    return _of_variables(path, variables, units, time)
+    log = _of_variables(path, variables, units, time)
+    return log.noted(f"may be cut off or damaged; npTDMS reports: {said[0]}") if said else log
 
 
 def _of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[str, str], time: str) -> Log:
