@@ -360,6 +360,7 @@ def test_long_lists_in_messages_are_cut(tmp_path: Path) -> None:
     path = tmp_path / "s.toml"
     for wrong in (
         'base = "no such one"',
+        f'base = "{"x" * 5000}"',
         "[motor]\nx = 1\ny = 2\n[gearbox]\nz = 3",
         "[shafts]\na = 1\nb = 2\n[gears.g]\ninput = 'c'\n[gears.h]\noutput = 5\n[gears.i]\nkind = 3",
         "[shafts.a]\ninertia = 1\n" + "".join(f"[brakes.b{k}]\nshaft = 'none{k}'\ntorque = 1\n" for k in range(50)),
