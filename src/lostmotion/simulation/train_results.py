@@ -35,7 +35,7 @@ def run_train(
         Duration [s], sample interval [s], samples, whether to keep the energy ledger, relative tolerance (0: exact), and how
         many switchings are kept.
     """
-    core, result = _core_result(scenario, options, control)
+    core, result = core_result(scenario, options, control)
     time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
     data = dict(zip((name for name, _, _ in core.channels()), result["values"], strict=True))
     data |= named_signals(scenario.axes(), result["control"])
@@ -46,7 +46,7 @@ def run_train(
     return RawResult(time, data, attributes, variables_of(scenario))
 
 
-def _core_result(
+def core_result(
     scenario: TrainScenario, options: tuple[Any, ...], control: Bound
 ) -> tuple[_core.Train, dict[str, Any]]:
     """The solver's train, and what the solver gave for it."""
@@ -54,7 +54,7 @@ def _core_result(
     if len(parts) > 1:
 
         def solved(part: TrainScenario) -> dict[str, Any]:
-            core, result = _core_result(part, options, control_of_part(control, scenario, part))
+            core, result = core_result(part, options, control_of_part(control, scenario, part))
             names = {"channels": [name for name, _, _ in core.channels()], "contacts": core.contact_names()}
             return result | names
 
