@@ -595,6 +595,16 @@ def test_a_scheduler_that_dies_takes_no_written_part_with_it(tmp_path: Path):
     assert read_table(directory).equals(read_table(lm.study(study, tmp_path / "t")))
 
 
+@pytest.mark.filterwarnings("default")
+def test_the_command_line_computes_on_the_workers_of_a_scheduler(tmp_path: Path):
+    example = ROOT / "examples" / "tolerance.toml"
+    with Cluster(tmp_path) as cluster:
+        words = ["study", str(example), "-o", str(tmp_path / "s"), "--scheduler", cluster.address]
+        done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    assert read_table(tmp_path / "s").equals(read_table(lm.study(lm.load_study(example), tmp_path / "t")))
+
+
 def test_progress_rises_to_the_total_and_starts_from_what_is_there(tmp_path: Path):
     study = make(runs=2 * CHUNK + 1, design="random")
     seen: list[int] = []
