@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import pickle
@@ -321,6 +322,57 @@ def test_files_without_end_are_refused_before_they_take_memory(tmp_path: Path) -
     assert float(peak) < 200.0  # [MiB]
 
 
+WITHOUT_END = [
+    "run /dev/zero",
+    "run based.toml",
+    "run record.toml",
+    "run series.toml",
+    "drive check zero.toml",
+    "response zero.toml",
+    "rig zero.toml",
+    "servo zero.toml",
+    "track zero.toml",
+    "fmu zero.toml -o x.fmu",
+    "study zero.toml",
+    "study show zero.toml",
+    "study resume /dev/zero",
+    "select zero.toml",
+    "identify zero.toml",
+    "catalogue zero.toml",
+]
+CALLS = """
+import resource, sys
+import lostmotion.cli.entry as entry, lostmotion as lm, scipy, pyarrow.parquet, matplotlib.pyplot, jinja2
+lm.load("paper-2dof-nl-small")
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+for words in sys.argv[1:]:
+    sys.argv = ["lostmotion", *words.split()]
+    try:
+        entry.main()
+    except SystemExit as end:
+        print(end.code)
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
+"""
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs a file without end")
+def test_every_command_refuses_a_file_without_end(tmp_path: Path) -> None:
+    (tmp_path / "zero.toml").symlink_to("/dev/zero")
+    (tmp_path / "based.toml").write_text('base = "/dev/zero"')
+    (tmp_path / "record.toml").write_text('base = "paper-2dof-nl-small"\n[gearbox]\nfrom = "zero.toml"')
+    (tmp_path / "series.toml").write_text('base = "paper-2dof-nl-small"\n[command]\nsamples = { file = "/dev/zero" }')
+    done = subprocess.run(
+        [sys.executable, "-c", CALLS, *WITHOUT_END], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    *codes, peak = done.stdout.split()
+    assert codes == ["1"] * len(WITHOUT_END)
+    lines = done.stderr.splitlines()
+    assert len(lines) == len(WITHOUT_END)
+    for words, line in zip(WITHOUT_END, lines, strict=True):
+        assert "zero" in line, (words, line)
+    assert float(peak) < 300.0  # [MiB]
+
+
 @pytest.mark.usefixtures("small_limit")
 def test_compressed_elements_of_matlab_files_are_bounded(tmp_path: Path) -> None:
     import scipy.io
@@ -367,6 +419,17 @@ def test_lists_of_an_mdf_file_that_lead_back_into_themselves_are_refused(tmp_pat
     struct.pack_into("<Q", content, at + 24, at)
     path.write_bytes(content)
     refused(path, "a list of blocks leads back into itself")
+
+
+def test_a_damaged_mdf_file_prints_nothing(tmp_path: Path) -> None:
+    path = as_mdf(tmp_path / "log.mf4", None)
+    path.write_bytes(path.read_bytes()[:64] + bytes(8) + path.read_bytes()[72:])  # the header block has no name
+    with pytest.MonkeyPatch.context() as patch:
+        seen: list[Any] = []
+        patch.setattr(sys, "unraisablehook", seen.append)
+        refused(path, "is not an MDF file")
+        gc.collect()
+    assert seen == []
 
 
 def test_announced_lengths_of_mdf_files_are_bounded(tmp_path: Path) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import resource
 import signal
+import sys
 import time
 import traceback
 from collections.abc import Iterator
@@ -50,7 +52,8 @@ def failure_of(case: Case, folder: Path) -> str:
         For its files, empty.
     """
 
-    home = Path.cwd()
+    home, unseen = Path.cwd(), list[str]()
+    hook, sys.unraisablehook = sys.unraisablehook, lambda error: unseen.append(f"{error.object}: {error.exc_value}")
     before = signal.signal(signal.SIGPROF, _ring)
     signal.setitimer(signal.ITIMER_PROF, PROCESSOR)
     try:
@@ -64,7 +67,9 @@ def failure_of(case: Case, folder: Path) -> str:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)
         os.chdir(home)
-    return ""
+        gc.collect()
+        sys.unraisablehook = hook
+    return f"an exception is printed, not raised: {unseen[0]}" if unseen else ""
 
 
 def _serve(pipe: Connection) -> None:

@@ -17,7 +17,7 @@ from ..inputs.hdf5_files import datasets
 from ..inputs.limits import check_memory, memory_limit
 from ..inputs.validation import did_you_mean
 from .conversions import conversion_of
-from .logs import Channel, Log, as_number, reason, warnings_of
+from .logs import Channel, Log, as_number, quiet_ends, reason, warnings_of
 from .mdf_blocks import check_mdf_blocks
 
 MATLAB_NUMBERS = {*(f"{u}int{n}" for u in ("", "u") for n in (8, 16, 32, 64)), "double", "single", "char", "logical"}
@@ -159,20 +159,17 @@ def read_mdf_log(path: Path, *, time: str = "") -> Log:
     InputError
     """
     need("asammdf", "Reading MDF files", "identify")
-    import asammdf
-
     check_mdf_blocks(path)
-    try:
-        with asammdf.MDF(path, process_bus_logging=False) as file:  # type: ignore[call-arg]
-            formulas = _formulas(path, file)
-            _check_mdf_memory(path, file)
-            masters = {(k, m) for k, m in file.masters_db.items()}
-            places = {name: at for name, at in file.channels_db.items() if not masters.intersection(at)}
-            signals = [_signal(file, name, at, formulas) for name, at in places.items() if _is_plain(file, at[0])]
-    except InputError:
-        raise
-    except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not an MDF file that asammdf reads ({reason(error)})") from None
+    problem = ""
+    with warnings_of("asammdf") as said, quiet_ends():
+        try:
+            signals = _mdf_signals(path)
+        except InputError:
+            raise
+        except Exception as error:  # the library raises what its parts raise
+            problem = reason(error)
+    if problem:
+        raise InputError(f"{path}: is not an MDF file that asammdf reads ({problem})")
     numbers = [signal for signal in signals if signal.samples.dtype.kind in "biuf" and signal.samples.ndim == 1]
     if not numbers:
         raise InputError(f"{path}: has no channel of numbers")
@@ -181,7 +178,19 @@ def read_mdf_log(path: Path, *, time: str = "") -> Log:
     channels = {
         s.name: Channel(np.interp(clock, s.timestamps, s.samples.astype(float)), str(s.unit or "")) for s in numbers
     }
-    return Log(path.name, clock - clock[0], channels)
+    log = Log(path.name, clock - clock[0], channels)
+    return log.noted(f"asammdf reports: {said[0]}") if said else log
+
+
+def _mdf_signals(path: Path) -> list[Any]:
+    import asammdf
+
+    with asammdf.MDF(path, process_bus_logging=False) as file:  # type: ignore[call-arg]
+        formulas = _formulas(path, file)
+        _check_mdf_memory(path, file)
+        masters = {(k, m) for k, m in file.masters_db.items()}
+        places = {name: at for name, at in file.channels_db.items() if not masters.intersection(at)}
+        return [_signal(file, name, at, formulas) for name, at in places.items() if _is_plain(file, at[0])]
 
 
 Formulas = dict[tuple[int, int], Callable[[np.ndarray], np.ndarray]]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import logging
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -36,6 +38,18 @@ def warnings_of(library: str) -> Iterator[list[str]]:
     finally:
         for logger, handlers, passing in before:
             logger.handlers, logger.propagate = handlers, passing
+
+
+@contextmanager
+def quiet_ends() -> Iterator[None]:
+    """Objects of a library that end half-made print no traceback."""
+    before = sys.unraisablehook
+    sys.unraisablehook = lambda _: None
+    try:
+        yield
+    finally:
+        gc.collect()
+        sys.unraisablehook = before
 
 
 @dataclass(frozen=True)
