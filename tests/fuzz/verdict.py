@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import time
@@ -68,8 +69,9 @@ def ends(make: Callable[[], R], seconds: float) -> R | None:
     try:
         return make()
     except Alarm:
-        # On a busy machine the clock runs on while the process waits; with several threads so does the processor time.
-        late = min(time.monotonic() - begin, time.process_time() - processor) - seconds
+        # Of each thread at most: on a busy machine the clock runs on while the process waits.
+        taken = (time.process_time() - processor - seconds) / (os.cpu_count() or 1)
+        late = min(time.monotonic() - begin - seconds, taken)
         if late > INTERRUPTED:
             raise Failure(f"an interruption is obeyed after {late:.1f} s") from None
         return None
