@@ -147,6 +147,12 @@ soak: with-core-tests
 	LOSTMOTION_CASES=1 $(BIN)/ctest --test-dir $(TREE) --output-on-failure --parallel 2 --tests-regex '^core'
 	$(TREE)/core/tests/soak $(CASES) $(SEED)
 
+# Random input of all kinds, for some minutes; CASE repeats one that failed, KINDS chooses some.
+MINUTES ?= 3
+.PHONY: fuzz
+fuzz: $(VENV)/dev fmu-library
+	PYTHONPATH=tests $(BIN)/python -m fuzz $(if $(CASE),--case $(CASE),--seed $(SEED) --minutes $(MINUTES) $(KINDS:%=--kinds %))
+
 bench: $(VENV)/dev fmu-library
 	$(BIN)/pip install -q --group bench
 	command -v valgrind >/dev/null || { apt-get update -q && apt-get install -qy valgrind; } || echo 'without valgrind'

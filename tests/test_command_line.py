@@ -4,6 +4,7 @@ import errno
 import os
 import pty
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -15,9 +16,11 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, ROOT, SCENARIOS
-from lostmotion.cli import app
+from lostmotion.cli import app, terminal
 from lostmotion.reports import plots
 from lostmotion.reports.listing import list_records
+from lostmotion.simulation.forecast import forecast
+from lostmotion.simulation.run import run
 
 SMALL = "paper-2dof-nl-small"
 
@@ -372,6 +375,75 @@ def test_long_work_shows_what_it_does_and_short_work_nothing(tmp_path: Path) -> 
     script = "import time; from lostmotion.cli.terminal import busy\nwith busy('Simulating'): time.sleep({})"
     assert "Simulating 0:00:0" in on_a_terminal(script.format(1.5), tmp_path)
     assert on_a_terminal(script.format(0.01), tmp_path) == ""
+
+
+LONG_RUN = ("simulation.duration=1e7", "simulation.sample_interval=1000")  # ten million periods of the command
+
+
+def test_a_run_of_minutes_says_so_at_once_and_is_interrupted() -> None:
+    command = [sys.executable, "-m", "lostmotion", "run", SMALL, *(word for key in LONG_RUN for word in ("--set", key))]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    line = process.stderr.readline()
+    assert re.fullmatch(
+        r"Simulating: takes [0-9.]+ (s|min|h) by estimate; its first [0-9.e+]+ s have [0-9]+ switchings\n", line
+    )
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (130, "", "lostmotion: interrupted; nothing was written\n")
+
+
+@pytest.mark.parametrize(("scenario", "changes"), [(SMALL, {}), ("worm-lowering", {}), ("position-axis", {})])
+def test_the_length_of_a_run_is_estimated_within_a_factor(scenario: str, changes: dict[str, float]) -> None:
+    loaded = lm.load(scenario)
+    whole = loaded.replace(**{"simulation.duration": 50.0 * loaded.simulation.duration}, **changes)
+    run(whole)
+    begin = time.process_time()
+    run(whole)
+    taken = time.process_time() - begin
+    expected = forecast(whole)
+    assert taken / 10.0 < expected.seconds < 10.0 * taken + 0.1
+    assert 0.0 < expected.part <= whole.simulation.duration / 64.0
+
+
+@pytest.mark.parametrize(
+    ("passed", "expected", "text"),
+    [
+        (30.0, 120.0, "about 25 %, 90 s left by estimate"),
+        (600.0, 7800.0, "about 8 %, 2 h left by estimate"),
+        (130.0, 120.0, "2 min so far, longer than estimated; Ctrl-C ends it"),
+    ],
+)
+def test_progress_is_told_in_words(passed: float, expected: float, text: str) -> None:
+    assert terminal._progress(passed, expected) == text
+
+
+def test_work_that_takes_long_prints_a_line_now_and_then(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with terminal.progress(3, "Runs") as step:
+        step()
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(terminal, "LONG", 0.0)
+    monkeypatch.setattr(terminal, "EVERY", 0.05)
+    with terminal.progress(3, "Runs") as step:
+        time.sleep(0.06)
+        step()
+        step()
+    assert re.fullmatch(r"Runs: 1 of 3, 0 s left by estimate\n", capsys.readouterr().err)
+    with terminal.simulating("Simulating", lm.load(SMALL)):
+        time.sleep(0.12)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith("Simulating: takes 0 s by estimate")
+    assert "longer than estimated" in lines[-1]
+
+
+def test_a_terminal_shows_how_far_a_long_run_has_got(tmp_path: Path) -> None:
+    script = (
+        "import time, lostmotion as lm\nfrom lostmotion.cli import terminal\nterminal.LONG = 0.0\n"
+        f"with terminal.simulating('Simulating', lm.load({SMALL!r})): time.sleep(1.5)"
+    )
+    assert "longer than estimated; Ctrl-C ends it" in on_a_terminal(script, tmp_path)
 
 
 def test_the_rig_reports_its_progress_to_the_end() -> None:

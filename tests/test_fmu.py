@@ -368,6 +368,19 @@ def test_without_its_controller_the_motor_is_turned_by_an_input(tmp_path: Path, 
     assert inputs == ["command", "load_torque"]
 
 
+def test_a_state_that_was_never_got_is_refused(drive: Slave) -> None:
+    from ctypes import byref, c_size_t, c_void_p
+
+    fmu, component = drive.fmu.dll, c_void_p(drive.fmu.component)
+    fmu.fmi2SetFMUstate.argtypes = fmu.fmi2SerializeFMUstate.argtypes = None
+    assert fmu.fmi2SetFMUstate(component, None) == 3
+    assert drive.said == ["these bytes are no state of this FMU"]
+    size = c_size_t(1)
+    fmu.fmi2SerializedFMUstateSize.argtypes = None
+    assert fmu.fmi2SerializedFMUstateSize(component, None, byref(size)) == 0
+    assert size.value == 0
+
+
 def test_directional_derivatives_are_those_of_the_inputs(drive: Slave) -> None:
     drive.step(0.05, command=(0.3, 0.3))
     unknown, known = ([drive.reference[name]] for name in ("load_torque", "command"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -391,6 +392,17 @@ def test_formulas_compute(text: str, value: object) -> None:
 def test_formulas_refuse_what_is_no_arithmetic(text: str) -> None:
     with pytest.raises(ValueError, match=r"cannot be read|something else"):
         Formula(text)
+
+
+@pytest.mark.parametrize(
+    "text", ["9**9**9", "a**9**9", "word * 10**10", "10**10 * word", "-" * 1900 + "a", "2**a**a**a**a"]
+)
+def test_formulas_that_no_memory_holds_are_refused(text: str) -> None:
+    begin = time.process_time()
+    with pytest.raises(ValueError, match=r"has no value|nested too deeply") as refused:
+        Formula(text).value({"a": 9, "word": "x"})
+    assert time.process_time() - begin < 1.0
+    assert len(str(refused.value)) < 200
 
 
 def test_mistakes_of_the_file_are_one_line(tmp_path: Path) -> None:

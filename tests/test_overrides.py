@@ -1,5 +1,7 @@
 """Changes to motor, gearbox and load: each key is felt, or refused in one line."""
 
+import time
+from copy import deepcopy
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ from lostmotion.model.gearbox import GearboxLimits
 from lostmotion.model.losses import LossMap
 from lostmotion.model.motor import MotorLimits
 from lostmotion.model.torsion import Hysteresis, TorsionCurve
+from lostmotion.simulation.keys import set_values
 from lostmotion.simulation.scenario import LoadTable
 
 # A catalogue motor and gearbox near their limits, so that every limit is judged.
@@ -148,6 +151,19 @@ def test_half_the_command_at_twice_the_rated_voltage_is_the_same_motion(name: st
     assert float(
         abs(lm.simulate(scenario.replace(**{"motor.rated_voltage": 2.0 * voltage}))["load_speed"]).max()
     ) > 1.5 * float(abs(first["load_speed"]).max())
+
+
+def test_the_time_for_overrides_is_linear() -> None:
+    tables = {"load": {"inertia": 2.0}, "shared": {"list": [1.0, {"x": 1.0}]}}
+    before = deepcopy(tables)
+    data = dict(tables)
+    begin = time.process_time()
+    set_values(data, ((f"load.k{k}", k) for k in range(200_000)))
+    assert time.process_time() - begin < 10.0  # 1 s; copying the table for each took 100 s
+    assert len(data["load"]) == 200_001
+    set_values(data, [("shared.list.1.x", 2.0), ("shared.list.0", 3.0), ("shared.list.1.y", 4.0)])
+    assert data["shared"] == {"list": [3.0, {"x": 2.0, "y": 4.0}]}
+    assert tables == before
 
 
 def test_what_is_given_beside_a_rated_voltage_does_not_follow_it() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import pickle
@@ -9,6 +10,7 @@ import sqlite3
 import struct
 import subprocess
 import sys
+import tracemalloc
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +22,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
+from lostmotion.identification import csv_log, servo_json
 from lostmotion.identification.conversions import conversion_of
 from lostmotion.identification.readers import TABLES, read_log
 from lostmotion.inputs.limits import memory_limit, size_of
@@ -319,6 +322,57 @@ def test_files_without_end_are_refused_before_they_take_memory(tmp_path: Path) -
     assert float(peak) < 200.0  # [MiB]
 
 
+WITHOUT_END = [
+    "run /dev/zero",
+    "run based.toml",
+    "run record.toml",
+    "run series.toml",
+    "drive check zero.toml",
+    "response zero.toml",
+    "rig zero.toml",
+    "servo zero.toml",
+    "track zero.toml",
+    "fmu zero.toml -o x.fmu",
+    "study zero.toml",
+    "study show zero.toml",
+    "study resume /dev/zero",
+    "select zero.toml",
+    "identify zero.toml",
+    "catalogue zero.toml",
+]
+CALLS = """
+import resource, sys
+import lostmotion.cli.entry as entry, lostmotion as lm, scipy, pyarrow.parquet, matplotlib.pyplot, jinja2
+lm.load("paper-2dof-nl-small")
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+for words in sys.argv[1:]:
+    sys.argv = ["lostmotion", *words.split()]
+    try:
+        entry.main()
+    except SystemExit as end:
+        print(end.code)
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
+"""
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs a file without end")
+def test_every_command_refuses_a_file_without_end(tmp_path: Path) -> None:
+    (tmp_path / "zero.toml").symlink_to("/dev/zero")
+    (tmp_path / "based.toml").write_text('base = "/dev/zero"')
+    (tmp_path / "record.toml").write_text('base = "paper-2dof-nl-small"\n[gearbox]\nfrom = "zero.toml"')
+    (tmp_path / "series.toml").write_text('base = "paper-2dof-nl-small"\n[command]\nsamples = { file = "/dev/zero" }')
+    done = subprocess.run(
+        [sys.executable, "-c", CALLS, *WITHOUT_END], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    *codes, peak = done.stdout.split()
+    assert codes == ["1"] * len(WITHOUT_END)
+    lines = done.stderr.splitlines()
+    assert len(lines) == len(WITHOUT_END)
+    for words, line in zip(WITHOUT_END, lines, strict=True):
+        assert "zero" in line, (words, line)
+    assert float(peak) < 300.0  # [MiB]
+
+
 @pytest.mark.usefixtures("small_limit")
 def test_compressed_elements_of_matlab_files_are_bounded(tmp_path: Path) -> None:
     import scipy.io
@@ -365,6 +419,17 @@ def test_lists_of_an_mdf_file_that_lead_back_into_themselves_are_refused(tmp_pat
     struct.pack_into("<Q", content, at + 24, at)
     path.write_bytes(content)
     refused(path, "a list of blocks leads back into itself")
+
+
+def test_a_damaged_mdf_file_prints_nothing(tmp_path: Path) -> None:
+    path = as_mdf(tmp_path / "log.mf4", None)
+    path.write_bytes(path.read_bytes()[:64] + bytes(8) + path.read_bytes()[72:])  # the header block has no name
+    with pytest.MonkeyPatch.context() as patch:
+        seen: list[Any] = []
+        patch.setattr(sys, "unraisablehook", seen.append)
+        refused(path, "is not an MDF file")
+        gc.collect()
+    assert seen == []
 
 
 def test_announced_lengths_of_mdf_files_are_bounded(tmp_path: Path) -> None:
@@ -431,6 +496,54 @@ def test_chunks_of_bags_are_bounded(tmp_path: Path, method: str) -> None:
 def test_logs_longer_than_the_limit_are_refused(tmp_path: Path, ending: str) -> None:
     (tmp_path / f"log{ending}").write_bytes(bytes(3_000_000))
     refused(tmp_path / f"log{ending}", "needs .* MB of memory")
+
+
+TEXTS = {
+    "short lines": ("log.csv", "t,a\n", "1,2\n", ""),
+    "empty values": ("log.csv", "t," + ",".join(f"c{k}" for k in range(100)) + "\n", "1" + "," * 100 + "\n", ""),
+    "usual lines": ("log.csv", "t,a,b\n", "1.234567,12.345678,-0.123456\n", ""),
+    "wide characters": ("log.csv", "# \U0001f600\nt,a\n", "1,2\n", ""),
+    "entries": ("log.json", '{"entries": [{"timestamp": 0, "p": 1}', ', {"timestamp": 1.25, "p": 2.125}', "]}"),
+    "empty lists": ("log.json", '{"x": [0', ",[]", '], "entries": [{"timestamp": 1, "p": 2}]}'),
+    "empty objects": ("log.json", '{"x": [0', ",{}", '], "entries": [{"timestamp": 1, "p": 2}]}'),
+    "objects": ("log.json", '{"x": [0', ',{"a": 1}', '], "entries": [{"timestamp": 1, "p": 2}]}'),
+}
+
+
+@pytest.mark.parametrize("what", TEXTS)
+def test_the_memory_of_logs_in_text_is_not_underestimated(tmp_path: Path, what: str) -> None:
+    name, begin, line, end = TEXTS[what]
+    path = tmp_path / name
+    path.write_text(begin + line * (60_000 // len(line)) + end)
+    read_log(path)  # what is imported and kept once
+    tracemalloc.start(1)
+    try:
+        read_log(path)
+        _, taken = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    estimate = []
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (csv_log, servo_json):
+            patch.setattr(module, "check_memory", lambda needed, *_: estimate.append(needed))
+        read_log(path)
+    assert 0.95 * taken < max(estimate) < 4.0 * taken
+
+
+def test_a_log_that_is_cut_off_says_so(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    path = tmp_path / "log.tdms"
+    with nptdms.TdmsWriter(path) as writer:
+        channel = nptdms.ChannelObject(
+            "run", "position", TIME, properties={"wf_increment": 0.01, "wf_start_offset": 0.0}
+        )
+        writer.write_segment([channel])
+    assert read_log(path).notes == ()
+    path.write_bytes(path.read_bytes()[:-80])
+    log = read_log(path)
+    assert len(log.time) == len(TIME) - 10
+    assert "may be cut off or damaged" in log.notes[0]
+    assert capfd.readouterr() == ("", "")
 
 
 def test_channels_of_tdms_files_are_bounded(tmp_path: Path, small_limit: int) -> None:

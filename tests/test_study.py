@@ -427,6 +427,31 @@ def test_damaged_parts_are_named_and_made_again(tmp_path: Path, harm, said: str)
     assert read_table(directory).equals(whole)
 
 
+@pytest.mark.parametrize("name", [*SWAPPED[:2], "_checksums.txt", "_study.json"])
+@pytest.mark.parametrize("what", ["device", "directory", "link to nothing", "link to itself"])
+def test_what_is_no_file_is_named_and_not_read(tmp_path: Path, name: str, what: str):
+    study = make(design="random", runs=CHUNK + 1)
+    directory = lm.study(study, tmp_path / "s")
+    whole = read_table(directory)
+    path = directory / name
+    path.unlink()
+    if what == "directory":
+        path.mkdir()
+    else:
+        path.symlink_to({"device": "/dev/zero", "link to nothing": "none", "link to itself": name}[what])
+    begin = time.process_time()
+    with pytest.raises(InputError, match="holds no study" if name == "_study.json" else name):
+        read_table(directory)
+    done = CliRunner().invoke(app, ["study", "resume", str(directory), "--repair"])
+    assert time.process_time() - begin < 10.0
+    if done.exit_code == 0:
+        assert read_table(directory).equals(whole)
+    else:
+        assert isinstance(done.exception, InputError), done.output
+        assert name in str(done.exception)
+    assert done.exit_code == 0 or name.startswith("_") or what == "directory"
+
+
 def test_only_damaged_parts_are_made_again(tmp_path: Path):
     study = make(design="random", runs=2 * CHUNK + 1)
     directory = lm.study(study, tmp_path / "s")
@@ -568,6 +593,16 @@ def test_a_scheduler_that_dies_takes_no_written_part_with_it(tmp_path: Path):
         lm.study(study, directory, executor=client.get_executor(pure=False))
     assert {name: (directory / name).stat().st_mtime_ns for name in kept} == kept
     assert read_table(directory).equals(read_table(lm.study(study, tmp_path / "t")))
+
+
+@pytest.mark.filterwarnings("default")
+def test_the_command_line_computes_on_the_workers_of_a_scheduler(tmp_path: Path):
+    example = ROOT / "examples" / "tolerance.toml"
+    with Cluster(tmp_path) as cluster:
+        words = ["study", str(example), "-o", str(tmp_path / "s"), "--scheduler", cluster.address]
+        done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    assert read_table(tmp_path / "s").equals(read_table(lm.study(lm.load_study(example), tmp_path / "t")))
 
 
 def test_progress_rises_to_the_total_and_starts_from_what_is_there(tmp_path: Path):

@@ -104,7 +104,11 @@ class Component {
     Instance instance;
 
  private:
-    static const State& of(const void* state) { return *static_cast<const State*>(state); }
+    // Of an importer that has got none, the empty one, which no instance takes.
+    static const State& of(const void* state) {
+        static const State none;
+        return state == nullptr ? none : *static_cast<const State*>(state);
+    }
     // That of the importer, or a new one.
     static State& room(void** state) {
         if (*state == nullptr) *state = new State;

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .arguments import Overrides, SourceArgument
-from .terminal import busy
+from .terminal import simulating
 
 
 def check(
@@ -23,7 +23,7 @@ def check(
 
     loaded = load(scenario, overrides or ())
     try:
-        with busy("Checking"):
+        with simulating("Checking", loaded):
             findings = check_drive(loaded)
     except (InputError, RuntimeError) as error:
         raise InputError(f"{scenario}: {error}") from None

@@ -9,7 +9,7 @@ import typer
 
 from .arguments import Overrides, SourceArgument, number
 from .targets import try_file
-from .terminal import busy
+from .terminal import busy, simulating
 
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -66,10 +66,11 @@ def run(
     if explain is not None:
         need_open_loop(loaded, f"--explain {explain:g}")
     _check_solver(solver, tolerance)
+    from ..simulation.run import TOLERANCE
     from ..simulation.run import run as work
 
     try:
-        with busy("Simulating"):
+        with simulating("Simulating", loaded, 0.0 if solver == "exact" else tolerance or TOLERANCE):
             result = work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
     except RuntimeError as error:
         raise InputError(f"{scenario}: {error}") from None

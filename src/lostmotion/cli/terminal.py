@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TextIO
@@ -42,7 +43,9 @@ def console(stream: Any, width: int | None = None) -> Console:
 
 
 def fail(text: str, code: int = 1) -> NoReturn:
-    """One line on stderr, and the end."""
+    """One line on stderr, and the end. Of a text that is too long for it, which only long names make, the middle is left out."""
+    if len(text) > MAX_LINE:
+        text = f"{text[: MAX_LINE // 2]} ... {text[-MAX_LINE // 2 + 5 :]}"
     print(f"lostmotion: {text}", file=sys.stderr)
     sys.exit(code)
 
@@ -55,9 +58,9 @@ class Step(Protocol):
 
 @contextmanager
 def progress(total: int, what: str) -> Iterator[Step]:
-    """A progress bar with rate and remaining time on stderr, where that is a terminal."""
+    """A progress bar with rate and remaining time on stderr; where that is no terminal, a line now and then."""
     if not sys.stderr.isatty():
-        yield _unseen
+        yield _lines(total, what)
         return
     from rich.progress import (
         BarColumn,
@@ -86,11 +89,27 @@ def progress(total: int, what: str) -> Iterator[Step]:
         yield step
 
 
-def _unseen(done: int | None = None) -> None:
-    """No terminal, no bar."""
+def _lines(total: int, what: str) -> Step:
+    """Prints a line now and then, once the work takes long."""
+    begin = last = time.monotonic()
+    count = 0
+
+    def step(done: int | None = None) -> None:
+        nonlocal last, count
+        count = count + 1 if done is None else done
+        now = time.monotonic()
+        if now - begin > LONG and now - last > EVERY:
+            last = now
+            left = (now - begin) * (total - count) / max(1, count)
+            print(f"{what}: {count} of {total}, {_span(left)} left by estimate", file=sys.stderr, flush=True)
+
+    return step
 
 
+MAX_LINE = 300  # characters of an error
 SILENCE = 0.5  # [s] after which something must be seen
+LONG = 60.0  # [s] from which on work is said to take long
+EVERY = 30.0  # [s] between lines where there is no terminal
 REFRESH = 0.2  # [s]
 
 
@@ -130,3 +149,54 @@ def busy(what: str) -> Iterator[Callable[[str], None]]:
     finally:
         done.set()
         shown.join()
+
+
+@contextmanager
+def simulating(what: str, scenario: Any, tolerance: float = 0.0) -> Iterator[Callable[[str], None]]:
+    """As `busy`, of a run of a scenario; of one that takes more than a minute, an estimate and how far it has got, on stderr.
+
+    Parameters
+    ----------
+    tolerance
+        Relative one of the adaptive solver; 0: the exact solver.
+    """
+    from ..simulation.forecast import forecast
+
+    with busy(what) as tell:
+        expected = forecast(scenario, tolerance)
+        begin = time.monotonic()
+        done = threading.Event()
+        terminal = sys.stderr.isatty()
+        say = tell if terminal else lambda text: print(f"{what}: {text}", file=sys.stderr, flush=True)
+
+        def watch() -> None:
+            if long := expected.seconds > LONG:
+                say(
+                    f"takes {_span(expected.seconds)} by estimate; its first {expected.part:.3g} s have {expected.switchings} switchings"
+                )
+            while not done.wait(REFRESH if terminal else EVERY):
+                passed = time.monotonic() - begin
+                if long or passed > LONG:
+                    say(_progress(passed, expected.seconds))
+
+        watching = threading.Thread(target=watch, daemon=True)
+        watching.start()
+        try:
+            yield tell
+        finally:
+            done.set()
+            watching.join()
+
+
+def _progress(passed: float, expected: float) -> str:
+    """How far a run has got by an estimate of its length, both in seconds."""
+    if passed < expected:
+        return f"about {100.0 * passed / expected:.0f} %, {_span(expected - passed)} left by estimate"
+    return f"{_span(passed)} so far, longer than estimated; Ctrl-C ends it"
+
+
+def _span(seconds: float) -> str:
+    """A time in words."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.3g} h"

@@ -17,7 +17,7 @@ from ..inputs.hdf5_files import datasets
 from ..inputs.limits import check_memory, memory_limit
 from ..inputs.validation import did_you_mean
 from .conversions import conversion_of
-from .logs import Channel, Log, as_number
+from .logs import Channel, Log, as_number, quiet_ends, reason, warnings_of
 from .mdf_blocks import check_mdf_blocks
 
 MATLAB_NUMBERS = {*(f"{u}int{n}" for u in ("", "u") for n in (8, 16, 32, 64)), "double", "single", "char", "logical"}
@@ -25,6 +25,7 @@ COMPRESSED = 15  # type of an element of a MATLAB file
 PIECE = 2**20  # [bytes] that are decompressed at once
 ALGEBRAIC = 3  # type of a conversion of MDF 4
 MDF_NUMBERS = range(6)  # data types of MDF 4: integers and floating-point numbers of both byte orders
+WAVEFORM = {"wf_increment", "wf_start_offset"}  # properties of a TDMS channel that holds its time
 TIME_NAMES = ("time", "t", "timestamp", "times", "tm")
 
 
@@ -61,7 +62,7 @@ def _mat5_variables(path: Path) -> dict[str, Any]:
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not a MATLAB file ({error}); save it with -v7 or -v7.3") from None
+        raise InputError(f"{path}: is not a MATLAB file ({reason(error)}); save it with -v7 or -v7.3") from None
     return {name: value for name, value in data.items() if not name.startswith("__")}
 
 
@@ -102,7 +103,7 @@ def _hdf5_variables(path: Path) -> dict[str, Any]:
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not a MATLAB 7.3 file ({error})") from None
+        raise InputError(f"{path}: is not a MATLAB 7.3 file ({reason(error)})") from None
     return found
 
 
@@ -132,7 +133,7 @@ def read_parquet_log(path: Path, *, time: str = "") -> Log:
             check_memory(16.0 * len(names) * file.metadata.num_rows, str(path))
             table = file.read(names)
     except (OSError, pa.ArrowException) as error:
-        raise InputError(f"{path}: is not a Parquet file ({error})") from None
+        raise InputError(f"{path}: is not a Parquet file ({reason(error)})") from None
     units = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in schema}
     header = {k.decode(): v.decode() for k, v in (schema.metadata or {}).items() if not k.startswith(b"ARROW")}
     columns: dict[str, Any] = {}
@@ -158,20 +159,17 @@ def read_mdf_log(path: Path, *, time: str = "") -> Log:
     InputError
     """
     need("asammdf", "Reading MDF files", "identify")
-    import asammdf
-
     check_mdf_blocks(path)
-    try:
-        with asammdf.MDF(path, process_bus_logging=False) as file:  # type: ignore[call-arg]
-            formulas = _formulas(path, file)
-            _check_mdf_memory(path, file)
-            masters = {(k, m) for k, m in file.masters_db.items()}
-            places = {name: at for name, at in file.channels_db.items() if not masters.intersection(at)}
-            signals = [_signal(file, name, at, formulas) for name, at in places.items() if _is_plain(file, at[0])]
-    except InputError:
-        raise
-    except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not an MDF file that asammdf reads ({error})") from None
+    problem = ""
+    with warnings_of("asammdf") as said, quiet_ends():
+        try:
+            signals = _mdf_signals(path)
+        except InputError:
+            raise
+        except Exception as error:  # the library raises what its parts raise
+            problem = reason(error)
+    if problem:
+        raise InputError(f"{path}: is not an MDF file that asammdf reads ({problem})")
     numbers = [signal for signal in signals if signal.samples.dtype.kind in "biuf" and signal.samples.ndim == 1]
     if not numbers:
         raise InputError(f"{path}: has no channel of numbers")
@@ -180,7 +178,19 @@ def read_mdf_log(path: Path, *, time: str = "") -> Log:
     channels = {
         s.name: Channel(np.interp(clock, s.timestamps, s.samples.astype(float)), str(s.unit or "")) for s in numbers
     }
-    return Log(path.name, clock - clock[0], channels)
+    log = Log(path.name, clock - clock[0], channels)
+    return log.noted(f"asammdf reports: {said[0]}") if said else log
+
+
+def _mdf_signals(path: Path) -> list[Any]:
+    import asammdf
+
+    with asammdf.MDF(path, process_bus_logging=False) as file:  # type: ignore[call-arg]
+        formulas = _formulas(path, file)
+        _check_mdf_memory(path, file)
+        masters = {(k, m) for k, m in file.masters_db.items()}
+        places = {name: at for name, at in file.channels_db.items() if not masters.intersection(at)}
+        return [_signal(file, name, at, formulas) for name, at in places.items() if _is_plain(file, at[0])]
 
 
 Formulas = dict[tuple[int, int], Callable[[np.ndarray], np.ndarray]]
@@ -254,21 +264,22 @@ def read_tdms_log(path: Path, *, time: str = "") -> Log:
     variables: dict[str, Any] = {}
     units = {}
     try:
-        with path.open("rb") as stream, nptdms.TdmsFile.open(stream) as file:
+        with warnings_of("nptdms") as said, path.open("rb") as stream, nptdms.TdmsFile.open(stream) as file:
             channels = [c for group in file.groups() for c in group.channels() if c.dtype.kind in "biuf"]
             check_memory(sum(float(len(c)) * (c.dtype.itemsize + 8.0) for c in channels), str(path))
             for channel in channels:
                 variables[channel.name] = np.asarray(channel[:])
                 units[channel.name] = str(channel.properties.get("unit_string", ""))
-                if "wf_increment" in channel.properties and not any(name in variables for name in TIME_NAMES):
+                if channel.properties.keys() >= WAVEFORM and not any(name in variables for name in TIME_NAMES):
                     variables["time"] = channel.time_track()
             properties = file.properties
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not a TDMS file ({error})") from None
+        raise InputError(f"{path}: is not a TDMS file ({reason(error)})") from None
     variables |= {name: value for name, value in properties.items() if isinstance(value, int | float | str)}
-    return _of_variables(path, variables, units, time)
+    log = _of_variables(path, variables, units, time)
+    return log.noted(f"may be cut off or damaged; npTDMS reports: {said[0]}") if said else log
 
 
 def _of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[str, str], time: str) -> Log:

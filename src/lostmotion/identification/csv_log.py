@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 import csv
+import itertools
+import math
 import re
+import sys
+from array import array
+from collections import Counter
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -11,11 +17,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.validation import did_you_mean
-from .logs import Channel, Log
+from ..inputs.limits import check_memory
+from ..inputs.validation import did_you_mean, shortened
+from .logs import Channel, Log, reason
 from .prepare import is_unit
 
 NAME = re.compile(r"^\s*(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*$")
+PER_CELL = 11  # bytes of memory for a value while the table grows, measured
 COMMENT = re.compile(r"^\s*(?P<key>[\w .-]+?)\s*[:=]\s*(?P<value>.+?)\s*$")
 
 
@@ -40,35 +48,44 @@ def read_csv_log(path: Path, *, time: str = "") -> Log:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8") from None
-    comments, lines = [], []
-    for number, line in enumerate(text.splitlines(), 1):
-        if line.lstrip().startswith(("#", "%")):
-            comments.append(line.lstrip(" #%"))
-        elif line.strip():
-            lines.append((number, line))
-    if len(lines) < 3:
-        raise InputError(
-            f"{path}: has {max(0, len(lines) - 1)} rows of values; a log needs a heading and two rows at least"
-        )
-    separator = max(",;\t", key=lines[0][1].count)
-    rows = [_cells(path, number, line, separator) for number, line in lines]
-    heading = [cell.strip() for cell in rows[0]]
-    if all(_number(cell) is not None for cell in heading):
-        raise InputError(
-            f"{path}, line {lines[0][0]}: has no heading; name the columns, such as time [s],position [rad]"
-        )
-    header, units = _header(comments)
+    comments: list[str] = []
+    lines = _lines(text, comments)
+    first, heading_line = next(lines, (1, ""))
+    separator = max(",;\t", key=heading_line.count)
+    cells = text.count(separator) + text.count("\n") + 1
+    check_memory(2 * sys.getsizeof(text) + PER_CELL * cells, str(path))
+    heading = [cell.strip() for cell in _cells(path, first, heading_line, separator)]
+    if heading and all(_number(cell) is not None for cell in heading):
+        raise InputError(f"{path}, line {first}: has no heading; name the columns, such as time [s],position [rad]")
     columns = _columns(heading)
     names = [name for name, _ in columns]
-    units |= {name: unit for name, unit in columns if unit is not None}
-    twice = sorted({name for name in names if names.count(name) > 1})
+    twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
-        raise InputError(f"{path}, line {lines[0][0]}: has the column {twice[0]!r} twice; rename one of them")
-    table = _table(path, names, rows[1:], [number for number, _ in lines[1:]])
+        raise InputError(f"{path}, line {first}: has the column {min(twice)!r} twice; rename one of them")
+    table = _table(path, names, lines, separator)
+    if len(table) < 2:
+        raise InputError(f"{path}: has {len(table)} rows of values; a log needs a heading and two rows at least")
+    header, units = _header(comments)
+    units |= {name: unit for name, unit in columns if unit is not None}
     place = _time_column(path, names, time)
     values = table[:, place] * _seconds(path, units.get(names[place], ""))
     channels = {name: Channel(table[:, k], units.get(name, "")) for k, name in enumerate(names) if k != place and name}
     return Log(path.name, values, channels, header)
+
+
+def _lines(text: str, comments: list[str]) -> Iterator[tuple[int, str]]:
+    """Lines with something in them and their numbers, one at a time; comments are put into the list."""
+    begin = 0
+    for number in itertools.count(1):
+        end = text.find("\n", begin)
+        line = text[begin:] if end < 0 else text[begin:end]
+        if line.lstrip().startswith(("#", "%")):
+            comments.append(line.lstrip(" #%"))
+        elif line.strip():
+            yield number, line
+        if end < 0:
+            return
+        begin = end + 1
 
 
 def _columns(heading: list[str]) -> list[tuple[str, str | None]]:
@@ -97,7 +114,7 @@ def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
     try:
         return next(csv.reader([line], delimiter=separator))
     except csv.Error as error:
-        raise InputError(f"{path}, line {number}: cannot be read ({error}); the file may be damaged") from None
+        raise InputError(f"{path}, line {number}: cannot be read ({reason(error)}); the file may be damaged") from None
 
 
 def _seconds(path: Path, unit: str) -> float:
@@ -134,9 +151,10 @@ def _time_column(path: Path, names: list[str], wanted: str) -> int:
     return next((lower.index(name) for name in ("time", "t", "timestamp", "times") if name in lower), 0)
 
 
-def _table(path: Path, names: list[str], rows: list[list[str]], numbers: list[int]) -> np.ndarray:
-    out = np.full((len(rows), len(names)), np.nan)
-    for k, (row, number) in enumerate(zip(rows, numbers, strict=True)):
+def _table(path: Path, names: list[str], lines: Iterator[tuple[int, str]], separator: str) -> np.ndarray:
+    found = array("d")
+    for number, line in lines:
+        row = _cells(path, number, line, separator)
         if len(row) != len(names):
             raise InputError(
                 f"{path}, line {number}: has {len(row)} values for {len(names)} columns; the file may be cut off"
@@ -146,11 +164,10 @@ def _table(path: Path, names: list[str], rows: list[list[str]], numbers: list[in
             if value is None and cell.strip():
                 remedy = "; write decimal points" if _number(cell.replace(",", ".")) is not None else ""
                 raise InputError(
-                    f"{path}, line {number}: {cell.strip()[:40]!r} in column {names[j]} is no number{remedy}"
+                    f"{path}, line {number}: {cell.strip()[:40]!r} in column {shortened(names[j])} is no number{remedy}"
                 )
-            if value is not None:
-                out[k, j] = value
-    return out
+            found.append(math.nan if value is None else value)
+    return np.frombuffer(found).reshape(-1, max(1, len(names)))
 
 
 def _number(cell: str) -> float | None:

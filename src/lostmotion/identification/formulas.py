@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import ast
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
 from ..errors import InputError
-from ..inputs.operators import ARITHMETIC, COMPARISONS
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.operators import ARITHMETIC, COMPARISONS, is_too_deep
+from ..inputs.validation import MAX_LISTED, did_you_mean, shortened, shown
 
 MAX_LENGTH = 2000  # characters
 
@@ -47,12 +48,17 @@ class Formula:
 
     def __init__(self, text: str | float) -> None:
         self.text = str(text)
+        self._shown = shortened(self.text, MAX_LISTED)
         if len(self.text) > MAX_LENGTH:
             raise ValueError(f"{self.text[:40]!r}... is longer than {MAX_LENGTH} characters")
         try:
-            self._tree = ast.parse(" ".join(self.text.split()), mode="eval").body
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of the parser, about text that is refused anyway
+                self._tree = ast.parse(" ".join(self.text.split()), mode="eval").body
         except (SyntaxError, ValueError, RecursionError, MemoryError):
-            raise ValueError(f"{self.text!r} cannot be read as a formula") from None
+            raise ValueError(f"{self._shown!r} cannot be read as a formula") from None
+        if is_too_deep(self._tree):
+            raise ValueError(f"{self._shown!r} is nested too deeply")
         self.names = frozenset(
             node.id
             for node in ast.walk(self._tree)
@@ -60,7 +66,7 @@ class Formula:
         )
         """all that it names"""
         for node in ast.walk(self._tree):
-            _refuse(node, self.text)
+            _refuse(node, self._shown)
 
     def value(self, values: Values) -> Any:
         """With the values of its names.
@@ -73,13 +79,13 @@ class Formula:
         for name in sorted(self.names):
             if name not in values:
                 meant = did_you_mean(name, values, f"known are {', '.join(sorted(values)) or 'none'}")
-                raise ValueError(f"{name!r} in {self.text!r} has no value; {meant}")
+                raise ValueError(f"{name!r} in {self._shown!r} has no value; {meant}")
         try:
             found = _value(self._tree, values)
         except (ArithmeticError, ValueError, TypeError) as error:
-            raise ValueError(f"{self.text!r} has no value ({error})") from None
+            raise ValueError(f"{self._shown!r} has no value ({error})") from None
         if isinstance(found, complex) or (isinstance(found, float) and not math.isfinite(found)):
-            raise ValueError(f"{self.text!r} has the value {found}, which is no finite number")
+            raise ValueError(f"{self._shown!r} has the value {found}, which is no finite number")
         return found
 
 
@@ -164,7 +170,7 @@ def _value(node: ast.expr, values: Values) -> Any:
             found = _value(inner, values)
             return not found if isinstance(op, ast.Not) else -found if isinstance(op, ast.USub) else found
         case ast.BinOp(left, op, right):
-            return ARITHMETIC[type(op)](_value(left, values), _value(right, values))
+            return ARITHMETIC[type(op)](_plain(_value(left, values)), _plain(_value(right, values)))
         case ast.BoolOp(op, parts):
             together = all if isinstance(op, ast.And) else any
             return together(_value(part, values) for part in parts)
@@ -174,3 +180,8 @@ def _value(node: ast.expr, values: Values) -> Any:
         case ast.Call(ast.Name(name), inner):
             return FUNCTIONS[name](*(_value(part, values) for part in inner))
     raise ValueError(f"{shown(ast.dump(node))} is not part of a formula")
+
+
+def _plain(value: Any) -> Any:
+    """A number in double precision: whole numbers have powers, and texts multiples, that no memory holds."""
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value

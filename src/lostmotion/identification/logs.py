@@ -2,14 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import gc
+import logging
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.validation import did_you_mean
+from ..inputs.validation import MAX_LISTED, did_you_mean, shortened
+
+
+def reason(error: Exception) -> str:
+    """What a library says of a file that it cannot read, in one line."""
+    if isinstance(error, MemoryError):
+        return "it announces more than fits into memory"
+    return shortened(" ".join(str(error).split()), MAX_LISTED) or "it is damaged"
+
+
+@contextmanager
+def warnings_of(library: str) -> Iterator[list[str]]:
+    """What a library logs about a file, in place of its output to the terminal."""
+    said: list[str] = []
+    handler = logging.Handler(logging.WARNING)
+    handler.emit = lambda record: said.append(" ".join(record.getMessage().split()))  # type: ignore[method-assign]
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == library]
+    before = [(logger, logger.handlers, logger.propagate) for logger in map(logging.getLogger, names)]
+    for logger, _, _ in before:
+        logger.handlers, logger.propagate = [handler], False
+    try:
+        yield said
+    finally:
+        for logger, handlers, passing in before:
+            logger.handlers, logger.propagate = handlers, passing
+
+
+@contextmanager
+def quiet_ends() -> Iterator[None]:
+    """Objects of a library that end half-made print no traceback."""
+    before = sys.unraisablehook
+    sys.unraisablehook = lambda _: None
+    try:
+        yield
+    finally:
+        gc.collect()
+        sys.unraisablehook = before
 
 
 @dataclass(frozen=True)

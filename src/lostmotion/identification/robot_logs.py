@@ -15,7 +15,8 @@ import numpy as np
 
 from ..errors import InputError, need
 from ..inputs.limits import check_memory, memory_limit
-from .logs import Channel, Log, as_number
+from ..inputs.validation import listed
+from .logs import Channel, Log, as_number, reason
 
 Course = tuple[np.ndarray, np.ndarray]  # times of the messages [ns] and values
 STAMP = ".header.stamp"
@@ -74,7 +75,7 @@ def read_mcap_log(path: Path, *, time: str = "") -> Log:
     need("mcap", "Reading MCAP files", "identify")
     recording = _read_mcap(path)
     if not recording.topics:
-        kinds = ", ".join(sorted(set(recording.left_out.values()))) or "no message"
+        kinds = listed(sorted(set(recording.left_out.values()))) or "no message"
         raise InputError(
             f"{path}: has no topic in JSON or of ROS ({kinds}); record in one of these, or write its topics as CSV"
         )
@@ -108,7 +109,7 @@ def _log(path: Path, recording: Recording, time: str) -> Log:
     stamped = topic not in topics and topic.endswith(STAMP)
     topic = topic.removesuffix(STAMP) if stamped else topic
     if topic not in topics:
-        raise InputError(f"{path}: has no topic {topic}; its topics are {', '.join(topics)}")
+        raise InputError(f"{path}: has no topic {topic}; its topics are {listed(topics)}")
     instants = np.array([at for at, _ in topics[topic]], dtype=np.int64)
     clock = _stamps(path, topic, topics[topic]) if stamped else instants
     long: set[str] = set()
@@ -118,7 +119,7 @@ def _log(path: Path, recording: Recording, time: str) -> Log:
         for name, course in _courses(path, of, rows, long).items()
     }
     if not channels:
-        raise InputError(f"{path}: the messages of {', '.join(topics)} have no number")
+        raise InputError(f"{path}: the messages of {listed(topics)} have no number")
     log = Log(path.name, 1e-9 * (clock - clock[0]), channels, recording.header)
     if recording.left_out:
         kinds = ", ".join(f"{t} ({e})" for t, e in recording.left_out.items())
@@ -163,7 +164,7 @@ def _read_mcap(path: Path) -> Recording:
         raise
     except Exception as error:  # the library raises what its parts raise
         raise InputError(
-            f"{path}: is not an MCAP file that mcap reads ({_line(error)}); if cut off, use `mcap recover`"
+            f"{path}: is not an MCAP file that mcap reads ({reason(error)}); if cut off, use `mcap recover`"
         ) from None
     recording.topics = {topic: recording.topics[topic] for topic in sorted(recording.topics, key=lambda t: first[t])}
     return recording
@@ -222,7 +223,7 @@ def _decoder(path: Path, topic: str, encoding: str, schema: Any) -> Callable[[by
         store.get_msgdef(kind)
     except Exception as error:  # of a grammar
         raise InputError(
-            f"{path}: topic {topic}: the definition of {schema.name} cannot be read ({_line(error)}); record it again"
+            f"{path}: topic {topic}: the definition of {schema.name} cannot be read ({reason(error)}); record it again"
         ) from None
     decode = store.deserialize_cdr if encoding == "cdr" else store.deserialize_ros1
     return partial(decode, typename=kind)
@@ -305,7 +306,7 @@ def _read_bag(path: Path) -> Recording:
         raise
     except Exception as error:  # the library raises what its parts raise
         raise InputError(
-            f"{path}: is not a bag that rosbags reads ({_line(error)}); if cut off, use `rosbag reindex` or "
+            f"{path}: is not a bag that rosbags reads ({reason(error)}); if cut off, use `rosbag reindex` or "
             "`ros2 bag reindex`"
         ) from None
     return recording
@@ -322,7 +323,7 @@ def _check_definition(path: Path, connection: Any) -> None:
     except Exception as error:  # of a grammar
         raise InputError(
             f"{path}: topic {connection.topic.strip('/')}: the definition of {connection.msgtype} cannot be read "
-            f"({_line(error)}); record it again"
+            f"({reason(error)}); record it again"
         ) from None
 
 
@@ -356,11 +357,9 @@ def _decoded(path: Path, topic: str, decode: Callable[[bytes], Any], data: bytes
     try:
         return decode(data)
     except Exception as error:  # of what the message is not
-        raise InputError(f"{path}: topic {topic}: a message cannot be read ({_line(error)}); record it again") from None
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+        raise InputError(
+            f"{path}: topic {topic}: a message cannot be read ({reason(error)}); record it again"
+        ) from None
 
 
 def _stamps(path: Path, topic: str, rows: list[tuple[int, Any]]) -> np.ndarray:

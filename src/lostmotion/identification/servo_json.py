@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
-from .logs import Channel, Log, as_number
+from ..inputs.limits import check_memory
+from .logs import Channel, Log, as_number, reason
+
+# Bytes of memory for the objects, lists, keys and values of JSON, by a sign of each; measured.
+PER_SIGN = {"{": 64, "[": 64, ":": 100, ",": 32}
 
 
 def read_servo_json(path: Path, *, time: str = "") -> Log:
@@ -28,13 +33,20 @@ def read_servo_json(path: Path, *, time: str = "") -> Log:
     """
     clock = time or "timestamp"
     try:
-        data = json.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
+        check_memory(2 * sys.getsizeof(text) + sum(n * text.count(sign) for sign, n in PER_SIGN.items()), str(path))
+        data = json.loads(text)
+        del text
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except RecursionError:
         raise InputError(f"{path}: is not a log, its lists are too deep; leave the file out") from None
     except ValueError as error:  # of the encoding, of JSON, or of a number of thousands of digits
-        raise InputError(f"{path}: is not JSON ({error}); it may have been cut off, record or copy it again") from None
+        raise InputError(
+            f"{path}: is not JSON ({reason(error)}); it may have been cut off, record or copy it again"
+        ) from None
     if not isinstance(data, dict) or not isinstance(data.get("entries"), list):
         raise InputError(f"{path}: has no list entries; a servo log is an object with entries, one for each instant")
     entries = data["entries"]

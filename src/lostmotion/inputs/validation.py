@@ -23,7 +23,8 @@ MAX_READ = 1000  # problems that are told apart; of more only the number is give
 MAX_LENGTH = 60  # characters of a value that is shown
 MAX_NAME = 100  # characters of a name that another one is looked for
 MAX_NEAR = 20  # places, or misspelt keys, that are looked at for what was meant
-MAX_MISSING = 20  # keys that are named as missing
+MAX_LISTED = 120  # characters of a list of names
+MAX_LINE = 240  # characters of several problems in one line
 WORD_CUTOFF = 0.7  # likeness of two words of which one is taken for the other, misspelt
 JOINED_CUTOFF = 0.92  # of two names, where words run together or fall apart
 
@@ -55,17 +56,16 @@ def describe(error: ValidationError, schema: Mapping[str, Any], subject: str, gi
     others = [p for p in problems if p.kind not in ("extra_forbidden", "missing")]
     texts = [p.sentence(subject) for p in misspelt[:MAX_PROBLEMS]]
     if missing:
-        names = [shortened(p.name) for p in missing[:MAX_MISSING]]
-        names += [f"{len(missing) - MAX_MISSING} more"] if len(missing) > MAX_MISSING else []
+        names = [shortened(p.name) for p in missing]
         texts.append(
-            f"key {names[0]}: is missing; add it"
-            if len(names) == 1
-            else f"keys {', '.join(names)}: are missing; add them"
+            f"key {names[0]}: is missing; add it" if len(names) == 1 else f"keys {listed(names)}: are missing; add them"
         )
     texts += [p.sentence(subject) for p in others[:MAX_PROBLEMS]]
     total = len(misspelt) + bool(missing) + len(others) + max(0, len(found) - MAX_READ)
-    more = f"; and {total - MAX_PROBLEMS} more" if total > MAX_PROBLEMS else ""
-    return "; ".join(texts[:MAX_PROBLEMS]) + more
+    fitting = [k for k in range(1, MAX_PROBLEMS + 1) if k == 1 or len("; ".join(texts[:k])) <= MAX_LINE]
+    said = texts[: fitting[-1]]
+    more = f"; and {total - len(said)} more" if total > len(said) else ""
+    return "; ".join(said) + more
 
 
 def unknown_key(key: str, known: Iterable[str], inner: Iterable[str] = ()) -> str:
@@ -90,13 +90,26 @@ def unknown_key(key: str, known: Iterable[str], inner: Iterable[str] = ()) -> st
 def did_you_mean(given: str, choices: Iterable[str], otherwise: str) -> str:
     """The choice that was misspelt as what was given; if none was, what to say otherwise."""
     near = nearest(given, choices)
-    return f"did you mean {near}?" if near else otherwise
+    return f"did you mean {near}?" if near else beginning(otherwise)
 
 
 def names_like(given: str, names: Iterable[str], otherwise: str, count: int = 3) -> str:
     """As `did_you_mean`, of names of files and records, of which a part may have been left out."""
     near = difflib.get_close_matches(given[:MAX_NAME], list(names), n=count, cutoff=0.5)
-    return f"did you mean {' or '.join(near)}?" if near else otherwise
+    return f"did you mean {' or '.join(near)}?" if near else beginning(otherwise)
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names in a row; of more than fit into a message the first."""
+    return beginning(", ".join(names))
+
+
+def beginning(text: str) -> str:
+    """A text that ends in a list of names; of a long list the first, and how many are left out."""
+    if len(text) <= MAX_LISTED:
+        return text
+    first = text[:MAX_LISTED].rpartition(", ")[0]
+    return f"{first} and {text.count(', ', len(first))} more" if first else shortened(text, MAX_LISTED)
 
 
 def nearest(given: str, choices: Iterable[str]) -> str:
@@ -138,9 +151,9 @@ def shown(value: Any) -> str:
     return shortened(_toml(value))
 
 
-def shortened(text: str) -> str:
+def shortened(text: str, length: int = MAX_LENGTH) -> str:
     """A text that is not too long for a message."""
-    return text if len(text) < MAX_LENGTH else text[: MAX_LENGTH - 3] + "..."
+    return text if len(text) < length else text[: length - 3] + "..."
 
 
 def _toml(value: Any) -> str:
@@ -259,7 +272,7 @@ class _Problem:
             if self.kind.startswith(beginning):
                 return wanted
         if self.kind in ("model_type", "model_attributes_type", "dict_type", "mapping_type"):
-            keys = f" with some of the keys {', '.join(self.known())}" if self.known() else ""
+            keys = f" with some of the keys {listed(self.known())}" if self.known() else ""
             return f"must be a table{keys}"
         return "is not valid JSON" if self.kind == "json_invalid" else "cannot be used here"
 

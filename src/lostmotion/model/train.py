@@ -103,7 +103,7 @@ class DriveTrain(TrainElements):
             if shaft not in self.shafts
         ]
         if unknown:
-            raise InputError("; ".join(unknown))
+            raise InputError(unknown[0] + (f"; and {len(unknown) - 1} more" if len(unknown) > 1 else ""))
         if twice := [name for name in self.gravity if name in self.angle_torques]:
             raise InputError(
                 f"keys gravity.{twice[0]}, angle_torques.{twice[0]}: have the same name; rename one of them"

@@ -12,7 +12,7 @@ import numpy as np
 from .. import _core
 from ..control.references import PositionReference, SpeedReference, TorqueReference
 from ..errors import InputError
-from ..inputs.validation import shown
+from ..inputs.validation import listed, shown
 from ..model.drive import Drive
 from ..model.signals import CommandSignal, Signal, TorqueSignal
 from ..simulation.results import add_angles, add_efficiency
@@ -236,5 +236,5 @@ def known_output(output: str, known: Sequence[str]) -> str:
     InputError
     """
     if output not in known:
-        raise InputError(f"output {shown(output)} is not known; it must be one of {', '.join(known)}")
+        raise InputError(f"output {shown(output)} is not known; it must be one of {listed(known)}")
     return output

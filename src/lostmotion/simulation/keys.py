@@ -54,6 +54,7 @@ def set_values(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None
     changes = [(key, plain(value)) for key, value in changes]
     given = [key for key, _ in changes]
     signals = _TRAIN_SIGNALS if "shafts" in data else _SIGNALS
+    own = _Copies()
 
     def rank(change: tuple[str, Any]) -> int:
         return next((n for n, pattern in enumerate(_FIRST) if pattern.fullmatch(change[0])), len(_FIRST))
@@ -61,12 +62,27 @@ def set_values(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None
     for key, value in sorted(changes, key=rank):
         if key.count(".") > MAX_LEVELS:
             raise InputError(f"key {shortened(key)}: has more than {MAX_LEVELS} levels; no table is as deep")
-        _change_what_follows(data, key, value, given)
+        _change_what_follows(data, key, value, given, own)
         first, *rest = key.split(".")
-        data[first] = _changed(data.get(first), rest, value, first, signals)
+        data[first] = _changed(data.get(first), rest, value, first, signals, own)
 
 
-def _change_what_follows(data: dict[str, Any], key: str, value: Any, given: Sequence[str]) -> None:
+class _Copies:
+    """Tables and lists that were copied to be changed, so that each is copied once, however many changes there are."""
+
+    def __init__(self) -> None:
+        self.made: dict[int, Any] = {}
+
+    def of(self, node: Any) -> Any:
+        """The node itself, if it is a copy already; else a copy."""
+        if id(node) in self.made:
+            return node
+        copy = dict(node) if isinstance(node, dict) else list(node)
+        self.made[id(copy)] = copy
+        return copy
+
+
+def _change_what_follows(data: dict[str, Any], key: str, value: Any, given: Sequence[str], own: _Copies) -> None:
     """What goes with the kind or the rated voltage of a motor; beside `from` the record sees to it."""
     where, _, last = key.rpartition(".")
     *table, name = where.split(".")
@@ -81,12 +97,13 @@ def _change_what_follows(data: dict[str, Any], key: str, value: Any, given: Sequ
     else:
         return
     if table:
-        data["motors"] = {**data["motors"], name: changed}
+        data["motors"] = own.of(data["motors"])
+        data["motors"][name] = changed
     else:
         data["motor"] = changed
 
 
-def _changed(node: Any, keys: list[str], value: Any, where: str, signals: re.Pattern[str]) -> Any:
+def _changed(node: Any, keys: list[str], value: Any, where: str, signals: re.Pattern[str], own: _Copies) -> Any:
     """A node of a scenario file with one value changed; lists are counted from 0."""
     if not keys:
         return value
@@ -102,16 +119,18 @@ def _changed(node: Any, keys: list[str], value: Any, where: str, signals: re.Pat
     key, *rest = keys
     inner = f"{where}.{key}"
     if isinstance(node, list | tuple) or (node is None and key.isdecimal()):
-        entries = node or ()
+        entries = own.of(node or ())
         try:
             place = list_index(entries, key)
         except ValueError as error:
             raise InputError(f"key {inner}: {error}") from None
-        return [_changed(x, rest, value, inner, signals) if n == place else x for n, x in enumerate(entries)]
+        entries[place] = _changed(entries[place], rest, value, inner, signals, own)
+        return entries
     if node is not None and not isinstance(node, dict):
         raise InputError(f"key {inner}: {where} is the value {shown(node)}, not a table; it has no {key}")
-    fields = node or {}
-    return {**fields, key: _changed(fields.get(key), rest, value, inner, signals)}
+    fields = own.of(node or {})
+    fields[key] = _changed(fields.get(key), rest, value, inner, signals, own)
+    return fields
 
 
 def list_index(entries: Sequence[Any], part: str) -> int:

@@ -13,8 +13,8 @@ from ..data_sheets.components import gearbox_table
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import follow, unit_in_schema
-from ..inputs.toml_files import RESULTS, in_short, no_such_file, read_toml
-from ..inputs.validation import names_like, shown
+from ..inputs.toml_files import RESULTS, no_such_file, read_toml
+from ..inputs.validation import names_like, shortened, shown
 from ..model.gearbox import Gearbox
 from .keys import parse_override, set_values
 from .scenario import Scenario, from_tables
@@ -52,7 +52,7 @@ def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
     if path.suffix or os.path.lexists(path):
         return path
     hint = names_like(str(name), shipped, f"the scenarios that come with the package are {', '.join(shipped)}", 1)
-    raise InputError(f"{in_short(Path(name))}: there is no such file (.toml) and no such scenario; {hint}")
+    raise InputError(f"{shortened(str(name))}: there is no such file (.toml) and no such scenario; {hint}")
 
 
 def find_base(base: str, path: Path) -> Path:

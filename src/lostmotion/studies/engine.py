@@ -22,7 +22,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from .chunk import as_parquet, as_table, compute_chunk, parsed, pieces, run_piece
 from .file import from_json, to_json
-from .parts import STRAY, chunks, damages, forget_missing, part_of, write_part
+from .parts import NO_REPAIR, chunks, damages, forget_missing, part_of, write_part
 from .study import Study
 
 NOTE = "_study.json"  # a leading underscore: readers of Parquet directories pass it over
@@ -76,7 +76,7 @@ def study(
     text = to_json(what)
     _prepare(directory, text)
     damaged = damages(directory, text, what.total)
-    refuse_damaged(directory, {path: why for path, why in damaged.items() if not repair or why == STRAY})
+    refuse_damaged(directory, {path: why for path, why in damaged.items() if not repair or why in NO_REPAIR})
     for path in damaged:
         path.unlink()
     forget_missing(directory)
@@ -116,7 +116,7 @@ def refuse_damaged(directory: Path, damaged: Mapping[Path, str]) -> None:
         It names the first of them.
     """
     for path, reason in damaged.items():
-        if reason == STRAY:
+        if reason in NO_REPAIR:
             raise InputError(f"{path}: {reason}; remove it")
         more = f" ({len(damaged) - 1} more parts are damaged)" if len(damaged) > 1 else ""
         raise InputError(f"{path}: {reason}{more}; `lostmotion study resume {directory} --repair` makes it again")
@@ -261,6 +261,8 @@ def restore_note(directory: Path) -> None:
             from_json(text)
         except Exception:  # damaged in whatever way; the next part may be whole
             continue
+        if (directory / NOTE).is_symlink():  # which may lead to a device
+            (directory / NOTE).unlink()
         write_bytes(directory / NOTE, text.encode())
         return
     raise problem

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..inputs.operators import ARITHMETIC, COMPARISONS
-from ..inputs.validation import nearest
+from ..inputs.operators import ARITHMETIC, COMPARISONS, is_too_deep
+from ..inputs.validation import MAX_LISTED, listed, nearest, shortened
 from ..simulation.variables import VARIABLES
 from .functions import BANDWIDTH, FUNCTIONS, METHODS, REDUCTIONS, Function, Parameter
 from .measures import Measure, measure, plain, power, product, text_of, total
@@ -26,7 +26,6 @@ Names = Mapping[str, Any]
 """values by name: variables (run, time), `energy` (entry -> runs), `bandwidth` (a function of the amplitude)"""
 
 MAX_LENGTH = 2000  # characters
-MAX_DEPTH = 100  # parts inside of parts
 KNOWN_UNITS = ("1", *dict.fromkeys(v.unit for v in VARIABLES), "J", "Hz", "N*m/rad")
 
 LOGIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {ast.BitAnd: operator.and_, ast.BitOr: operator.or_}
@@ -71,17 +70,17 @@ class Expression:
     """
 
     def __init__(self, text: str, vocabulary: Vocabulary = OF_DRIVES) -> None:
-        self.text = text
+        self.text, shown = text, shortened(text, MAX_LISTED)
         tree = _parse(text)
         self.names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
         """all that it names"""
         known = {name for name, _ in vocabulary.variables}
         for name in sorted(self.names - FUNCTIONS.keys() - set(vocabulary.of_the_run) - known):
-            raise _unknown(name, text, vocabulary)
-        reader = _Reader(text, vocabulary)
+            raise _unknown(name, shown, vocabulary)
+        reader = _Reader(shown, vocabulary)
         self._term = reader.read(tree)
         if self._term.measure.over_time:
-            raise ValueError(f"{text!r} leaves a value for each instant; reduce it, as in peak({text})")
+            raise ValueError(f"{shown!r} leaves a value for each instant; reduce it, as in peak({shown})")
         self.instants = tuple(reader.instants)
         """instants [s] that it reads by .sel(time=...)"""
         self.indices = tuple(reader.indices)
@@ -113,7 +112,7 @@ def read_expression(text: str, vocabulary: Vocabulary = OF_DRIVES) -> Expression
 def _unknown(name: str, text: str, vocabulary: Vocabulary) -> ValueError:
     if name in OF_THE_RUN:
         return ValueError(f"{name} in {text!r} is of a drive of one motor, gearbox and load, not of a drive train")
-    choice = ", ".join((*FUNCTIONS, *vocabulary.of_the_run))
+    choice = listed((*FUNCTIONS, *vocabulary.of_the_run))
     near = nearest(name, [v for v, _ in vocabulary.variables])
     hint = f"; did you mean {near}?" if near else ""
     return ValueError(f"{name!r} in {text!r} is neither a result variable nor one of {choice}{hint}")
@@ -128,15 +127,11 @@ def _parse(text: str) -> ast.expr:
             warnings.simplefilter("ignore")  # of the parser, about text that is refused anyway
             tree = ast.parse(" ".join(text.split()), mode="eval").body
     except SyntaxError as error:
-        raise ValueError(f"{text!r} cannot be read as an expression ({error.msg})") from None
+        raise ValueError(f"{shortened(text, MAX_LISTED)!r} cannot be read as an expression ({error.msg})") from None
     except (ValueError, RecursionError, MemoryError):
         raise ValueError(f"{text[:40]!r} cannot be read as an expression") from None
-    level, depth = [tree], 0
-    while level:
-        depth += 1
-        if depth > MAX_DEPTH:
-            raise ValueError(f"{text[:40]!r}... is nested too deeply; split it into several columns")
-        level = [child for node in level for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)]
+    if is_too_deep(tree):
+        raise ValueError(f"{text[:40]!r}... is nested too deeply; split it into several columns")
     return tree
 
 
@@ -163,7 +158,7 @@ class _Reader:
                 return self.name(name)
             case ast.Attribute(ast.Name("energy"), entry):
                 if entry not in self.energies:
-                    raise ValueError(f"energy.{entry} is none of {', '.join(self.energies)}")
+                    raise ValueError(f"energy.{entry} is none of {listed(self.energies)}")
                 return Term(measure("J"), lambda names: names["energy"][entry])
             case ast.UnaryOp():
                 return self.unary(node)
@@ -174,7 +169,7 @@ class _Reader:
             case ast.Call():
                 return self.call(node)
             case ast.Attribute(_, name):
-                raise self.refuse(f".{name}; methods are called, and are {', '.join(METHODS)}")
+                raise self.refuse(f".{name}; methods are called, and are {listed(METHODS)}")
         raise self.refuse(INSTEAD.get(type(node), "this; it has numbers, names, operators, functions and methods only"))
 
     def number(self, number: float) -> Term:
@@ -249,7 +244,7 @@ class _Reader:
             case ast.Name(name) if name in FUNCTIONS:
                 return self.function(name, FUNCTIONS[name], node.args, node.keywords)
             case ast.Attribute(_, name) if name not in METHODS:
-                raise self.refuse(f".{name}; the methods are {', '.join(METHODS)}")
+                raise self.refuse(f".{name}; the methods are {listed(METHODS)}")
             case ast.Attribute(receiver, name):
                 return self.function(f".{name}", METHODS[name], [receiver, *node.args], node.keywords)
         raise self.refuse("this call; functions are called by their name")

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from ..atomic_writer import unwritable, write_bytes
+from ..errors import InputError
 from .design import CHUNK
 
 CHECKSUMS = "_checksums.txt"  # as `sha256sum` writes and checks it; readers of Parquet directories pass it over
 
 STRAY = "is no part of this study"
+FOLDER = "is a directory"
+NO_REPAIR = (STRAY, FOLDER)  # what repairing leaves to the user
 
 
 def chunks(total: int) -> Iterator[tuple[int, int]]:
@@ -42,11 +46,22 @@ def write_part(directory: Path, first: int, content: bytes) -> None:
 
 
 def checksums(directory: Path) -> dict[str, str]:
-    """Checksums of parts by their names; lines that a kill or damage left unreadable are passed over."""
-    try:
-        lines = (directory / CHECKSUMS).read_text(encoding="ascii", errors="replace").splitlines()
-    except FileNotFoundError:
+    """Checksums of parts by their names; lines that a kill or damage left unreadable are passed over.
+
+    Raises
+    ------
+    InputError
+        There is something else in the place of their file.
+    """
+    path = directory / CHECKSUMS
+    if not os.path.lexists(path):
         return {}
+    if not path.is_file():
+        raise InputError(f"{path}: is no file; remove it, and `lostmotion study resume {directory} --repair`")
+    try:
+        lines = path.read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     return {words[1]: words[0] for line in lines if len(words := line.split()) == 2 and len(words[0]) == 64}
 
 
@@ -79,6 +94,10 @@ def damages(directory: Path, text: str, total: int) -> dict[Path, str]:
 def _damage(path: Path, first: int, last: int, text: str, checksum: str | None) -> str:
     import pyarrow.parquet as pq
 
+    if path.is_dir():
+        return FOLDER
+    if not path.is_file():
+        return "is no file"
     if checksum is None:
         return f"has no line in {CHECKSUMS}"
     try:

@@ -13,7 +13,7 @@ from ..data_sheets.sheet import in_current_words
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import unit_in_schema
-from ..inputs.validation import shown
+from ..inputs.validation import listed, shown
 from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import scenario_from
 from ..simulation.train_scenario import TrainScenario
@@ -90,9 +90,7 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
     wanted = in_current_words(wanted)
     for key, value in wanted.items():
         if key not in known:
-            raise ValueError(
-                f"has catalogue.{key}, which is no datum of a {table}; they are {', '.join(sorted(known))}"
-            )
+            raise ValueError(f"has catalogue.{key}, which is no datum of a {table}; they are {listed(sorted(known))}")
         if _is_text(key):
             if not isinstance(value, str):
                 raise ValueError(

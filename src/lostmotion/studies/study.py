@@ -12,6 +12,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from ..inputs.part import Part
 from ..inputs.quantities import Whole
+from ..inputs.validation import listed
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, is_train
 from .axis import FEWEST, AxisTask, axis_scenario
@@ -163,7 +164,7 @@ class Study(Part):
         for name in self.trajectories.variables if self.trajectories else ():
             if name not in known:
                 raise ValueError(
-                    f"trajectories: has the variable {name!r}, which is none; they are {', '.join(sorted(known))}"
+                    f"trajectories: has the variable {name!r}, which is none; they are {listed(sorted(known))}"
                 )
 
     def _check_keys(self) -> None:
@@ -205,7 +206,7 @@ class Study(Part):
             units |= {f"{USE}{rule}": "1" for rule in SHARES}
         for column in select.named():
             if column not in units:
-                raise ValueError(f"select: {column!r} is no column of numbers; they are {', '.join(units)}")
+                raise ValueError(f"select: {column!r} is no column of numbers; they are {listed(units)}")
         check_bounds(select, units)
 
     @property
