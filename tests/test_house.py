@@ -17,7 +17,7 @@ PACKAGE = ROOT / "src" / "lostmotion"
 # Each package may import only from those in layers below its own, each module of the root counts as a package. The way of
 # the data: units -> parts -> scenario -> run -> dataset -> analysis -> figures and reports -> command line.
 LAYERS = [
-    {"errors", "_instruction_set"},
+    {"errors", "version", "_instruction_set"},
     {"_core", "atomic_writer"},
     {"reproducible"},
     {"units"},

@@ -11,7 +11,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    __version__: str
     from ._core import SolverError as SolverError
     from .control.camera import Camera as Camera
     from .control.camera import Tracker as Tracker
@@ -168,6 +167,7 @@ if TYPE_CHECKING:
     from .test_rig.measurement import RigReport as RigReport
     from .test_rig.measurement import measure as measure
     from .test_rig.rig import TestRig as TestRig
+    from .version import __version__ as __version__
 
 # Where each public name lives; it is imported when first used, so that `import lostmotion` stays quick.
 _HOMES = {
@@ -262,6 +262,7 @@ _HOMES = {
     "test_rig.loop": ("Loop",),
     "test_rig.measurement": ("RigReport", "measure"),
     "test_rig.rig": ("TestRig",),
+    "version": ("__version__",),
 }
 # Modules whose functions return datasets: with them comes `result.lm`.
 _WITH_DATASETS = (
@@ -278,21 +279,16 @@ _WITH_DATASETS = (
 )
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
-__all__ = ["__version__", *_HOME_OF]  # noqa: PLE0604
+__all__ = [*_HOME_OF]  # noqa: PLE0604
 
 
 def __getattr__(name: str) -> Any:
-    if name == "__version__":
-        from importlib.metadata import version
-
-        value: Any = version("lostmotion")
-    elif name in _HOME_OF:
-        home = _HOME_OF[name]
-        if home in _WITH_DATASETS:
-            importlib.import_module(".reports.accessor", __name__)
-        value = getattr(importlib.import_module(f".{home}", __name__), name)
-    else:
+    if name not in _HOME_OF:
         raise AttributeError(f"module 'lostmotion' has no attribute {name!r}")
+    home = _HOME_OF[name]
+    if home in _WITH_DATASETS:
+        importlib.import_module(".reports.accessor", __name__)
+    value = getattr(importlib.import_module(f".{home}", __name__), name)
     globals()[name] = value
     return value
 
