@@ -143,7 +143,7 @@ if TYPE_CHECKING:
     from .simulation.run import simulate as simulate
     from .simulation.scenario import Initial as Initial
     from .simulation.scenario import Scenario as Scenario
-    from .simulation.scenario_files import shipped_scenarios as shipped_scenarios
+    from .simulation.shipped import shipped_scenarios as shipped_scenarios
     from .simulation.sources import load as load
     from .simulation.stepping import Simulation as Simulation
     from .simulation.stepping import SimulationState as SimulationState
@@ -235,7 +235,7 @@ _HOMES = {
     "simulation.results": ("energy_of", "scenario_of"),
     "simulation.run": ("simulate",),
     "simulation.scenario": ("Initial", "Scenario"),
-    "simulation.scenario_files": ("shipped_scenarios",),
+    "simulation.shipped": ("shipped_scenarios",),
     "simulation.sources": ("load",),
     "simulation.stepping": ("Simulation", "SimulationState"),
     "simulation.switchings": ("switchings_of",),
