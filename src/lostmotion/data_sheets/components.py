@@ -60,7 +60,7 @@ def gearbox_table(
     assert isinstance(record, GearboxSheet)
     scalars = {key: value for key, value in changes.items() if key in SCALARS}
     try:
-        sheet = GearboxSheet(**_given(record) | scalars)
+        sheet = GearboxSheet(**_given(record) | scalars) if scalars else record
         conditions = Conditions(**{key: changes[key] for key in Conditions.model_fields if key in changes})
     except InputError as error:
         raise InputError(f"{where} from {shown(reference)}: {error}") from None
@@ -237,7 +237,7 @@ def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor"
     if record.kind == "brushless" and isinstance(winding, Mapping) and "pole_pairs" in winding:
         gaps["pole_pairs"] = winding["pole_pairs"]
     try:
-        sheet = MotorSheet(**_given(record) | gaps)
+        sheet = MotorSheet(**_given(record) | gaps) if gaps else record
         table = (sheet.synchronous() if changes.get("kind") == "synchronous" else sheet.motor()).model_dump()
     except ValueError as error:
         keys = [f"{where}.{key}" for key, gap in CLOSES.items() if missing.keys() & {key, gap} and key not in changes]
