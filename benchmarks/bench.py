@@ -12,6 +12,7 @@ from pathlib import Path
 import baseline
 import build_times
 import closed_loops
+import commands
 import costs
 import gradients
 import identification
@@ -21,17 +22,13 @@ import quotes
 import studies
 import tasks
 import trains
-from report import Report, best
+from report import Report
 
 import lostmotion as lm
 from lostmotion import _instruction_set
 
 ROOT = Path(__file__).parent.parent
 PEERS = ("numpy", "scipy", "numba", "pathsim", "mujoco", "rumoca", "cma", "xarray", "pyarrow")
-
-
-def start_up(*command: str) -> float:
-    return best(5, lambda: subprocess.run(command, check=True, stdout=subprocess.DEVNULL))
 
 
 def outputs(build: Path) -> dict[str, list[list[str]]]:
@@ -52,25 +49,6 @@ def outputs(build: Path) -> dict[str, list[list[str]]]:
         for p in wanted
         if (build / p).exists()
     }
-
-
-def start_up_section(report: Report) -> None:
-    report.section("Start-up", "Whole processes.")
-    python, command = sys.executable, str(Path(sys.executable).with_name("lostmotion"))
-    bare = start_up(python, "-c", "pass")
-    target = str(ROOT / "build" / "bench-report")
-    reproduced = best(
-        1, lambda: subprocess.run([command, "reproduce", "-o", target], check=True, stdout=subprocess.DEVNULL)
-    )
-    imported = start_up(python, "-c", "import lostmotion") - bare
-    report.table(
-        ("", "time [ms]"),
-        [
-            (f"import lostmotion, beyond the interpreter's own {bare:.1f} ms", f"{imported:.1f}"),
-            ("lostmotion --help", f"{start_up(command, '--help'):.0f}"),
-            ("lostmotion reproduce", f"{reproduced:.0f}"),
-        ],
-    )
 
 
 def main() -> None:
@@ -96,7 +74,7 @@ def main() -> None:
     costs.section(report, scenario, build, programs)
     studies.section(report, scenario)
     tasks.section(report)
-    start_up_section(report)
+    commands.section(report)
     live.section(report)
     print(report.text())
     (ROOT / "benchmarks" / "RESULTS.md").write_text(report.text())

@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 import numpy as np
-from lostmotion.simulation.train_results import core_case
+from lostmotion.simulation.core_runs import core_case
 from report import Report, best
 
 import lostmotion as lm
@@ -98,20 +98,20 @@ def section(report: Report) -> None:
     def differences() -> None:
         for of_key in runs:
             for *case, bound in of_key:
-                _core.run_train(*case, *options, bound)
+                _core.run(*case, *options, bound)
 
     core = core_case(s)
     names = [name for name, _, _ in core[0].channels()]
-    one = best(5, lambda: _core.run_train(*core, *options, control), time.process_time)
+    one = best(5, lambda: _core.run(*core, *options, control), time.process_time)
     gradient = best(5, lambda: run_cases(exact, CHANNELS), time.process_time)
     by_differences = best(3, differences, time.process_time)
     (found,) = run_cases(exact, CHANNELS)
     rows = [names.index(name) for name in CHANNELS]
     gaps = []
     for p, (of_key, beside) in enumerate(zip(runs, [neighbours(s, key) for key in KEYS], strict=True)):
-        base = _core.run_train(*core, *options, control)["values"][rows]
+        base = _core.run(*core, *options, control)["values"][rows]
         got = sum(
-            n.weight * (_core.run_train(*case, *options, bound)["values"][rows] - base)
+            n.weight * (_core.run(*case, *options, bound)["values"][rows] - base)
             for n, (*case, bound) in zip(beside, of_key, strict=True)
         )
         size = np.max(np.abs(found.derivatives[p]), axis=1, keepdims=True)  # 0 if the motion does not depend on it

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
+from lostmotion.data_sheets import records
 from lostmotion.data_sheets.loss_map_builder import build_loss_map
 from lostmotion.data_sheets.records import catalogue, find, parse_sheets
 from lostmotion.errors import InputError
@@ -29,6 +30,15 @@ def test_names_are_unique_and_enough_records_can_run():
     assert len(COMPLETE) >= 8
     assert len([r for r in MOTORS if not r.missing()]) >= 4
     assert {r.kind for r in GEARBOXES} >= {"strain_wave", "planetary", "worm"}
+
+
+def test_a_record_found_by_name_is_that_of_the_catalogue_and_other_files_are_not_parsed(monkeypatch):
+    for table, kind in (("gearbox", lm.GearboxSheet), ("motor", lm.MotorSheet)):
+        assert all(find(r.name, table) == r for r in catalogue() if isinstance(r, kind))
+    parsed = []
+    monkeypatch.setattr(records, "_entries_of", lambda file: parsed.append(file) or ())
+    assert records._named.__wrapped__("schaeffler-rt1-h-20-100") is None
+    assert parsed == ["strain-wave-schaeffler-rt1-h.toml"]
 
 
 def test_what_is_missing_is_named_with_the_place_to_read_it():

@@ -36,7 +36,7 @@ def imports(node: ast.AST) -> set[str]:
 
 def test_the_core_installation_is_small_and_covers_all_that_is_imported_at_once() -> None:
     core = names(PROJECT["dependencies"])
-    assert core == {"numpy", "xarray", "pydantic", "pint", "matplotlib", "typer", "rich"}
+    assert core == {"numpy", "xarray", "pydantic", "matplotlib", "typer", "rich"}
     everything = core | set().union(*(names(r) for r in EXTRAS.values()))
     for path in (ROOT / "src" / "lostmotion").glob("*.py"):
         tree = ast.parse(path.read_text())

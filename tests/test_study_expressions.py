@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pint
 import pytest
 import xarray as xr
 from hypothesis import given, settings
@@ -17,7 +18,6 @@ from lostmotion.simulation.results import ENERGY
 from lostmotion.simulation.variables import VARIABLES
 from lostmotion.studies.expressions import OF_THE_RUN, read_expression
 from lostmotion.studies.functions import FUNCTIONS, METHODS
-from lostmotion.units.conversion import registry
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ from lostmotion.units.conversion import registry
     ],
 )
 def test_an_expression_has_the_unit_of_what_it_gives(expression: str, unit: str):
-    parse = registry().Unit
+    parse = pint.UnitRegistry().Unit
     found = read_expression(expression).unit
     assert (found == "") == (unit == "")
     assert parse("" if found == "1" else found.replace("^", "**")) == parse("" if unit == "1" else unit)

@@ -1,9 +1,13 @@
 """A value is one number and one unit: what each text means under each key, or the sentence that refuses it."""
 
 import math
+import random
 import re
+from collections.abc import Mapping
+from decimal import Decimal
 from pathlib import Path
 
+import pint
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,8 +17,9 @@ from conftest import ROOT
 from lostmotion.data_sheets.records import parse_sheets
 from lostmotion.simulation.scenario_files import gearbox_from_record
 from lostmotion.studies.units import unit_of_key
-from lostmotion.units.conversion import to_si
-from lostmotion.units.grammar import plain, read_unit, symbols, written
+from lostmotion.units.conversion import si_factor, to_si
+from lostmotion.units.grammar import PREFIXED, angle_of, plain, read_unit, symbols, written
+from lostmotion.units.table import PREFIXES, UNITS, dimension_of, factor_of
 
 RPM = 2.0 * math.pi / 60.0
 DEG = math.pi / 180.0
@@ -317,7 +322,47 @@ def test_accelerations_and_jerks_without_an_angle_are_refused(text: str, unit: s
         to_si(text, unit)
 
 
-def test_every_symbol_is_a_unit_of_the_registry_and_is_written_as_it_is_read():
+PINT = pint.UnitRegistry(non_int_type=Decimal)
+
+
+def in_pint(units: Mapping[str, int]) -> pint.Quantity:
+    """One of a product of units; within it a temperature is a difference of temperatures."""
+    names = {name: f"delta_{name}" if name.startswith("degree_") else name for name in units}
+    return PINT.Quantity(Decimal(1), "*".join(f"{names[name]}**{n}" for name, n in units.items()) or "dimensionless")
+
+
+def test_every_unit_has_the_factor_and_the_dimension_of_pint():
+    prefixed = {prefix + name for prefix in PREFIXES for name, _ in PREFIXED.values()}
+    for name in {*UNITS, *prefixed, *(name for units in symbols().values() for name in units)}:
+        expected = in_pint({name: 1}).to_base_units()
+        assert factor_of({name: 1}) == expected.magnitude, name
+        si = {"kg": "kilogram", "m": "meter", "s": "second", "A": "ampere", "K": "kelvin"}
+        dimension = {si[base]: power for base, power in dimension_of({name: 1}).items()}
+        assert dimension == {base: n for base, n in expected.unit_items() if base != "radian"}, name
+
+
+def test_products_of_units_are_converted_as_by_pint():
+    rng = random.Random(1)
+    names = sorted({name for units in symbols().values() for name in units})
+    for unit in ("N*m", "kg*m^2", "rad/s", "N*m/rad", "N*m*s/rad", "V*s/rad", "N*m/A", "K/W", "kg/m^3", "degC"):
+        wanted = read_unit(unit)
+        for _ in range(100):
+            units: dict[str, int] = {}
+            for name, power in wanted.items():
+                like = [n for n in names if dimension_of({n: 1}) == dimension_of({name: 1}) and n != "hertz"]
+                chosen = rng.choice([n for n in like if angle_of({n: 1}) == angle_of({name: 1})])
+                units[chosen] = units.get(chosen, 0) + power
+            factor = in_pint(units).to(in_pint(wanted).units).magnitude
+            assert float(factor_of(units) / factor_of(wanted)) == float(factor), (units, unit)
+
+
+@pytest.mark.parametrize("unit", ["kN^999999999999", "kN^200", "mm^999999999999", "mm^-200"])
+def test_a_power_beyond_the_range_of_numbers_is_refused(unit: str):
+    with pytest.raises(ValueError, match="beyond the range of numbers"):
+        si_factor(unit)
+
+
+def test_every_symbol_is_a_unit_of_the_table_and_is_written_as_it_is_read():
     for symbol, units in symbols().items():
         assert read_unit(plain(symbol)) == units, symbol
         assert read_unit(plain(written(units))) == units, symbol

@@ -11,7 +11,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    __version__: str
     from ._core import SolverError as SolverError
     from .control.camera import Camera as Camera
     from .control.camera import Tracker as Tracker
@@ -143,7 +142,7 @@ if TYPE_CHECKING:
     from .simulation.run import simulate as simulate
     from .simulation.scenario import Initial as Initial
     from .simulation.scenario import Scenario as Scenario
-    from .simulation.scenario_files import shipped_scenarios as shipped_scenarios
+    from .simulation.shipped import shipped_scenarios as shipped_scenarios
     from .simulation.sources import load as load
     from .simulation.stepping import Simulation as Simulation
     from .simulation.stepping import SimulationState as SimulationState
@@ -167,6 +166,7 @@ if TYPE_CHECKING:
     from .test_rig.measurement import RigReport as RigReport
     from .test_rig.measurement import measure as measure
     from .test_rig.rig import TestRig as TestRig
+    from .version import __version__ as __version__
 
 # Where each public name lives; it is imported when first used, so that `import lostmotion` stays quick.
 _HOMES = {
@@ -234,7 +234,7 @@ _HOMES = {
     "simulation.results": ("energy_of", "scenario_of"),
     "simulation.run": ("simulate",),
     "simulation.scenario": ("Initial", "Scenario"),
-    "simulation.scenario_files": ("shipped_scenarios",),
+    "simulation.shipped": ("shipped_scenarios",),
     "simulation.sources": ("load",),
     "simulation.stepping": ("Simulation", "SimulationState"),
     "simulation.switchings": ("switchings_of",),
@@ -261,6 +261,7 @@ _HOMES = {
     "test_rig.loop": ("Loop",),
     "test_rig.measurement": ("RigReport", "measure"),
     "test_rig.rig": ("TestRig",),
+    "version": ("__version__",),
 }
 # Modules whose functions return datasets: with them comes `result.lm`.
 _WITH_DATASETS = (
@@ -277,21 +278,16 @@ _WITH_DATASETS = (
 )
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
-__all__ = ["__version__", *_HOME_OF]  # noqa: PLE0604
+__all__ = [*_HOME_OF]  # noqa: PLE0604
 
 
 def __getattr__(name: str) -> Any:
-    if name == "__version__":
-        from importlib.metadata import version
-
-        value: Any = version("lostmotion")
-    elif name in _HOME_OF:
-        home = _HOME_OF[name]
-        if home in _WITH_DATASETS:
-            importlib.import_module(".reports.accessor", __name__)
-        value = getattr(importlib.import_module(f".{home}", __name__), name)
-    else:
+    if name not in _HOME_OF:
         raise AttributeError(f"module 'lostmotion' has no attribute {name!r}")
+    home = _HOME_OF[name]
+    if home in _WITH_DATASETS:
+        importlib.import_module(".reports.accessor", __name__)
+    value = getattr(importlib.import_module(f".{home}", __name__), name)
     globals()[name] = value
     return value
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import sys
@@ -9,6 +10,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from ..version import __version__
 from . import (
     catalogue,
     drive,
@@ -42,6 +44,10 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point: known errors end in one line and exit code 1, Ctrl-C in 130."""
+    gc.set_threshold(
+        100_000
+    )  # loading makes many objects that stay; looking through them again and again takes a tenth of it
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # a search of all that is installed
     with harmless_output():
         _run()
 
@@ -88,9 +94,7 @@ def _explain_usage(error: Any) -> NoReturn:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
-
-        print(version("lostmotion"))
+        print(__version__)
         raise typer.Exit
 
 

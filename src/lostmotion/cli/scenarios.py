@@ -6,7 +6,7 @@ from __future__ import annotations
 def scenarios() -> None:
     """List the scenarios that come with the package; `run`, `response` and `drive check` take their names."""
     from ..inputs.toml_files import read_toml
-    from ..simulation.scenario_files import shipped_scenarios
+    from ..simulation.shipped import shipped_scenarios
 
     found = shipped_scenarios()
     width = max(map(len, found))

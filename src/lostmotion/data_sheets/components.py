@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from contextlib import suppress
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from ..errors import InputError
 from ..inputs.arguments import RecordName, checked
@@ -15,10 +15,11 @@ from ..inputs.validation import shortened, shown, unknown_key
 from ..model.gearbox import Gearbox
 from ..model.motor import DC_KEYS, Motor
 from ..model.torsion import LinearStiffness, TorsionCurve
-from .gearbox_sheet import SCALARS, GearboxSheet
-from .loss_map_builder import BuiltMap, build_loss_map
-from .motor_sheet import MotorSheet
-from .records import find
+
+if TYPE_CHECKING:
+    from .gearbox_sheet import GearboxSheet
+    from .loss_map_builder import BuiltMap
+    from .motor_sheet import MotorSheet
 
 
 class Conditions(Part):
@@ -45,6 +46,10 @@ def gearbox_table(
     InputError
         The record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """
+    from .gearbox_sheet import SCALARS, GearboxSheet  # here, as most scenarios name no record
+    from .loss_map_builder import build_loss_map
+    from .records import find
+
     known = {*Gearbox.model_fields, *Conditions.model_fields}
     for key in changes:
         if key not in known:
@@ -55,7 +60,7 @@ def gearbox_table(
     assert isinstance(record, GearboxSheet)
     scalars = {key: value for key, value in changes.items() if key in SCALARS}
     try:
-        sheet = GearboxSheet(**_given(record) | scalars)
+        sheet = GearboxSheet(**_given(record) | scalars) if scalars else record
         conditions = Conditions(**{key: changes[key] for key in Conditions.model_fields if key in changes})
     except InputError as error:
         raise InputError(f"{where} from {shown(reference)}: {error}") from None
@@ -221,6 +226,9 @@ def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor"
     InputError
         The record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """
+    from .motor_sheet import MotorSheet
+    from .records import find
+
     record = find(reference, "motor")
     assert isinstance(record, MotorSheet)
     missing = record.missing()
@@ -229,7 +237,7 @@ def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor"
     if record.kind == "brushless" and isinstance(winding, Mapping) and "pole_pairs" in winding:
         gaps["pole_pairs"] = winding["pole_pairs"]
     try:
-        sheet = MotorSheet(**_given(record) | gaps)
+        sheet = MotorSheet(**_given(record) | gaps) if gaps else record
         table = (sheet.synchronous() if changes.get("kind") == "synchronous" else sheet.motor()).model_dump()
     except ValueError as error:
         keys = [f"{where}.{key}" for key, gap in CLOSES.items() if missing.keys() & {key, gap} and key not in changes]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from ..errors import InputError
 from ..inputs.toml_files import read_toml
@@ -16,7 +16,9 @@ from .gearbox_sheet import GearboxSheet
 from .motor_sheet import MotorSheet
 from .sheet import in_current_words
 
-KINDS: dict[str, type[GearboxSheet] | type[MotorSheet]] = {"gearbox": GearboxSheet, "motor": MotorSheet}
+Kind: TypeAlias = type[GearboxSheet] | type[MotorSheet]
+Entry: TypeAlias = tuple[Kind, dict[str, Any], str]
+KINDS: dict[str, Kind] = {"gearbox": GearboxSheet, "motor": MotorSheet}
 
 
 # Keys of a sheet file that hold for all of its records.
@@ -30,12 +32,29 @@ def catalogue() -> tuple[GearboxSheet | MotorSheet, ...]:
 
 @cache
 def _shipped() -> tuple[GearboxSheet | MotorSheet, ...]:
-    found: list[GearboxSheet | MotorSheet] = []
-    directory = files("lostmotion") / "catalogue"
-    for file in sorted(directory.iterdir(), key=lambda f: f.name):
-        if file.name.endswith(".toml"):
-            found += parse_sheets(tomllib.loads(file.read_text(encoding="utf-8")), file.name)
+    found = [_made(*entry) for file in _texts() for entry in _entries_of(file)]
     return tuple(sorted(found, key=lambda r: isinstance(r, MotorSheet)))
+
+
+@cache
+def _texts() -> dict[str, str]:
+    """The files of the catalogue, by their names."""
+    directory = files("lostmotion") / "catalogue"
+    found = sorted((f for f in directory.iterdir() if f.name.endswith(".toml")), key=lambda f: f.name)
+    return {f.name: f.read_text(encoding="utf-8") for f in found}
+
+
+@cache
+def _entries_of(file: str) -> tuple[Entry, ...]:
+    """What the records of a file of the catalogue are made of."""
+    return tuple(_entries(tomllib.loads(_texts()[file]), file))
+
+
+@cache
+def _named(name: str) -> GearboxSheet | MotorSheet | None:
+    """The shipped record of a name. Only files whose text has the name are parsed, and no other record is made."""
+    near = (entry for file, text in _texts().items() if f'"{name}"' in text for entry in _entries_of(file))
+    return next((_made(*entry) for entry in near if entry[1].get("name") == name), None)
 
 
 def read_sheets(path: Path) -> list[GearboxSheet | MotorSheet]:
@@ -51,12 +70,19 @@ def read_sheets(path: Path) -> list[GearboxSheet | MotorSheet]:
 
 def parse_sheets(data: dict[str, Any], where: str) -> list[GearboxSheet | MotorSheet]:
     """Records from the contents of a sheet file."""
+    records = [_made(*entry) for entry in _entries(data, where)]
+    if not records:
+        raise InputError(f"{where}: holds no record; add a table [[gearbox]] or [[motor]]")
+    return records
+
+
+def _entries(data: dict[str, Any], where: str) -> Iterator[Entry]:
+    """The kind of each record of a sheet file, its fields, and what it is called in messages."""
     known = {*KINDS, *COMMON, "source", "gap"}
     data = in_current_words(data)
     for key in data:
         if key not in known:
             raise InputError(f"{where}: key {key}: {unknown_key(key, known)}")
-    records: list[GearboxSheet | MotorSheet] = []
     common = {key: data[key] for key in COMMON if key in data}
     for table, kind in KINDS.items():
         for entry in _tables(data, table, where):
@@ -66,13 +92,14 @@ def parse_sheets(data: dict[str, Any], where: str) -> list[GearboxSheet | MotorS
             for key in ("source", "gap"):  # those of the record, then those of the whole file
                 fields.pop(key, None)
                 fields[f"{key}s"] = [*_tables(own, key, which), *_tables(data, key, where)]
-            try:
-                records.append(kind(**fields))
-            except InputError as error:
-                raise InputError(f"{which}: {error}") from None
-    if not records:
-        raise InputError(f"{where}: holds no record; add a table [[gearbox]] or [[motor]]")
-    return records
+            yield kind, fields, which
+
+
+def _made(kind: Kind, fields: Mapping[str, Any], which: str) -> GearboxSheet | MotorSheet:
+    try:
+        return kind(**fields)
+    except InputError as error:
+        raise InputError(f"{which}: {error}") from None
 
 
 def _tables(data: Mapping[str, Any], key: str, where: str) -> list[Mapping[str, Any]]:
@@ -106,12 +133,12 @@ def find(reference: str, table: str) -> GearboxSheet | MotorSheet:
             found = f"{len(own)} of them: {', '.join(r.name for r in own)}" if own else "none"
             raise InputError(f"{reference}: a {table} is wanted here, and this file has {found}; name a file with one")
         return own[0]
-    named = {r.name: r for r in catalogue()}
-    if isinstance(named.get(reference), kind):
-        return named[reference]
+    record = _named(reference)
+    if isinstance(record, kind):
+        return record
     same = [r.name for r in catalogue() if isinstance(r, kind)]
     hint = names_like(reference, same, "`lostmotion catalogue` lists them")
-    if reference in named:
-        other = next(name for name, k in KINDS.items() if isinstance(named[reference], k))
+    if record is not None:
+        other = next(name for name, k in KINDS.items() if isinstance(record, k))
         raise InputError(f"{reference} is a {other}; a {table} is wanted here; `lostmotion catalogue` lists them")
     raise InputError(f"{table} {shown(reference)} is not in the catalogue; {hint}")

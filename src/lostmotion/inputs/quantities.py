@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, GetCoreSchemaHandler, Strict
@@ -60,7 +60,7 @@ class Limit:
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         # Into the number itself, behind the reading of units, so that the JSON Schema has it too.
         schema: Any = handler(source)
-        schema["schema"].update({name: value for name, value in asdict(self).items() if value is not None})
+        schema["schema"].update({name: value for name, value in vars(self).items() if value is not None})
         return schema  # type: ignore[no-any-return]
 
 

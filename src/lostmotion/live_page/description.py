@@ -14,6 +14,7 @@ from ..portable.description import described
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from ..units.practical import ARCMIN
+from ..version import __version__
 from . import sliders
 from .drawn import axis_figures, drawn_drive, drawn_train
 from .loops import loop_views
@@ -35,8 +36,6 @@ def describe(scenario: Scenario | TrainScenario, name: str) -> dict[str, Any]:
     InputError
         A controller has a law of your own, which only Python can call.
     """
-    from importlib.metadata import version
-
     numbers, values = described(scenario)
     closed = _closed_gap(scenario)
     core = {
@@ -56,7 +55,7 @@ def describe(scenario: Scenario | TrainScenario, name: str) -> dict[str, Any]:
     return {
         "name": name,
         "title": scenario.title,
-        "version": version("lostmotion"),
+        "version": __version__,
         "core": core,
         **drawn,
         "open_loop": not (scenario.axes() or (isinstance(scenario, TrainScenario) and scenario.controllers)),

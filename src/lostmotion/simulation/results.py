@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +15,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
+from ..version import __version__
 from .scenario import Scenario
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import CONTACTS_OF_TRAIN, packed
@@ -34,10 +33,9 @@ MOST_RESIDUAL = 1e-6  # of the energy turned over, by which the balance of an ac
 """entries of the energy ledger"""
 
 
-@cache
 def installed_version() -> str:
     """Version of this package."""
-    return version("lostmotion")
+    return __version__
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +18,11 @@ from ..model.gearbox import Gearbox
 from .keys import parse_override, set_values
 from .scenario import Scenario, from_tables
 from .series_files import read_series
+from .shipped import shipped_scenarios
 from .train_scenario import TrainScenario, file_schema, in_long_form, is_train, train_from_tables
 
 MAX_BASES = 100  # files that are each the base of the one before
 MOTOR = "motor"  # its name in the long form of a drive
-
-
-def shipped_scenarios() -> dict[str, Path]:
-    """The scenarios that come with the package: name -> file."""
-    directory = files("lostmotion") / "scenarios"
-    return {f.name.removesuffix(".toml"): Path(str(f)) for f in sorted(directory.iterdir(), key=lambda f: f.name)}
 
 
 def find_scenario(name: str | Path, directory: Path = Path()) -> Path:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..inputs.arguments import checked
-from ..simulation.run import simulate
+from ..simulation.results import RawResult
+from ..simulation.run import as_scenario, run
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
@@ -19,9 +19,6 @@ from .motion_check import dead_zone, holdings, inertia, load_torques, resonance,
 from .motor_check import command_of_run, current, heat, largest_speed, voltage
 from .motor_run import oriented_amplitudes
 from .train_check import check_train
-
-if TYPE_CHECKING:
-    import xarray
 
 POINTS = 40  # samples to a period of the fastest resonance, so that no peak is missed
 SAMPLES = (2_000, 200_000)  # the fewest of a run, and the most at the finest interval
@@ -49,7 +46,7 @@ def check_drive(scenario: Scenario | TrainScenario) -> tuple[Finding, ...]:
     result = _finely_sampled(scenario)
     cycle = duty_cycle(result, scenario.task.cycle)
     g, m, task = scenario.gearbox, scenario.motor, scenario.task
-    command, torque, speed = (result[name].values for name in ("command", "motor_torque", "motor_speed"))
+    command, torque, speed = (result[name] for name in ("command", "motor_torque", "motor_speed"))
     command = command_of_run(m, scenario.controller, command, torque, speed)
     oriented = oriented_amplitudes(result, "motor")
     findings = [
@@ -71,7 +68,7 @@ def check_drive(scenario: Scenario | TrainScenario) -> tuple[Finding, ...]:
     return tuple(_with_sinking(f, result, cycle) if f.rule in MEANS else f for f in findings)
 
 
-def _with_sinking(finding: Finding, result: xarray.Dataset, cycle: DutyCycle) -> Finding:
+def _with_sinking(finding: Finding, result: RawResult, cycle: DutyCycle) -> Finding:
     """A mean, with what the load does to it where it drives the motor with command 0.
 
     Such a motion that goes on at the end of the run has no end of its own: the mean depends on the duration, and is not judged
@@ -89,11 +86,11 @@ def _with_sinking(finding: Finding, result: xarray.Dataset, cycle: DutyCycle) ->
     return replace(finding, remark="; ".join(filter(None, [finding.remark, told])))
 
 
-def _sinking(result: xarray.Dataset) -> tuple[float, float]:
+def _sinking(result: RawResult) -> tuple[float, float]:
     """Time [s] in which the load torque drives the turning motor with command 0: of the whole run, and after the last command."""
-    time, command = result["time"].values, result["command"].values
-    speed = result["motor_speed"].values
-    driven = result["load_torque"].values * speed < 0.0
+    time, command = result["time"], result["command"]
+    speed = result["motor_speed"]
+    driven = result["load_torque"] * speed < 0.0
     sinks = (command == 0.0) & (abs(speed) > STANDSTILL * abs(speed).max()) & driven
     lasting = np.diff(time) * (sinks[1:] & sinks[:-1])
     commanded = np.flatnonzero(command)
@@ -101,16 +98,15 @@ def _sinking(result: xarray.Dataset) -> tuple[float, float]:
     return float(lasting.sum()), float(lasting[last:].sum())
 
 
-def _finely_sampled(scenario: Scenario) -> xarray.Dataset:
+def _finely_sampled(scenario: Scenario) -> RawResult:
     """The run with samples so close that no peak is missed; of a very long one only the beginning, since long ones end in rest."""
     table = scenario.simulation
     fastest = max((f for _, f, _ in resonances(scenario)), default=0.0)
     fine = min(table.sample_interval, table.duration / SAMPLES[0], 1.0 / (POINTS * fastest) if fastest else math.inf)
     if table.duration <= fine * SAMPLES[1]:
-        return simulate(scenario, sample_interval=fine, energy=False)
-    begin = simulate(scenario, duration=fine * SAMPLES[1], sample_interval=fine, energy=False)
-    whole = simulate(scenario, sample_interval=table.duration / SAMPLES[1], energy=False)
-    rest = whole.isel(time=whole["time"] > begin["time"][-1])
-    import xarray as xr
-
-    return xr.concat([begin, rest], "time", combine_attrs="override").assign_attrs(whole.attrs)
+        return run(as_scenario(scenario, sample_interval=fine), energy=False)
+    begin = run(as_scenario(scenario, duration=fine * SAMPLES[1], sample_interval=fine), energy=False)
+    whole = run(as_scenario(scenario, sample_interval=table.duration / SAMPLES[1]), energy=False)
+    rest = whole.time > begin.time[-1]
+    values = {name: np.concatenate([begin[name], whole[name][rest]]) for name in whole.values}
+    return replace(whole, time=np.concatenate([begin.time, whole.time[rest]]), values=values)

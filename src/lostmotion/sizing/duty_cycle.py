@@ -16,6 +16,8 @@ from ..errors import InputError
 if TYPE_CHECKING:
     import xarray
 
+    from ..simulation.results import RawResult
+
 STANDSTILL = 1e-3  # below this share of its largest speed the motor is taken to be at rest
 MIN_REST = 0.01  # of the time in motion; a shorter standstill is no rest
 STEADY = 0.01  # of the largest motor torque, within which it does not change at rest
@@ -100,7 +102,7 @@ class DutyCycle:
 
 
 def duty_cycle(
-    result: xarray.Dataset,
+    result: xarray.Dataset | RawResult,
     period: float | None,
     *,
     speed: str = "motor_speed",
@@ -126,8 +128,8 @@ def duty_cycle(
     InputError
         The motion does not fit into the period, or is not at its end where a pause would begin.
     """
-    time, torque = result["time"].values, result[motor_torque].values
-    fast = np.abs(result[speed].values)
+    time, torque = np.asarray(result["time"]), np.asarray(result[motor_torque])
+    fast = np.abs(np.asarray(result[speed]))
     turning = np.flatnonzero(fast > STANDSTILL * fast.max())
     first, last = (turning[0], turning[-1]) if len(turning) else (0, len(fast) - 1)
     shortest = MIN_REST * (time[last] - time[first])
@@ -139,7 +141,7 @@ def duty_cycle(
     found = DutyCycle(
         time[part],
         fast[part],
-        result[output_torque].values[part],
+        np.asarray(result[output_torque])[part],
         torque[part],
         float(torque[-1]) if rests else None,
         period,

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ..model.signals import Ramp, TorqueSignal
-from ..simulation.run import simulate
+from ..simulation.run import as_scenario, run
 from ..simulation.scenario import Initial, Scenario
 
 MAX_DURATION = 1000.0  # [s]
@@ -70,19 +70,19 @@ def _lasting_speed(scenario: Scenario, load_torque: TorqueSignal, start: Initial
     """Load speed [rad/s] that remains; 0 if the motor comes to rest, infinite if it does not settle."""
     duration = 4.0 * RAMP
     while True:
-        run = simulate(
+        one = as_scenario(
             scenario,
             command=0.0,
             load_torque=load_torque,
             duration=duration,
             sample_interval=duration / SAMPLES,
             initial=start,
-            energy=False,
         )
-        angle = run["load_angle"].values
+        found = run(one, energy=False)
+        angle = found["load_angle"]
         half, quarter = SAMPLES // 2, SAMPLES // 4
         last, before = angle[-1] - angle[-1 - quarter], angle[-1 - quarter] - angle[-1 - half]
-        if not run["motor_speed"].values[-quarter:].any():
+        if not found["motor_speed"][-quarter:].any():
             return 0.0
         if abs(last - before) < STEADY * abs(last) or duration > MAX_DURATION:
             return float(last / (0.25 * duration))

@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from .. import _core
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..model.torsion import Rigid
 from ..simulation.explanation import smallest_commands
+from ..simulation.results import RawResult
 from ..simulation.scenario import Scenario
 from ..test_rig.rig import TestRig
 from .finding import Finding, Verdict
 from .holding import holding
 
-if TYPE_CHECKING:
-    import xarray
-
 INERTIA_RATIO = 10.0  # beyond it a load is usually called hard to control
 NEAR_RESONANCE = 1.5  # a command within this factor of a resonance excites it
 
 
-def load_torques(result: xarray.Dataset) -> list[float]:
+def load_torques(result: RawResult) -> list[float]:
     """The largest and the least load torque of a run, but not 0 [N·m]."""
     torque = result["load_torque"]
     return sorted({float(torque.max()), float(torque.min())} - {0.0})
@@ -80,7 +77,7 @@ def resonance(scenario: Scenario) -> list[Finding]:
     return out
 
 
-def dead_zone(scenario: Scenario, result: xarray.Dataset) -> Finding:
+def dead_zone(scenario: Scenario, result: RawResult) -> Finding:
     """The commands that move the load from rest."""
     against = float(result["load_torque"][0])
     forward, backward = smallest_commands(scenario.drive(), against)
@@ -97,7 +94,7 @@ def dead_zone(scenario: Scenario, result: xarray.Dataset) -> Finding:
     return Finding("dead_zone", "dead zone", value, "warning" if small else "ok", remark)
 
 
-def holdings(scenario: Scenario, result: xarray.Dataset) -> list[Finding]:
+def holdings(scenario: Scenario, result: RawResult) -> list[Finding]:
     """Whether the drive bears the load torques of the run with command 0."""
     loads = load_torques(result)
     if not loads:

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from ..model.losses import ConstantEfficiency, LossMap
 from ..model.task import Task
-from ..simulation.run import simulate
+from ..simulation.results import RawResult
+from ..simulation.run import run
 from ..simulation.train_scenario import TrainScenario
 from .duty_cycle import duty_cycle
 from .finding import Finding
 from .gearbox_check import input_speeds, loads, locks, loss_map
 from .motor_check import command_of_run, current, heat, largest_speed, voltage
 from .motor_run import oriented_amplitudes
-
-if TYPE_CHECKING:
-    import xarray
 
 SAMPLES = 20_000  # the fewest of a run
 
@@ -33,7 +30,7 @@ def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
     """
     table = scenario.simulation
     interval = min(table.sample_interval, table.duration / SAMPLES)
-    result = simulate(scenario, sample_interval=interval, energy=False)
+    result = run(scenario.replace(**{"simulation.sample_interval": interval}), energy=False)
     findings = [f for name in scenario.gears for f in _gear(scenario, name, result)]
     findings += [f for name in scenario.motors for f in _motor(scenario, name, result)]
     if any(isinstance(g.losses, LossMap) for g in scenario.gears.values()):
@@ -49,7 +46,7 @@ def _named(name: str, findings: list[Finding]) -> list[Finding]:
     return [replace(f, what=f"{name}: {f.what}") for f in findings]
 
 
-def _gear(scenario: TrainScenario, name: str, result: xarray.Dataset) -> list[Finding]:
+def _gear(scenario: TrainScenario, name: str, result: RawResult) -> list[Finding]:
     gear, where = scenario.gears[name], f"gears.{name}"
     torque = f"{name}_output_torque"
     cycle = duty_cycle(
@@ -66,7 +63,7 @@ def _gear(scenario: TrainScenario, name: str, result: xarray.Dataset) -> list[Fi
     return findings
 
 
-def _load_torques(scenario: TrainScenario, name: str, result: xarray.Dataset) -> list[float]:
+def _load_torques(scenario: TrainScenario, name: str, result: RawResult) -> list[float]:
     """The largest and the least load torque at the output of a gear, from the shafts behind it through their ratios [N·m]; its
     rated torque where there are none."""
     gear, share = scenario.gears[name], 1.0
@@ -84,11 +81,11 @@ def _load_torques(scenario: TrainScenario, name: str, result: xarray.Dataset) ->
     return [gear.rated_output_torque]
 
 
-def _motor(scenario: TrainScenario, name: str, result: xarray.Dataset) -> list[Finding]:
+def _motor(scenario: TrainScenario, name: str, result: RawResult) -> list[Finding]:
     motor, where = scenario.motors[name], f"motors.{name}"
     torque, speed = f"{name}_torque", f"{motor.shaft}_speed"
     cycle = duty_cycle(result, None, speed=speed, motor_torque=torque, output_torque=torque)
-    command, T, w = (result[key].values for key in (f"{name}_command", torque, speed))
+    command, T, w = (result[key] for key in (f"{name}_command", torque, speed))
     command = command_of_run(motor, scenario.controllers.get(name), command, T, w)
     oriented = oriented_amplitudes(result, where)
     findings = [

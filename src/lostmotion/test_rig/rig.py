@@ -23,9 +23,10 @@ from ..model.load import Load
 from ..model.motor import Motor
 from ..model.signals import CommandSignal, Samples, TorqueSignal
 from ..model.torsion import Rigid
-from ..simulation.run import simulate
+from ..simulation.results import RawResult
+from ..simulation.run import as_scenario, run
 from ..simulation.scenario import Initial
-from ..simulation.switchings import switchings_of
+from ..simulation.switchings import names_in, unpacked
 from .loop import Loop
 
 if TYPE_CHECKING:
@@ -94,6 +95,10 @@ class TestRig:
             rest, previous = rest - slope * (b - previous), b
         raise AssertionError("the last piece has no end")
 
+    @staticmethod
+    def _run(drive: Drive, **surroundings: Any) -> RawResult:
+        return run(as_scenario(drive, **surroundings), energy=False)
+
     def _flywheel(self) -> Drive:
         motor = Motor(kind="torque_source", rotor_inertia=FLYWHEEL)
         return Drive(motor=motor, gearbox=self.gearbox, load=self.load)
@@ -105,17 +110,16 @@ class TestRig:
         """(input torque, output torque) [N·m] at an input speed [rad/s] and a relative load, < 0 overrunning."""
         g = self.gearbox
         torque, speed = load * g.rated_output_torque, input_speed / g.ratio
-        result = simulate(
+        result = self._run(
             self._flywheel(),
             load_torque=torque - self.load.viscous_friction * speed,
             duration=SETTLING,
             sample_interval=SETTLING / 50.0,
             initial=Initial(motor_speed=input_speed, load_speed=speed, twist=self._twist_at(torque)),
-            energy=False,
         )
-        last = result.isel(time=slice(-10, None))
-        T_1, T_2 = float(last["input_torque"].mean()), float(last["output_torque"].mean())
-        if float(np.ptp(last["output_torque"].values)) > 1e-6 * g.rated_output_torque:
+        in_end, out_end = result["input_torque"][-10:], result["output_torque"][-10:]
+        T_1, T_2 = float(in_end.mean()), float(out_end.mean())
+        if float(np.ptp(out_end)) > 1e-6 * g.rated_output_torque:
             raise RigError(f"no steady state at {input_speed:.4g} rad/s and load {load:g} within {SETTLING:g} s")
         return T_1, T_2
 
@@ -170,24 +174,27 @@ class TestRig:
         InputError
             The gearbox is rigid.
         """
+        return self._torsion(turning_points, samples).dataset()
+
+    def _torsion(self, turning_points: Iterable[float], samples: int = 2000) -> RawResult:
+        """The same without a dataset."""
         if self.rigid:
             raise InputError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
         points = [0.0, *turning_points]
         times = [RAMP * k for k in range(len(points))]
         # The locked input is a flywheel at rest; the load torque pulls against the output.
-        return simulate(
+        return self._run(
             self._flywheel(),
             load_torque=TorqueSignal(samples=Samples(times=tuple(times), values=tuple(points))),
             duration=times[-1],
             sample_interval=RAMP / samples,
-            energy=False,
         )
 
     @checked
     def initial_loading_curve(self, torque: Torque) -> tuple[Any, Any]:
         """(twist [rad], torque [N·m]) of the first loading up to a torque."""
-        result = self.torsion([torque])
-        return result["twist"].values, result["output_torque"].values
+        result = self._torsion([torque])
+        return result["twist"], result["output_torque"]
 
     @checked
     def stiffness(self, torques: Iterable[Torque], up_to: Torque) -> list[float]:
@@ -217,9 +224,8 @@ class TestRig:
     def loop(self, amplitude: Torque) -> Loop:
         """The loop that a slow load between -amplitude and amplitude [N·m] settles on."""
         samples, amplitude = 2000, _positive("amplitude", amplitude)
-        result = self.torsion([amplitude, -amplitude, amplitude, -amplitude, amplitude], samples)
-        last = result.isel(time=slice(3 * samples, None))
-        return Loop(amplitude, last["twist"].values, last["output_torque"].values)
+        result = self._torsion([amplitude, -amplitude, amplitude, -amplitude, amplitude], samples)
+        return Loop(amplitude, result["twist"][3 * samples :], result["output_torque"][3 * samples :])
 
     def lost_motion(self) -> float:
         """Twist [rad] between loads of -3 % and +3 % of rated torque; 0 of a rigid gearbox."""
@@ -236,26 +242,24 @@ class TestRig:
         g = self.gearbox
         against = load * g.rated_output_torque
         begin, rise = against / g.ratio, (1.0 + 4.0 * load) * g.rated_output_torque / g.ratio
-        result = simulate(
+        result = self._run(
             self._braked(),
             command=CommandSignal(samples=Samples(times=(0.0, RAMP), values=(begin, begin + rise))),
             load_torque=against,
             duration=RAMP,
             sample_interval=RAMP,
             initial=Initial(twist=self._twist_at(against)),
-            energy=False,
         )
         return begin + rise * self._break_away(result)[0] / RAMP
 
     def backdriving_torque(self) -> float | None:
         """Output torque [N·m] that sets the gearbox in motion with a free input, by a slow ramp; None: it holds three times its rated torque."""
         g = self.gearbox
-        result = simulate(
+        result = self._run(
             self._braked(),
             load_torque=TorqueSignal(samples=Samples(times=(0.0, RAMP), values=(0.0, -3.0 * g.rated_output_torque))),
             duration=RAMP,
             sample_interval=RAMP,
-            energy=False,
         )
         try:
             return abs(self._break_away(result)[1])
@@ -270,13 +274,12 @@ class TestRig:
         return Drive(motor=motor, gearbox=g.model_copy(update={"viscous_friction": damper}), load=self.load)
 
     @staticmethod
-    def _break_away(result: xarray.Dataset) -> tuple[float, float]:
+    def _break_away(result: RawResult) -> tuple[float, float]:
         """(instant [s], output torque [N·m]) at which the input shaft first starts to turn: at once where nothing holds it."""
-        if result["input_contact"].values[0] != 0:
-            return 0.0, float(result["output_torque"].values[0])
-        switchings = switchings_of(result)
-        freed = (switchings["input_contact_before"] == 0) & (switchings["input_contact_after"] != 0)
-        events = np.flatnonzero(freed.values)
+        if result["input_contact"][0] != 0:
+            return 0.0, float(result["output_torque"][0])
+        switchings = dict(zip(names_in(result.attrs), unpacked(result.attrs).T, strict=True))
+        events = np.flatnonzero((switchings["input_contact_before"] == 0) & (switchings["input_contact_after"] != 0))
         if len(events) == 0:
             raise RigError("the input shaft never started to turn")
         k = events[0]

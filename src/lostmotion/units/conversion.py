@@ -1,6 +1,6 @@
 """Units at the edge: numbers are SI, strings carry a unit. Inside the package everything is SI and radians.
 
-A string is one number and one unit, by a grammar of our own (`unit_grammar`); the unit library only converts. What a unit
+A string is one number and one unit, by a grammar of our own (`grammar`), and `table` has the units in SI. What a unit
 means may depend on the key: ``1/min`` is a speed of rotation where a speed is wanted, ``lb`` a force where a torque is.
 """
 
@@ -12,14 +12,14 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from .grammar import FORCE_OF, Product, UnknownUnitError, angle_of, near, plain, read_unit, written
 from .scalars import is_number, objection, scalar
+from .table import dimension_of, factor_of
 
 if TYPE_CHECKING:
-    import pint
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
     from pydantic_core import CoreSchema
 
@@ -33,18 +33,6 @@ _GROUPED = re.compile(r"[+-]?[0-9]+(?:[.,'’_][0-9]+| [0-9]{3}(?![0-9]))*")
 _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[ .,'’_][0-9]{3})+")
 _TIMES_TEN_TO = re.compile(r"\s*(?:[*xX]\s*10\s*(?:(?:\^|\*\*)\s*|(?=[+-]))|[eE])([+-]?[0-9]+)")
 _OPERATION = re.compile(r"\s*(\*\*|[*/+^-])\s*([0-9.]+)(?:\s*(?:\^|\*\*)\s*([+-]?[0-9]+))?")
-
-
-@cache
-def registry(exact: bool = False) -> pint.UnitRegistry[Any]:
-    """The unit registry, made when the first string with a unit is read (importing it takes a while).
-
-    exact
-        Computes with decimal numbers, so that ``"3 gcm2"`` is the same number as 3e-7; it knows no roots of units.
-    """
-    import pint
-
-    return pint.UnitRegistry(non_int_type=Decimal if exact else float)
 
 
 @lru_cache(maxsize=10_000)  # data sheets say the same again and again
@@ -108,7 +96,12 @@ def si_factor(unit: str) -> float:
         units = read_unit(unit)
     except UnknownUnitError as error:
         raise ValueError(_unknown("1", unit, error.symbol, "")) from None
-    return float(registry(exact=True).Quantity(Decimal(1), _registry_text(units)).to_base_units().magnitude)
+    factor = 0.0
+    with suppress(ArithmeticError):
+        factor = float(factor_of(units))
+    if not 0.0 < factor < math.inf:
+        raise ValueError("is beyond the range of numbers; check its exponent")
+    return factor
 
 
 def _wanted(unit: str) -> str:
@@ -192,22 +185,13 @@ def _known(unit: str) -> Product:
     return read_unit(unit) if unit else {}
 
 
-def _registry_text(units: Product) -> str:
-    """A product for the registry. Within a product a temperature is a difference of temperatures."""
-    names = {name: "delta_" + name if name.startswith("degree_") else name for name in units}
-    return "*".join(f"{names[name]}**{power}" for name, power in units.items()) or "dimensionless"
-
-
 def _ratio(units: Product, other: Product) -> Decimal | None:
     """How many of the other one of the first is; None if they measure something else."""
-    import pint
-
-    if angle_of(units) != angle_of(other):
+    if angle_of(units) != angle_of(other) or dimension_of(units) != dimension_of(other):
         return None
-    try:
-        return Decimal(registry(exact=True).convert(Decimal(1), _registry_text(units), _registry_text(other)))
-    except (pint.errors.DimensionalityError, ArithmeticError):
-        return None
+    with suppress(ArithmeticError):
+        return factor_of(units) / factor_of(other)
+    return None
 
 
 def _factor(units: Product, unit: str) -> Decimal | None:

@@ -9,10 +9,10 @@ from functools import cache
 from itertools import product as pairs
 
 Product = dict[str, int]
-"""unit of the registry: its power"""
+"""unit of the table: its power"""
 
 PREFIXES = {"n": "nano", "u": "micro", "m": "milli", "c": "centi", "d": "deci", "da": "deca", "k": "kilo", "M": "mega"}
-# Symbol: unit of the registry, and the prefixes that are in use with it.
+# Symbol: unit of the table, and the prefixes that are in use with it.
 PREFIXED = {
     "N": ("newton", "u m c d da k M"),
     "m": ("meter", "u m c d"),
@@ -30,7 +30,7 @@ PREFIXED = {
     "St": ("stokes", "c"),
     "rev": ("revolution", "k"),
 }
-# Other spellings of a unit of the registry; the first is the one that messages show.
+# Other spellings of a unit of the table; the first is the one that messages show.
 SPELLINGS = {
     "newton": "newton newtons",
     "meter": "meter metre meters metres",
@@ -68,7 +68,7 @@ SPELLINGS = {
     "force_gram": "gf",
 }
 ANGLES = {"radian", "degree", "arcminute", "arcsecond", "milliarcsecond", "gon", "revolution"}
-# How a mass is read where only a force gives the quantity: (registry's mass, force).
+# How a mass is read where only a force gives the quantity: (mass, force) of the table.
 FORCE_OF = {"pound": "force_pound", "ounce": "force_ounce", "kilogram": "kilogram_force", "gram": "force_gram"}
 
 _SAME = str.maketrans(
@@ -229,7 +229,7 @@ def written(units: Product) -> str:
 
 
 def angle_of(units: Product) -> int:
-    """The power of the plane angle, which the unit library takes for a plain number."""
+    """The power of the plane angle, whose dimension is that of a plain number."""
     return sum(power for name, power in units.items() if _without_prefix(name) in ANGLES)
 
 
