@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "lostmotion/control/linear_step.hpp"
 #include "lostmotion/simulation/train_control.hpp"
 
 namespace lostmotion::binding {
@@ -118,6 +119,52 @@ std::unique_ptr<double[]> control_room(Options& options) {
     auto room = std::make_unique_for_overwrite<double[]>(shape[0] * shape[1] * shape[2]);
     options.control_out = room.get();
     return room;
+}
+
+inline Array as_array(const control::LinearStep& step) {
+    auto data = std::make_unique_for_overwrite<double[]>(step.rows.size());
+    std::copy(step.rows.begin(), step.rows.end(), data.get());
+    return as_array(std::move(data), {step.rows.size() / step.columns, step.columns});
+}
+
+inline void bind_linear_steps(nb::module_& m) {
+    using namespace control;
+    nb::enum_<Loop>(m, "Loop")
+        .value("current", Loop::current)
+        .value("speed", Loop::speed)
+        .value("position", Loop::position);
+    nb::enum_<CurrentAxis>(m, "CurrentAxis")
+        .value("none", CurrentAxis::none)
+        .value("direct", CurrentAxis::direct)
+        .value("quadrature", CurrentAxis::quadrature);
+    m.def(
+        "linear_step",
+        [](const BoundAxis& axis, Loop outermost, bool cut, std::int64_t tick, double tick_length) {
+            return as_array(linear_step(axis, outermost, cut, tick, tick_length));
+        },
+        "axis"_a, "outermost"_a, "cut"_a, "tick"_a, "tick_length"_a,
+        nb::sig("def linear_step(axis: Axis, outermost: Loop, cut: bool, tick: int, tick_length: float) -> "
+                "numpy.typing.NDArray[numpy.float64]"),
+        "Slots after a sample step, over the slots before it and (angle of the position's encoder, angle and speed of "
+        "the speed's, torque of the motor, value, rate and acceleration of the reference, measured value of a loop "
+        "that is cut).");
+    m.def(
+        "linear_orientation",
+        [](const FieldOrientation& law, double speed, double lag, double torque, double weakening,
+           std::pair<double, double> current, std::pair<double, double> voltage, CurrentAxis outermost, bool cut,
+           int every, int since, double tick_length) {
+            const SteadyOrientation motion{
+                speed, lag, torque, weakening, {current.first, current.second}, {voltage.first, voltage.second}};
+            return as_array(linear_orientation(law, motion, outermost, cut, every, since, tick_length));
+        },
+        "law"_a, "speed"_a, "lag"_a, "torque"_a, "weakening"_a, "current"_a, "voltage"_a, "outermost"_a, "cut"_a,
+        "every"_a, "since"_a, "tick_length"_a,
+        nb::sig("def linear_orientation(law: FieldOrientation, speed: float, lag: float, torque: float, weakening: "
+                "float, current: tuple[float, float], voltage: tuple[float, float], outermost: CurrentAxis, cut: bool, "
+                "every: int, since: int, tick_length: float) -> numpy.typing.NDArray[numpy.float64]"),
+        "Slots of the field orientation after a tick, the voltage (u_d, u_q) that acts and the measured currents, over "
+        "the slots before it and (torque that is asked for; speed, angle as it is read and angle of the rotor; i_d, "
+        "i_q; reference and measured value of the current that is looked at).");
 }
 
 template <class Names>
@@ -247,7 +294,14 @@ inline void bind_control(nb::module_& m) {
         .def_rw("sample_time", &FieldOrientation::sample_time)
         .def_rw("delay_time", &FieldOrientation::delay_time)
         .def_rw("delay", &FieldOrientation::delay)
-        .def_rw("parts", &FieldOrientation::parts);
+        .def_rw("parts", &FieldOrientation::parts)
+        .def(
+            "least_current",
+            [](const FieldOrientation& f, double torque) {
+                const DirectQuadrature i = f.least_current(torque);
+                return std::pair(i.d, i.q);
+            },
+            "torque"_a, "(i_d, i_q) [A] of the least current for a torque [N m].");
     nb::class_<TorqueFeedforward>(m, "TorqueFeedforward")
         .def(nb::init<>())
         .def_rw("inertia", &TorqueFeedforward::inertia)
@@ -338,6 +392,9 @@ inline void bind_control(nb::module_& m) {
         .def("set_python_law", &BoundAxis::set_python_law, "function"_a, "states"_a,
              nb::sig("def set_python_law(self, function: collections.abc.Callable[..., float], states: int) -> None"))
         .def("set_compiled_law", &BoundAxis::set_compiled_law, "function"_a, "data"_a, "states"_a);
+    bind_linear_steps(m);
+    m.attr("COMMAND_SLOT") = Axis::command_slot();
+    m.attr("SPEED_ANGLE_SLOT") = Axis::speed_angle_slot();
     m.def(
         "axis_signals", [] { return signal_names(axis_signal_names); },
         nb::sig("def axis_signals() -> list[tuple[str, str, str]]"), "Name, unit, meaning of what each axis shows.");

@@ -380,6 +380,9 @@ class FieldOrientation:
     @parts.setter
     def parts(self, arg: int, /) -> None: ...
 
+    def least_current(self, torque: float) -> tuple[float, float]:
+        """(i_d, i_q) [A] of the least current for a torque [N m]."""
+
 class TorqueFeedforward:
     def __init__(self) -> None: ...
 
@@ -909,6 +912,34 @@ class Axis:
     def set_python_law(self, function: Callable[..., float], states: int) -> None: ...
 
     def set_compiled_law(self, function: int, data: int, states: int) -> None: ...
+
+class Loop(enum.Enum):
+    current = 1
+
+    speed = 2
+
+    position = 3
+
+class CurrentAxis(enum.Enum):
+    none = 0
+
+    direct = 1
+
+    quadrature = 2
+
+def linear_step(axis: Axis, outermost: Loop, cut: bool, tick: int, tick_length: float) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Slots after a sample step, over the slots before it and (angle of the position's encoder, angle and speed of the speed's, torque of the motor, value, rate and acceleration of the reference, measured value of a loop that is cut).
+    """
+
+def linear_orientation(law: FieldOrientation, speed: float, lag: float, torque: float, weakening: float, current: tuple[float, float], voltage: tuple[float, float], outermost: CurrentAxis, cut: bool, every: int, since: int, tick_length: float) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Slots of the field orientation after a tick, the voltage (u_d, u_q) that acts and the measured currents, over the slots before it and (torque that is asked for; speed, angle as it is read and angle of the rotor; i_d, i_q; reference and measured value of the current that is looked at).
+    """
+
+COMMAND_SLOT: int = 14
+
+SPEED_ANGLE_SLOT: int = 10
 
 def axis_signals() -> list[tuple[str, str, str]]:
     """Name, unit, meaning of what each axis shows."""

@@ -59,15 +59,13 @@ void Axis::start(const Sampled& y, double tick_length, double* slot) const {
 bool Axis::step(std::int64_t tick, double tick_length, const Sampled& y, double* slot) const {
     const double time = static_cast<double>(tick) * tick_length;
     double command = slot[computed_command];
-    slot[speed_angle] = speed_sensor.scale * speed_sensor.encoder(y.speed_angle, tick, slot);
-    if (two_encoders)
-        slot[position_angle] = position_sensor.scale * position_sensor.encoder(y.position_angle, tick, slot);
+    slot[speed_angle] = speed_sensor.scale * speed_sensor.encoder(y.speed_angle, slot);
+    if (two_encoders) slot[position_angle] = position_sensor.scale * position_sensor.encoder(y.position_angle, slot);
     if (camera.present) watch(tick, tick_length, y, slot);
     if (speed_schedule.due(tick)) {
         const double T = tick_length * speed_schedule.every;
         const double acts = voltage_at_limit(slot) == 0.0 ? slot[torque_reference] : y.motor_torque;
-        slot[measured_speed] =
-            estimate(slot[speed_angle], speed_sensor.scale * y.speed, acts, speed_schedule.sample(tick), T, slot);
+        slot[measured_speed] = estimate(slot[speed_angle], speed_sensor.scale * y.speed, acts, T, slot);
         if (load_observer.present) load_observer.observe(y.motor_torque, slot[measured_speed], inverse_model, slot);
     }
     if (own_law.present()) {
@@ -87,17 +85,18 @@ bool Axis::step(std::int64_t tick, double tick_length, const Sampled& y, double*
         } else if (!current_loop) {
             command = in_range(slot[torque_reference] / rated_torque, torque_range(y, slot));
         } else if (current_schedule.due(tick)) {
-            command = (*current_loop)(slot[torque_reference], y.motor_torque, slot[measured_speed], slot);
+            command = (*current_loop)(slot[torque_reference], taken(Loop::current, y.motor_torque),
+                                      slot[measured_speed], slot);
         }
     }
     if (field_orientation) {
         if (!field_orientation->finite(slot)) return false;
-        field_orientation->act(tick, slot);
+        field_orientation->act(slot);
         return true;
     }
     if (!std::isfinite(command)) return false;
     slot[computed_command] = command;
-    slot[acting_command] = delay(command, tick, slot);
+    slot[acting_command] = delay(command, slot);
     return true;
 }
 
@@ -166,7 +165,8 @@ void Axis::run_position_loop(double time, double T, double* slot) const {
     slot[position_reference] = reference_delay == 0.0 ? ahead.value : wanted(time - reference_delay, slot).value;
     slot[measured_position] = position(slot);
     const InverseModel::Ahead twist = inverse_model.twist(ahead.rate, ahead.second, load_observer.load(slot), T, slot);
-    const double e = slot[position_reference] + backlash(ahead.rate, T, slot) + twist.angle - slot[measured_position];
+    const double e = slot[position_reference] + backlash(ahead.rate, T, slot) + twist.angle -
+                     taken(Loop::position, slot[measured_position]);
     slot[speed_reference] = ratio * position_loop(e, ahead.rate + twist.rate, sign_of(ratio) * at_limit(slot), T, slot);
 }
 
@@ -179,8 +179,8 @@ void Axis::run_speed_loop(double time, double T, TorqueRange range, double* slot
     for (const DiscreteSystem& f : speed_filters) speed = f(speed, slot);
     InverseModel::Known known{feedforward(ratio * speed_ahead, ratio * gain_ahead)};
     if (inverse_model.present) known = inverse_model.torque(speed_ahead, gain_ahead, load_observer.load(slot), slot);
-    double M = load_observer.schedule(speed_loop, inverse_model, slot)(speed, slot[measured_speed], known.torque, range,
-                                                                       voltage_at_limit(slot), T, slot);
+    double M = load_observer.schedule(speed_loop, inverse_model, slot)(
+        speed, taken(Loop::speed, slot[measured_speed]), known.torque, range, voltage_at_limit(slot), T, slot);
     for (const DiscreteSystem& f : torque_filters) M = f(M, slot);
     slot[torque_reference] = range(M);
     slot[torque_at_limit] = range.at_limit(slot[torque_reference]);
@@ -222,7 +222,7 @@ bool Axis::run_own_law(double time, const Sampled& y, double& command, double* s
         measured[3] = i.d;
         measured[4] = i.q;
         if (own_law(time, measured.data(), asked.data(), given.data(), slot) != 0) return false;
-        field_orientation->command(field_orientation->limited({given[0], given[1]}), seen, slot);
+        field_orientation->command(field_orientation->within_limits({given[0], given[1]}), seen, slot);
         return true;
     }
     if (own_law(time, measured.data(), asked.data(), given.data(), slot) != 0) return false;

@@ -37,7 +37,14 @@ struct Schedule {
     int every = 1, phase = 0;
 
     bool due(std::int64_t tick) const { return tick >= phase && (tick - phase) % every == 0; }
-    std::int64_t sample(std::int64_t tick) const { return (tick - phase) / every; }
+};
+
+enum class Loop { none, current, speed, position };
+
+// What one loop takes for its measured value, whatever is measured: the loop is cut there.
+struct Cut {
+    Loop loop = Loop::none;
+    double value = 0.0;
 };
 
 // An encoder, and how often the shaft that a loop works on turns for one turn of the encoder's shaft.
@@ -140,6 +147,7 @@ class Axis {
     BacklashCompensation backlash;
     std::vector<DiscreteSystem> speed_filters, torque_filters;
     OwnLaw own_law;  // instead of all loops
+    Cut cut;         // in a linear model
 
     // Gives each block its slots. Once, after all has been set.
     void place();
@@ -152,9 +160,11 @@ class Axis {
 
     // One tick. Returns false if the user's own law has failed, or the command is no number.
     bool step(std::int64_t tick, double tick_length, const Sampled& y, double* slot) const;
+    double taken(Loop loop, double measured) const { return cut.loop == loop ? cut.value : measured; }
     // What acts on the motor from this tick on, of an axis without a winding.
     double command(const double* slot) const { return slot[acting_command]; }
     static int command_slot() { return acting_command; }
+    static int speed_angle_slot() { return speed_angle; }
     static double signal(int s, const double* slot) { return slot[s]; }
 
     // Of the winding, from the last exchange of torque and speed on.

@@ -16,7 +16,7 @@ struct Encoder {
 
     void place(Slots& slots) { delay.place(slots); }
     double reading(double angle) const;
-    double operator()(double angle, std::int64_t tick, double* slot) const { return delay(reading(angle), tick, slot); }
+    double operator()(double angle, double* slot) const { return delay(reading(angle), slot); }
     void start(double angle, double* slot) const { delay.fill(reading(angle), slot); }
 };
 

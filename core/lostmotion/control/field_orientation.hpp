@@ -34,6 +34,7 @@ struct FieldOrientation {
     double delay_time = 0.0;            // [s] from the sample until its voltage acts
     TickDelay delay;                    // the same in ticks
     int parts = 2;                      // of a tick, in each of which torque and speed are exchanged once
+    bool limited = true;                // by voltage and largest current; false in a linear model
 
     // What the controller reads at a tick.
     struct Reading {
@@ -53,23 +54,33 @@ struct FieldOrientation {
     DirectQuadrature measured(const Reading& y) const {
         return turned(y.current, winding.pole_pairs * (y.true_angle - y.angle));
     }
-    // The voltage for a torque [N m].
-    void control(double torque, const Reading& y, double* slot) const;
+    // The currents for a torque [N m] at a speed of the rotor [rad/s], with the field weakened as the last voltage
+    // needs.
+    DirectQuadrature wanted(double torque, double speed, double* slot) const;
+    // The voltage for them, with the currents as they are measured.
+    void follow(DirectQuadrature wanted, DirectQuadrature measured, const Reading& y, double* slot) const;
+    // Both.
+    void control(double torque, const Reading& y, double* slot) const {
+        follow(wanted(torque, y.speed, slot), measured(y), y, slot);
+    }
+    // As in a steady motion in which the controller asks for this voltage.
+    void settle(double torque, double weakened, DirectQuadrature voltage, const Reading& y, double* slot) const;
     // Sign of the torque that the voltage circle allowed no more of at the last sample, or 0.
     double at_limit(const double* slot) const { return slot[first_ + beyond]; }
     // What the voltage circle leaves of a voltage in coordinates of the rotor.
-    DirectQuadrature limited(DirectQuadrature voltage) const;
+    DirectQuadrature within_limits(DirectQuadrature voltage) const;
     // A voltage in coordinates of the rotor as it is read now, for the time that it will act.
     void command(DirectQuadrature voltage, const Reading& y, double* slot) const;
     bool finite(const double* slot) const;
     // What acts from this tick on.
-    void act(std::int64_t tick, double* slot) const;
+    void act(double* slot) const;
     // The voltage that acts, in coordinates of the rotor at an angle [rad].
     DirectQuadrature voltage(double angle, const double* slot) const;
 
     // Least current for a torque: i_d = D - sgn(D) sqrt(D^2 + i_q^2), D = psi/(2 (L_q - L_d)). The torque rises with
     // i_q, for i_q > 0 ever more steeply, so that Newton's steps from above go down to the root.
     DirectQuadrature least_current(double torque) const;
+    static DirectQuadrature turned(DirectQuadrature v, double angle);
 
  private:
     enum OwnSlot : int {
@@ -89,8 +100,9 @@ struct FieldOrientation {
     };
 
     // Share of a voltage with this square of its amplitude.
-    double within_circle(double square) const { return std::fmin(1.0, voltage_limit / std::sqrt(square)); }
-    static DirectQuadrature turned(DirectQuadrature v, double angle);
+    double within_circle(double square) const {
+        return limited ? std::fmin(1.0, voltage_limit / std::sqrt(square)) : 1.0;
+    }
     // Where the circle of the largest current has its largest torque.
     double circle_i_d() const;
     // Beyond -psi/L_d the voltage would rise again.
@@ -98,8 +110,6 @@ struct FieldOrientation {
     // Within the circle; where i_d gives no more voltage, that which is left is for i_q.
     double most_i_q(double i_d, double w_e) const;
     double largest_torque(double weakened, double w_e) const;
-
-    DirectQuadrature currents(double torque, double w_e, double* own) const;
 
     double steepest_ = 0.0;  // [A]
     int first_ = 0;

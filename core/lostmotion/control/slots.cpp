@@ -1,5 +1,7 @@
 #include "slots.hpp"
 
+#include <algorithm>
+
 namespace lostmotion::control {
 
 int Slots::take(int count) {
@@ -8,11 +10,14 @@ int Slots::take(int count) {
     return first;
 }
 
-double TickDelay::operator()(double in, std::int64_t tick, double* slot) const {
-    if (ticks == 0) return in;
-    double& kept = slot[first + tick % ticks];
-    const double out = kept;
-    kept = in;
+double TickDelay::operator()(double in, double* slot) const {
+    return ticks == 0 ? in : shifted(in, slot + first, ticks);
+}
+
+double shifted(double in, double* kept, int count) {
+    const double out = kept[0];
+    std::copy(kept + 1, kept + count, kept);
+    kept[count - 1] = in;
     return out;
 }
 

@@ -2,8 +2,6 @@
 // compared and restored.
 #pragma once
 
-#include <cstdint>
-
 namespace lostmotion::control {
 
 // Gives each block its place in the row.
@@ -16,13 +14,16 @@ class Slots {
     int count_ = 0;
 };
 
-// What a signal was some ticks ago.
+// The first of some numbers, whose place the others move up to and a new one joins.
+double shifted(double in, double* kept, int count);
+
+// What a signal was some ticks ago; the oldest value comes first.
 struct TickDelay {
     int ticks = 0;
     int first = 0;  // slot
 
     void place(Slots& slots) { first = slots.take(ticks); }
-    double operator()(double in, std::int64_t tick, double* slot) const;
+    double operator()(double in, double* slot) const;
     void fill(double value, double* slot) const {
         for (int k = 0; k < ticks; ++k) slot[first + k] = value;
     }

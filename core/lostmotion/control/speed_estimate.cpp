@@ -13,14 +13,11 @@ void SpeedEstimate::start(double angle, double speed, double sample_time, double
     for (int k = 0; k < span; ++k) s[1 + k] = angle - speed * sample_time * (span - k);
 }
 
-double SpeedEstimate::operator()(double angle, double speed, double torque, std::int64_t n, double sample_time,
-                                 double* slot) const {
+double SpeedEstimate::operator()(double angle, double speed, double torque, double sample_time, double* slot) const {
     double* s = slot + first_;
     if (kind == exact) return speed;
     if (kind == difference) {
-        double& before = s[1 + n % span];
-        s[0] += smoothing * ((angle - before) / (sample_time * span) - s[0]);
-        before = angle;
+        s[0] += smoothing * ((angle - shifted(angle, s + 1, span)) / (sample_time * span) - s[0]);
         return s[0];
     }
     // Of this sample what the last ones predict, corrected for the next.

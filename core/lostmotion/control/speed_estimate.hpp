@@ -17,9 +17,8 @@ struct SpeedEstimate {
     void place(Slots& slots) { first_ = slots.take(kind == observer ? 2 : 1 + span); }
     // At rest at an angle.
     void start(double angle, double speed, double sample_time, double* slot) const;
-    // angle [rad], speed [rad/s] as it is, torque [N m] that the controller takes to act, of sample n.
-    double operator()(double angle, double speed, double torque, std::int64_t n, double sample_time,
-                      double* slot) const;
+    // angle [rad], speed [rad/s] as it is, torque [N m] that the controller takes to act, of a sample.
+    double operator()(double angle, double speed, double torque, double sample_time, double* slot) const;
 
  private:
     int first_ = 0;
