@@ -15,26 +15,8 @@
 #include "lostmotion/analysis/steady_regime.hpp"
 #include "lostmotion/analysis/train_batch.hpp"
 #include "lostmotion/model/train_description.hpp"
-#include "lostmotion/scenario/fields.hpp"
 
 namespace lostmotion::binding {
-
-// Fields of an element, by name.
-class NamedFields {
- public:
-    using Range = lostmotion::Range;
-
-    explicit NamedFields(const nb::dict& values) : values_(values) {}
-    void number(const char* name, double& v, Range = Range::any) { v = nb::cast<double>(values_[name]); }
-    void flag(const char* name, bool& v) { v = nb::cast<bool>(values_[name]); }
-    template <class Curve>
-    void curve(const char* name, Curve& v) {
-        v = nb::cast<Curve>(values_[name]);
-    }
-
- private:
-    const nb::dict& values_;
-};
 
 // As Python describes a train.
 class TrainDescription : public model::TrainDescription {
@@ -152,6 +134,7 @@ class TrainDescription : public model::TrainDescription {
         element.name = name;
         NamedFields named(fields);
         element.describe(named);
+        named.refuse_unknown();
         return element;
     }
     model::LinearController::Signal controller_signal(const ControllerSignal& s) const {

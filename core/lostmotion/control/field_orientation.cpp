@@ -1,11 +1,17 @@
 #include "field_orientation.hpp"
 
+#include "../kernel/powers.hpp"
+
 namespace lostmotion::control {
 
 void FieldOrientation::place(Slots& slots) {
     first_ = slots.take(n_own);
     steepest_ = circle_i_d();
-    for (TickDelay* d : {&delay_d_, &delay_q_, &delay_angle_}) {
+    const double R = winding.resistance;
+    K_d_ = -gain * R / exponential_minus_one(-R * sample_time / winding.inductance_d);
+    K_q_ = -gain * R / exponential_minus_one(-R * sample_time / winding.inductance_q);
+    K_i_ = gain * R;
+    for (SampleDelay* d : {&delay_d_, &delay_q_, &delay_angle_}) {
         *d = delay;
         d->place(slots);
     }
@@ -25,14 +31,14 @@ void FieldOrientation::follow(DirectQuadrature wanted, DirectQuadrature i, const
     double* own = slot + first_;
     const double w_e = winding.pole_pairs * y.speed;
     const double e_d = wanted.d - i.d, e_q = wanted.q - i.q;
-    const double v_d = gain_d * e_d + own[integral_d] - decoupling * w_e * winding.inductance_q * i.q;
-    const double v_q = gain_q * e_q + own[integral_q] + decoupling * w_e * winding.inductance_d * i.d +
+    const double v_d = K_d_ * e_d + own[integral_d] - decoupling * w_e * winding.inductance_q * i.q;
+    const double v_q = K_q_ * e_q + own[integral_q] + decoupling * w_e * winding.inductance_d * i.d +
                        back_emf * w_e * winding.flux_linkage;
     own[wanted_square] = v_d * v_d + v_q * v_q;
     const double share = within_circle(own[wanted_square]);
     own[beyond] = share < 1.0 ? sign_of(e_q) : 0.0;
-    own[integral_d] += integral_gain * (e_d + (share - 1.0) * v_d / gain_d);
-    own[integral_q] += integral_gain * (e_q + (share - 1.0) * v_q / gain_q);
+    own[integral_d] += K_i_ * (e_d + (share - 1.0) * v_d / K_d_);
+    own[integral_q] += K_i_ * (e_q + (share - 1.0) * v_q / K_q_);
     command({share * v_d, share * v_q}, y, slot);
 }
 
@@ -123,7 +129,7 @@ auto FieldOrientation::wanted(double torque, double speed, double* slot) const -
     double* own = slot + first_;
     const double psi = winding.flux_linkage, w_e = winding.pole_pairs * speed;
     const double w_b = std::fmax(std::fabs(w_e), voltage_limit / psi);
-    const double spare = weakening_voltage * weakening_voltage - own[wanted_square];
+    const double u_f = weakening_voltage * voltage_limit, spare = u_f * u_f - own[wanted_square];
     own[weakening] += field_weakening * spare / (2.0 * w_b * w_b * winding.inductance_d * psi);
     double M = torque;
     if (limited) {

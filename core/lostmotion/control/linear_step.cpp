@@ -7,7 +7,7 @@ namespace {
 constexpr double unlimited = std::numeric_limits<double>::infinity();
 
 // The axis without what is not affine, with this loop as its outermost.
-Axis affine(Axis a, Loop outermost) {
+Axis affine(Axis a, Loop outermost, double sample_time) {
     const Axis::Mode mode = outermost == Loop::position ? Axis::position_mode
                             : outermost == Loop::speed  ? Axis::speed_mode
                                                         : Axis::torque_mode;
@@ -16,22 +16,23 @@ Axis affine(Axis a, Loop outermost) {
         a.ratio = 1.0;
     }
     a.mode = mode;
-    a.feedforward.friction_torque = a.feedforward.load_torque = 0.0;
+    a.feedforward.friction_torque = a.feedforward.load_torque = a.feedforward.backlash = 0.0;
     a.reference.sines.clear();
-    a.reference_delay = 0.0;
     a.torque_limit = a.stall_torque = unlimited;
-    a.speed_sensor.encoder.resolution = a.speed_sensor.encoder.error = 0.0;
-    a.position_sensor.encoder.resolution = a.position_sensor.encoder.error = 0.0;
+    for (Encoder* e : {&a.speed_sensor.encoder, &a.position_sensor.encoder}) {
+        e->ideal = true;
+        e->error = 0.0;
+    }
     a.position_loop.speed_limit = a.speed_loop.torque_limit = unlimited;
-    a.position_loop.inner = a.position_loop.outer = 0.0;
-    if (a.current_loop) a.current_loop->limit = unlimited;
+    a.position_loop.dead_zone = {};
+    a.position_loop.reference_delay = 0.0;
+    if (a.current_loop) a.current_loop->command_limit = unlimited;
     a.field_orientation.reset();
     a.camera = {};
     a.inverse_model = {};
     a.load_observer = {};
-    a.backlash = {};
     a.own_law = {};
-    a.place();
+    a.place(sample_time);
     return a;
 }
 
@@ -61,16 +62,16 @@ std::vector<double> derivatives(std::vector<double> x, const Function& f) {
 
 }  // namespace
 
-LinearStep linear_step(const Axis& axis, Loop outermost, bool cut, std::int64_t tick, double tick_length) {
-    Axis a = affine(axis, outermost);
+LinearStep linear_step(const Axis& axis, Loop outermost, bool cut, std::int64_t sample, double sample_time) {
+    Axis a = affine(axis, outermost, sample_time);
     const std::size_t states = static_cast<std::size_t>(a.slots()), inputs = 8, n = states + inputs;
     const auto after = [&](const std::vector<double>& x) {
         std::vector<double> slot(x.begin(), x.begin() + static_cast<long>(states));
         const double* u = x.data() + states;
         const Sampled y{.position_angle = u[0], .speed_angle = u[1], .speed = u[2], .motor_torque = u[3]};
-        a.reference.pieces = {{static_cast<double>(tick) * tick_length, {u[4], u[5], u[6]}}};
+        a.reference.pieces = {{static_cast<double>(sample) * sample_time, {u[4], u[5], u[6]}}};
         a.cut = {cut ? outermost : Loop::none, u[7]};
-        a.step(tick, tick_length, y, slot.data());
+        a.step(sample, sample_time, y, slot.data());
         return slot;
     };
     LinearStep out{n, std::vector<double>(states * n)};
@@ -86,7 +87,7 @@ LinearStep linear_step(const Axis& axis, Loop outermost, bool cut, std::int64_t 
 }
 
 LinearStep linear_orientation(const FieldOrientation& given, const SteadyOrientation& m, CurrentAxis outermost,
-                              bool cut, int every, int since, double tick_length) {
+                              bool cut, int every, int since, double sample_time) {
     FieldOrientation law = given;
     law.limited = false;
     if (m.weakening == 0.0 || outermost != CurrentAxis::none) law.field_weakening = 0.0;
@@ -94,17 +95,17 @@ LinearStep linear_orientation(const FieldOrientation& given, const SteadyOrienta
     law.place(slots);
     const std::size_t states = static_cast<std::size_t>(slots.count());
     const double lag = m.lag / law.winding.pole_pairs;
-    const int last = (law.delay.ticks / every + 1) * every + since;  // all that is delayed is of the steady motion
-    const auto reading = [&](int tick) {
-        const double angle = m.speed * (tick - last) * tick_length;
+    const int last = (law.delay.samples / every + 1) * every + since;  // all that is delayed is of the steady motion
+    const auto reading = [&](int sample) {
+        const double angle = m.speed * (sample - last) * sample_time;
         // The current in coordinates of the rotor is seen as m.current.
         return FieldOrientation::Reading{angle - lag, m.speed, angle, FieldOrientation::turned(m.current, -m.lag)};
     };
     std::vector<double> x(states);
     law.settle(m.torque, m.weakening, m.voltage, reading(0), x.data());
-    for (int tick = 0; tick < last; ++tick) {
-        const FieldOrientation::Reading y = reading(tick);
-        if (tick % every == 0) law.command(m.voltage, y, x.data());
+    for (int sample = 0; sample < last; ++sample) {
+        const FieldOrientation::Reading y = reading(sample);
+        if (sample % every == 0) law.command(m.voltage, y, x.data());
         law.act(x.data());
     }
     const bool direct = outermost == CurrentAxis::direct;

@@ -23,7 +23,7 @@ struct LinearStep {
 // [N m]; value, rate and acceleration of the reference; and, where the loop is cut, its measured value. Outputs: the
 // slots. The outermost loop is the one given: the reference is that of this loop, of the motor where it is none of the
 // axis itself, and nothing is fed forward then. Without its field orientation, whose torque_reference it gives.
-LinearStep linear_step(const Axis& axis, Loop outermost, bool cut, std::int64_t tick, double tick_length);
+LinearStep linear_step(const Axis& axis, Loop outermost, bool cut, std::int64_t sample, double sample_time);
 
 // A motion of constant speed in which currents and voltages repeat from sample to sample of the currents.
 struct SteadyOrientation {
@@ -38,10 +38,10 @@ struct SteadyOrientation {
 // Of the currents, which component is looked at: its reference is an input then. Else the torque is.
 enum class CurrentAxis { none, direct, quadrature };
 
-// `since`: ticks since the last sample of the currents, `every` ticks apart. Inputs: torque that is asked for, speed,
-// angle and true angle of the rotor, its currents; reference and, where it is cut, measured value of the current looked
-// at. Outputs: the slots, the voltage u_d and u_q that acts, and both currents as they are measured.
+// `since`: samples since the last sample of the currents, `every` samples apart. Inputs: torque that is asked for,
+// speed, angle and true angle of the rotor, its currents; reference and, where it is cut, measured value of the current
+// looked at. Outputs: the slots, the voltage u_d and u_q that acts, and both currents as they are measured.
 LinearStep linear_orientation(const FieldOrientation& law, const SteadyOrientation& motion, CurrentAxis outermost,
-                              bool cut, int every, int since, double tick_length);
+                              bool cut, int every, int since, double sample_time);
 
 }  // namespace lostmotion::control

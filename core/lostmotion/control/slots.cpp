@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "../kernel/powers.hpp"
+
 namespace lostmotion::control {
 
 int Slots::take(int count) {
@@ -10,8 +12,12 @@ int Slots::take(int count) {
     return first;
 }
 
-double TickDelay::operator()(double in, double* slot) const {
-    return ticks == 0 ? in : shifted(in, slot + first, ticks);
+double SampleDelay::operator()(double in, double* slot) const {
+    return samples == 0 ? in : shifted(in, slot + first, samples);
+}
+
+double share_of(double sample_time, double time) {
+    return time > 0.0 ? -exponential_minus_one(-sample_time / time) : 1.0;
 }
 
 double shifted(double in, double* kept, int count) {

@@ -156,10 +156,9 @@ class Regime:
         block = np.zeros((n + 1, n + 1))
         block[:n, :n], block[:n, n] = model.A, model.B[:, model.inputs.index(f"{axis.motor}_command")]
         over_tick = expm(block * axis.controller.sample_time)[:n]
-        winding, orientation = None, axis.law[0].field_orientation
-        if orientation is not None:
-            motor = axis.scenario.motors[axis.motor]
-            winding = OrientedWinding.of(motor, axis.motor, axis.controller, orientation, model)
+        winding, law = None, axis.law[0]
+        if law.is_oriented:
+            winding = OrientedWinding.of(axis.scenario.motors[axis.motor], axis.motor, axis.controller, law, model)
         return cls(name, meaning, model, over_tick, winding)
 
 

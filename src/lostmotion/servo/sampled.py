@@ -81,7 +81,7 @@ class SampledLoop:
     @cached_property
     def ticks(self) -> list[tuple[np.ndarray, np.ndarray, dict[str, Row]]]:
         """Of each tick of one sample time: state to state, inputs to state, and the signals."""
-        first = self.axis.law[0].position_schedule.phase if self.loop == "position" else 0
+        first = self.axis.law[0].position_phase if self.loop == "position" else 0
         ticks = [self._tick(first + k) for k in range(self.every(self.loop))]
         # What neither the plant nor an input reaches stays as it is, such as the integrators of the loops left open.
         reached = np.arange(len(ticks[0][0])) < self._plant_states

@@ -56,8 +56,8 @@ class Steady:
 class OrientedWinding:
     """Winding and inverter of an axis in one regime, about its steady motion."""
 
-    law: _core.FieldOrientation
-    """the controller of the currents as the solver has it"""
+    law: _core.Axis
+    """the controller as the solver has it"""
     phase: PhaseValues
     loop: FieldOriented
     tick: float
@@ -83,9 +83,7 @@ class OrientedWinding:
     """the speed of the rotor over the plant's states"""
 
     @classmethod
-    def of(
-        cls, motor: ShaftMotor, name: str, c: Controller, law: _core.FieldOrientation, model: LinearModel
-    ) -> OrientedWinding:
+    def of(cls, motor: ShaftMotor, name: str, c: Controller, law: _core.Axis, model: LinearModel) -> OrientedWinding:
         """In the regime of a linear model, at the speed of its point.
 
         Parameters
