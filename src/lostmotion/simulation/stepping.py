@@ -330,8 +330,7 @@ class Simulation:
         elif self._controllers:
             raise InputError("command: the controller of the scenario turns the motor; leave it out")
         if inputs or command is _GIVE:
-            problem = "missing a required argument: 'command'"
-            raise misfit("Simulation.advance", ("interval", "command", "load_torque"), inputs, problem)
+            raise misfit("Simulation.advance", ("interval", "command", "load_torque"), inputs, lacking="command")
         c0, c1 = _ramp("command", command, "")
         m0, m1 = _ramp("load_torque", load_torque, "N*m")
         self._step(interval, c0, c1, m0, m1)
