@@ -1,8 +1,6 @@
 // A servo cascade on the paper's drive: current and speed loop every 125 us, position loop every 1 ms.
 #pragma once
 
-#include <cmath>
-
 #include "lostmotion/simulation/closed_loop.hpp"
 #include "paper_run.hpp"
 
@@ -16,19 +14,18 @@ inline Control cascade(const test::Drive& drive, double resolution, double ampli
     control::Axis& a = axis.law;
     a.mode = control::Axis::position_mode;
     a.ratio = drive.gearbox.ratio;
-    a.delay.ticks = 1;
+    a.delay.samples = 1;
     a.speed_sensor.encoder.resolution = resolution;
     a.position_schedule.every = 8;
     a.position_loop.gain = 10.0;
-    a.position_loop.speed_feedforward = 1.0;
-    a.speed_loop.gain = a.speed_loop.reference_gain = 8.29e-3;
+    a.position_loop.feedforward = 1.0;
+    a.speed_loop.gain = 8.29e-3;
     a.speed_loop.integral_gain = 0.1266;
     a.speed_loop.torque_limit = 1.5;
-    const double k_N = drive.motor.armature_voltage_constant, tau = drive.motor.electrical_time_constant;
     control::CurrentLoop& loop = a.current_loop.emplace();
-    loop.gain = 1.0 / 3.0 / (k_N * (1.0 - std::exp(-c.tick / tau)));
-    loop.integral_gain = 1.0 / 3.0 / k_N;
-    loop.back_emf = (k_N - 1.0) / (k_N * drive.motor.rated_speed);
+    loop.armature_voltage_constant = drive.motor.armature_voltage_constant;
+    loop.electrical_time_constant = drive.motor.electrical_time_constant;
+    loop.rated_speed = drive.motor.rated_speed;
     loop.rated_torque = drive.motor.rated_torque;
     a.reference.sines.push_back({amplitude, 1.0, 0.0});
     c.axes.push_back(axis);

@@ -14,8 +14,7 @@ from report import Report, best
 
 import lostmotion as lm
 from lostmotion import _core
-from lostmotion.simulation.run import core_inputs
-from lostmotion.simulation.variables import CHANNEL_NAMES
+from lostmotion.simulation.core_runs import core_case
 
 CORES = os.cpu_count() or 1
 PLANE = {
@@ -121,7 +120,7 @@ def batches(report: Report, scenario: lm.Scenario) -> None:
     short = scenario.replace(**{"simulation.duration": 1.0})
     plane = short.replace(**{f"gearbox.losses.{k}": v for k, v in PLANE.items()})
     fields = [_core.batch_fields().index(key) for key in ("command.amplitude", "load.inertia", "motor.friction_torque")]
-    channels = [CHANNEL_NAMES.index(name) for name in ("load_speed", "twist")]
+    channels = ("load_speed", "twist")
 
     def rate(s: lm.Scenario, runs: int, threads: int, *, drive: bool) -> float:
         share = np.arange(runs) / runs
@@ -130,8 +129,7 @@ def batches(report: Report, scenario: lm.Scenario) -> None:
         chosen = np.ascontiguousarray(values[:, :used])
 
         def work() -> None:
-            inputs = core_inputs(s)
-            _core.run_batch(*inputs, fields[:used], chosen, 1.0, 1e-3, 1001, False, channels, [], threads)
+            _core.run_batch([core_case(s)], fields[:used], chosen, 1.0, 1e-3, 1001, (), channels, [], threads)
 
         return runs / (1e-3 * best(7 if runs < 5000 else 3, work))
 

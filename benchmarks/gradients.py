@@ -6,12 +6,12 @@ import time
 from typing import Any
 
 import numpy as np
-from lostmotion.simulation.core_runs import core_case
 from report import Report, best
 
 import lostmotion as lm
 from lostmotion import _core
 from lostmotion.control.axis import Bound
+from lostmotion.simulation.core_runs import core_case
 from lostmotion.simulation.sensitivities import (
     core_variation,
     neighbours,

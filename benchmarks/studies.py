@@ -16,8 +16,7 @@ from report import Report, best
 
 import lostmotion as lm
 from lostmotion import _core
-from lostmotion.simulation.run import core_inputs
-from lostmotion.simulation.variables import CHANNEL_NAMES
+from lostmotion.simulation.core_runs import core_case
 from lostmotion.studies.design import CHUNK
 from lostmotion.studies.file import to_json
 
@@ -42,14 +41,14 @@ def make(scenario: lm.Scenario, vary: list[dict[str, object]], runs: int) -> lm.
 def core_alone(study: lm.Study, threads: int) -> float:
     """Processor time of the calls into the core alone [s]."""
     fields = [_core.batch_fields().index(v.key) for v in study.vary]
-    channels = [CHANNEL_NAMES.index(name) for name in ("load_speed", "twist")]
-    table, inputs = study.scenario.simulation, core_inputs(study.scenario)
+    channels = ("load_speed", "twist")
+    table, case = study.scenario.simulation, core_case(study.scenario)
     chunks = [study.parameters(k, k + CHUNK) for k in range(0, study.total, CHUNK)]
 
     def work() -> None:
         for values in chunks:
             grid = (table.duration, table.sample_interval, table.samples)
-            _core.run_batch(*inputs, fields, np.ascontiguousarray(values), *grid, False, channels, KEPT, threads)
+            _core.run_batch([case], fields, np.ascontiguousarray(values), *grid, (), channels, KEPT, threads)
 
     return 1e-3 * best(3, work, time.process_time)
 

@@ -9,7 +9,9 @@
 #include <tuple>
 #include <vector>
 
-#include "arrays.hpp"
+#include "fields.hpp"
+#include "lostmotion/control/linear_step.hpp"
+#include "lostmotion/scenario/control_fields.hpp"
 #include "lostmotion/simulation/train_control.hpp"
 
 namespace lostmotion::binding {
@@ -78,6 +80,11 @@ struct [[gnu::visibility("hidden")]] BoundAxis : control::Axis {
         own_law.data = reinterpret_cast<void*>(data);
         own_law.states = states;
     }
+    void set(const nb::dict& fields) {
+        NamedFields f(fields);
+        control::describe(f, static_cast<control::Axis&>(*this));
+        f.refuse_unknown();
+    }
     void raise_again() const {
         if (python_law) python_law->raise_again();
     }
@@ -85,8 +92,8 @@ struct [[gnu::visibility("hidden")]] BoundAxis : control::Axis {
                        const std::vector<std::array<double, 3>>& sines) {
         reference = {};
         reference.pieces.clear();
-        for (const auto& [time, value, rate, second, third] : pieces)
-            reference.pieces.push_back({time, {value, rate, second, third}});
+        for (const auto& [time, value, rate, acceleration, jerk] : pieces)
+            reference.pieces.push_back({time, {value, rate, acceleration, jerk}});
         for (const auto& [amplitude, frequency, phase] : sines)
             reference.sines.push_back({amplitude, frequency, phase});
     }
@@ -120,6 +127,54 @@ std::unique_ptr<double[]> control_room(Options& options) {
     return room;
 }
 
+inline Array as_array(const control::LinearStep& step) {
+    auto data = std::make_unique_for_overwrite<double[]>(step.rows.size());
+    std::copy(step.rows.begin(), step.rows.end(), data.get());
+    return as_array(std::move(data), {step.rows.size() / step.columns, step.columns});
+}
+
+inline void bind_linear_steps(nb::module_& m) {
+    using namespace control;
+    nb::enum_<Loop>(m, "Loop")
+        .value("current", Loop::current)
+        .value("speed", Loop::speed)
+        .value("position", Loop::position);
+    nb::enum_<CurrentAxis>(m, "CurrentAxis")
+        .value("none", CurrentAxis::none)
+        .value("direct", CurrentAxis::direct)
+        .value("quadrature", CurrentAxis::quadrature);
+    m.def(
+        "linear_step",
+        [](const BoundAxis& axis, Loop outermost, bool cut, std::int64_t sample, double sample_time) {
+            return as_array(linear_step(axis, outermost, cut, sample, sample_time));
+        },
+        "axis"_a, "outermost"_a, "cut"_a, "sample"_a, "sample_time"_a,
+        nb::sig("def linear_step(axis: Axis, outermost: Loop, cut: bool, sample: int, sample_time: float) -> "
+                "numpy.typing.NDArray[numpy.float64]"),
+        "Slots after a sample step, over the slots before it and (angle of the position's encoder, angle and speed of "
+        "the speed's, torque of the motor, value, rate and acceleration of the reference, measured value of a loop "
+        "that is cut).");
+    m.def(
+        "linear_orientation",
+        [](const BoundAxis& axis, double speed, double lag, double torque, double weakening,
+           std::pair<double, double> current, std::pair<double, double> voltage, CurrentAxis outermost, bool cut,
+           int every, int since, double sample_time) {
+            const SteadyOrientation motion{
+                speed, lag, torque, weakening, {current.first, current.second}, {voltage.first, voltage.second}};
+            return as_array(
+                linear_orientation(axis.field_orientation.value(), motion, outermost, cut, every, since, sample_time));
+        },
+        "axis"_a, "speed"_a, "lag"_a, "torque"_a, "weakening"_a, "current"_a, "voltage"_a, "outermost"_a, "cut"_a,
+        "every"_a, "since"_a, "sample_time"_a,
+        nb::sig("def linear_orientation(axis: Axis, speed: float, lag: float, torque: float, weakening: "
+                "float, current: tuple[float, float], voltage: tuple[float, float], outermost: CurrentAxis, cut: bool, "
+                "every: int, since: int, sample_time: float) -> numpy.typing.NDArray[numpy.float64]"),
+        "Slots of the field orientation after a sample step, the voltage (u_d, u_q) that acts and the measured "
+        "currents, over "
+        "the slots before it and (torque that is asked for; speed, angle as it is read and angle of the rotor; i_d, "
+        "i_q; reference and measured value of the current that is looked at).");
+}
+
 template <class Names>
 std::vector<std::tuple<std::string, std::string, std::string>> signal_names(const Names& names) {
     std::vector<std::tuple<std::string, std::string, std::string>> out;
@@ -127,217 +182,85 @@ std::vector<std::tuple<std::string, std::string, std::string>> signal_names(cons
     return out;
 }
 
-inline void bind_inverse_model(nb::module_& m) {
-    using namespace control;
-    nb::class_<GearLosses> losses(m, "GearLosses");
-    nb::enum_<GearLosses::Kind>(losses, "Kind")
-        .value("none", GearLosses::none)
-        .value("efficiency", GearLosses::constant_efficiency)
-        .value("map", GearLosses::loss_map);
-    losses.def(nb::init<>())
-        .def_rw("kind", &GearLosses::kind)
-        .def_rw("ratio", &GearLosses::ratio)
-        .def_rw("efficiency", &GearLosses::efficiency)
-        .def_rw("map", &GearLosses::map)
-        .def_rw("rated_torque", &GearLosses::rated_torque)
-        .def_rw("rated_speed", &GearLosses::rated_speed)
-        .def("__call__", &GearLosses::operator(), "output_torque"_a, "direction"_a, "speed"_a)
-        .def("output_torque", &GearLosses::output_torque, "input_torque"_a, "direction"_a, "speed"_a, "factor"_a);
-    nb::class_<Adaptation>(m, "Adaptation")
-        .def(nb::init<>())
-        .def_rw("rate", &Adaptation::rate)
-        .def_rw("min", &Adaptation::min)
-        .def_rw("max", &Adaptation::max);
-    nb::class_<InverseModel>(m, "InverseModel")
-        .def(nb::init<>())
-        .def_rw("present", &InverseModel::present)
-        .def_rw("motor_inertia", &InverseModel::motor_inertia)
-        .def_rw("motor_viscous_friction", &InverseModel::motor_viscous_friction)
-        .def_rw("load_inertia", &InverseModel::load_inertia)
-        .def_rw("load_viscous_friction", &InverseModel::load_viscous_friction)
-        .def_rw("load_torque", &InverseModel::load_torque)
-        .def_rw("losses", &InverseModel::losses)
-        .def_rw("loss_factor", &InverseModel::loss_factor)
-        .def_rw("friction_torque", &InverseModel::friction_torque)
-        .def_rw("of_losses", &InverseModel::of_losses)
-        .def_rw("of_friction", &InverseModel::of_friction)
-        .def_rw("min_speed", &InverseModel::min_speed)
-        .def_rw("through_gear", &InverseModel::through_gear)
-        .def_rw("curve", &InverseModel::curve)
-        .def_rw("twist_rate", &InverseModel::twist_rate);
-    nb::class_<LoadObserver>(m, "LoadObserver")
-        .def(nb::init<>())
-        .def_rw("present", &LoadObserver::present)
-        .def_rw("input_time", &LoadObserver::input_time)
-        .def_rw("load_time", &LoadObserver::load_time)
-        .def_rw("input_share", &LoadObserver::input_share)
-        .def_rw("load_share", &LoadObserver::load_share)
-        .def_rw("bandwidth", &LoadObserver::bandwidth);
-}
-
 inline void bind_control(nb::module_& m) {
     using namespace control;
-    nb::class_<TickDelay>(m, "TickDelay").def(nb::init<>()).def_rw("ticks", &TickDelay::ticks);
-    nb::class_<Schedule>(m, "Schedule")
-        .def(nb::init<>())
-        .def_rw("every", &Schedule::every)
-        .def_rw("phase", &Schedule::phase);
-    nb::class_<Encoder>(m, "Encoder")
-        .def(nb::init<>())
-        .def_rw("resolution", &Encoder::resolution)
-        .def_rw("error", &Encoder::error)
-        .def_rw("periods", &Encoder::periods)
-        .def_rw("phase", &Encoder::phase)
-        .def_rw("delay", &Encoder::delay);
-    nb::class_<Sensor>(m, "Sensor")
-        .def(nb::init<>())
-        .def_rw("encoder", &Sensor::encoder)
-        .def_rw("scale", &Sensor::scale);
-    nb::class_<SpeedEstimate> estimate(m, "SpeedEstimate");
-    nb::enum_<SpeedEstimate::Kind>(estimate, "Kind")
-        .value("exact", SpeedEstimate::exact)
-        .value("difference", SpeedEstimate::difference)
-        .value("observer", SpeedEstimate::observer);
-    estimate.def(nb::init<>())
-        .def_rw("kind", &SpeedEstimate::kind)
-        .def_rw("span", &SpeedEstimate::span)
-        .def_rw("smoothing", &SpeedEstimate::smoothing)
-        .def_rw("bandwidth", &SpeedEstimate::bandwidth)
-        .def_rw("damping", &SpeedEstimate::damping)
-        .def_rw("inertia", &SpeedEstimate::inertia);
-    nb::class_<PositionLoop>(m, "PositionLoop")
-        .def(nb::init<>())
-        .def_rw("gain", &PositionLoop::gain)
-        .def_rw("integral_gain", &PositionLoop::integral_gain)
-        .def_rw("speed_feedforward", &PositionLoop::speed_feedforward)
-        .def_rw("speed_limit", &PositionLoop::speed_limit)
-        .def_rw("inner", &PositionLoop::inner)
-        .def_rw("outer", &PositionLoop::outer);
-    nb::class_<SpeedLoop>(m, "SpeedLoop")
-        .def(nb::init<>())
-        .def_rw("gain", &SpeedLoop::gain)
-        .def_rw("reference_gain", &SpeedLoop::reference_gain)
-        .def_rw("integral_gain", &SpeedLoop::integral_gain)
-        .def_rw("torque_limit", &SpeedLoop::torque_limit);
-    nb::class_<CurrentLoop>(m, "CurrentLoop")
-        .def(nb::init<>())
-        .def_rw("gain", &CurrentLoop::gain)
-        .def_rw("integral_gain", &CurrentLoop::integral_gain)
-        .def_rw("back_emf", &CurrentLoop::back_emf)
-        .def_rw("rated_torque", &CurrentLoop::rated_torque)
-        .def_rw("limit", &CurrentLoop::limit);
-    nb::class_<FieldOrientation>(m, "FieldOrientation")
-        .def(nb::init<>())
-        .def_prop_rw(
-            "winding",
-            [](const FieldOrientation& f) {
-                const SynchronousWinding& w = f.winding;
-                return std::array{w.pole_pairs, w.resistance, w.inductance_d, w.inductance_q, w.flux_linkage};
-            },
-            [](FieldOrientation& f, const std::array<double, 5>& w) { f.winding = {w[0], w[1], w[2], w[3], w[4]}; })
-        .def_rw("gain_d", &FieldOrientation::gain_d)
-        .def_rw("gain_q", &FieldOrientation::gain_q)
-        .def_rw("integral_gain", &FieldOrientation::integral_gain)
-        .def_rw("back_emf", &FieldOrientation::back_emf)
-        .def_rw("decoupling", &FieldOrientation::decoupling)
-        .def_rw("field_weakening", &FieldOrientation::field_weakening)
-        .def_rw("weakening_voltage", &FieldOrientation::weakening_voltage)
-        .def_rw("voltage_limit", &FieldOrientation::voltage_limit)
-        .def_rw("current_limit", &FieldOrientation::current_limit)
-        .def_rw("sample_time", &FieldOrientation::sample_time)
-        .def_rw("delay_time", &FieldOrientation::delay_time)
-        .def_rw("delay", &FieldOrientation::delay)
-        .def_rw("parts", &FieldOrientation::parts);
-    nb::class_<TorqueFeedforward>(m, "TorqueFeedforward")
-        .def(nb::init<>())
-        .def_rw("inertia", &TorqueFeedforward::inertia)
-        .def_rw("viscous_friction", &TorqueFeedforward::viscous_friction)
-        .def_rw("friction_torque", &TorqueFeedforward::friction_torque)
-        .def_rw("load_torque", &TorqueFeedforward::load_torque);
-    nb::class_<BacklashCompensation>(m, "BacklashCompensation")
-        .def(nb::init<>())
-        .def_rw("backlash", &BacklashCompensation::backlash)
-        .def_rw("rate", &BacklashCompensation::rate);
-    bind_inverse_model(m);
-    nb::class_<Camera>(m, "Camera")
-        .def(nb::init<>())
-        .def_rw("present", &Camera::present)
-        .def_rw("every", &Camera::every)
-        .def_rw("latency", &Camera::latency)
-        .def_rw("step", &Camera::step)
-        .def_rw("noise", &Camera::noise)
-        .def_rw("half_field", &Camera::half_field)
-        .def_rw("seed", &Camera::seed)
-        .def_rw("stream", &Camera::stream);
-    nb::class_<Tracker>(m, "Tracker")
-        .def(nb::init<>())
-        .def_rw("alpha", &Tracker::alpha)
-        .def_rw("beta", &Tracker::beta)
-        .def_rw("gamma", &Tracker::gamma)
-        .def_rw("frame_time", &Tracker::frame_time)
-        .def_rw("predicts", &Tracker::predicts);
-    nb::class_<DiscreteSystem>(m, "DiscreteSystem")
+    m.def(
+        "control_tables",
+        [] {
+            nb::dict tables;
+            control::each_table([&](const char* name, auto&& describe_table) {
+                DescribedFields f;
+                describe_table(f);
+                tables[name] = f.rows;
+            });
+            return tables;
+        },
+        nb::sig("def control_tables() -> dict[str, list[tuple[str, str, str, str, str, tuple[float | None, float | "
+                "None, float | None], bool, typing.Any]]]"),
+        "Of each table of controllers its parameters: key, kind, symbol, unit, meaning, range (above, from on, up to), "
+        "whether it is needed, default.");
+    m.def(
+        "encoder_step",
+        [](const nb::dict& fields) {
+            Encoder e;
+            NamedFields f(fields);
+            e.describe(f);
+            return e.step();
+        },
+        "fields"_a, nb::sig("def encoder_step(fields: dict[str, typing.Any]) -> float"));
+    m.def(
+        "tracker_gains",
+        [](const nb::dict& fields) {
+            Tracker t;
+            NamedFields f(fields);
+            t.describe(f);
+            Slots slots;
+            t.place(slots);
+            return std::tuple(t.alpha, t.beta, t.gamma);
+        },
+        "fields"_a, nb::sig("def tracker_gains(fields: dict[str, typing.Any]) -> tuple[float, float, float]"));
+    m.attr("MAX_FILTER_ORDER") = DiscreteSystem::max_order;
+    nb::class_<GearLosses>(m, "GearLosses")
         .def(
             "__init__",
-            [](DiscreteSystem* self, const std::vector<double>& A, const std::vector<double>& B,
-               const std::vector<double>& C, double D) {
-                new (self) DiscreteSystem();
-                self->A = A;
-                self->B = B;
-                self->C = C;
-                self->D = D;
+            [](GearLosses* self, const nb::dict& fields) {
+                new (self) GearLosses();
+                NamedFields f(fields);
+                control::describe(f, *self);
             },
-            "A"_a, "B"_a, "C"_a, "D"_a)
-        .def_ro_static("max_order", &DiscreteSystem::max_order);
-
+            "fields"_a, nb::sig("def __init__(self, fields: dict[str, typing.Any]) -> None"))
+        .def("__call__", &GearLosses::operator(), "output_torque"_a, "direction"_a, "speed"_a)
+        .def("output_torque", &GearLosses::output_torque, "input_torque"_a, "direction"_a, "speed"_a, "factor"_a);
     nb::class_<BoundAxis> axis(m, "Axis");
-    nb::enum_<Axis::Mode>(axis, "Mode")
-        .value("torque", Axis::torque_mode)
-        .value("speed", Axis::speed_mode)
-        .value("position", Axis::position_mode);
     axis.def(nb::init<>())
-        .def_rw("mode", &BoundAxis::mode)
+        .def("set", &BoundAxis::set, "fields"_a, nb::sig("def set(self, fields: dict[str, typing.Any]) -> None"),
+             "Parameters by the keys of scenario files, tables as dicts; what is left out stays as it is.")
         .def(
             "slots",
             [](const BoundAxis& a) {
                 control::Axis placed = a;
-                placed.place();
+                placed.place(1.0);
                 return std::pair(placed.slots(), placed.running_slots());
             },
             "How many numbers it remembers, and which of them go on with time.")
-        .def_rw("camera", &BoundAxis::camera)
-        .def_rw("tracker", &BoundAxis::tracker)
-        .def_rw("reference_delay", &BoundAxis::reference_delay)
-        .def_rw("ratio", &BoundAxis::ratio)
-        .def_rw("rated_torque", &BoundAxis::rated_torque)
-        .def_rw("torque_limit", &BoundAxis::torque_limit)
-        .def_rw("stall_torque", &BoundAxis::stall_torque)
-        .def_rw("torque_droop", &BoundAxis::torque_droop)
-        .def_rw("delay", &BoundAxis::delay)
-        .def_rw("speed_sensor", &BoundAxis::speed_sensor)
-        .def_rw("position_sensor", &BoundAxis::position_sensor)
-        .def_rw("two_encoders", &BoundAxis::two_encoders)
-        .def_rw("position_share", &BoundAxis::position_share)
-        .def_rw("estimate", &BoundAxis::estimate)
-        .def_rw("position_schedule", &BoundAxis::position_schedule)
-        .def_rw("speed_schedule", &BoundAxis::speed_schedule)
-        .def_rw("current_schedule", &BoundAxis::current_schedule)
-        .def_rw("position_loop", &BoundAxis::position_loop)
-        .def_rw("speed_loop", &BoundAxis::speed_loop)
-        .def_rw("current_loop", &BoundAxis::current_loop)
-        .def_rw("field_orientation", &BoundAxis::field_orientation)
-        .def_rw("commutates_by_encoder", &BoundAxis::commutates_by_encoder)
-        .def_rw("feedforward", &BoundAxis::feedforward)
-        .def_rw("inverse_model", &BoundAxis::inverse_model)
-        .def_rw("load_observer", &BoundAxis::load_observer)
-        .def_rw("backlash", &BoundAxis::backlash)
-        .def_rw("speed_filters", &BoundAxis::speed_filters)
-        .def_rw("torque_filters", &BoundAxis::torque_filters)
+        .def_prop_ro("position_phase", [](const BoundAxis& a) { return a.position_schedule.phase; })
+        .def_prop_ro("commutates_by_encoder", [](const BoundAxis& a) { return a.commutates_by_encoder; })
+        .def_prop_ro("is_oriented", [](const BoundAxis& a) { return a.field_orientation.has_value(); })
+        .def(
+            "least_current",
+            [](const BoundAxis& a, double torque) {
+                const DirectQuadrature i = a.field_orientation.value().least_current(torque);
+                return std::pair(i.d, i.q);
+            },
+            "torque"_a, "(i_d, i_q) [A] of the least current for a torque [N m], under field-oriented control.")
         .def("set_reference", &BoundAxis::set_reference, "pieces"_a, "sines"_a)
         .def("raise_again", &BoundAxis::raise_again)
         .def("set_python_law", &BoundAxis::set_python_law, "function"_a, "states"_a,
              nb::sig("def set_python_law(self, function: collections.abc.Callable[..., float], states: int) -> None"))
         .def("set_compiled_law", &BoundAxis::set_compiled_law, "function"_a, "data"_a, "states"_a);
+    bind_linear_steps(m);
+    m.attr("COMMAND_SLOT") = Axis::command_slot();
+    m.attr("SPEED_ANGLE_SLOT") = Axis::speed_angle_slot();
     m.def(
         "axis_signals", [] { return signal_names(axis_signal_names); },
         nb::sig("def axis_signals() -> list[tuple[str, str, str]]"), "Name, unit, meaning of what each axis shows.");

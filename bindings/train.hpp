@@ -18,7 +18,6 @@
 #include "lostmotion/analysis/steady_regime.hpp"
 #include "lostmotion/analysis/train_batch.hpp"
 #include "lostmotion/model/train_description.hpp"
-#include "lostmotion/scenario/fields.hpp"
 
 namespace lostmotion::binding {
 
@@ -32,23 +31,6 @@ inline model::Train with_parameters(const std::map<std::string, double>& values)
     }
     return t;
 }
-
-// Fields of an element, by name.
-class NamedFields {
- public:
-    using Range = lostmotion::Range;
-
-    explicit NamedFields(const nb::dict& values) : values_(values) {}
-    void number(const char* name, double& v, Range = Range::any) { v = nb::cast<double>(values_[name]); }
-    void flag(const char* name, bool& v) { v = nb::cast<bool>(values_[name]); }
-    template <class Curve>
-    void curve(const char* name, Curve& v) {
-        v = nb::cast<Curve>(values_[name]);
-    }
-
- private:
-    const nb::dict& values_;
-};
 
 // Name, symbol, unit, meaning.
 using ChannelRow = std::tuple<std::string, std::string, std::string, std::string>;
@@ -235,6 +217,7 @@ class TrainDescription : public model::TrainDescription {
         element.name = name;
         NamedFields named(fields);
         element.describe(named);
+        named.refuse_unknown();
         return element;
     }
     mutable std::shared_ptr<const SharedRun> run_;

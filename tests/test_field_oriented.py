@@ -161,10 +161,7 @@ def test_the_bound_holds_against_the_full_equations(part: int) -> None:
 def in_parts(one: lm.Scenario, parts: int) -> Any:
     """The run with so many exchanges of torque and speed in a tick."""
     tick, axes = one.control()
-    orientation = axes[0][0].field_orientation
-    assert orientation is not None
-    orientation.parts = parts
-    axes[0][0].field_orientation = orientation
+    axes[0][0].set({"field_orientation": {"parts": parts}})
     table = one.simulation
     return whole_run(one, (table.duration, table.sample_interval, table.samples, False, 0.0, 0), "", (tick, axes))
 

@@ -63,9 +63,8 @@ def test_a_wrong_map_is_still_better_than_none(factor: float) -> None:
 def test_losses_are_those_of_the_map_and_their_inverse_returns_the_load() -> None:
     gearbox = AXIS.gearbox
     table = gearbox.losses.core()
-    losses = _core.GearLosses()
-    losses.kind, losses.map, losses.ratio = _core.GearLosses.Kind.map, table, gearbox.ratio
-    losses.rated_torque, losses.rated_speed = gearbox.rated_output_torque, gearbox.rated_input_speed
+    rated = {"rated_torque": gearbox.rated_output_torque, "rated_speed": gearbox.rated_input_speed}
+    losses = _core.GearLosses({"kind": "loss_map", "map": table, "ratio": gearbox.ratio, **rated})
     random = np.random.default_rng(5)
     for _ in range(2000):
         T_2, w, s = random.uniform(-80.0, 80.0), random.uniform(0.0, 400.0), random.choice((-1.0, 1.0))
@@ -214,7 +213,7 @@ def test_a_gap_needs_a_rate_and_a_train_one_gear() -> None:
     motor = next(iter(train.motors))
     shaft = list(train.shafts)[-1]
     with pytest.raises(lm.InputError, match="takes one gear"):
-        lm.InverseModel().core(train.train(), motor, shaft, on_motor=True)
+        lm.InverseModel().solver_fields(train.train(), motor, shaft, on_motor=True)
 
 
 def test_both_feedforwards_are_refused() -> None:

@@ -104,19 +104,19 @@ inline std::vector<Knob> knobs(const RandomCase& c) {
         };
         using control::Axis;
         of_axis("speed_gain", [](Axis& x) -> double& { return x.speed_loop.gain; });
-        of_axis("speed_reference_gain", [](Axis& x) -> double& { return x.speed_loop.reference_gain; });
+        of_axis("reference_weight", [](Axis& x) -> double& { return x.speed_loop.reference_weight; });
         of_axis("speed_integral_gain", [](Axis& x) -> double& { return x.speed_loop.integral_gain; });
         of_axis("speed_torque_limit", [](Axis& x) -> double& { return x.speed_loop.torque_limit; });
         of_axis("position_gain", [](Axis& x) -> double& { return x.position_loop.gain; });
-        of_axis("speed_feedforward", [](Axis& x) -> double& { return x.position_loop.speed_feedforward; });
+        of_axis("speed_feedforward", [](Axis& x) -> double& { return x.position_loop.feedforward; });
         of_axis("inertia_feedforward", [](Axis& x) -> double& { return x.feedforward.inertia; });
-        of_axis("smoothing", [](Axis& x) -> double& { return x.estimate.smoothing; });
+        of_axis("time_constant", [](Axis& x) -> double& { return x.estimate.time_constant; });
         of_axis("observer_bandwidth", [](Axis& x) -> double& { return x.estimate.bandwidth; });
         of_axis("reference_amplitude", [](Axis& x) -> double& { return x.reference.sines[0].amplitude; });
         of_axis("reference_frequency", [](Axis& x) -> double& { return x.reference.sines[0].frequency; });
         if (c.control.axes[a].law.current_loop) {
             of_axis("current_gain", [](Axis& x) -> double& { return x.current_loop->gain; });
-            of_axis("current_limit", [](Axis& x) -> double& { return x.current_loop->limit; });
+            of_axis("current_limit", [](Axis& x) -> double& { return x.current_loop->command_limit; });
         }
     }
     for (std::size_t i = 0; i < c.inputs.size(); ++i) {

@@ -47,15 +47,8 @@ inline control::FieldOrientation random_winding(RandomTrains& random, double sam
     f.winding.inductance_d = f.winding.flux_linkage * random.uniform(0.1, 0.4);
     f.winding.inductance_q = f.winding.inductance_d * (random.coin() ? 1.0 : random.uniform(1.0, 2.5));
     f.winding.resistance = f.winding.inductance_d / (sample_time * random.uniform(5.0, 50.0));
-    const auto gain = [&](double L) {
-        return 0.3 * f.winding.resistance / -std::expm1(-f.winding.resistance * sample_time / L);
-    };
-    f.gain_d = gain(f.winding.inductance_d);
-    f.gain_q = gain(f.winding.inductance_q);
-    f.integral_gain = 0.3 * f.winding.resistance;
-    f.field_weakening = 0.02;
+    f.gain = 0.3;
     f.voltage_limit = f.winding.flux_linkage * 0.3 / sample_time;
-    f.weakening_voltage = 0.95 * f.voltage_limit;
     f.sample_time = sample_time;
     f.parts = random.pick(1, 2);
     return f;
@@ -76,32 +69,33 @@ inline Control random_control(RandomTrains& random, const Assembly& a, bool wind
         if (!shaft_angle(a, motor.shaft)) continue;
         Axis& law = axis.law;
         law.mode = static_cast<Axis::Mode>(random.pick(0, 2));
-        law.delay.ticks = random.pick(0, 2);
+        law.delay.samples = random.pick(0, 2);
         law.estimate.kind = static_cast<control::SpeedEstimate::Kind>(random.pick(0, 2));
         law.estimate.span = random.pick(1, 3);
-        law.estimate.smoothing = random.uniform(0.2, 1.0);
-        law.estimate.bandwidth = random.uniform(0.05, 0.3) / c.tick;
+        law.estimate.time_constant = c.tick * random.uniform(0.0, 4.0);
+        law.estimate.bandwidth = random.uniform(0.008, 0.05) / c.tick;
         law.speed_schedule.every = law.current_schedule.every = random.pick(1, 2);
         law.position_schedule = {law.speed_schedule.every * random.pick(1, 4), random.pick(0, 1)};
         const double bandwidth = random.uniform(0.01, 0.05) / (c.tick * law.speed_schedule.every);
         law.speed_loop.gain = bandwidth;
-        law.speed_loop.reference_gain = law.speed_loop.gain * random.uniform(0.3, 1.0);
+        law.speed_loop.reference_weight = random.uniform(0.3, 1.0);
         law.speed_loop.integral_gain = random.coin() ? law.speed_loop.gain * bandwidth * 0.2 : 0.0;
         law.speed_loop.torque_limit = random.uniform(0.5, 3.0);
         law.position_loop.gain = 0.2 * bandwidth;
-        law.position_loop.speed_feedforward = random.uniform(0.0, 1.0);
+        law.position_loop.feedforward = random.uniform(0.0, 1.0);
         law.feedforward.inertia = random.uniform(0.0, 1.0);
         law.rated_torque = motor.law.rated_torque;
         if (motor.law.kind == Motor::dc) {
             control::CurrentLoop& loop = law.current_loop.emplace();
-            loop.gain = 0.3;
-            loop.integral_gain = 0.02;
-            loop.back_emf = 0.05;
-            loop.limit = 2.0;
+            loop.electrical_time_constant = motor.law.electrical_time_constant;
+            loop.armature_voltage_constant = motor.law.armature_voltage_constant;
+            loop.rated_speed = motor.law.rated_speed;
+            loop.rated_torque = motor.law.rated_torque;
+            loop.command_limit = 2.0;
         } else if (windings) {
             law.field_orientation = random_winding(random, c.tick * law.current_schedule.every);
             law.field_orientation->delay = law.delay;
-            law.field_orientation->delay_time = c.tick * law.delay.ticks;
+            law.field_orientation->delay_time = c.tick * law.delay.samples;
         }
         const double amplitude = random.uniform(0.1, 1.0);
         law.reference.sines.push_back({amplitude, random.uniform(0.5, 3.0), random.uniform(0.0, 6.0)});

@@ -27,8 +27,8 @@ Control proportional_speed(double gain, control::SpeedEstimate::Kind kind, int d
     c.tick = T;
     ControlledAxis axis;
     axis.law.estimate.kind = kind;
-    axis.law.speed_loop.gain = axis.law.speed_loop.reference_gain = gain;
-    axis.law.delay.ticks = delay;
+    axis.law.speed_loop.gain = gain;
+    axis.law.delay.samples = delay;
     c.axes.push_back(axis);
     return c;
 }
@@ -96,11 +96,11 @@ TEST_CASE("no integrator of a limited loop runs further into its limit") {
                 std::array<double, 2> current{}, speed{}, position{};
                 control::Slots slots;
                 control::CurrentLoop loop;
-                loop.gain = 1.0 / (6.0 * share);
-                loop.integral_gain = 1.0 / 6.0;
-                loop.back_emf = 0.5;
-                loop.limit = 1.0;
-                loop.place(slots);
+                loop.gain = 1.0 / 3.0;  // K = 1/(6 share), K (1 - a) = 1/6, K_e = 0.5
+                loop.armature_voltage_constant = 2.0;
+                loop.electrical_time_constant = -1.0 / std::log1p(-share);
+                loop.command_limit = 1.0;
+                loop.place(slots, 1.0);
                 // The current of a motor that runs up at the limit; its speed rises by at most 1e-3 in a sample.
                 double i = 0.0, w = 0.0;
                 for (int k = 0; k < samples; ++k) {
@@ -114,7 +114,7 @@ TEST_CASE("no integrator of a limited loop runs further into its limit") {
 
                 slots = {};
                 control::SpeedLoop outer;
-                outer.gain = outer.reference_gain = 2.0;
+                outer.gain = 2.0;
                 outer.integral_gain = 5.0;
                 outer.place(slots);
                 const control::TorqueRange all{-1e9, 1e9}, some{-3.0, 3.0};

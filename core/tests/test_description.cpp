@@ -21,7 +21,7 @@ Scenario paper_scenario() {
     s.start.assign(n_states, 0.0);
     s.hysteresis_capacities = {0.0};
     ControlledAxis axis;
-    axis.law.speed_loop.gain = axis.law.speed_loop.reference_gain = 0.01;
+    axis.law.speed_loop.gain = 0.01;
     axis.law.speed_loop.integral_gain = 0.1;
     axis.law.reference.pieces = {{0.0, {0.0, 50.0}}, {0.1, {5.0}}};
     control::DiscreteSystem filter;

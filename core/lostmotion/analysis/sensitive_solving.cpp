@@ -10,7 +10,7 @@ bool acts_at_the_same_instants(const Control& a, const Control& b) {
     const std::vector<control::Axis> one = a.laws(), other = b.laws();
     for (std::size_t k = 0; k < one.size(); ++k) {
         const control::Axis &s = one[k], &t = other[k];
-        if (s.slots() != t.slots() || s.delay.ticks != t.delay.ticks || !same(s.speed_schedule, t.speed_schedule) ||
+        if (s.slots() != t.slots() || s.delay.samples != t.delay.samples || !same(s.speed_schedule, t.speed_schedule) ||
             !same(s.position_schedule, t.position_schedule) || !same(s.current_schedule, t.current_schedule))
             return false;
     }
@@ -21,10 +21,10 @@ std::string check_derivatives(const Control& control, const std::vector<Variatio
     for (const ControlledAxis& axis : control.axes) {
         if (axis.law.field_orientation)
             return "field-oriented control has no derivatives here; take a current loop of kind \"pi\"";
-        if (axis.law.camera.present && axis.law.camera.step > 0.0)
+        if (axis.law.camera.present && axis.law.camera.pixel > 0.0)
             return "a camera of finite resolution has no derivative; leave its pixels out";
         for (const auto* encoder : {&axis.law.speed_sensor.encoder, &axis.law.position_sensor.encoder})
-            if (encoder->resolution > 0.0 && encoder->error > 0.0)
+            if (encoder->step() > 0.0 && encoder->error > 0.0)
                 return "an encoder with a resolution and an interpolation error has no derivatives here; leave one of "
                        "them out";
     }

@@ -33,7 +33,7 @@ void TickTangent::measure(std::size_t a, const control::Axis& law, const FormTan
         y[static_cast<std::size_t>(k)] = form.value(f, w);
         const control::Encoder& encoder =
             k == 0 && law.two_encoders ? law.position_sensor.encoder : law.speed_sensor.encoder;
-        if (k < 2 && encoder.resolution > 0.0) continue;
+        if (k < 2 && encoder.step() > 0.0) continue;
         double* to = &measured_derivative_[static_cast<std::size_t>(k * parameters_)];
         form.add_motion(f, derivative, 1.0, to);
         for (int p = 0; p < parameters_; ++p)

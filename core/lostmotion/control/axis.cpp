@@ -2,24 +2,26 @@
 
 namespace lostmotion::control {
 
-void Axis::place() {
+void Axis::place(double sample_time) {
     Slots slots;
     slots.take(n_own_slots);
     delay.place(slots);
     speed_sensor.encoder.place(slots);
     if (two_encoders) position_sensor.encoder.place(slots);
-    estimate.place(slots);
+    const double of_speed = sample_time * speed_schedule.every;
+    estimate.place(slots, of_speed);
     position_loop.place(slots);
     speed_loop.place(slots);
-    if (current_loop) current_loop->place(slots);
+    position_share_ = share_of(sample_time * position_schedule.every, blend_time);
+    if (current_loop) current_loop->place(slots, sample_time * current_schedule.every);
     if (field_orientation) {
         field_orientation->place(slots);
         course_ = slots.take(sizeof(WindingCourse) / sizeof(double));
         energy_ = slots.take(2);
     }
-    backlash.place(slots);
+    feedforward.place(slots);
     inverse_model.place(slots);
-    load_observer.place(slots);
+    load_observer.place(slots, of_speed);
     for (auto* filters : {&speed_filters, &torque_filters})
         for (DiscreteSystem& f : *filters) f.place(slots);
     own_law.place(slots);
@@ -34,12 +36,12 @@ std::vector<int> Axis::running_slots() const {
     return {course_, course_ + 1, energy_, energy_ + 1};
 }
 
-void Axis::start(const Sampled& y, double tick_length, double* slot) const {
+void Axis::start(const Sampled& y, double sample_time, double* slot) const {
     std::fill_n(slot, slots_, 0.0);
     speed_sensor.encoder.start(y.speed_angle, slot);
     if (two_encoders) position_sensor.encoder.start(y.position_angle, slot);
     const double angle = speed_sensor.scale * speed_sensor.encoder.reading(y.speed_angle);
-    estimate.start(angle, speed_sensor.scale * y.speed, tick_length * speed_schedule.every, slot);
+    estimate.start(angle, speed_sensor.scale * y.speed, sample_time * speed_schedule.every, slot);
     inverse_model.start(slot);
     load_observer.start(speed_sensor.scale * y.speed, inverse_model, slot);
     show_model(slot);
@@ -56,48 +58,48 @@ void Axis::start(const Sampled& y, double tick_length, double* slot) const {
     }
 }
 
-bool Axis::step(std::int64_t tick, double tick_length, const Sampled& y, double* slot) const {
-    const double time = static_cast<double>(tick) * tick_length;
+bool Axis::step(std::int64_t sample, double sample_time, const Sampled& y, double* slot) const {
+    const double time = static_cast<double>(sample) * sample_time;
     double command = slot[computed_command];
-    slot[speed_angle] = speed_sensor.scale * speed_sensor.encoder(y.speed_angle, tick, slot);
-    if (two_encoders)
-        slot[position_angle] = position_sensor.scale * position_sensor.encoder(y.position_angle, tick, slot);
-    if (camera.present) watch(tick, tick_length, y, slot);
-    if (speed_schedule.due(tick)) {
-        const double T = tick_length * speed_schedule.every;
+    slot[speed_angle] = speed_sensor.scale * speed_sensor.encoder(y.speed_angle, slot);
+    if (two_encoders) slot[position_angle] = position_sensor.scale * position_sensor.encoder(y.position_angle, slot);
+    if (camera.present) watch(sample, sample_time, y, slot);
+    if (speed_schedule.due(sample)) {
+        const double T = sample_time * speed_schedule.every;
         const double acts = voltage_at_limit(slot) == 0.0 ? slot[torque_reference] : y.motor_torque;
-        slot[measured_speed] =
-            estimate(slot[speed_angle], speed_sensor.scale * y.speed, acts, speed_schedule.sample(tick), T, slot);
+        slot[measured_speed] = estimate(slot[speed_angle], speed_sensor.scale * y.speed, acts, T, slot);
         if (load_observer.present) load_observer.observe(y.motor_torque, slot[measured_speed], inverse_model, slot);
     }
     if (own_law.present()) {
         if (!run_own_law(time, y, command, slot)) return false;
         if (std::isfinite(command)) command = in_range(command, torque_range(y, slot));
     } else {
-        if (mode == position_mode && position_schedule.due(tick))
-            run_position_loop(time, tick_length * position_schedule.every, slot);
-        if (mode != torque_mode && speed_schedule.due(tick))
-            run_speed_loop(time, tick_length * speed_schedule.every, torque_range(y, slot), slot);
+        if (mode == position_mode && position_schedule.due(sample))
+            run_position_loop(time, sample_time * position_schedule.every, slot);
+        if (mode != torque_mode && speed_schedule.due(sample))
+            run_speed_loop(time, sample_time * speed_schedule.every, torque_range(y, slot), slot);
         if (mode == torque_mode) {
             const double asked = reference.at(time).value;  // field orientation limits it by itself
             slot[torque_reference] = field_orientation ? asked : torque_range(y, slot)(asked);
         }
         if (field_orientation) {
-            if (current_schedule.due(tick)) field_orientation->control(slot[torque_reference], reading(y, slot), slot);
+            if (current_schedule.due(sample))
+                field_orientation->control(slot[torque_reference], reading(y, slot), slot);
         } else if (!current_loop) {
             command = in_range(slot[torque_reference] / rated_torque, torque_range(y, slot));
-        } else if (current_schedule.due(tick)) {
-            command = (*current_loop)(slot[torque_reference], y.motor_torque, slot[measured_speed], slot);
+        } else if (current_schedule.due(sample)) {
+            command = (*current_loop)(slot[torque_reference], taken(Loop::current, y.motor_torque),
+                                      slot[measured_speed], slot);
         }
     }
     if (field_orientation) {
         if (!field_orientation->finite(slot)) return false;
-        field_orientation->act(tick, slot);
+        field_orientation->act(slot);
         return true;
     }
     if (!std::isfinite(command)) return false;
     slot[computed_command] = command;
-    slot[acting_command] = delay(command, tick, slot);
+    slot[acting_command] = delay(command, slot);
     return true;
 }
 
@@ -150,37 +152,40 @@ double Axis::at_limit(const double* slot) const {
     return by_voltage != 0.0 ? by_voltage : slot[torque_at_limit];
 }
 
-void Axis::watch(std::int64_t tick, double tick_length, const Sampled& y, double* slot) const {
-    const double time = static_cast<double>(tick) * tick_length;
-    camera.expose(tick, reference.at(time).value - y.shaft_angle, line_of_sight(slot[speed_angle], slot), slot);
-    if (!camera.arrives(tick)) return;
-    const Camera::Frame frame = camera.arrived(tick, slot);
+void Axis::watch(std::int64_t sample, double sample_time, const Sampled& y, double* slot) const {
+    const double time = static_cast<double>(sample) * sample_time;
+    camera.expose(sample, reference.at(time).value - y.shaft_angle, line_of_sight(slot[speed_angle], slot), slot);
+    if (!camera.arrives(sample)) return;
+    const Camera::Frame frame = camera.arrived(sample, slot);
     slot[target_seen] = frame.seen ? 1.0 : 0.0;
     if (!frame.seen) return;
     slot[target_direction] = frame.direction;
-    tracker(frame.direction, static_cast<double>(tick - camera.latency) * tick_length, slot);
+    tracker(frame.direction, static_cast<double>(sample - camera.late) * sample_time, slot);
 }
 
 void Axis::run_position_loop(double time, double T, double* slot) const {
-    const ReferencePoint ahead = wanted(time, slot);
-    slot[position_reference] = reference_delay == 0.0 ? ahead.value : wanted(time - reference_delay, slot).value;
+    const ReferencePoint r = wanted(time, slot);
+    const double reference_delay = position_loop.reference_delay;
+    slot[position_reference] = reference_delay == 0.0 ? r.value : wanted(time - reference_delay, slot).value;
     slot[measured_position] = position(slot);
-    const InverseModel::Ahead twist = inverse_model.twist(ahead.rate, ahead.second, load_observer.load(slot), T, slot);
-    const double e = slot[position_reference] + backlash(ahead.rate, T, slot) + twist.angle - slot[measured_position];
-    slot[speed_reference] = ratio * position_loop(e, ahead.rate + twist.rate, sign_of(ratio) * at_limit(slot), T, slot);
+    const InverseModel::Twist twist = inverse_model.twist(r.rate, r.acceleration, load_observer.load(slot), T, slot);
+    const double e = slot[position_reference] + feedforward.offset(r.rate, T, slot) + twist.angle -
+                     taken(Loop::position, slot[measured_position]);
+    slot[speed_reference] = ratio * position_loop(e, r.rate + twist.rate, sign_of(ratio) * at_limit(slot), T, slot);
 }
 
 void Axis::run_speed_loop(double time, double T, TorqueRange range, double* slot) const {
     const ReferencePoint r = wanted(time, slot);
     if (mode == speed_mode) slot[speed_reference] = ratio * r.value;
-    const double speed_ahead = mode == speed_mode ? r.value : r.rate,
-                 gain_ahead = mode == speed_mode ? r.rate : r.second;
+    const double feedforward_speed = mode == speed_mode ? r.value : r.rate,
+                 feedforward_acceleration = mode == speed_mode ? r.rate : r.acceleration;
     double speed = slot[speed_reference];
     for (const DiscreteSystem& f : speed_filters) speed = f(speed, slot);
-    InverseModel::Known known{feedforward(ratio * speed_ahead, ratio * gain_ahead)};
-    if (inverse_model.present) known = inverse_model.torque(speed_ahead, gain_ahead, load_observer.load(slot), slot);
-    double M = load_observer.schedule(speed_loop, inverse_model, slot)(speed, slot[measured_speed], known.torque, range,
-                                                                       voltage_at_limit(slot), T, slot);
+    InverseModel::Known known{feedforward.torque(ratio * feedforward_speed, ratio * feedforward_acceleration)};
+    if (inverse_model.present)
+        known = inverse_model.torque(feedforward_speed, feedforward_acceleration, load_observer.load(slot), slot);
+    double M = load_observer.schedule(speed_loop, inverse_model, slot)(
+        speed, taken(Loop::speed, slot[measured_speed]), known.torque, range, voltage_at_limit(slot), T, slot);
     for (const DiscreteSystem& f : torque_filters) M = f(M, slot);
     slot[torque_reference] = range(M);
     slot[torque_at_limit] = range.at_limit(slot[torque_reference]);
@@ -214,7 +219,7 @@ bool Axis::run_own_law(double time, const Sampled& y, double& command, double* s
          : mode == speed_mode  ? speed_reference
                                : torque_reference] = mode == speed_mode ? ratio * r.value : r.value;
     std::array<double, 5> measured{slot[measured_position], slot[measured_speed], y.motor_torque};
-    const std::array<double, 4> asked{r.value, r.rate, r.second, r.third};
+    const std::array<double, 4> asked{r.value, r.rate, r.acceleration, r.jerk};
     std::array<double, 2> given{command};
     if (field_orientation) {
         const FieldOrientation::Reading seen = reading(y, slot);
@@ -222,7 +227,7 @@ bool Axis::run_own_law(double time, const Sampled& y, double& command, double* s
         measured[3] = i.d;
         measured[4] = i.q;
         if (own_law(time, measured.data(), asked.data(), given.data(), slot) != 0) return false;
-        field_orientation->command(field_orientation->limited({given[0], given[1]}), seen, slot);
+        field_orientation->command(field_orientation->within_limits({given[0], given[1]}), seen, slot);
         return true;
     }
     if (own_law(time, measured.data(), asked.data(), given.data(), slot) != 0) return false;
@@ -233,7 +238,7 @@ bool Axis::run_own_law(double time, const Sampled& y, double& command, double* s
 double Axis::position(double* slot) const {
     const double by_motor = slot[speed_angle] / ratio;
     if (!two_encoders) return by_motor;
-    slot[blended] += position_share * (slot[position_angle] - by_motor - slot[blended]);
+    slot[blended] += position_share_ * (slot[position_angle] - by_motor - slot[blended]);
     return by_motor + slot[blended];
 }
 

@@ -1,9 +1,9 @@
 // The controller of one motor: reference, position, speed and current loop at their sample times.
 //
-//   tick k:  sample        compute, outermost first                                       apply
-//            encoders -> [position loop] -> w* -> [speed loop] -> M* -> [current loop] -> E, `delay` ticks later
+//   sample k:  sample        compute, outermost first                                       apply
+//            encoders -> [position loop] -> w* -> [speed loop] -> M* -> [current loop] -> E, `delay` samples later
 //
-// All loops that are due at a tick use its samples; what is not due keeps its last output.
+// All loops that are due at a sample use its samples; what is not due keeps its last output.
 #pragma once
 
 #include <algorithm>
@@ -32,12 +32,19 @@
 
 namespace lostmotion::control {
 
-// When a loop runs: at the ticks phase, phase + every, ...
+// When a loop runs: at the samples phase, phase + every, ...
 struct Schedule {
     int every = 1, phase = 0;
 
-    bool due(std::int64_t tick) const { return tick >= phase && (tick - phase) % every == 0; }
-    std::int64_t sample(std::int64_t tick) const { return (tick - phase) / every; }
+    bool due(std::int64_t sample) const { return sample >= phase && (sample - phase) % every == 0; }
+};
+
+enum class Loop { none, current, speed, position };
+
+// What one loop takes for its measured value, whatever is measured: the loop is cut there.
+struct Cut {
+    Loop loop = Loop::none;
+    double value = 0.0;
 };
 
 // An encoder, and how often the shaft that a loop works on turns for one turn of the encoder's shaft.
@@ -58,7 +65,7 @@ struct Sampled {
     double time = 0.0;            // [s]
 };
 
-// What an axis shows, held from tick to tick.
+// What an axis shows, held from sample to sample.
 enum AxisSignal : int {
     position_reference,  // [rad], of the reference's shaft
     measured_position,   // the same
@@ -113,20 +120,19 @@ class Axis {
     enum Mode { torque_mode, speed_mode, position_mode } mode = speed_mode;  // what the reference is of
     Reference reference;  // with a camera the direction of the target, which only the camera sees
     Camera camera;
-    Tracker tracker;               // of what the camera sees; the loops follow it
-    double reference_delay = 0.0;  // [s] by which the reference of the position loop comes later than its feedforward
-    double ratio = 1.0;            // turns of the motor for one of the reference's shaft
-    double rated_torque = 1.0;     // [N m] of command 1, without a current loop
+    Tracker tracker;            // of what the camera sees; the loops follow it
+    double ratio = 1.0;         // turns of the motor for one of the reference's shaft
+    double rated_torque = 1.0;  // [N m] of command 1, without a current loop
     double torque_limit = std::numeric_limits<double>::infinity();  // [N m] at the largest current
     // Of the torque at the largest voltage, where no current loop keeps to it: at standstill [N m], and by how much it
     // falls with the speed [N m s/rad].
     double stall_torque = std::numeric_limits<double>::infinity(), torque_droop = 0.0;
-    TickDelay delay;  // until the command acts
+    SampleDelay delay;  // until the command acts
 
-    Sensor speed_sensor;          // to the motor
-    Sensor position_sensor;       // to the reference's shaft
-    bool two_encoders = false;    // else that of the speed serves both
-    double position_share = 1.0;  // of the difference of both angles, taken over at a sample of the position loop
+    Sensor speed_sensor;        // to the motor
+    Sensor position_sensor;     // to the reference's shaft
+    bool two_encoders = false;  // else that of the speed serves both
+    double blend_time = 0.0;    // [s] with which the difference of both angles is taken over
     SpeedEstimate estimate;
     Schedule position_schedule, speed_schedule, current_schedule;
     PositionLoop position_loop;
@@ -134,27 +140,29 @@ class Axis {
     std::optional<CurrentLoop> current_loop;
     std::optional<FieldOrientation> field_orientation;  // in its place
     bool commutates_by_encoder = true;                  // of the speed; else the angle of the rotor is known
-    TorqueFeedforward feedforward;
+    Feedforward feedforward;
     InverseModel inverse_model;  // in the place of feedforward and backlash
     LoadObserver load_observer;
-    BacklashCompensation backlash;
     std::vector<DiscreteSystem> speed_filters, torque_filters;
     OwnLaw own_law;  // instead of all loops
+    Cut cut;         // in a linear model
 
-    // Gives each block its slots. Once, after all has been set.
-    void place();
+    // Gives each block its slots and what it derives from its parameters. Once, after all has been set.
+    void place(double sample_time);
     int slots() const { return slots_; }
     // Those of a winding that go on with time: instants and energies. A motion that repeats does not bring them back.
     std::vector<int> running_slots() const;
 
-    // Before the first tick: the drive as it is, the integrators empty.
-    void start(const Sampled& y, double tick_length, double* slot) const;
+    // Before the first sample: the drive as it is, the integrators empty.
+    void start(const Sampled& y, double sample_time, double* slot) const;
 
-    // One tick. Returns false if the user's own law has failed, or the command is no number.
-    bool step(std::int64_t tick, double tick_length, const Sampled& y, double* slot) const;
-    // What acts on the motor from this tick on, of an axis without a winding.
+    // One sample. Returns false if the user's own law has failed, or the command is no number.
+    bool step(std::int64_t sample, double sample_time, const Sampled& y, double* slot) const;
+    double taken(Loop loop, double measured) const { return cut.loop == loop ? cut.value : measured; }
+    // What acts on the motor from this sample on, of an axis without a winding.
     double command(const double* slot) const { return slot[acting_command]; }
     static int command_slot() { return acting_command; }
+    static int speed_angle_slot() { return speed_angle; }
     static double signal(int s, const double* slot) { return slot[s]; }
 
     // Of the winding, from the last exchange of torque and speed on.
@@ -199,7 +207,7 @@ class Axis {
     double line_of_sight(double speed_encoder, const double* slot) const {
         return two_encoders ? slot[position_angle] : speed_encoder / ratio;
     }
-    void watch(std::int64_t tick, double tick_length, const Sampled& y, double* slot) const;
+    void watch(std::int64_t sample, double sample_time, const Sampled& y, double* slot) const;
 
     void run_position_loop(double time, double T, double* slot) const;
 
@@ -216,6 +224,7 @@ class Axis {
     // by.
     double position(double* slot) const;
 
+    double position_share_ = 1.0;  // taken over at a sample of the position loop
     int slots_ = 0, course_ = 0, energy_ = 0;
 };
 

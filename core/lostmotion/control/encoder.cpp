@@ -2,9 +2,17 @@
 
 namespace lostmotion::control {
 
+double Encoder::step() const {
+    if (ideal || resolution > 0.0) return ideal ? 0.0 : resolution;
+    constexpr double turn = 2.0 * std::numbers::pi;
+    if (lines > 0) return turn / (lines * std::ldexp(1.0, bits == 0 ? 2 : bits));
+    return bits > 0 ? std::ldexp(turn, -bits) : 0.0;
+}
+
 double Encoder::reading(double angle) const {
-    const double read = resolution > 0.0 ? resolution * std::floor(angle / resolution + 0.5) : angle;
-    return error > 0.0 ? read + error * sine_cosine(periods * angle + phase).sin : read;
+    const double q = step(), read = q > 0.0 ? q * std::floor(angle / q + 0.5) : angle;
+    const double periods = error_periods != 0 ? error_periods : lines;
+    return error > 0.0 ? read + error * sine_cosine(periods * angle + error_phase).sin : read;
 }
 
 }  // namespace lostmotion::control

@@ -2,15 +2,15 @@
 
 namespace lostmotion::control {
 
-double BacklashCompensation::operator()(double reference_rate, double sample_time, double* slot) const {
+double Feedforward::offset(double reference_rate, double sample_time, double* slot) const {
     if (backlash == 0.0) return 0.0;
-    double& offset = slot[first_];
+    double& moved = slot[first_];
     const double way = sign_of(reference_rate);
     if (way != 0.0) {
-        const double step = rate * sample_time, target = way * 0.5 * backlash;
-        offset += std::clamp(target - offset, -step, step);
+        const double step = backlash_rate * sample_time, target = way * 0.5 * backlash;
+        moved += std::clamp(target - moved, -step, step);
     }
-    return offset;
+    return moved;
 }
 
 }  // namespace lostmotion::control

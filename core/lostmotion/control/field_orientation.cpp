@@ -1,11 +1,17 @@
 #include "field_orientation.hpp"
 
+#include "../kernel/powers.hpp"
+
 namespace lostmotion::control {
 
 void FieldOrientation::place(Slots& slots) {
     first_ = slots.take(n_own);
     steepest_ = circle_i_d();
-    for (TickDelay* d : {&delay_d_, &delay_q_, &delay_angle_}) {
+    const double R = winding.resistance;
+    K_d_ = -gain * R / exponential_minus_one(-R * sample_time / winding.inductance_d);
+    K_q_ = -gain * R / exponential_minus_one(-R * sample_time / winding.inductance_q);
+    K_i_ = gain * R;
+    for (SampleDelay* d : {&delay_d_, &delay_q_, &delay_angle_}) {
         *d = delay;
         d->place(slots);
     }
@@ -21,24 +27,36 @@ void FieldOrientation::start(double angle, double speed, double* slot) const {
     slot[first_ + available] = largest_torque(0.0, w_e);
 }
 
-void FieldOrientation::control(double torque, const Reading& y, double* slot) const {
+void FieldOrientation::follow(DirectQuadrature wanted, DirectQuadrature i, const Reading& y, double* slot) const {
     double* own = slot + first_;
     const double w_e = winding.pole_pairs * y.speed;
-    const DirectQuadrature wanted = currents(torque, w_e, own);
-    const DirectQuadrature i = measured(y);
     const double e_d = wanted.d - i.d, e_q = wanted.q - i.q;
-    const double v_d = gain_d * e_d + own[integral_d] - decoupling * w_e * winding.inductance_q * i.q;
-    const double v_q = gain_q * e_q + own[integral_q] + decoupling * w_e * winding.inductance_d * i.d +
+    const double v_d = K_d_ * e_d + own[integral_d] - decoupling * w_e * winding.inductance_q * i.q;
+    const double v_q = K_q_ * e_q + own[integral_q] + decoupling * w_e * winding.inductance_d * i.d +
                        back_emf * w_e * winding.flux_linkage;
     own[wanted_square] = v_d * v_d + v_q * v_q;
     const double share = within_circle(own[wanted_square]);
     own[beyond] = share < 1.0 ? sign_of(e_q) : 0.0;
-    own[integral_d] += integral_gain * (e_d + (share - 1.0) * v_d / gain_d);
-    own[integral_q] += integral_gain * (e_q + (share - 1.0) * v_q / gain_q);
+    own[integral_d] += K_i_ * (e_d + (share - 1.0) * v_d / K_d_);
+    own[integral_q] += K_i_ * (e_q + (share - 1.0) * v_q / K_q_);
     command({share * v_d, share * v_q}, y, slot);
 }
 
-auto FieldOrientation::limited(DirectQuadrature voltage) const -> DirectQuadrature {
+void FieldOrientation::settle(double torque, double weakened, DirectQuadrature voltage, const Reading& y,
+                              double* slot) const {
+    double* own = slot + first_;
+    own[integral_d] = own[integral_q] = 0.0;
+    for (int round = 0; round < 2; ++round) {  // the first finds what the integrators have to give
+        own[weakening] = weakened;
+        own[wanted_square] = voltage.d * voltage.d + voltage.q * voltage.q;
+        const DirectQuadrature held{own[integral_d], own[integral_q]};
+        control(torque, y, slot);
+        own[integral_d] = held.d + voltage.d - own[u_d];
+        own[integral_q] = held.q + voltage.q - own[u_q];
+    }
+}
+
+auto FieldOrientation::within_limits(DirectQuadrature voltage) const -> DirectQuadrature {
     const double share = within_circle(voltage.d * voltage.d + voltage.q * voltage.q);
     return {share * voltage.d, share * voltage.q};
 }
@@ -55,11 +73,11 @@ bool FieldOrientation::finite(const double* slot) const {
            std::isfinite(slot[first_ + stator_angle]);
 }
 
-void FieldOrientation::act(std::int64_t tick, double* slot) const {
+void FieldOrientation::act(double* slot) const {
     double* own = slot + first_;
-    own[acting_d] = delay_d_(own[u_d], tick, slot);
-    own[acting_q] = delay_q_(own[u_q], tick, slot);
-    own[acting_angle] = delay_angle_(own[stator_angle], tick, slot);
+    own[acting_d] = delay_d_(own[u_d], slot);
+    own[acting_q] = delay_q_(own[u_q], slot);
+    own[acting_angle] = delay_angle_(own[stator_angle], slot);
 }
 
 auto FieldOrientation::voltage(double angle, const double* slot) const -> DirectQuadrature {
@@ -107,17 +125,21 @@ double FieldOrientation::largest_torque(double weakened, double w_e) const {
     return std::fabs(winding.torque(i_d, most_i_q(i_d, w_e)));
 }
 
-auto FieldOrientation::currents(double torque, double w_e, double* own) const -> DirectQuadrature {
-    const double psi = winding.flux_linkage;
+auto FieldOrientation::wanted(double torque, double speed, double* slot) const -> DirectQuadrature {
+    double* own = slot + first_;
+    const double psi = winding.flux_linkage, w_e = winding.pole_pairs * speed;
     const double w_b = std::fmax(std::fabs(w_e), voltage_limit / psi);
-    const double spare = weakening_voltage * weakening_voltage - own[wanted_square];
-    own[weakening] = std::clamp(
-        own[weakening] + field_weakening * spare / (2.0 * w_b * w_b * winding.inductance_d * psi), -current_limit, 0.0);
-    own[available] = largest_torque(own[weakening], w_e);
-    const double M = std::clamp(torque, -own[available], own[available]);
+    const double u_f = weakening_voltage * voltage_limit, spare = u_f * u_f - own[wanted_square];
+    own[weakening] += field_weakening * spare / (2.0 * w_b * w_b * winding.inductance_d * psi);
+    double M = torque;
+    if (limited) {
+        own[weakening] = std::clamp(own[weakening], -current_limit, 0.0);
+        own[available] = largest_torque(own[weakening], w_e);
+        M = std::clamp(torque, -own[available], own[available]);
+    }
     const double i_d = std::clamp(least_current(M).d + own[weakening], least_i_d(), current_limit);
     const double i_q = M / (1.5 * winding.pole_pairs * (psi + winding.saliency() * i_d)), most = most_i_q(i_d, w_e);
-    return {i_d, std::clamp(i_q, -most, most)};
+    return {i_d, limited ? std::clamp(i_q, -most, most) : i_q};
 }
 
 }  // namespace lostmotion::control

@@ -14,7 +14,7 @@
 #include <cmath>
 
 #include "../kernel/sine.hpp"
-#include "reference.hpp"
+#include "current_loop.hpp"
 #include "slots.hpp"
 #include "synchronous_winding.hpp"
 
@@ -22,20 +22,47 @@ namespace lostmotion::control {
 
 struct FieldOrientation {
     SynchronousWinding winding;
-    double gain_d = 0.0, gain_q = 0.0;  // K_d, K_q [V/A]
-    double integral_gain = 0.0;         // g R [V/A]
-    double back_emf = 1.0;              // share of w_e psi that is compensated
-    double decoupling = 1.0;            // share of w_e L i that is
-    double field_weakening = 0.0;       // g_f
-    double weakening_voltage = 1.0;     // u_f [V], above which the field is weakened; up to u_max there is a reserve
-    double voltage_limit = 1.0;         // u_max, amplitude of a phase [V]
-    double current_limit = 1.0;         // I_max, amplitude of a phase [A]
-    double sample_time = 1e-3;          // T [s]
-    double delay_time = 0.0;            // [s] from the sample until its voltage acts
-    TickDelay delay;                    // the same in ticks
-    int parts = 2;                      // of a tick, in each of which torque and speed are exchanged once
+    double gain = 1.0 / 3.0;
+    double back_emf = 1.0;
+    double decoupling = 1.0;
+    double field_weakening = 0.02;
+    double weakening_voltage = 0.95;
+    double voltage_limit = 1.0;  // u_max, amplitude of a phase [V]
+    double current_limit = 1.0;  // I_max, amplitude of a phase [A]
+    double sample_time = 1e-3;   // T [s]
+    double delay_time = 0.0;     // [s] from the sample until its voltage acts
+    SampleDelay delay;           // the same in samples
+    int parts = 2;               // of a sample, in each of which torque and speed are exchanged once
+    bool limited = true;         // by voltage and largest current; false in a linear model
 
-    // What the controller reads at a tick.
+    template <class Fields>
+    void describe(Fields& f) {
+        CurrentLoop::describe_shares(f, gain, back_emf);
+        f.number({"decoupling", "", "", Range::share, Given::has_default,
+                  "share of what the current of one axis induces in the other that is compensated"},
+                 decoupling);
+        f.number({"field_weakening", "g_f", "", Range::share, Given::has_default,
+                  "share of the excess of the voltage that i_d makes up for in one sample time; 0: none"},
+                 field_weakening);
+        f.number(
+            {"weakening_voltage", "u_f/u_max", "", Range::up_to_one, Given::has_default,
+             "share of the largest voltage above which the field is weakened; the rest is a reserve to control the "
+             "currents with"},
+            weakening_voltage);
+        f.number({"pole_pairs", "p", "", Range::positive, Given::none}, winding.pole_pairs);
+        f.number({"resistance", "R", "ohm", Range::positive, Given::none}, winding.resistance);
+        f.number({"inductance_d", "L_d", "H", Range::positive, Given::none}, winding.inductance_d);
+        f.number({"inductance_q", "L_q", "H", Range::positive, Given::none}, winding.inductance_q);
+        f.number({"flux_linkage", "psi", "V*s", Range::positive, Given::none}, winding.flux_linkage);
+        f.number({"voltage_limit", "u_max", "V", Range::positive, Given::none}, voltage_limit);
+        f.number({"current_limit", "I_max", "A", Range::positive, Given::none}, current_limit);
+        f.number({"sample_time", "T", "s", Range::positive, Given::none}, sample_time);
+        f.number({"delay_time", "", "s", Range::not_negative, Given::none}, delay_time);
+        f.integer({.key = "delay", .given = Given::none}, delay.samples, 0, max_delay);
+        f.integer({.key = "parts", .given = Given::none}, parts, 1, 1000);
+    }
+
+    // What the controller reads at a sample.
     struct Reading {
         double angle = 0.0;       // of the rotor, as measured [rad]
         double speed = 0.0;       // of the rotor, as measured [rad/s]
@@ -53,23 +80,33 @@ struct FieldOrientation {
     DirectQuadrature measured(const Reading& y) const {
         return turned(y.current, winding.pole_pairs * (y.true_angle - y.angle));
     }
-    // The voltage for a torque [N m].
-    void control(double torque, const Reading& y, double* slot) const;
+    // The currents for a torque [N m] at a speed of the rotor [rad/s], with the field weakened as the last voltage
+    // needs.
+    DirectQuadrature wanted(double torque, double speed, double* slot) const;
+    // The voltage for them, with the currents as they are measured.
+    void follow(DirectQuadrature wanted, DirectQuadrature measured, const Reading& y, double* slot) const;
+    // Both.
+    void control(double torque, const Reading& y, double* slot) const {
+        follow(wanted(torque, y.speed, slot), measured(y), y, slot);
+    }
+    // As in a steady motion in which the controller asks for this voltage.
+    void settle(double torque, double weakened, DirectQuadrature voltage, const Reading& y, double* slot) const;
     // Sign of the torque that the voltage circle allowed no more of at the last sample, or 0.
     double at_limit(const double* slot) const { return slot[first_ + beyond]; }
     // What the voltage circle leaves of a voltage in coordinates of the rotor.
-    DirectQuadrature limited(DirectQuadrature voltage) const;
+    DirectQuadrature within_limits(DirectQuadrature voltage) const;
     // A voltage in coordinates of the rotor as it is read now, for the time that it will act.
     void command(DirectQuadrature voltage, const Reading& y, double* slot) const;
     bool finite(const double* slot) const;
-    // What acts from this tick on.
-    void act(std::int64_t tick, double* slot) const;
+    // What acts from this sample on.
+    void act(double* slot) const;
     // The voltage that acts, in coordinates of the rotor at an angle [rad].
     DirectQuadrature voltage(double angle, const double* slot) const;
 
     // Least current for a torque: i_d = D - sgn(D) sqrt(D^2 + i_q^2), D = psi/(2 (L_q - L_d)). The torque rises with
     // i_q, for i_q > 0 ever more steeply, so that Newton's steps from above go down to the root.
     DirectQuadrature least_current(double torque) const;
+    static DirectQuadrature turned(DirectQuadrature v, double angle);
 
  private:
     enum OwnSlot : int {
@@ -89,8 +126,9 @@ struct FieldOrientation {
     };
 
     // Share of a voltage with this square of its amplitude.
-    double within_circle(double square) const { return std::fmin(1.0, voltage_limit / std::sqrt(square)); }
-    static DirectQuadrature turned(DirectQuadrature v, double angle);
+    double within_circle(double square) const {
+        return limited ? std::fmin(1.0, voltage_limit / std::sqrt(square)) : 1.0;
+    }
     // Where the circle of the largest current has its largest torque.
     double circle_i_d() const;
     // Beyond -psi/L_d the voltage would rise again.
@@ -99,11 +137,10 @@ struct FieldOrientation {
     double most_i_q(double i_d, double w_e) const;
     double largest_torque(double weakened, double w_e) const;
 
-    DirectQuadrature currents(double torque, double w_e, double* own) const;
-
-    double steepest_ = 0.0;  // [A]
+    double K_d_ = 0.0, K_q_ = 0.0, K_i_ = 0.0;  // [V/A]
+    double steepest_ = 0.0;                     // [A]
     int first_ = 0;
-    TickDelay delay_d_, delay_q_, delay_angle_;
+    SampleDelay delay_d_, delay_q_, delay_angle_;
 };
 
 }  // namespace lostmotion::control

@@ -9,7 +9,7 @@ void InverseModel::start(double* slot) const {
 }
 
 auto InverseModel::twist(double speed, double acceleration, double observed_load, double sample_time,
-                         double* slot) const -> Ahead {
+                         double* slot) const -> Twist {
     if (!present || !through_gear) return {};
     double &angle = slot[first_ + 2], &rate = slot[first_ + 3];
     const double step = twist_rate * sample_time, target = inverse(output_torque(speed, acceleration, observed_load));

@@ -8,8 +8,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <limits>
 
+#include "../parts/field.hpp"
 #include "../parts/torsion_curve.hpp"
 #include "gear_losses.hpp"
 #include "reference.hpp"
@@ -20,10 +22,22 @@ namespace lostmotion::control {
 // How fast a parameter follows the error, and where it has to stay.
 struct Adaptation {
     double rate = 0.0;
-    double min = -std::numeric_limits<double>::infinity(), max = std::numeric_limits<double>::infinity();
+    std::array<double, 2> limits{0.0, 5.0};
+
+    template <class Fields>
+    void describe_of_losses(Fields& f) {
+        f.number({"rate", "g_1", "1/(N*m)", Range::positive, Given::needed, "g_1"}, rate);
+        f.pair({"limits", "", "", Range::not_negative, Given::has_default, "that the factor stays within"}, limits);
+    }
+    template <class Fields>
+    void describe_of_friction(Fields& f) {
+        f.number({"rate", "g_2", "N*m/rad", Range::positive, Given::needed, "g_2"}, rate);
+        f.pair({"limits", "", "N*m", Range::not_negative, Given::needed, "that the torque stays within"}, limits);
+    }
 
     void operator()(double& parameter, double error, double regressor, double sample_time) const {
-        if (rate > 0.0) parameter = std::clamp(parameter + rate * sample_time * error * regressor, min, max);
+        if (rate > 0.0)
+            parameter = std::clamp(parameter + rate * sample_time * error * regressor, limits[0], limits[1]);
     }
 };
 
@@ -35,10 +49,38 @@ struct InverseModel {
     GearLosses losses;
     double loss_factor = 1.0, friction_torque = 0.0;  // kappa and T_10 [N m] at the start
     Adaptation of_losses, of_friction;
-    double min_speed = 0.0;     // [rad/s] of the motor's reference, below which nothing is adapted
+    double min_speed = 0.0;     // of the motor's reference
     bool through_gear = false;  // the encoder is on the motor: its reference is ahead by the twist
     TorsionCurve curve;
     double twist_rate = std::numeric_limits<double>::infinity();  // [rad/s]
+
+    template <class Fields>
+    void describe(Fields& f) {
+        f.number({"efficiency", "eta", "", Range::up_to_one, Given::may_be_left_out,
+                  "constant efficiency, in the place of the losses of the gear"},
+                 losses.efficiency);
+        f.number(
+            {"loss_factor", "kappa", "", Range::not_negative, Given::has_default, "kappa at the start, on the losses"},
+            loss_factor);
+        f.number({"friction_torque", "T_10", "N*m", Range::not_negative, Given::may_be_left_out, "T_10 at the start"},
+                 friction_torque);
+        f.number({"load_inertia", "J_Z", "kg*m^2", Range::not_negative, Given::may_be_left_out}, load_inertia);
+        f.number({"load_torque", "M_Z", "N*m", Range::any, Given::has_default,
+                  "M_Z that is known beforehand, against the motion forward"},
+                 load_torque);
+        f.number(
+            {"twist_rate", "", "rad/s", Range::limit, Given::may_be_left_out,
+             "at which the motor passes through a gap, in terms of the load's shaft; needed where the gear has one"},
+            twist_rate);
+        f.number({"min_speed", "w_min", "rad/s", Range::not_negative, Given::has_default,
+                  "of the motor, below which nothing is adapted or observed"},
+                 min_speed);
+        f.number({"motor_inertia", "J_MR", "kg*m^2", Range::not_negative, Given::none}, motor_inertia);
+        f.number({"motor_viscous_friction", "b_MR", "N*m*s/rad", Range::not_negative, Given::none},
+                 motor_viscous_friction);
+        f.number({"load_viscous_friction", "b_Z", "N*m*s/rad", Range::not_negative, Given::none},
+                 load_viscous_friction);
+    }
 
     void place(Slots& slots) { first_ = slots.take(present ? 4 : 0); }
     void start(double* slot) const;
@@ -47,10 +89,10 @@ struct InverseModel {
 
     // By how much the position of the encoder's shaft, in terms of the load's, is to be ahead of the reference [rad],
     // and the rate of that.
-    struct Ahead {
+    struct Twist {
         double angle = 0.0, rate = 0.0;
     };
-    Ahead twist(double speed, double acceleration, double observed_load, double sample_time, double* slot) const;
+    Twist twist(double speed, double acceleration, double observed_load, double sample_time, double* slot) const;
     // M_ff [N m] for phi*' and phi*'' of the reference's shaft, and what it adapts by.
     struct Known {
         double torque = 0.0;

@@ -1,6 +1,15 @@
 #include "load_observer.hpp"
 
+#include <numbers>
+
 namespace lostmotion::control {
+
+void LoadObserver::place(Slots& slots, double sample_time) {
+    first_ = slots.take(present ? n_slots : 0);
+    input_share_ = share_of(sample_time, input_time);
+    load_share_ = share_of(sample_time, load_time);
+    w_c_ = 2.0 * std::numbers::pi * speed_bandwidth;
+}
 
 void LoadObserver::start(double speed, const InverseModel& model, double* slot) const {
     if (!present) return;
@@ -21,22 +30,22 @@ void LoadObserver::observe(double M, double w, const InverseModel& model, double
         return;
     }
     const double given = M - model.motor_viscous_friction * w - model.friction_now(slot) * s;
-    x[input] += input_share * (given + J_1 * w - x[input]);
+    x[input] += input_share_ * (given + J_1 * w - x[input]);
     x[input_torque] = x[input] - J_1 * w;
     const double T_2 = model.losses.output_torque(x[input_torque], s, w, model.loss_factor_now(slot));
     const double left = T_2 - model.load_viscous_friction * phi_rate;
-    x[output] += load_share * (left + J_2 * phi_rate - x[output]);
+    x[output] += load_share_ * (left + J_2 * phi_rate - x[output]);
     x[torque] = x[output] - J_2 * phi_rate;
     x[slope] = model.losses.slope(T_2, s, w);
 }
 
 auto LoadObserver::schedule(SpeedLoop loop, const InverseModel& model, const double* slot) const -> SpeedLoop {
-    if (!present || bandwidth == 0.0) return loop;
-    const double i = model.losses.ratio, weight = loop.reference_gain / loop.gain;
+    if (!present || std::isinf(speed_bandwidth)) return loop;
+    const double i = model.losses.ratio;
     const double J = model.motor_inertia + (1.0 + slot[first_ + slope]) * model.load_inertia / (i * i);
-    loop.gain = bandwidth * J;
-    loop.reference_gain = weight * loop.gain;
-    loop.integral_gain = 0.25 * bandwidth * loop.gain;
+    loop.gain = w_c_ * J;
+    loop.integral_gain = 0.25 * w_c_ * loop.gain;
+    loop.integral_time = std::numeric_limits<double>::infinity();
     return loop;
 }
 

@@ -14,11 +14,23 @@ namespace lostmotion::control {
 
 struct LoadObserver {
     bool present = false;
-    double input_time = 0.0, load_time = 0.0;    // [s] of the two low passes
-    double input_share = 0.0, load_share = 0.0;  // 1 - exp(-T/time), what each takes over at a sample
-    double bandwidth = 0.0;                      // w_c [rad/s] of the speed loop; 0: its gains stay
+    double input_time = 1.0, load_time = 1.0;
+    double speed_bandwidth = std::numeric_limits<double>::infinity();
 
-    void place(Slots& slots) { first_ = slots.take(present ? n_slots : 0); }
+    template <class Fields>
+    void describe(Fields& f) {
+        f.number({"input_time", "", "s", Range::positive, Given::needed,
+                  "of the low pass on the torque at the gear's input"},
+                 input_time);
+        f.number({"load_time", "", "s", Range::positive, Given::needed, "of the low pass on the load torque"},
+                 load_time);
+        f.number({"speed_bandwidth", "w_c", "Hz", Range::limit, Given::may_be_left_out,
+                  "w_c/(2 pi): the gains of the speed loop become k_p = w_c J and k_i = k_p w_c/4, with the inertia\n"
+                  "J = J_MR + (1 + dm_2B/dmu) J_Z/i^2 that the motor feels under that load; left out, they stay"},
+                 speed_bandwidth);
+    }
+
+    void place(Slots& slots, double sample_time);
     void start(double speed, const InverseModel& model, double* slot) const;
     double load(const double* slot) const { return present ? slot[first_ + torque] : 0.0; }
 
@@ -30,6 +42,7 @@ struct LoadObserver {
  private:
     enum Slot : int { input, input_torque, output, torque, slope, n_slots };
 
+    double input_share_ = 0.0, load_share_ = 0.0, w_c_ = 0.0;  // of both low passes at a sample, [rad/s]
     int first_ = 0;
 };
 

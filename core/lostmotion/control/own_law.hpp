@@ -1,4 +1,4 @@
-// A controller of the user's own: a function that is called at each tick.
+// A controller of the user's own: a function that is called at each sample.
 #pragma once
 
 #include "slots.hpp"
@@ -6,9 +6,9 @@
 namespace lostmotion::control {
 
 // time [s]; measured: position [rad] of the reference's shaft, speed [rad/s] of the motor, its torque [N m], and of one
-// under field-oriented control i_d and i_q [A]; reference: value, rate, second and third derivative; state: its own
-// numbers, kept from tick to tick; command: out, of one under field-oriented control u_d and u_q [V].
-// Returns 0; anything else ends the run.
+// under field-oriented control i_d and i_q [A]; reference: value, rate, acceleration and jerk of a position; state: its
+// own numbers, kept from sample to sample; command: out, of one under field-oriented control u_d and u_q [V]. Returns
+// 0; anything else ends the run.
 using OwnLawFunction = int (*)(double time, const double* measured, const double* reference, double* state,
                                double* command, void* data);
 

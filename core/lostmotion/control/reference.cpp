@@ -11,15 +11,15 @@ auto Reference::at(double t) const -> ReferencePoint {
     }
     const auto& [time, p] = pieces[low];
     const double s = t - time;
-    ReferencePoint out{p.value + s * (p.rate + s / 2.0 * (p.second + s / 3.0 * p.third)),
-                       p.rate + s * (p.second + s / 2.0 * p.third), p.second + s * p.third, p.third};
+    ReferencePoint out{p.value + s * (p.rate + s / 2.0 * (p.acceleration + s / 3.0 * p.jerk)),
+                       p.rate + s * (p.acceleration + s / 2.0 * p.jerk), p.acceleration + s * p.jerk, p.jerk};
     for (const Sine& sine : sines) {
         const double omega = 2.0 * std::numbers::pi * sine.frequency;
         const auto [sin, cos] = sine_cosine(2.0 * std::numbers::pi * fraction_of_turn(sine.frequency, t) + sine.phase);
         out.value += sine.amplitude * sin;
         out.rate += sine.amplitude * omega * cos;
-        out.second -= sine.amplitude * omega * omega * sin;
-        out.third -= sine.amplitude * omega * omega * omega * cos;
+        out.acceleration -= sine.amplitude * omega * omega * sin;
+        out.jerk -= sine.amplitude * omega * omega * omega * cos;
     }
     return out;
 }

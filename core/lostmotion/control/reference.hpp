@@ -12,12 +12,12 @@ namespace lostmotion::control {
 // Which way a speed goes: 1, -1, or 0 at rest.
 inline double sign_of(double v) { return v > 0.0 ? 1.0 : v < 0.0 ? -1.0 : 0.0; }
 
-// A value and its time derivatives.
+// A value and its time derivatives, named as those of a position.
 struct ReferencePoint {
-    double value = 0.0, rate = 0.0, second = 0.0, third = 0.0;
+    double value = 0.0, rate = 0.0, acceleration = 0.0, jerk = 0.0;
 };
 
-// From `time` [s] on value + rate s + second s^2/2 + third s^3/6, until the next piece.
+// From `time` [s] on value + rate s + acceleration s^2/2 + jerk s^3/6, until the next piece.
 struct ReferencePiece {
     double time = 0.0;
     ReferencePoint begin;

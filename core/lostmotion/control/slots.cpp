@@ -1,5 +1,9 @@
 #include "slots.hpp"
 
+#include <algorithm>
+
+#include "../kernel/powers.hpp"
+
 namespace lostmotion::control {
 
 int Slots::take(int count) {
@@ -8,11 +12,18 @@ int Slots::take(int count) {
     return first;
 }
 
-double TickDelay::operator()(double in, std::int64_t tick, double* slot) const {
-    if (ticks == 0) return in;
-    double& kept = slot[first + tick % ticks];
-    const double out = kept;
-    kept = in;
+double SampleDelay::operator()(double in, double* slot) const {
+    return samples == 0 ? in : shifted(in, slot + first, samples);
+}
+
+double share_of(double sample_time, double time) {
+    return time > 0.0 ? -exponential_minus_one(-sample_time / time) : 1.0;
+}
+
+double shifted(double in, double* kept, int count) {
+    const double out = kept[0];
+    std::copy(kept + 1, kept + count, kept);
+    kept[count - 1] = in;
     return out;
 }
 

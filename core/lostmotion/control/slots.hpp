@@ -2,8 +2,6 @@
 // compared and restored.
 #pragma once
 
-#include <cstdint>
-
 namespace lostmotion::control {
 
 // Gives each block its place in the row.
@@ -16,15 +14,23 @@ class Slots {
     int count_ = 0;
 };
 
-// What a signal was some ticks ago.
-struct TickDelay {
-    int ticks = 0;
+// What a low pass of first order takes over at a sample: 1 - exp(-T/time); all of it without one.
+double share_of(double sample_time, double time);
+
+// The first of some numbers, whose place the others move up to and a new one joins.
+double shifted(double in, double* kept, int count);
+
+inline constexpr long max_delay = 100000;  // [samples]
+
+// What a signal was some samples ago; the oldest value comes first.
+struct SampleDelay {
+    int samples = 0;
     int first = 0;  // slot
 
-    void place(Slots& slots) { first = slots.take(ticks); }
-    double operator()(double in, std::int64_t tick, double* slot) const;
+    void place(Slots& slots) { first = slots.take(samples); }
+    double operator()(double in, double* slot) const;
     void fill(double value, double* slot) const {
-        for (int k = 0; k < ticks; ++k) slot[first + k] = value;
+        for (int k = 0; k < samples; ++k) slot[first + k] = value;
     }
 };
 

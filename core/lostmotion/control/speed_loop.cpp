@@ -5,10 +5,9 @@ namespace lostmotion::control {
 double SpeedLoop::operator()(double reference, double speed, double feedforward, TorqueRange range, double at_limit,
                              double sample_time, double* slot) const {
     double& integral = slot[first_];
-    const double v = integral - (gain - reference_gain) * speed + feedforward;
-    const double torque = range(reference_gain * (reference - speed) + v);
-    if (integral_gain != 0.0 && !((torque - v) * at_limit > 0.0))
-        integral += sample_time * (integral_gain / reference_gain) * (torque - v);
+    const double k_t = reference_weight * gain, v = integral - (gain - k_t) * speed + feedforward;
+    const double torque = range(k_t * (reference - speed) + v);
+    if (k_i() != 0.0 && !((torque - v) * at_limit > 0.0)) integral += sample_time * (k_i() / k_t) * (torque - v);
     return torque;
 }
 

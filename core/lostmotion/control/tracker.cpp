@@ -1,6 +1,17 @@
 #include "tracker.hpp"
 
+#include <cmath>
+
 namespace lostmotion::control {
+
+void Tracker::place(Slots& slots) {
+    first_ = slots.take(4);
+    if (std::isinf(tracking_index)) return;
+    // beta^2 = index^2 (1 - alpha) and beta = 2 (2 - alpha) - 4 sqrt(1 - alpha), by r = sqrt(1 - alpha).
+    const double index = tracking_index, r = (4.0 + index - std::sqrt(8.0 * index + index * index)) / 4.0;
+    alpha = 1.0 - r * r;
+    beta = index * r;
+}
 
 void Tracker::start(double angle, double rate, double* slot) const {
     double* s = slot + first_;
@@ -14,13 +25,13 @@ void Tracker::operator()(double direction, double time, double* slot) const {
     const double r = direction - p.value;
     s[0] = p.value + alpha * r;
     s[1] = p.rate + beta / frame_time * r;
-    s[2] = p.second + gamma / (2.0 * frame_time * frame_time) * r;
+    s[2] = p.acceleration + gamma / (2.0 * frame_time * frame_time) * r;
     s[3] = time;
 }
 
 auto Tracker::at(double time, const double* slot) const -> ReferencePoint {
     ReferencePoint p = extrapolated(time, slot);
-    if (!predicts) p.value = slot[first_];
+    if (!prediction) p.value = slot[first_];
     return p;
 }
 

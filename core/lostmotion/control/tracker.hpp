@@ -2,6 +2,9 @@
 // alpha-beta-gamma.
 #pragma once
 
+#include <limits>
+
+#include "../parts/field.hpp"
 #include "reference.hpp"
 #include "slots.hpp"
 
@@ -11,10 +14,31 @@ namespace lostmotion::control {
 //   x += alpha r,  v += (beta/T) r,  a += (gamma/(2 T^2)) r   (Kalata 1984)
 struct Tracker {
     double alpha = 1.0, beta = 0.0, gamma = 0.0;
+    double tracking_index = std::numeric_limits<double>::infinity();
+    bool prediction = true;
     double frame_time = 1.0;  // T [s]
-    bool predicts = true;     // else the angle stays that of the last frame until the next
 
-    void place(Slots& slots) { first_ = slots.take(4); }
+    template <class Fields>
+    void describe(Fields& f) {
+        f.number({"alpha", "alpha", "", Range::positive, Given::may_be_left_out}, alpha);
+        f.number({"beta", "beta", "", Range::not_negative, Given::may_be_left_out}, beta);
+        f.number({"gamma", "gamma", "", Range::not_negative, Given::has_default,
+                  "0: the target is taken to move at constant speed"},
+                 gamma);
+        f.number(
+            {"tracking_index", "Lambda", "", Range::limit, Given::may_be_left_out,
+             "in the place of alpha and beta: T^2 times the deviation of the target's acceleration over that of the "
+             "noise, for which\nalpha and beta are best (Kalata 1984)"},
+            tracking_index);
+        f.flag({.key = "prediction",
+                .meaning =
+                    "whether the angle goes on at the expected rate from the exposure of the last frame; without, it "
+                    "stays"},
+               prediction);
+    }
+
+    // Takes alpha and beta from the tracking index if that is given.
+    void place(Slots& slots);
     void start(double angle, double rate, double* slot) const;
     // A measured direction [rad] of an instant [s].
     void operator()(double direction, double time, double* slot) const;

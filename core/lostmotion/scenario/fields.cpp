@@ -9,6 +9,7 @@ bool within(Range range, double v) {
         case Range::positive: return finite && v > 0.0;
         case Range::not_negative: return finite && v >= 0.0;
         case Range::up_to_one: return v > 0.0 && v <= 1.0;
+        case Range::share: return v >= 0.0 && v <= 1.0;
         case Range::limit: return v > 0.0;
         case Range::limit_or_zero: return v >= 0.0;
         case Range::bound: return !std::isnan(v);
@@ -22,6 +23,7 @@ const char* range_text(Range range) {
         case Range::positive: return "finite and > 0";
         case Range::not_negative: return "finite and >= 0";
         case Range::up_to_one: return "> 0 and <= 1";
+        case Range::share: return ">= 0 and <= 1";
         case Range::limit: return "> 0";
         case Range::limit_or_zero: return ">= 0";
         case Range::bound: return "a number";
@@ -50,6 +52,19 @@ void FieldReader::number(const char* name, double& v, Range range) {
     if (!well()) return;
     if (!within(range, given)) return wrong(name, "is " + printed(given) + "; it must be " + range_text(range));
     v = given;
+}
+
+void FieldReader::number(const Field& field, double& v) {
+    if (field.given == Given::may_be_left_out && left() > 0 && numbers_[next_] == v)
+        ++next_;
+    else
+        number(field.key, v, field.range);
+}
+
+void FieldReader::pair(const Field& field, std::array<double, 2>& v) {
+    for (double& end : v) number(field.key, end, field.range);
+    if (well() && v[1] < v[0])
+        wrong(field.key, "falls from " + printed(v[0]) + " to " + printed(v[1]) + "; it must not");
 }
 
 void FieldReader::flag(const char* name, bool& v) {

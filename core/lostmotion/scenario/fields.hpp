@@ -2,11 +2,15 @@
 //
 // A structure is described once, by a function describe(fields, structure), which both call. A text is its length and
 // its bytes, one number each; a list is its length and its entries; what may be absent is 0, or 1 and what it is.
+// A Field also says what a parameter is; what documents parameters, and what sets them by name, calls the same
+// function.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <initializer_list>
 #include <limits>
 #include <optional>
 #include <span>
@@ -14,18 +18,9 @@
 #include <utility>
 #include <vector>
 
-namespace lostmotion {
+#include "../parts/field.hpp"
 
-// What a number may be; all but `limit` and `bound` are finite.
-enum class Range {
-    any,
-    positive,
-    not_negative,
-    up_to_one,  // > 0 and <= 1
-    limit,      // > 0, or infinite
-    limit_or_zero,
-    bound,  // any, or infinite
-};
+namespace lostmotion {
 
 bool within(Range range, double v);
 const char* range_text(Range range);
@@ -60,15 +55,32 @@ class FieldWriter {
     void wrong(const std::string&, const std::string&) {}
 
     void number(const char*, double v, Range = Range::any) { numbers.push_back(v); }
+    void number(const Field&, double v) { numbers.push_back(v); }
+    void pair(const Field&, const std::array<double, 2>& v) { numbers.insert(numbers.end(), v.begin(), v.end()); }
     template <class Integer>
     void integer(const char*, Integer v, long long, long long) {
+        numbers.push_back(static_cast<double>(v));
+    }
+    template <class Integer>
+    void integer(const Field&, Integer v, long long, long long) {
         numbers.push_back(static_cast<double>(v));
     }
     template <class Enum>
     void choice(const char*, Enum v, int) {
         numbers.push_back(static_cast<double>(static_cast<int>(v)));
     }
+    template <class Enum>
+    void choice(const char*, Enum v, std::initializer_list<const char*>) {
+        numbers.push_back(static_cast<double>(static_cast<int>(v)));
+    }
     void flag(const char*, bool v) { numbers.push_back(v ? 1.0 : 0.0); }
+    void flag(const Field&, bool v) { numbers.push_back(v ? 1.0 : 0.0); }
+    // What is there or not.
+    template <class Use>
+    void present(const char*, bool v, Use&& use) {
+        numbers.push_back(v ? 1.0 : 0.0);
+        if (v) use();
+    }
     void text(const char*, const std::string& v);
     void list(const char*, const std::vector<double>& v, Range = Range::any);
     template <class T, class Use>
@@ -108,6 +120,9 @@ class FieldReader {
     }
 
     void number(const char* name, double& v, Range range = Range::any);
+    // A key that may be left out may have the value that stands for that.
+    void number(const Field& field, double& v);
+    void pair(const Field& field, std::array<double, 2>& v);
     template <class Integer>
     void integer(const char* name, Integer& v, long long low, long long high) {
         const double given = take(name);
@@ -117,6 +132,17 @@ class FieldReader {
                                    " to " + std::to_string(high));
         v = static_cast<Integer>(given);
     }
+    template <class Integer>
+    void integer(const Field& field, Integer& v, long long low, long long high) {
+        if (field.given == Given::may_be_left_out && left() > 0 && numbers_[next_] == static_cast<double>(v))
+            ++next_;
+        else
+            integer(field.key, v, low, high);
+    }
+    template <class Enum>
+    void choice(const char* name, Enum& v, std::initializer_list<const char*> names) {
+        choice(name, v, static_cast<int>(names.size()));
+    }
     template <class Enum>
     void choice(const char* name, Enum& v, int count) {
         int given = 0;
@@ -124,6 +150,14 @@ class FieldReader {
         if (well()) v = static_cast<Enum>(given);
     }
     void flag(const char* name, bool& v);
+    void flag(const Field& field, bool& v) { flag(field.key, v); }
+    template <class Use>
+    void present(const char* name, bool& v, Use&& use) {
+        flag(name, v);
+        if (!well() || !v) return;
+        const FieldPath::Step here(path_, name);
+        use();
+    }
     void text(const char* name, std::string& v);
     void list(const char* name, std::vector<double>& v, Range range = Range::any);
     template <class T, class Use>

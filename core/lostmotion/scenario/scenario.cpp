@@ -31,7 +31,7 @@ std::vector<FreeInput> free_inputs(const Scenario& s) {
 
 std::string check_given_references(const Scenario& s) {
     for (const ControlledAxis& axis : s.control.axes)
-        if (axis.law.reference_delay > 0.0)
+        if (axis.law.position_loop.reference_delay > 0.0)
             return "a controller has a reference_delay, for which it has to know the past of its reference; set it to "
                    "0";
     return {};

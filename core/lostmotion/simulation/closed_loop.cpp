@@ -13,7 +13,7 @@ auto Control::laws() const -> std::vector<control::Axis> {
     std::vector<control::Axis> out;
     for (const ControlledAxis& axis : axes) {
         out.push_back(axis.law);
-        out.back().place();
+        out.back().place(tick);
     }
     return out;
 }

@@ -8,6 +8,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 from .. import _core
 from ..errors import InputError
@@ -15,17 +16,17 @@ from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor
 from ..model.parameters import MotorLaw
 from ..model.train import DriveTrain
-from ..reproducible import expm1
-from .camera import core_camera, core_tracker
 from .continuous import ContinuousController
 from .controller import Controller
+from .described import Described
+from .encoder import Encoder
 from .filters import core_filter
 from .law import Law
-from .loops import CurrentLoop, FieldOriented, FirstOrderCurrent, VoltageCommand
+from .loops import CurrentLoop, FieldOriented, FirstOrderCurrent, SpeedLoop, VoltageCommand
 from .sample_times import whole_multiple
 
 Bound = tuple[float, list[tuple[_core.Axis, int, int, int, int]]]
-"""base tick [s]; of each axis the controller, its motor, the shafts of the position's and of the speed's encoder, and that of its reference"""
+"""shortest sample time [s]; of each axis the controller, its motor, the shafts of the position's and of the speed's encoder, and that of its reference"""
 OPEN_LOOP: Bound = (1.0, [])
 NO_LAWS: Mapping[str, Law] = MappingProxyType({})
 
@@ -83,106 +84,93 @@ class _Place:
         encoder = getattr(self.controller, key)
         return self.known(f"{key}.shaft", None if encoder is None else encoder.shaft, self.motor_shaft)
 
-    def axis(self, ticks: int) -> _core.Axis:
-        """The solver's controller; `ticks` of the base tick are its sample time."""
+    def axis(self, samples: int) -> _core.Axis:
+        """The solver's controller; its sample time is so many of the shortest one."""
         c = self.controller
         out = _core.Axis()
-        out.mode = getattr(_core.Axis.Mode, c.reference.kind)
         out.set_reference(c.reference.pieces(), c.reference.sine_list())
-        out.ratio = self.ratio(self.motor_shaft, self.shaft, "shaft")
-        out.rated_torque = self.motor.rated_torque
-        out.delay.ticks = c.delay * ticks
-        for name, _, every in c.schedules():
-            getattr(out, f"{name}_schedule").every = every * ticks
-        self._encoders(out, ticks)
-        self._loops(out)
-        self._limits(out)
-        if c.camera is not None and c.tracker is not None:
-            stream = zlib.crc32(self.name.encode())
-            out.camera = core_camera(c.camera, c.sample_time, ticks, stream)
-            out.tracker = core_tracker(c.tracker, c.camera.sample_time)
-        if c.phase > 0.0:
-            phase = whole_multiple(c.phase, c.sample_time, "phase") * ticks
-            if phase >= out.position_schedule.every:
-                raise InputError(f"phase: {c.phase:g} s is not below the sample time of the position loop; take less")
-            out.position_schedule.phase = phase
-        if isinstance(c.current, CurrentLoop):
-            out.current_loop = self._current(c.current)
-        elif isinstance(c.current, FieldOriented):
-            out.field_orientation = self._field_oriented(c.current, out.delay)
-            out.commutates_by_encoder = self.encoder_shaft("encoder") == self.motor_shaft
+        out.set(
+            {
+                "mode": c.reference.kind,
+                "ratio": self.ratio(self.motor_shaft, self.shaft, "shaft"),
+                "rated_torque": self.motor.rated_torque,
+                "delay": c.delay * samples,
+                "encoder": self._encoder("encoder", self.motor_shaft, samples),
+                "position_encoder": self._encoder("position_encoder", self.shaft, samples),
+                "blend_time": c.blend_time,
+                "feedforward": c.feedforward.core_fields(),
+                "position": c.position and c.position.core_fields(),
+                **self._schedules(samples),
+                **({} if c.speed is None else self._speed(c.speed)),
+                **self._current(c.delay * samples),
+                "camera": self._camera(samples),
+            }
+        )
         return out
 
-    def _encoders(self, out: _core.Axis, ticks: int) -> None:
+    def _schedules(self, samples: int) -> dict[str, Any]:
         c = self.controller
-        if c.encoder is not None:
-            shaft = self.encoder_shaft("encoder")
-            scale = self.ratio(self.motor_shaft, shaft, "encoder.shaft")
-            out.speed_sensor = c.encoder.core(scale, ticks)
-        if c.position_encoder is not None:
-            shaft = self.encoder_shaft("position_encoder")
-            out.two_encoders = True
-            out.position_sensor = c.position_encoder.core(
-                self.ratio(self.shaft, shaft, "position_encoder.shaft"), ticks
-            )
-            if c.blend_time is not None:
-                out.position_share = -expm1(-c.loop_time("position") / c.blend_time)
+        out = {f"{name}_schedule": {"every": every * samples} for name, _, every in c.schedules()}
+        if c.phase > 0.0:
+            phase = whole_multiple(c.phase, c.sample_time, "phase") * samples
+            if phase >= out["position_schedule"]["every"]:
+                raise InputError(f"phase: {c.phase:g} s is not below the sample time of the position loop; take less")
+            out["position_schedule"]["phase"] = phase
+        return out
 
-    def _loops(self, out: _core.Axis) -> None:
-        c = self.controller
-        if c.position is not None:
-            out.position_loop = c.position.core()
-            out.reference_delay = c.position.reference_delay
-        if c.speed is None:
-            return
-        time = c.loop_time("speed")
-        out.speed_loop = c.speed.core()
-        out.estimate = c.speed.core_estimate(time)
+    def _encoder(self, key: str, target: str, samples: int) -> dict[str, Any] | None:
+        """Of an encoder, read as the angle of the shaft `target`."""
+        encoder: Encoder | None = getattr(self.controller, key)
+        if encoder is None:
+            return None
+        scale = self.ratio(target, self.encoder_shaft(key), f"{key}.shaft")
+        return {**encoder.core_fields(), "scale": scale, "delay": encoder.delay * samples}
+
+    def _speed(self, loop: SpeedLoop) -> dict[str, Any]:
+        c, e = self.controller, loop.estimate
+        out: dict[str, Any] = {
+            "speed": loop.core_fields(),
+            "estimate": {"kind": e.kind} | (e.core_fields() if isinstance(e, Described) else {}),
+        }
         for key in ("reference_filters", "torque_filters"):
-            filters = []
-            for k, f in enumerate(getattr(c.speed, key)):
+            out[key] = []
+            for k, f in enumerate(getattr(loop, key)):
                 try:
-                    filters.append(core_filter(f, time))
+                    out[key].append(core_filter(f, c.loop_time("speed")))
                 except InputError as problem:
                     raise InputError(f"speed.{key}[{k}]: {problem}") from None
-            setattr(out, "speed_filters" if key == "reference_filters" else key, filters)
-        out.feedforward = c.feedforward.core()
         if c.inverse_model is not None:
             on_motor = self.encoder_shaft("encoder" if c.position_encoder is None else "position_encoder") != self.shaft
-            out.inverse_model = c.inverse_model.core(self.train, self.name, self.shaft, on_motor=on_motor)
-            out.load_observer = c.inverse_model.core_observer(time)
-        if c.feedforward.backlash > 0.0:
-            out.backlash.backlash = c.feedforward.backlash
-            out.backlash.rate = c.feedforward.backlash_rate or 0.0
+            fields = c.inverse_model.solver_fields(self.train, self.name, self.shaft, on_motor=on_motor)
+            out["inverse_model"] = fields
+        return out
 
-    def _limits(self, out: _core.Axis) -> None:
-        """Those of motor and amplifier that no loop of the currents or voltages keeps to."""
+    def _current(self, delay: int) -> dict[str, Any]:
+        """The loop of the currents, and the limits of motor and amplifier that no loop of currents or voltages keeps to."""
         current = self.controller.current
-        if isinstance(current, FieldOriented | VoltageCommand):
-            return
-        out.torque_limit = self.motor.largest_torque
-        line = self.motor.torque_line()
-        if line is not None and not isinstance(current, CurrentLoop):
-            out.stall_torque, out.torque_droop = line
+        if isinstance(current, FieldOriented):
+            own = self.encoder_shaft("encoder") == self.motor_shaft
+            fields = current.core_fields() | self._winding() | {"delay": delay}
+            return {"field_orientation": fields, "commutates_by_encoder": own}
+        if isinstance(current, VoltageCommand):
+            return {}
+        out: dict[str, Any] = {"torque_limit": self.motor.largest_torque}
+        if isinstance(current, CurrentLoop):
+            return out | {"current_loop": current.core_fields() | self._armature()}
+        if (line := self.motor.torque_line()) is not None:
+            out["stall_torque"], out["torque_droop"] = line
+        return out
 
-    def _current(self, loop: CurrentLoop) -> _core.CurrentLoop:
-        """Of (2): relative torque for current, 1/k_N for the resistance, so that K = g/(k_N (1 - a))."""
+    def _armature(self) -> dict[str, Any]:
         m = self.motor.as_dc()
+        keys = ("rated_torque", "rated_speed", "armature_voltage_constant", "electrical_time_constant", "command_limit")
         if m.electrical_time_constant is None or m.armature_voltage_constant is None or m.rated_speed is None:
             raise InputError(
                 'current.kind: "pi" needs a motor with a winding, and this one is a torque source; take "ideal" or "first_order"'
             )
-        k_N = m.armature_voltage_constant
-        share = -expm1(-self.controller.loop_time("current") / m.electrical_time_constant)
-        out = _core.CurrentLoop()
-        out.gain = loop.gain / (k_N * share)
-        out.integral_gain = loop.gain / k_N
-        out.back_emf = loop.back_emf * (k_N - 1.0) / (k_N * m.rated_speed)
-        out.rated_torque = m.rated_torque
-        out.limit = math.inf if m.command_limit is None else m.command_limit
-        return out
+        return {key: getattr(m, key) for key in keys}
 
-    def _field_oriented(self, loop: FieldOriented, delay: _core.TickDelay) -> _core.FieldOrientation:
+    def _winding(self) -> dict[str, Any]:
         m = self.motor
         if m.kind != "synchronous" or m.winding is None:
             raise InputError(
@@ -192,27 +180,27 @@ class _Place:
             raise InputError(
                 'current.kind: "field_oriented" needs the largest current; give motor.winding.max_current_rms or max_current_peak'
             )
-        phase = m.winding.phase_values()
-        current, time = math.sqrt(2.0) * m.winding.max_current, self.controller.loop_time("current")
+        phase, current = m.winding.phase_values(), math.sqrt(2.0) * m.winding.max_current
         if (phase.inductance_d - phase.inductance_q) * current >= phase.flux_linkage:
             raise InputError(
                 'current.kind: "field_oriented": L_d - L_q times the largest current is not below the flux linkage, so that field '
                 "weakening would turn the torque around; exchange inductance_d and inductance_q, or lower the largest current"
             )
-        out = _core.FieldOrientation()
-        out.winding = [float(value) for value in dataclasses.astuple(phase)]
-        gains = [
-            -loop.gain * phase.resistance / expm1(-phase.resistance * time / L)
-            for L in (phase.inductance_d, phase.inductance_q)
-        ]
-        out.gain_d, out.gain_q = gains
-        out.integral_gain = loop.gain * phase.resistance
-        out.back_emf, out.decoupling, out.field_weakening = loop.back_emf, loop.decoupling, loop.field_weakening
-        out.voltage_limit, out.current_limit = m.phase_voltage, current
-        out.weakening_voltage = loop.weakening_voltage * m.phase_voltage
-        out.sample_time, out.delay_time = time, self.controller.delay * self.controller.sample_time
-        out.delay = delay
-        return out
+        c = self.controller
+        times = {"sample_time": c.loop_time("current"), "delay_time": c.delay * c.sample_time}
+        return dataclasses.asdict(phase) | times | {"voltage_limit": m.phase_voltage, "current_limit": current}
+
+    def _camera(self, samples: int) -> dict[str, Any] | None:
+        c = self.controller
+        if c.camera is None or c.tracker is None:
+            return None
+        every, late = (
+            0 if time == 0.0 else whole_multiple(time, c.sample_time, f"camera.{key}") * samples
+            for key, time in (("sample_time", c.camera.sample_time), ("latency", c.camera.latency))
+        )
+        tracker = c.tracker.core_fields() | {"frame_time": c.camera.sample_time}
+        of_motor = {"every": every, "late": late, "stream": zlib.crc32(self.name.encode())}
+        return c.camera.core_fields() | of_motor | {"tracker": tracker}
 
 
 def core_control(
@@ -242,10 +230,10 @@ def core_control(
     for name, controller in controllers.items():
         place = _Place(train, name, controller)
         try:
-            ticks = whole_multiple(controller.sample_time, base, "sample_time")
+            samples = whole_multiple(controller.sample_time, base, "sample_time")
             position, speed = (place.encoder_shaft(key) for key in ("position_encoder", "encoder"))
             shafts = list(train.shafts)
-            axis = place.axis(ticks)
+            axis = place.axis(samples)
             if name in laws:
                 laws[name].set(axis)
             encoders = shafts.index(position), shafts.index(speed)

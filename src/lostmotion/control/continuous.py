@@ -18,6 +18,7 @@ from ..inputs.quantities import (
     Angle,
     Inertia,
     IntegralTorqueGain,
+    Limit,
     NotNegative,
     Number,
     Positive,
@@ -32,9 +33,10 @@ from ..model.motor import Motor
 from ..model.signals import CommandSignal, Signal, Step
 from ..model.train import DriveTrain
 from ..reproducible import sin
-from .loops import FirstOrderCurrent, IdealCurrent, Share, VoltageCommand
+from .loops import FirstOrderCurrent, IdealCurrent, VoltageCommand
 
 MAX_ORDER = 8  # of a state space
+Share = Limit(ge=0.0, le=1.0)
 
 Row = tuple[Number, ...]
 

@@ -35,7 +35,7 @@ AnyCurrent = Annotated[
 class Controller(Part):
     """Cascade of position, speed and current loop, each at its own sample time; what is left out is not there.
 
-    At each tick the encoders are read, the loops that are due are computed, the outermost first, and what the innermost
+    At each sample instant the encoders are read, the loops that are due are computed, the outermost first, and what the innermost
     one gives acts `delay` sample times later.
     """
 
@@ -117,12 +117,12 @@ class Controller(Part):
             )
 
     def schedules(self) -> Iterator[tuple[str, float, int]]:
-        """Of each loop its name, sample time [s] and how many of the base tick that is.
+        """Of each loop its name, sample time [s] and how many of the controller's that is.
 
         Raises
         ------
         ValueError
-            One of them is no whole multiple of the base tick.
+            One of them is no whole multiple of the controller's.
         """
         for name in ("position", "speed", "current"):
             time = self.loop_time(name)

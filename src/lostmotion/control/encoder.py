@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..inputs.part import Part
-from ..inputs.quantities import Angle, NotNegative, Positive, Switch, Whole
+from ..inputs.quantities import Whole
+from .described import EncoderFields
 
 RESOLUTION_KEYS = ("lines", "bits", "resolution")
 
 
-class Encoder(Part):
+class Encoder(EncoderFields):
     """A rotary encoder on a shaft: ``q floor(angle/q + 1/2) + error sin(periods angle + phase)``.
 
     Its resolution q is that of an incremental encoder of so many `lines`, 2 pi/(4 lines); of an absolute one of so many
@@ -23,19 +22,6 @@ class Encoder(Part):
 
     shaft: str | None = None
     """that it is on; left out, that of the motor"""
-    lines: Annotated[Whole, Field(ge=1, le=1 << 24)] | None = None
-    """signal periods in a turn"""
-    bits: Annotated[Whole, Field(ge=1, le=40)] | None = None
-    """of a turn, or, with lines, of a signal period"""
-    resolution: Annotated[Angle, Positive] | None = None
-    """q itself"""
-    ideal: Switch = False
-    """no resolution at all, for theory"""
-    error: Annotated[Angle, NotNegative] = 0.0
-    """amplitude of the error within a period"""
-    error_periods: Annotated[Whole, Field(ge=1, le=1 << 24)] | None = None
-    """in a turn; left out, lines"""
-    error_phase: Angle = 0.0
     delay: Annotated[Whole, Field(ge=0, le=1000)] = 0
     """sample times from the reading until the controller has it"""
 
@@ -57,22 +43,4 @@ class Encoder(Part):
     @property
     def step(self) -> float:
         """q [rad]; 0 for an ideal one."""
-        if self.ideal:
-            return 0.0
-        if self.resolution is not None:
-            return self.resolution
-        turn = 2.0 * math.pi
-        if self.lines is None:
-            return math.ldexp(turn, -(self.bits or 0))
-        return turn / (self.lines * math.ldexp(1.0, 2 if self.bits is None else self.bits))
-
-    def core(self, scale: float, ticks: int) -> _core.Sensor:
-        """The solver's encoder: turns of what is controlled for one of its shaft, and base ticks in a sample time."""
-        sensor = _core.Sensor()
-        sensor.scale = scale
-        sensor.encoder.resolution = self.step
-        sensor.encoder.error = self.error
-        sensor.encoder.periods = float(self.error_periods or self.lines or 0)
-        sensor.encoder.phase = self.error_phase
-        sensor.encoder.delay.ticks = self.delay * ticks
-        return sensor
+        return _core.encoder_step(self.core_fields())

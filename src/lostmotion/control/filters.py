@@ -14,7 +14,7 @@ from ..inputs.part import Part
 from ..inputs.quantities import Frequency, NotNegative, Number, Positive, Time
 from ..reproducible import tan
 
-MAX_ORDER = _core.DiscreteSystem.max_order
+MAX_ORDER = _core.MAX_FILTER_ORDER
 
 
 class LowPass(Part):
@@ -167,7 +167,7 @@ def companion(numerator: np.ndarray, denominator: np.ndarray) -> tuple[np.ndarra
     return A, B, b[1:] - b[0] * a[1:], float(b[0])
 
 
-def core_filter(filter: LowPass | Notch | TransferFunction, sample_time: float) -> _core.DiscreteSystem:
+def core_filter(filter: LowPass | Notch | TransferFunction, sample_time: float) -> dict[str, Any]:
     """The solver's system."""
     A, B, C, D = companion(*filter.discrete(sample_time))
-    return _core.DiscreteSystem(A.ravel().tolist(), B.tolist(), C.tolist(), D)
+    return {"A": A.ravel().tolist(), "B": B.tolist(), "C": C.tolist(), "D": D}

@@ -80,7 +80,7 @@ class Reference(TimeFunction[V], Generic[V]):
     def pieces(self) -> list[Piece]:
         """All but the sines: (time [s], value, first, second, third derivative) of each piece, the first from 0 on.
 
-        Within a piece the value is ``value + rate s + second s**2/2 + third s**3/6``, s seconds after its time.
+        Within a piece the value is ``value + rate s + acceleration s**2/2 + jerk s**3/6``, s seconds after its time.
         """
         return _pieces_of(self)
 
@@ -116,8 +116,8 @@ class Reference(TimeFunction[V], Generic[V]):
             for n, wave in enumerate((sine, cosine, -sine, -cosine)):
                 found[n] = found[n] + factor * wave
                 factor *= omega
-        value, rate, second, third = found
-        return value, rate, second, third
+        value, rate, acceleration, jerk = found
+        return value, rate, acceleration, jerk
 
     @property
     def duration(self) -> float:
@@ -127,7 +127,7 @@ class Reference(TimeFunction[V], Generic[V]):
 
 @lru_cache(maxsize=64)
 def _pieces_of(reference: Reference[Any]) -> list[Piece]:
-    return [(t, value, rate, second, third) for t, value, rate, second, third in reference.breakpoint_list()]
+    return [(t, value, rate, acceleration, jerk) for t, value, rate, acceleration, jerk in reference.breakpoint_list()]
 
 
 @lru_cache(maxsize=64)

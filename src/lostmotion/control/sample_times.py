@@ -6,7 +6,7 @@ import math
 
 from ..errors import InputError
 
-MAX_TICKS = 1_000_000  # of the base tick in a sample time
+MAX_SAMPLES = 1_000_000  # of the shortest sample time in another
 
 
 def whole_multiple(time: float, base: float, key: str) -> int:
@@ -17,10 +17,10 @@ def whole_multiple(time: float, base: float, key: str) -> int:
     InputError
         It is no whole multiple.
     """
-    ticks = round(time / base)
-    if ticks < 1 or ticks > MAX_TICKS or not math.isclose(ticks * base, time, rel_tol=1e-9):
-        near = max(1, min(ticks, MAX_TICKS)) * base
+    samples = round(time / base)
+    if samples < 1 or samples > MAX_SAMPLES or not math.isclose(samples * base, time, rel_tol=1e-9):
+        near = max(1, min(samples, MAX_SAMPLES)) * base
         raise InputError(
             f"{key}: {time:g} s is no whole multiple of the sample time {base:g} s; take {near:g} s, or another sample time"
         )
-    return ticks
+    return samples

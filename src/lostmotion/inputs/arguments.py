@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import inspect
-import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sized
 from functools import cache, wraps
 from numbers import Integral
 from typing import Any, ParamSpec, TypeAlias, TypeVar, get_args
@@ -69,7 +68,8 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         try:
             bound = signature.bind(*args, **kwargs)
         except TypeError as error:
-            raise misfit(function.__qualname__, signature.parameters, kwargs, str(error)) from None
+            lacking = _lacking(signature, args, kwargs)
+            raise misfit(function.__qualname__, signature.parameters, kwargs, str(error), lacking) from None
         for name, annotation in wanted.items():
             if name in bound.arguments:
                 bound.arguments[name] = _read(name, bound.arguments[name], annotation, known)
@@ -78,7 +78,9 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     return call
 
 
-def misfit(function: str, parameters: Iterable[str], given: Iterable[str], problem: str) -> ArgumentError:
+def misfit(
+    function: str, parameters: Iterable[str], given: Iterable[str], problem: str = "", lacking: str | None = None
+) -> ArgumentError:
     """What is wrong with the names or the number of the arguments of a call.
 
     Parameters
@@ -89,15 +91,26 @@ def misfit(function: str, parameters: Iterable[str], given: Iterable[str], probl
         Names of those that it was given by name.
     problem
         What the language says of the call.
+    lacking
+        Name of an argument that is needed and was not given.
     """
     known = [name for name in parameters if name != "self"]
     where = f"{function.removesuffix('.__init__')}()"
     if unknown := [name for name in given if name not in known]:
         meant = did_you_mean(unknown[0], known, f"its arguments are {', '.join(known)}" if known else "it has none")
         return ArgumentError(f"{where} has no argument {unknown[0]}; {meant}")
-    if lacking := re.search(r"missing a required (?:keyword-only )?argument: '(\w+)'", problem):
-        return ArgumentError(f"{where} lacks the argument {lacking[1]}; add it")
-    return ArgumentError(f"{where} {problem}")
+    return ArgumentError(f"{where} {problem if lacking is None else f'lacks the argument {lacking}; add it'}")
+
+
+def _lacking(signature: inspect.Signature, args: Sized, given: Collection[str]) -> str | None:
+    """The first argument that a call lacks; None where its arguments are too many, or one of them is given twice."""
+    parameters = signature.parameters.values()
+    places = [p.name for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
+    by_place = set(places[: len(args)])
+    if len(args) > len(places) or by_place & set(given):
+        return None
+    needed = [p.name for p in parameters if p.default is p.empty and p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
+    return next((name for name in needed if name not in by_place and name not in given), None)
 
 
 def _read(name: str, value: Any, annotation: str, known: Mapping[str, Any]) -> Any:

@@ -260,7 +260,7 @@ class _Problem:
             case "finite_number":
                 return "must be a finite number"
             case "literal_error" | "enum":
-                choices = re.findall("'([^']*)'", c["expected"])
+                choices = [x for n in self.nodes for x in n.get("enum", [n["const"]] if "const" in n else [])]
                 return f"must be {_one_of(choices, self.value)}"
             case "too_short":
                 return f"has {_entries(len(self.value))}; it needs at least {c['min_length']}"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from ..control.axis import turns
+from ..control.axis import core_control, turns
 from ..control.controller import Controller
 from ..errors import InputError, need
 from ..inputs.validation import shown
@@ -59,6 +59,13 @@ class Axis:
     def ratio(self) -> float:
         """Turns of the motor for one of that shaft."""
         return turns(self.train, self.motor_shaft, self.shaft) or 1.0
+
+    @cached_property
+    def law(self) -> tuple[_core.Axis, str, str]:
+        """The controller as the solver has it, and the shafts whose angles its position and its speed are read from."""
+        ((law, _, position, speed, _),) = core_control(self.train, {self.motor: self.controller})[1]
+        shafts = list(self.train.shafts)
+        return law, shafts[position], shafts[speed]
 
     @property
     def loops(self) -> tuple[str, ...]:
@@ -149,9 +156,9 @@ class Regime:
         block = np.zeros((n + 1, n + 1))
         block[:n, :n], block[:n, n] = model.A, model.B[:, model.inputs.index(f"{axis.motor}_command")]
         over_tick = expm(block * axis.controller.sample_time)[:n]
-        winding, c = None, axis.controller
-        if c.current.kind == "field_oriented":
-            winding = OrientedWinding.of(axis.scenario.motors[axis.motor], axis.motor, c, model)
+        winding, law = None, axis.law[0]
+        if law.is_oriented:
+            winding = OrientedWinding.of(axis.scenario.motors[axis.motor], axis.motor, axis.controller, law, model)
         return cls(name, meaning, model, over_tick, winding)
 
 

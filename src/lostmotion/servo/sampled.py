@@ -1,8 +1,8 @@
 """The exact linear sampled loops of an axis in one regime of its plant.
 
-Between two base ticks the plant is x' = A x + B u with u held, so x[k+1] = Phi x[k] + Gamma u[k] with the matrix exponential. The
-controller computes at its ticks what core/lostmotion/control/axis.hpp says, without limits, quantisation and dead zones. Both
-together are linear and repeat after the sample time of the outermost loop that is closed. Over that time they are one
+Between two base ticks the plant is x' = A x + B u with u held, so x[k+1] = Phi x[k] + Gamma u[k] with the matrix exponential. A
+sample step of the controller is affine away from its limits; the core gives its matrices (core/lostmotion/control/linear_step.hpp).
+Both together are linear and repeat after the sample time of the outermost loop that is closed. Over that time they are one
 time-invariant system, from whose samples all is computed; nothing is averaged or approximated.
 """
 
@@ -11,23 +11,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ..control.axis import turns
-from ..control.encoder import Encoder
-from ..control.filters import companion
-from ..control.loops import CurrentLoop, Difference, ExactSpeed, Observer
+from .. import _core
 from ..errors import InputError
 from ..response.linear import LinearModel
-from . import field_orientation
 from .regimes import Axis, Regime
-from .rows import INPUTS, Row, Tick
 
-LOOPS = ("direct current", "current", "speed", "position")  # the innermost first
+INPUTS = ("reference", "rate", "acceleration", "measured")
+"""of a loop: its reference with two derivatives, and what takes the place of its measured value where it is cut"""
+CURRENTS = {"direct current": _core.CurrentAxis.direct, "current": _core.CurrentAxis.quadrature}
+"""loops of field-oriented control, of i_d and of i_q, the other one closed"""
 
+Row = np.ndarray
+"""a signal as a linear form over the state at a tick, and the inputs"""
 Entering = Callable[[int, np.ndarray], np.ndarray]
 
 
@@ -81,64 +81,57 @@ class SampledLoop:
     @cached_property
     def ticks(self) -> list[tuple[np.ndarray, np.ndarray, dict[str, Row]]]:
         """Of each tick of one sample time: state to state, inputs to state, and the signals."""
-        names = self._states()
-        n, total = len(self.plant_states), len(names)
-        out = []
-        for k in range(self.every(self.loop)):
-            tick = Tick(names)
-            acting = self._control(tick, k)
-            plant = self._over_tick(k) @ np.vstack([[tick[name] for name in names[:n]], acting])
-            rows = np.vstack([plant, [tick[name] for name in names[n:]]])
-            out.append((rows[:, :total], rows[:, total:], tick.rows))
-        return out
+        first = self.axis.law[0].position_phase if self.loop == "position" else 0
+        ticks = [self._tick(first + k) for k in range(self.every(self.loop))]
+        # What neither the plant nor an input reaches stays as it is, such as the integrators of the loops left open.
+        reached = np.arange(len(ticks[0][0])) < self._plant_states
+        for _ in reached:
+            reached = reached | np.any([F[:, reached].any(axis=1) | G.any(axis=1) for F, G, _ in ticks], axis=0)
+        kept = np.append(reached, np.ones(len(INPUTS), bool))
+        return [
+            (F[np.ix_(reached, reached)], G[reached], {name: row[kept] for name, row in rows.items()})
+            for F, G, rows in ticks
+        ]
 
     @property
-    def plant_states(self) -> tuple[str, ...]:
-        """Those of the plant, and the currents of a winding."""
-        return (*self.model.states, *(() if self.regime.winding is None else field_orientation.CURRENTS))
+    def _plant_states(self) -> int:
+        """With the currents of a winding."""
+        return len(self.model.states) + (0 if self.regime.winding is None else 2)
 
-    def _over_tick(self, k: int) -> np.ndarray:
-        """From the states of the plant and what acts on it to its states a tick later."""
-        winding = self.regime.winding
-        return self.regime.over_tick if winding is None else winding.over_ticks[k % winding.every][0]
-
-    def _states(self) -> list[str]:
-        c = self.axis.controller
-        names = list(self.plant_states)
-
-        def row(name: str, count: int) -> list[str]:
-            return [f"{name}{k}" for k in range(count)]
-
-        names += ["torque_reference", "measured_speed", "speed_reference"]
-        if self.regime.winding is not None:
-            names += field_orientation.states(self.regime.winding)
+    def _tick(self, tick: int) -> tuple[np.ndarray, np.ndarray, dict[str, Row]]:
+        law, position_shaft, speed_shaft = self.axis.law
+        winding, motor, loop = self.regime.winding, self.axis.motor, self.loop
+        oriented = CURRENTS.get(loop) if winding is not None else None
+        outermost = getattr(_core.Loop, "current" if oriented else loop)
+        step = _core.linear_step(law, outermost, self.cut, tick, self.tick)
+        currents = np.zeros((4, 0)) if winding is None else winding.step(oriented, self.cut, tick)
+        counts = (self._plant_states, len(step), len(currents) - 4, len(INPUTS))
+        plant, slots, own, inputs = np.split(np.eye(sum(counts)), np.cumsum(counts)[:-1])
+        sampled = (f"{position_shaft}_angle", f"{speed_shaft}_angle", f"{speed_shaft}_speed", f"{motor}_torque")
+        # What a controller does not read need not follow from the states.
+        read = [
+            self._output(name, plant) if column.any() else np.zeros(sum(counts))
+            for name, column in zip(sampled, step.T[len(step) :], strict=False)
+        ]
+        after = step @ np.vstack([slots, *read, 0.0 * inputs if oriented else inputs])
+        rows = {name: after[j] for j, (name, _, _) in enumerate(_core.axis_signals())}
+        rows |= {f"{s}_angle": self._output(f"{s}_angle", plant) for s in (self.axis.motor_shaft, self.axis.shaft)}
+        rows |= {f"{name}_measured": rows[f"measured_{name}"] for name in ("speed", "position")}
+        if winding is None:
+            acting, over_tick = after[[_core.COMMAND_SLOT]], self.regime.over_tick
+            if loop == "current":
+                rows["current_measured"] = self._output(sampled[3], plant)
         else:
-            names += ["computed_command", "current_integral", *row("command_delay_", c.delay)]
-        for key in ("encoder", "position_encoder"):
-            encoder = getattr(c, key)
-            names += row(f"{key}_delay_", 0 if encoder is None else encoder.delay)
-        e = self._kind_of_estimate()
-        names += row("before_", e.span) if isinstance(e, Difference) else []
-        names += ["estimate", "estimated_angle"] if isinstance(e, Observer) else ["estimate"]
-        if c.speed is not None:
-            names += ["speed_integral"]
-            for key in ("reference_filters", "torque_filters"):
-                for k, system in enumerate(self._filters(key)):
-                    names += row(f"{key}_{k}_", len(system[1]))
-        if c.position is not None:
-            names += ["position_integral", "blended"]
-        return names
+            rotor = rows[f"{self.axis.motor_shaft}_angle"]
+            angle = after[_core.SPEED_ANGLE_SLOT] if law.commutates_by_encoder else rotor
+            taken = [rows["torque_reference"], rows["measured_speed"], angle, rotor, *plant[-2:], inputs[0], inputs[3]]
+            own, acting, measured = np.split(currents @ np.vstack([own, *taken]), [len(own), len(own) + 2])
+            rows |= {f"{name}_measured": row for name, row in zip(CURRENTS, measured, strict=True)}
+            over_tick = winding.over_ticks[tick % winding.every][0]
+        whole = np.vstack([over_tick @ np.vstack([plant, acting]), after, own])
+        return whole[:, : -len(INPUTS)], whole[:, -len(INPUTS) :], rows
 
-    def _kind_of_estimate(self) -> Difference | Observer | ExactSpeed:
-        """Without a speed loop, the current loop has the plain difference for its back-e.m.f."""
-        speed = self.axis.controller.speed
-        return Difference() if speed is None else speed.estimate
-
-    def _filters(self, key: str) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, float]]:
-        c = self.axis.controller
-        return [companion(*f.discrete(c.loop_time("speed"))) for f in getattr(c.speed, key)]
-
-    def _output(self, tick: Tick, name: str) -> Row:
+    def _output(self, name: str, plant: np.ndarray) -> Row:
         """A variable of the plant that the command does not act on at once."""
         m = self.model
         if name not in m.outputs:
@@ -146,129 +139,7 @@ class SampledLoop:
                 f"{name}: follows from no gear in this regime, as behind a transmission error or an open clutch; put the encoder "
                 "on a shaft that the motor turns"
             )
-        return sum((c * tick[s] for c, s in zip(m.C[m.outputs.index(name)], m.states, strict=True)), tick.zero)
-
-    # --- one tick, in the order of Axis::step ---
-
-    def _control(self, tick: Tick, k: int) -> np.ndarray:
-        """Computes the signals of a tick; returns what acts on the plant from it on."""
-        c, axis = self.axis.controller, self.axis
-        for shaft in (axis.motor_shaft, axis.shaft):
-            tick[f"{shaft}_angle"] = self._output(tick, f"{shaft}_angle")
-        due = {name: k % self.every(name) == 0 for name in LOOPS if name in self.active}
-        speed_shaft = self._sensor(tick, "encoder", "speed_angle", axis.motor_shaft)
-        if c.position_encoder is not None:
-            self._sensor(tick, "position_encoder", "position_angle", axis.shaft)
-        if k % self.every("speed") == 0:
-            tick["measured_speed"] = self._estimate(tick, speed_shaft)
-        if self.loop == "position" and due["position"]:
-            self._position_loop(tick)
-        if due.get("speed"):
-            self._speed_loop(tick)
-        if self.regime.winding is not None:
-            return self._winding(tick, k, speed_shaft)
-        if self.loop == "current":
-            tick["torque_reference"] = tick["reference"]
-        if isinstance(c.current, CurrentLoop):
-            if due["current"]:
-                tick["computed_command"] = self._current_loop(tick, c.current)
-        else:
-            tick["computed_command"] = tick["torque_reference"] / axis.scenario.motors[axis.motor].rated_torque
-        return tick.delayed("command_delay_", tick["computed_command"], c.delay)[None, :]
-
-    def _winding(self, tick: Tick, k: int, speed_shaft: str) -> np.ndarray:
-        winding = self.regime.winding
-        assert winding is not None
-        rotor = tick[f"{self.axis.motor_shaft}_angle"]
-        read = tick["speed_angle"] if speed_shaft == self.axis.motor_shaft else rotor
-        if k % winding.every == 0:
-            measured = partial(self._measured, tick)
-            field_orientation.control(tick, winding, (rotor, read), self.loop, measured)
-        return field_orientation.acting(tick, winding, rotor, k % winding.every)
-
-    def _sensor(self, tick: Tick, key: str, signal: str, target: str) -> str:
-        """Reads an encoder, to the angle of `target`; returns its shaft."""
-        encoder: Encoder | None = getattr(self.axis.controller, key)
-        shaft = (encoder and encoder.shaft) or self.axis.motor_shaft
-        delay = 0 if encoder is None else encoder.delay
-        scale = turns(self.axis.train, target, shaft)
-        tick[signal] = (scale or 1.0) * tick.delayed(f"{key}_delay_", self._output(tick, f"{shaft}_angle"), delay)
-        return shaft
-
-    def _estimate(self, tick: Tick, shaft: str) -> Row:
-        T, e, angle = self.axis.controller.loop_time("speed"), self._kind_of_estimate(), tick["speed_angle"]
-        if isinstance(e, Difference):
-            smoothing = -math.expm1(-T / e.time_constant) if e.time_constant > 0.0 else 1.0
-            difference = (angle - tick.delayed("before_", angle, e.span)) / (T * e.span)
-            tick["estimate"] = tick["estimate"] + smoothing * (difference - tick["estimate"])
-            return tick["estimate"]
-        if isinstance(e, Observer):
-            w, before = 2.0 * math.pi * e.bandwidth, tick["estimate"]
-            error = angle - tick["estimated_angle"]
-            acceleration = tick["torque_reference"] / e.inertia if e.inertia else tick.zero
-            step = before + 2.0 * e.damping * w * error
-            tick["estimated_angle"] = tick["estimated_angle"] + T * step + 0.5 * T * T * acceleration
-            tick["estimate"] = before + T * (w * w * error + acceleration)
-            return before
-        scale = turns(self.axis.train, self.axis.motor_shaft, shaft)
-        return (scale or 1.0) * self._output(tick, f"{shaft}_speed")
-
-    def _measured(self, tick: Tick, loop: str, row: Row) -> Row:
-        """What a controller takes for its measured value: where the loop is cut, the input in its place."""
-        tick[f"{loop}_measured"] = row
-        return tick["measured"] if self.cut and loop == self.loop else row
-
-    def _position_loop(self, tick: Tick) -> None:
-        c, ratio = self.axis.controller, self.axis.ratio
-        assert c.position is not None
-        angle = tick["speed_angle"] / ratio
-        if c.position_encoder is not None:
-            T = c.loop_time("position")
-            share = 1.0 if c.blend_time is None else -math.expm1(-T / c.blend_time)
-            beyond = tick["position_angle"] - angle - tick["blended"]
-            tick["blended"] = tick["blended"] + share * beyond
-            angle = angle + tick["blended"]
-        e = tick["reference"] - self._measured(tick, "position", angle)
-        wanted = c.position.gain * e + tick["position_integral"] + c.position.feedforward * tick["rate"]
-        tick["position_integral"] = tick["position_integral"] + c.loop_time("position") * c.position.integral_gain * e
-        tick["speed_reference"] = ratio * wanted
-
-    def _speed_loop(self, tick: Tick) -> None:
-        c, ratio = self.axis.controller, self.axis.ratio
-        loop, T = c.speed, c.loop_time("speed")
-        assert loop is not None
-        outermost = self.loop == c.reference.kind
-        if self.loop == "speed":
-            tick["speed_reference"] = (ratio if outermost else 1.0) * tick["reference"]
-        wanted = tick["speed_reference"]
-        for k, system in enumerate(self._filters("reference_filters")):
-            wanted = tick.filtered(f"reference_filters_{k}_", wanted, system)
-        ahead = tick.zero
-        if outermost:
-            speed, acceleration = ("reference", "rate") if self.loop == "speed" else ("rate", "second")
-            f = c.feedforward
-            ahead = ratio * (f.inertia * tick[acceleration] + f.viscous_friction * tick[speed])
-        measured = self._measured(tick, "speed", tick["measured_speed"])
-        k_t = loop.reference_weight * loop.gain
-        v = tick["speed_integral"] - (loop.gain - k_t) * measured + ahead
-        torque = k_t * (wanted - measured) + v
-        if loop.k_i:
-            tick["speed_integral"] = tick["speed_integral"] + T * loop.k_i / k_t * (torque - v)
-        for k, system in enumerate(self._filters("torque_filters")):
-            torque = tick.filtered(f"torque_filters_{k}_", torque, system)
-        tick["torque_reference"] = torque
-
-    def _current_loop(self, tick: Tick, loop: CurrentLoop) -> Row:
-        m = self.axis.scenario.motors[self.axis.motor].as_dc()
-        k_N, tau = m.armature_voltage_constant, m.electrical_time_constant
-        assert k_N is not None and tau is not None and m.rated_speed is not None  # noqa: PT018
-        share = -math.expm1(-self.axis.controller.loop_time("current") / tau)
-        torque = self._measured(tick, "current", self._output(tick, f"{self.axis.motor}_torque"))
-        e = (tick["torque_reference"] - torque) / m.rated_torque
-        wanted = loop.gain / (k_N * share) * e + tick["current_integral"]
-        wanted = wanted + loop.back_emf * (k_N - 1.0) / (k_N * m.rated_speed) * tick["measured_speed"]
-        tick["current_integral"] = tick["current_integral"] + loop.gain / k_N * e
-        return np.asarray(wanted)
+        return np.asarray(m.C[m.outputs.index(name)] @ plant[: len(m.states)])
 
     # --- what follows ---
 

@@ -20,6 +20,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .. import _core
 from ..control.controller import Controller
 from ..control.loops import FieldOriented
 from ..errors import InputError
@@ -29,13 +30,12 @@ from ..response.linear import LinearModel
 
 POINTS, WEIGHTS = (0.5 * (x + s) for x, s in zip(np.polynomial.legendre.leggauss(12), (1.0, 0.0), strict=True))
 """of Gauss's formula over a tick, as shares of it"""
-QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
-"""turns a pair (d, q) by 90 degrees"""
 
 
 def turn(angle: float) -> np.ndarray:
     """The matrix that turns a pair (d, q) by an angle [rad]."""
-    return math.cos(angle) * np.eye(2) + math.sin(angle) * QUARTER
+    sine, cosine = math.sin(angle), math.cos(angle)
+    return np.array([[cosine, -sine], [sine, cosine]])
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,8 @@ class Steady:
 class OrientedWinding:
     """Winding and inverter of an axis in one regime, about its steady motion."""
 
+    law: _core.Axis
+    """the controller as the solver has it"""
     phase: PhaseValues
     loop: FieldOriented
     tick: float
@@ -81,15 +83,15 @@ class OrientedWinding:
     """the speed of the rotor over the plant's states"""
 
     @classmethod
-    def of(cls, motor: ShaftMotor, name: str, c: Controller, model: LinearModel) -> OrientedWinding:
+    def of(cls, motor: ShaftMotor, name: str, c: Controller, law: _core.Axis, model: LinearModel) -> OrientedWinding:
         """In the regime of a linear model, at the speed of its point.
 
         Parameters
         ----------
         motor, name
             With field-oriented control, and its name in the model.
-        c
-            Its controller.
+        c, law
+            Its controller, and what the solver makes of that.
 
         Raises
         ------
@@ -111,6 +113,7 @@ class OrientedWinding:
         late = encoder.delay * c.sample_time if encoder is not None and on_rotor else 0.0
         every = next(n for loop_name, _, n in c.schedules() if loop_name == "current")
         return cls(
+            law=law,
             phase=phase,
             loop=loop,
             tick=c.sample_time,
@@ -143,11 +146,6 @@ class OrientedWinding:
         """L_d - L_q [H]."""
         return self.phase.inductance_d - self.phase.inductance_q
 
-    @property
-    def ahead(self) -> float:
-        """By how much the inverter turns a voltage ahead of what is read [s]."""
-        return self.delay * self.tick + 0.5 * self.sample_time
-
     def placed(self, since: int) -> float:
         """Electrical angle from the voltage as it was asked for to that in coordinates of the rotor, so many ticks after the
         sample of the currents [rad]."""
@@ -179,33 +177,13 @@ class OrientedWinding:
         """The same after shares of a tick: at Gauss's points, and at its end."""
         return [self._drifted(share * self.tick) for share in (*POINTS, 1.0)]
 
-    def least_current(self, torque: float) -> tuple[np.ndarray, float]:
-        """(i_d, i_q) [A] of the least current for a torque [N·m], and d i_d/d torque [A/(N·m)]."""
-        linear, S = self.phase.torque_constant, self.saliency
-        if S == 0.0:
-            return np.array([0.0, torque / linear]), 0.0
-        from scipy.optimize import brentq
-
-        D = -self.phase.flux_linkage / (2.0 * S)
-
-        def direct(i_q: float) -> float:
-            return -i_q * i_q / (D + math.copysign(math.hypot(D, i_q), D))
-
-        most = abs(torque) / linear
-        i_q = brentq(lambda x: self.phase.torque(direct(x), x) - abs(torque), 0.0, most, xtol=1e-300) if most else 0.0
-        root = math.copysign(math.hypot(D, i_q), D)
-        scale = 1.5 * self.phase.pole_pairs
-        slope = scale * (self.phase.flux_linkage + S * (direct(i_q) - i_q * i_q / root))
-        sign = math.copysign(1.0, torque)
-        return np.array([direct(i_q), sign * i_q]), sign * -i_q / root / slope
-
     @property
     def least_direct(self) -> float:
         """Beyond it the voltage would rise again [A]."""
         return -min(self.largest_current, self.phase.flux_linkage / self.phase.inductance_d)
 
     def _wanted(self, torque: float, weakening: float) -> np.ndarray:
-        i_d = max(float(self.least_current(torque)[0][0]) + weakening, self.least_direct)
+        i_d = max(self.law.least_current(torque)[0] + weakening, self.least_direct)
         return np.array([i_d, torque / self.constant(i_d)])
 
     def constant(self, i_d: float) -> float:
@@ -283,6 +261,20 @@ class OrientedWinding:
         return found
 
     # --- small deviations ---
+
+    def step(self, outermost: _core.CurrentAxis | None, cut: bool, tick: int) -> np.ndarray:
+        """The matrix of `_core.linear_orientation` at a tick.
+
+        Parameters
+        ----------
+        outermost
+            The current that is looked at; None for both under a torque.
+        """
+        m = self.steady
+        (i_d, i_q), (u_d, u_q) = m.wanted.tolist(), m.asked.tolist()
+        motion = (self.speed, self.lag, m.torque_reference, m.weakening, (i_d, i_q), (u_d, u_q))
+        looked_at = outermost or _core.CurrentAxis.none
+        return _core.linear_orientation(self.law, *motion, looked_at, cut, self.every, tick % self.every, self.tick)
 
     @cached_property
     def over_ticks(self) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -321,8 +321,7 @@ class Simulation:
     def _of_drive(self, command: Ramp, load_torque: Ramp, others: dict[str, Ramp]) -> dict[str, Ramp]:
         """The inputs of a drive by name."""
         if others or (command is _GIVE and not self._controllers):
-            problem = "missing a required argument: 'command'"
-            raise misfit("Simulation.advance", ("interval", "command", "load_torque"), others, problem)
+            raise misfit("Simulation.advance", ("interval", "command", "load_torque"), others, lacking="command")
         if not self._controllers:
             return {"command": command, "load_torque": load_torque}
         if command is not _GIVE:

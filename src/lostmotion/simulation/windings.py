@@ -43,10 +43,8 @@ def coarser(control: Bound) -> Bound:
     """The same controllers, with one exchange of torque and speed in each tick in the place of two."""
     tick, axes = control
     for axis, *_ in axes:
-        if axis.field_orientation is not None:
-            orientation = axis.field_orientation
-            orientation.parts = 1
-            axis.field_orientation = orientation
+        if axis.is_oriented:
+            axis.set({"field_orientation": {"parts": 1}})
     return tick, axes
 
 

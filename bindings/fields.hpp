@@ -1,0 +1,158 @@
+// Parameters by name: what sets them from a dict of Python, and what says what they are.
+#pragma once
+
+#include <initializer_list>
+#include <limits>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "arrays.hpp"
+#include "lostmotion/scenario/fields.hpp"
+
+namespace lostmotion::binding {
+
+// Sets what a dict has, by name; the rest stays as it is. None stands for a key that is left out.
+class NamedFields {
+ public:
+    static constexpr bool reads = true;
+    using Range = lostmotion::Range;
+
+    explicit NamedFields(nb::dict values) : values_(std::move(values)) {}
+
+    bool well() const { return true; }
+    void wrong(const std::string& name, const std::string& how) { throw nb::value_error((name + ' ' + how).c_str()); }
+
+    void number(const char* name, double& v, Range = Range::any) { take(name, v); }
+    void number(const Field& field, double& v) { take(field.key, v); }
+    void pair(const Field& field, std::array<double, 2>& v) { take(field.key, v); }
+    template <class Integer>
+    void integer(const char* name, Integer& v, long long, long long) {
+        take(name, v);
+    }
+    template <class Integer>
+    void integer(const Field& field, Integer& v, long long, long long) {
+        take(field.key, v);
+    }
+    void flag(const char* name, bool& v) { take(name, v); }
+    void flag(const Field& field, bool& v) { take(field.key, v); }
+    template <class Enum>
+    void choice(const char* name, Enum& v, std::initializer_list<const char*> names) {
+        std::string given;
+        if (!take(name, given)) return;
+        int k = 0;
+        for (const char* each : names) {
+            if (given == each) {
+                v = static_cast<Enum>(k);
+                return;
+            }
+            ++k;
+        }
+        wrong(name, "is " + given + ", which is none of its names");
+    }
+    void list(const char* name, std::vector<double>& v, Range = Range::any) { take(name, v); }
+    template <class Curve>
+    void curve(const char* name, Curve& v) {
+        take(name, v);
+    }
+    template <class T, class Use>
+    void each(const char* name, std::vector<T>& v, Use&& use) {
+        std::vector<nb::dict> given;
+        if (!take(name, given)) return;
+        v.assign(given.size(), T{});
+        for (std::size_t k = 0; k < given.size(); ++k) within(given[k], [&] { use(v[k]); });
+    }
+    template <class Use>
+    void part(const char* name, Use&& use) {
+        nb::dict given;
+        if (take(name, given)) within(std::move(given), use);
+    }
+    template <class Use>
+    void present(const char* name, bool& v, Use&& use) {
+        part(name, [&] {
+            v = true;
+            use();
+        });
+    }
+    template <class T, class Use>
+    void optional(const char* name, std::optional<T>& v, const T& initial, Use&& use) {
+        part(name, [&] {
+            if (!v) v = initial;
+            use(*v);
+        });
+    }
+    // After all has been read.
+    void refuse_unknown() const {
+        if (used_ != values_.size()) wrong_keys();
+    }
+
+ private:
+    template <class T>
+    bool take(const char* name, T& v) {
+        if (!values_.contains(name)) return false;
+        ++used_;
+        const nb::object given = values_[name];
+        if (given.is_none()) return false;
+        v = nb::cast<T>(given);
+        return true;
+    }
+    template <class Use>
+    void within(nb::dict inner, Use&& use) {
+        std::swap(values_, inner);
+        const std::size_t used = std::exchange(used_, 0);
+        use();
+        refuse_unknown();
+        std::swap(values_, inner);
+        used_ = used;
+    }
+    [[noreturn]] void wrong_keys() const {
+        throw nb::value_error(("unknown keys among " + std::string(nb::repr(values_.keys()).c_str())).c_str());
+    }
+
+    nb::dict values_;
+    std::size_t used_ = 0;
+};
+
+// Of each parameter that a scenario file may have: key, symbol, unit, meaning, range (above, from on, up to), whether
+// it is needed, and its default, None where it is left out.
+class DescribedFields {
+ public:
+    static constexpr bool reads = false;
+    using Range = lostmotion::Range;
+
+    nb::list rows;
+
+    void number(const Field& field, double v) { add(field, "number", limits(field.range), nb::float_(v)); }
+    void pair(const Field& field, const std::array<double, 2>& v) {
+        add(field, "pair", limits(field.range), nb::make_tuple(v[0], v[1]));
+    }
+    template <class Integer>
+    void integer(const Field& field, Integer v, long long low, long long high) {
+        add(field, "integer", nb::make_tuple(nb::none(), low, high), nb::int_(v));
+    }
+    void flag(const Field& field, bool v) {
+        add(field, "flag", nb::make_tuple(nb::none(), nb::none(), nb::none()), nb::bool_(v));
+    }
+
+ private:
+    static nb::tuple limits(Range range) {
+        const nb::object none = nb::none(), zero = nb::float_(0.0), one = nb::float_(1.0);
+        switch (range) {
+            case Range::positive:
+            case Range::limit: return nb::make_tuple(zero, none, none);
+            case Range::not_negative:
+            case Range::limit_or_zero: return nb::make_tuple(none, zero, none);
+            case Range::up_to_one: return nb::make_tuple(zero, none, one);
+            case Range::share: return nb::make_tuple(none, zero, one);
+            default: return nb::make_tuple(none, none, none);
+        }
+    }
+    void add(const Field& field, const char* kind, const nb::tuple& range, const nb::object& value) {
+        if (field.given == Given::none) return;
+        rows.append(nb::make_tuple(field.key, kind, field.symbol, field.unit, field.meaning, range,
+                                   field.given == Given::needed,
+                                   field.given == Given::has_default ? value : nb::none()));
+    }
+};
+
+}  // namespace lostmotion::binding

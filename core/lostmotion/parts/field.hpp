@@ -1,0 +1,33 @@
+// What is said of a parameter, in one place: what reads, writes, checks and documents it is made from this.
+//
+// A structure states its parameters by a function describe(fields), which calls fields.number({...}, value) for each.
+// The value that a new structure has is its default, or, where a key may be left out, what stands for that.
+#pragma once
+
+namespace lostmotion {
+
+// What a number may be; all but `limit`, `limit_or_zero` and `bound` are finite.
+enum class Range {
+    any,
+    positive,
+    not_negative,
+    up_to_one,  // > 0 and <= 1
+    share,      // >= 0 and <= 1
+    limit,      // > 0, or infinite
+    limit_or_zero,
+    bound,  // any, or infinite
+};
+
+// Of a key in a scenario file.
+enum class Given { has_default, needed, may_be_left_out, none };  // none: it follows from other parts of the drive
+
+struct Field {
+    const char* key;
+    const char* symbol = "";
+    const char* unit = "";
+    Range range = Range::any;
+    Given given = Given::has_default;
+    const char* meaning = "";
+};
+
+}  // namespace lostmotion
