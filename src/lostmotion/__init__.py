@@ -276,6 +276,8 @@ _WITH_DATASETS = (
     "test_rig.measurement",
     "test_rig.rig",
 )
+# Modules whose results notebooks show as the page that the command writes.
+_WITH_PAGES = ("servo.commission",)
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = ["__version__", *_HOME_OF]  # noqa: PLE0604
@@ -290,7 +292,10 @@ def __getattr__(name: str) -> Any:
         home = _HOME_OF[name]
         if home in _WITH_DATASETS:
             importlib.import_module(".reports.accessor", __name__)
-        value = getattr(importlib.import_module(f".{home}", __name__), name)
+        module = importlib.import_module(f".{home}", __name__)
+        if home in _WITH_PAGES:
+            importlib.import_module(".reports.notebook", __name__).attach(module)
+        value = getattr(module, name)
     else:
         raise AttributeError(f"module 'lostmotion' has no attribute {name!r}")
     globals()[name] = value

@@ -12,7 +12,9 @@ from matplotlib.figure import Figure
 
 from ..simulation.results import scenario_of
 from ..simulation.scenario import Scenario
-from .panels import COMMAND_STYLE, STYLES, Curve, Panel
+from . import other_plots as others
+from .panels import COMMAND_STYLE, STYLES, Chart, Curve, Group, Panel
+from .thinning import thinned
 
 if TYPE_CHECKING:
     import xarray
@@ -55,64 +57,68 @@ class Picture(Figure):
         return png.getvalue()
 
 
-MAX_POINTS = 10_000  # of a curve that is drawn; more than twice the pixels across any figure
-
-
-def thinned(x: Any, y: Any, max_points: int = MAX_POINTS) -> tuple[Any, Any]:
-    """Points of a curve that look the same: of each run of neighbours the first and the extremes of both coordinates."""
-    n = len(y)
-    if n <= max_points:
-        return x, y
-    x, y = np.asarray(x), np.asarray(y)
-    width = -(-n * 5 // max_points)
-    whole = n // width * width
-    firsts = np.arange(0, whole, width)
-    kept: list[Any] = [firsts, np.arange(whole, n), [n - 1]]
-    for values in (y,) if np.all(x[1:] >= x[:-1]) else (x, y):
-        rows = values[:whole].reshape(-1, width)
-        gaps = bool(np.isnan(rows.min()))
-        for extreme, fill in ((np.argmin, np.inf), (np.argmax, -np.inf)):
-            kept.append(firsts + extreme(np.where(np.isnan(rows), fill, rows) if gaps else rows, axis=1))
-    index: Any = np.unique(np.concatenate(kept))
-    return x[index], y[index]
-
-
 @in_our_looks
-def draw(panels: Iterable[Panel], columns: int, size: tuple[float, float], note: str = "") -> Figure:
-    """Panels in rows of `columns`, `size` [inch] in all; `note` stands below."""
-    panels = list(panels)
+def draw(charts: Iterable[Chart], columns: int, size: tuple[float, float], note: str = "") -> Figure:
+    """Charts in rows of `columns`, `size` [inch] in all; `note` stands below."""
+    charts = list(charts)
     figure = Picture(figsize=size)
-    rows = -(-len(panels) // columns)
-    for k, panel in enumerate(panels):
+    rows = -(-len(charts) // columns)
+    for k, chart in enumerate(charts):
         axes = figure.add_subplot(rows, columns, k + 1)
-        for low, high in panel.shaded:
-            axes.axvspan(low, high, color="0.88", linewidth=0)
-        for curve in panel.curves:
-            axes.plot(*thinned(curve.x, curve.y), label=curve.shown, **curve.style)
-        if panel.log_x:
-            axes.set_xscale("log")
-        if panel.log_y and any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves):
-            axes.set_yscale("log")
-        axes.set(title=panel.title, xlabel=panel.x_label, ylabel=panel.y_label)
+        if isinstance(chart, Panel):
+            _panel(axes, chart)
+        else:
+            others.draw(axes, chart)
+        axes.set_title(chart.title)
         axes.title.set_fontsize(10)
-        if panel.x_range is not None:
-            axes.set_xlim(*panel.x_range)
-        if panel.y_range is not None:
-            axes.set_ylim(*panel.y_range)
-        elif panel.x_range is not None:
-            axes.set_ylim(*_range_within(panel.curves, panel.x_range))
-    labels = [[c.shown for c in panel.curves] for panel in panels]
+    labels = [[c.shown for c in chart.curves] if isinstance(chart, Panel) else [] for chart in charts]
     if len(labels[0]) > 1 and all(names == labels[0] for names in labels):
         columns = len(labels[0]) if len(labels[0]) <= 4 else 3
         handles = figure.axes[0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside upper center", ncols=columns, fontsize=8.5)
     else:
-        for axes, names in zip(figure.axes, labels, strict=True):
+        for axes, names in zip(figure.axes, labels, strict=False):
             if len(names) > 1:
                 axes.legend(fontsize=8, loc="best")
     if note:
         figure.supxlabel(note, fontsize=8, color="0.35")
     return figure
+
+
+def draw_group(group: Group) -> Figure:
+    """The picture of a group of charts."""
+    columns = min(group.columns, len(group.charts))
+    rows = -(-len(group.charts) // columns)
+    return draw(group.charts, columns, (max(6.0, min(4.2 * columns, 12.0)), 0.6 + 2.7 * rows))
+
+
+def _panel(axes: Any, panel: Panel) -> None:
+    for low, high in panel.shaded:
+        axes.axvspan(low, high, color="0.88", linewidth=0)
+    if (ground := panel.ground) is not None:
+        mesh = axes.contourf(ground.x, ground.y, np.ma.masked_invalid(ground.values), levels=14, cmap="cividis")
+        axes.figure.colorbar(mesh, ax=axes, label=ground.label)
+    if panel.level is not None:
+        axes.axhline(panel.level, color="0.45", linestyle="--", linewidth=0.9)
+    for curve in panel.curves:
+        axes.plot(*thinned(curve.x, curve.y), label=curve.shown, **curve.style)
+    for mark in panel.marks:
+        axes.plot([mark.x, mark.x], [mark.y, mark.y if mark.to is None else mark.to], color=mark.style["color"])
+        axes.plot([mark.x], [mark.y], ".", color=mark.style["color"])
+        axes.annotate(mark.text, (mark.x, mark.y), (4, 4), textcoords="offset points", fontsize=7)
+    if panel.log_x:
+        axes.set_xscale("log")
+    if panel.log_y and any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves):
+        axes.set_yscale("log")
+    axes.set(xlabel=panel.x_label, ylabel=panel.y_label)
+    if panel.x_names:
+        axes.set_xticks(range(len(panel.x_names)), panel.x_names, rotation=45, ha="right", fontsize=7)
+    if panel.x_range is not None:
+        axes.set_xlim(*panel.x_range)
+    if panel.y_range is not None:
+        axes.set_ylim(*panel.y_range)
+    elif panel.x_range is not None and panel.curves:
+        axes.set_ylim(*_range_within(panel.curves, panel.x_range))
 
 
 def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tuple[float, float]:

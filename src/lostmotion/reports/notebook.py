@@ -1,0 +1,23 @@
+"""Results in notebooks: as the pages that the commands write of them."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+# Module -> its class, the module here that makes a page of it, and the function that does.
+PAGES = {
+    "servo.commission": ("ServoReport", "servo", "servo_report"),
+}
+
+
+def attach(module: ModuleType) -> None:
+    """Gives the class of results in a module what notebooks call to show one."""
+    name, home, function = PAGES[module.__name__.partition(".")[2]]
+
+    def shown(result: Any) -> str:
+        report = getattr(import_module(f".{home}", __package__), function)(name, result)
+        return str(report._repr_html_())
+
+    setattr(getattr(module, name), "_repr_html_", shown)  # noqa: B010
