@@ -16,6 +16,7 @@ OF_TAG = {
     "div": {"data-chart"},
     "img": {"alt", "src"},
     "link": {"href", "rel"},
+    "output": {"data-line"},
     "script": {"type"},
     "td": {"colspan", "style"},
     "th": {"colspan", "rowspan", "scope"},

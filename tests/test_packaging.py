@@ -90,7 +90,7 @@ def test_a_response_leaves_out_only_the_file_that_it_cannot_write(tmp_path: Path
     assert done.returncode == 0, done.stderr
     assert 'response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"' in done.stdout
     assert {p.name for p in (tmp_path / "r").iterdir()} == {
-        "bode.png", "bode.svg", "bode.csv", "maps.png", "maps.svg", "response.csv", "characteristics.csv",
+        "response.html", "bode.csv", "response.csv", "characteristics.csv",
     }  # fmt: skip
 
 

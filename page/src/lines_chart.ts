@@ -16,6 +16,7 @@ export class LinesChart {
   private readonly readings: HTMLElement[];
   /** every line goes from left to right: the cursor is a line, and others follow it */
   readonly rising: boolean;
+  private readonly ground?: (x: number, y: number) => number;
   private readonly whole: Range;
   private seen: Range;
   private at?: number;
@@ -39,7 +40,13 @@ export class LinesChart {
     place.append(this.box, this.tip);
     this.readings = [...place.closest("figure")!.querySelectorAll<HTMLElement>("output")];
     this.lines = data.lines.map((line) => ({ ...line, x: arrays[line.x]!, y: arrays[line.y]! }));
-    this.rising = this.lines.every(({ x, width }, n) => width !== 0 && !data.lines[n]!.names && rises(x));
+    const { x, y, ground } = data;
+    if (ground)
+      this.ground = surface(arrays[ground.x]!, arrays[ground.y]!, arrays[ground.values]!, [
+        x.logarithmic,
+        y.logarithmic,
+      ]);
+    this.rising = !ground && this.lines.every(({ x, width }, n) => width !== 0 && !data.lines[n]!.names && rises(x));
     this.whole = data.x.range ?? this.reach();
     this.seen = this.whole;
     this.listen();
@@ -62,21 +69,17 @@ export class LinesChart {
     this.tip.hidden = x === undefined;
     this.plot.mark(x ?? NaN);
     const values = this.lines.map((line) => (x === undefined ? NaN : line.y[nearest(line.x, x)]!));
-    this.readings.forEach((reading, k) => (reading.textContent = x === undefined ? "" : format(values[k] ?? NaN, 4)));
+    for (const reading of this.readings)
+      reading.textContent = x === undefined ? "" : format(values[Number(reading.dataset.line)]!, 4);
     if (x === undefined) return;
     const alone = this.lines.length === 1 && this.readings.length === 0;
-    this.say(x, alone ? `${format(x)}: ${format(values[0]!, 4)}` : format(x), this.plot.place(x, NaN)[0], 4);
+    this.say(alone ? `${format(x)}: ${format(values[0]!, 4)}` : format(x), this.plot.place(x, NaN)[0], 4);
   }
 
   private chart(): Chart {
-    const { x, y, marks, spans, level, ground } = this.data;
+    const { x, y, marks, spans, level } = this.data;
     const axis = { ...y, range: y.range && this.seen === this.whole ? y.range : this.height() };
-    const shade = ground && {
-      value: surface(this.arrays[ground.x]!, this.arrays[ground.y]!, this.arrays[ground.values]!, [
-        x.logarithmic,
-        y.logarithmic,
-      ]),
-    };
+    const shade = this.ground && { value: this.ground };
     return { x: { ...x, range: this.seen }, y: axis, lines: this.lines, marks, spans, level, shade };
   }
 
@@ -126,18 +129,22 @@ export class LinesChart {
       }),
     );
     const near = found.distance < NEAR;
-    this.tip.hidden = !near;
+    this.tip.hidden = !near && !this.ground;
     this.plot.mark(NaN);
+    if (!near && this.ground) {
+      const [x, y] = this.plot.valuesAt(left, top);
+      this.say(`${format(x, 3)}, ${format(y, 3)}: ${format(this.ground(x, y), 4)}`, left, top);
+    }
     if (!near) return;
     const { x, y, label } = this.lines[found.line]!;
     const [value, other] = [x[found.k]!, y[found.k]!];
     const name = this.data.lines[found.line]!.names?.[found.k] ?? (this.lines.length > 1 ? label : "");
     const [a, b] = this.plot.place(value, other);
     this.plot.mark(value, other);
-    this.say(value, `${name ? `${name}: ` : ""}${this.data.x.names?.[value] ?? format(value)}, ${format(other)}`, a, b);
+    this.say(`${name ? `${name}: ` : ""}${this.data.x.names?.[value] ?? format(value)}, ${format(other)}`, a, b);
   }
 
-  private say(_: number, text: string, left: number, top: number): void {
+  private say(text: string, left: number, top: number): void {
     this.tip.textContent = text;
     const right = left > this.place.clientWidth / 2;
     this.tip.style.left = right ? "" : `${left + 10}px`;

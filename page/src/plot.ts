@@ -105,6 +105,12 @@ export class Plot {
     return between(this.xRange, Math.min(1, Math.max(0, share)), this.chart?.x.logarithmic);
   }
 
+  /** The values below a point. */
+  valuesAt(left: number, top: number): [number, number] {
+    const share = (this.height - MARGIN.bottom - top) / (this.height - MARGIN.top - MARGIN.bottom);
+    return [this.valueAt(left), between(this.yRange, Math.min(1, Math.max(0, share)), this.chart?.y.logarithmic)];
+  }
+
   /** A line at x, or with y a point there; it does not redraw the chart. */
   mark(x: number, y?: number): void {
     this.marked = [x, y];

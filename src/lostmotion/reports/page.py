@@ -10,10 +10,12 @@ from html import escape
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from ..errors import InputError
 from ..portable.checkout import made_here
 from .packed import packed
-from .panels import Bars, Chart, Contacts, Flows, Group, Histogram, Matrix, Panel
+from .panels import Bars, Chart, Contacts, Flows, Ground, Group, Histogram, Matrix, Panel
 from .static import svg_of, swatch
 
 HERE = Path(__file__).parent
@@ -161,12 +163,14 @@ def _card(chart: Chart, charts: list[Chart]) -> str:
 
 def _legend(chart: Chart) -> str:
     if isinstance(chart, Panel):
-        shown = [curve for curve in chart.curves if len(chart.curves) > 1 or curve.style.get("marker")]
+        several = len(chart.curves) > 1
+        shown = [(k, c) for k, c in enumerate(chart.curves) if c.shown != "_" and (several or c.style.get("marker"))]
         found = [
-            f'<span class="entry">{swatch(curve)}{escape(curve.label)} <output></output></span>' for curve in shown
+            f'<span class="entry">{swatch(c)}{escape(c.shown)} <output data-line="{k}"></output></span>'
+            for k, c in shown
         ]
         if chart.ground is not None:
-            found.append(f'<span class="entry">{escape(chart.ground.label)}: darker is higher <output></output></span>')
+            found.append(f'<span class="entry">{escape(scale_of(chart.ground))}</span>')
         return "".join(found)
     if isinstance(chart, Bars) and chart.series:
         boxes = [
@@ -182,6 +186,14 @@ def _legend(chart: Chart) -> str:
     if isinstance(chart, Contacts):
         return '<span class="entry">full: stuck; upper half: slips forward; lower half: backward</span>'
     return ""
+
+
+def scale_of(ground: Ground) -> str:
+    """What the shades of a map mean."""
+    values = ground.values[np.isfinite(ground.values)]
+    if len(values) == 0:
+        return "no values"
+    return f"{ground.label}: {values.min():.3g} to {values.max():.3g}, higher where it is shaded more"
 
 
 def _matrix(chart: Matrix) -> str:

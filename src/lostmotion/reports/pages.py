@@ -96,7 +96,7 @@ def write_report(
 
 
 def _has_panels(group: Group) -> bool:
-    return any(isinstance(chart, Panel) for chart in group.charts)
+    return any(isinstance(chart, Panel) and chart.curves for chart in group.charts)
 
 
 def _plain(label: str) -> str:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from ..simulation.results import scenario_of
 from ..simulation.scenario import Scenario
 from . import other_plots as others
-from .panels import COMMAND_STYLE, STYLES, Chart, Curve, Group, Panel
+from .panels import COMMAND_STYLE, STYLES, Chart, Curve, Ground, Group, Panel
 from .thinning import thinned
 
 if TYPE_CHECKING:
@@ -96,8 +96,7 @@ def _panel(axes: Any, panel: Panel) -> None:
     for low, high in panel.shaded:
         axes.axvspan(low, high, color="0.88", linewidth=0)
     if (ground := panel.ground) is not None:
-        mesh = axes.contourf(ground.x, ground.y, np.ma.masked_invalid(ground.values), levels=14, cmap="cividis")
-        axes.figure.colorbar(mesh, ax=axes, label=ground.label)
+        _contours(axes, ground)
     if panel.level is not None:
         axes.axhline(panel.level, color="0.45", linestyle="--", linewidth=0.9)
     for curve in panel.curves:
@@ -108,7 +107,7 @@ def _panel(axes: Any, panel: Panel) -> None:
         axes.annotate(mark.text, (mark.x, mark.y), (4, 4), textcoords="offset points", fontsize=7)
     if panel.log_x:
         axes.set_xscale("log")
-    if panel.log_y and any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves):
+    if panel.log_y and (panel.ground or any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves)):
         axes.set_yscale("log")
     axes.set(xlabel=panel.x_label, ylabel=panel.y_label)
     if panel.x_names:
@@ -119,6 +118,17 @@ def _panel(axes: Any, panel: Panel) -> None:
         axes.set_ylim(*panel.y_range)
     elif panel.x_range is not None and panel.curves:
         axes.set_ylim(*_range_within(panel.curves, panel.x_range))
+
+
+def _contours(axes: Any, ground: Ground) -> None:
+    shown = np.ma.masked_invalid(ground.values)
+    axes.grid(visible=False)
+    if shown.count() == 0 or float(np.ptp(shown.compressed())) == 0.0:
+        axes.text(0.5, 0.5, "nothing to show", transform=axes.transAxes, ha="center", color="0.35")
+        return
+    filled = axes.contourf(ground.x, ground.y, shown, levels=14, cmap="cividis")
+    axes.figure.colorbar(filled, ax=axes, label=ground.label)
+    axes.contour(ground.x, ground.y, shown, levels=14, colors="0.15", linewidths=0.4)
 
 
 def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tuple[float, float]:
@@ -235,23 +245,4 @@ def correlation_map(names: Sequence[str], values: Any) -> Figure:
         ink = "white" if abs(values[i, j]) > 0.6 else "black"
         axes.text(j, i, f"{values[i, j]:+.2f}", ha="center", va="center", fontsize=7.5, color=ink)
     figure.colorbar(image, ax=axes, label="correlation [-]", shrink=0.8)
-    return figure
-
-
-@in_our_looks
-def amplitude_maps(frequency: Any, amplitude: Any, maps: Mapping[str, tuple[str, Any]], amplitude_label: str) -> Figure:
-    """Contours over frequency [Hz] and amplitude: maps[title] = (label of the values, values[amplitude, frequency])."""
-    figure = Picture(figsize=(10.0, 3.4 * -(-len(maps) // 2)))
-    for k, (title, (label, values)) in enumerate(maps.items()):
-        axes = figure.add_subplot(-(-len(maps) // 2), 2, k + 1)
-        shown = np.ma.masked_invalid(values)
-        axes.set(xscale="log", yscale="log", title=title, xlabel="frequency [Hz]", ylabel=amplitude_label)
-        axes.title.set_fontsize(10)
-        axes.grid(visible=False)
-        if shown.count() == 0 or float(np.ptp(shown.compressed())) == 0.0:
-            axes.text(0.5, 0.5, "nothing to show", transform=axes.transAxes, ha="center", color="0.35")
-            continue
-        filled = axes.contourf(frequency, amplitude, shown, levels=14, cmap="cividis")
-        figure.colorbar(filled, ax=axes, label=label)
-        axes.contour(frequency, amplitude, shown, levels=14, colors="0.15", linewidths=0.4)
     return figure

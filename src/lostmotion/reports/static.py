@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from .packed import DASHES, colour_name
-from .panels import Bars, Chart, Contacts, Curve, Histogram, Panel
+from .panels import Bars, Chart, Contacts, Curve, Ground, Histogram, Panel
 from .thinning import simplified, thinned
 
 WIDTH, HEIGHT = 560.0, 240.0
 LEFT, RIGHT, TOP, BOTTOM = 56.0, 12.0, 10.0, 36.0
 POINTS = 1200  # of a curve, before those are dropped that no one sees
+SHADES = 16  # of a map
 SEEN = 0.3  # from a line between others, in units of the picture
 Scale = Callable[[Any], Any]
 
@@ -111,12 +112,18 @@ def _frame(panel: Panel, x: tuple[float, float], y: tuple[float, float], to_x: S
 
 def _panel(panel: Panel) -> str:
     log_y = panel.log_y and any(np.any(np.asarray(c.y) > 0.0) for c in panel.curves)
-    x = panel.x_range or extent([c.x for c in panel.curves], panel.log_x, 0.0 if panel.log_x else 0.02)
+    ground = panel.ground
+    log_y = log_y or (panel.log_y and ground is not None)
+    across, along = ([], []) if ground is None else ([ground.x], [ground.y])
+    x = panel.x_range or extent(
+        [*(c.x for c in panel.curves), *across], panel.log_x, 0.0 if panel.log_x or ground else 0.02
+    )
     marked = [v for m in panel.marks for v in (m.y, m.y if m.to is None else m.to)]
-    y = panel.y_range or extent([*(c.y for c in panel.curves), marked], log_y, 0.06)
+    y = panel.y_range or extent([*(c.y for c in panel.curves), marked, *along], log_y, 0.0 if ground else 0.06)
     to_x = _scale(x, LEFT, WIDTH - RIGHT, panel.log_x)
     to_y = _scale(y, HEIGHT - BOTTOM, TOP, log_y)
     parts = [_frame(panel, x, y, to_x, to_y, log_y)]
+    parts += [] if ground is None else [_ground(ground, to_x, to_y)]
     for low, high in panel.shaded:
         a, b = (float(np.clip(to_x(v), LEFT, WIDTH - RIGHT)) for v in (low, high))
         parts.append(
@@ -137,6 +144,31 @@ def _panel(panel: Panel) -> str:
             )
         parts.append(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3.5" fill="var(--{colour})"/>')
     return _svg(panel.title, HEIGHT, parts)
+
+
+def _ground(ground: Ground, to_x: Scale, to_y: Scale) -> str:
+    """A map as cells in a few shades."""
+    across, along = (_edges(to(np.asarray(v, float))) for to, v in ((to_x, ground.x), (to_y, ground.y)))
+    values = np.asarray(ground.values, float)
+    low, high = extent([values], False, 0.0)
+    with np.errstate(invalid="ignore"):
+        levels = np.where(np.isfinite(values), np.round(SHADES * (values - low) / ((high - low) or 1.0)), -1.0)
+    cells: dict[int, list[str]] = {}
+    for j, row in enumerate(levels.astype(int).tolist()):
+        ends = [0, *(k for k in range(1, len(row)) if row[k] != row[k - 1]), len(row)]
+        for a, b in pairwise(ends):
+            box = f"M{across[a]:.1f} {along[j]:.1f}H{across[b]:.1f}V{along[j + 1]:.1f}H{across[a]:.1f}z"
+            cells.setdefault(row[a], []).append(box)
+    shades = {level: 0.03 + 0.4 * level / SHADES for level in cells if level >= 0}
+    return "".join(
+        f'<path fill="var(--text)" fill-opacity="{s:.3f}" d="{"".join(cells[n])}"/>' for n, s in shades.items()
+    )
+
+
+def _edges(middles: np.ndarray) -> list[float]:
+    """Limits of cells about their middles, the outermost at the ends."""
+    between = 0.5 * (middles[1:] + middles[:-1])
+    return [float(v) for v in (middles[0], *between, middles[-1])]
 
 
 def _svg(title: str, height: float, parts: Iterable[str]) -> str:
