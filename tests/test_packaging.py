@@ -99,7 +99,6 @@ def test_a_response_leaves_out_only_the_file_that_it_cannot_write(tmp_path: Path
     [
         (("run", "paper-2dof-nl-small", "-o", "a.nc"), "h5netcdf", "netcdf"),
         (("run", "paper-2dof-nl-small", "-o", "a.parquet"), "pyarrow", "study"),
-        (("rig", "schaeffler-rt1-h-20-100"), "jinja2", "report"),
         (("reproduce",), "jinja2", "report"),
         (("study", str(ROOT / "examples" / "tolerance.toml")), "pyarrow", "study"),
         (("study", str(ROOT / "examples" / "tolerance.toml"), "--scheduler", "tcp://a:1"), "distributed", "cluster"),

@@ -232,7 +232,8 @@ export function limits(all: Float64Array[], logarithmic: boolean, room: number):
     const factor = high > low ? (high / low) ** room : 2;
     return [low / factor, high * factor];
   }
-  const wide = high > low ? room * (high - low) : Math.abs(high) || 1;
+  const rounding = 1e-9 * Math.max(Math.abs(low), Math.abs(high));
+  const wide = high - low > rounding ? room * (high - low) : Math.abs(high) || 1;
   return [low - wide, high + wide];
 }
 

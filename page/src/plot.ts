@@ -55,7 +55,7 @@ export interface Chart {
 
 const ANGLE = /°|deg(rees)?\]/; // with ticks at halves and thirds of a right angle
 const CELLS: [number, number] = [72, 48]; // of a shade
-const MARGIN = { left: 52, right: 12, top: 8, bottom: 34 };
+const MARGIN = { left: 58, right: 12, top: 8, bottom: 34 };
 
 export class Plot {
   private readonly canvas = document.createElement("canvas");

@@ -8,7 +8,9 @@ from typing import Any
 
 # Module -> its class, the module here that makes a page of it, and the function that does.
 PAGES = {
+    "pointing.budget": ("PointingBudget", "pointing", "pointing_report"),
     "servo.commission": ("ServoReport", "servo", "servo_report"),
+    "test_rig.measurement": ("RigReport", "rig", "rig_report"),
 }
 
 

@@ -89,7 +89,9 @@ def framed(page: str, height: int = 900) -> str:
 def render(report: Report) -> str:
     """The page as HTML; nothing in it refers to anything outside."""
     charts: list[Chart] = []
-    state = {"good": "Verdict", "bad": "Verdict: not in order", "open": "Verdict: open"}[report.verdict.state]
+    state = {"good": "Verdict", "bad": "Verdict: not in order", "open": "Verdict, with reservations"}[
+        report.verdict.state
+    ]
     lines = "".join(f"<p>{_text(line)}</p>\n" for line in report.verdict.lines)
     body = [f'<section class="verdict {report.verdict.state}"><h2>{state}</h2>\n{lines}</section>']
     for part in (report.main, *report.parts):

@@ -17,6 +17,7 @@ from .thinning import simplified, thinned
 WIDTH, HEIGHT = 560.0, 240.0
 LEFT, RIGHT, TOP, BOTTOM = 56.0, 12.0, 10.0, 36.0
 POINTS = 1200  # of a curve, before those are dropped that no one sees
+CONSTANT = 1e-9  # relative differences up to which are rounding
 SHADES = 16  # of a map
 SEEN = 0.3  # from a line between others, in units of the picture
 Scale = Callable[[Any], Any]
@@ -77,7 +78,7 @@ def extent(values: Iterable[Any], logarithmic: bool, share: float) -> tuple[floa
     low, high = float(every.min()), float(every.max())
     if logarithmic:
         return (low / 1.05, high * 1.05) if share else (low, high) if high > low else (low / 2.0, high * 2.0)
-    room = share * (high - low) if high > low else abs(high) or 1.0
+    room = share * (high - low) if high - low > CONSTANT * max(abs(low), abs(high)) else abs(high) or 1.0
     return low - room, high + room
 
 
