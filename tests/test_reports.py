@@ -7,17 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import lostmotion as lm
 from html_pages import Page, charts
+from lostmotion.cli import app
 from lostmotion.reports import page as pages
 from lostmotion.reports.packed import MAX_POINTS, packed
 from lostmotion.reports.page import Report, Table, Verdict, render
 from lostmotion.reports.panels import PALETTE, STEPS, Bars, Contacts, Curve, Flows, Group, Mark, Matrix, Panel, look
 from lostmotion.reports.pictures import endings
+from lostmotion.reports.run import run_report
 from lostmotion.reports.servo import servo_report, write_servo
 from lostmotion.reports.static import svg_of
 from lostmotion.reports.thinning import simplified
+from lostmotion.units.practical import practical
 
 X = np.geomspace(1.0, 1000.0, 50)
 PANEL = Panel("gain", "frequency [Hz]", "[-]", (Curve("one", X, 10.0 / X, look(0)),), log_x=True, log_y=True, level=1.0,
@@ -152,8 +156,42 @@ def test_figures_are_drawn_where_they_are_asked_for(axis: lm.ServoReport, tmp_pa
 
 def test_a_report_takes_no_plotting_library_along() -> None:
     modules = sorted(path.stem for path in Path(pages.__file__).parent.glob("*.py"))
-    drawing = {"plots", "other_plots", "train_figures", "hunting_figures", "response_figures", "pictures"}
+    drawing = {"plots", "other_plots", "hunting_figures", "response_figures", "pictures"}
     reports = [f"lostmotion.reports.{name}" for name in modules if name not in drawing | WITH_MATPLOTLIB]
     code = f"import sys, {', '.join(reports)}; print('matplotlib' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
+
+
+def test_a_run_is_reported_with_the_numbers_of_its_dataset(tmp_path: Path) -> None:
+    scenario = lm.load("position-axis", {"simulation.duration": 0.3})
+    result = lm.simulate(scenario)
+    page = render(run_report("position-axis", result))
+    found = {chart["title"]: chart for chart in charts(page)}
+    (error,) = found["Following error"]["lines"]
+    wanted = result["position_reference"].values - result["measured_position"].values
+    assert np.array_equal(error["y"], 1e3 * wanted)
+    assert np.array_equal(found["Twist"]["lines"][0]["y"], 1e3 * result["twist"].values)
+    modes = {row["label"]: row["modes"] for row in found["Contacts"]["rows"]}
+    assert np.array_equal(modes["input shaft"], result["input_contact"].values)
+    assert found["Energy of the whole run"]["energies"] == lm.energy_of(result)
+    assert len(found["Loss map of gearbox"]["lines"][0]["x"]) == result.sizes["time"]
+    assert practical(float(np.abs(wanted).max()), "rad") in page
+    assert not Page(page).faults
+    assert result.lm._repr_html_().startswith("<iframe")
+
+
+def test_the_figure_of_a_run_shows_its_axis_and_its_contacts_as_bars() -> None:
+    figure = lm.simulate(lm.load("direction-finder", {"simulation.duration": 0.05})).lm.plot()
+    axes = {a.get_title(): a for a in figure.axes}
+    assert {"Position of traverse drive", "Following error of elevation drive"} <= axes.keys()
+    assert [t.get_text() for t in axes["Contacts"].get_yticklabels()][:2] == ["traverse motor", "traverse gear twist"]
+
+
+def test_a_report_of_a_run_is_a_page(tmp_path: Path) -> None:
+    path = tmp_path / "r.html"
+    done = CliRunner().invoke(app, ["run", "paper-2dof-nl-small", "--report", str(path)])
+    assert done.exit_code == 0, done.output
+    assert "Share of the time in which contacts are stuck: input" in path.read_text()
+    wrong = CliRunner().invoke(app, ["run", "paper-2dof-nl-small", "--report", str(tmp_path / "r.pdf")])
+    assert "its name must end in .html" in str(wrong.exception)

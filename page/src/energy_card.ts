@@ -34,6 +34,7 @@ export function flows(energies: Map<string, number>): { into: Flow[]; out: Flow[
 }
 
 const [WIDTH, TOP, SPAN, GAP, ROW] = [610, 10, 150, 6, 19];
+const LETTER = 7.2; // width
 const [LEFT, MIDDLE, RIGHT] = [150, 215, 290]; // ends of the ribbons
 
 export class EnergyCard {
@@ -67,6 +68,7 @@ export function ribbons(ledger: Map<string, number>): SVGElement | string {
   const whole = into.reduce((sum, f) => sum + f.energy, 0);
   if (whole === 0) return "No energy has flowed.";
   const unit = shown("J", whole);
+  const beside = Math.max(0, LETTER * (Math.max(...into.map((f) => f.label.length)) + 8) - LEFT); // of long labels
   const parts: SVGElement[] = [];
   const bottom = Math.max(
     ...[into, out].map((side, k) =>
@@ -93,7 +95,7 @@ export function ribbons(ledger: Map<string, number>): SVGElement | string {
   return svg(
     "svg",
     {
-      viewBox: `0 0 ${WIDTH} ${Math.max(bottom + 16, TOP + SPAN + 26)}`,
+      viewBox: `${-beside} 0 ${WIDTH + beside} ${Math.max(bottom + 16, TOP + SPAN + 26)}`,
       role: "img",
       "aria-label": `Energy: ${energies.join("; ")}`,
     },

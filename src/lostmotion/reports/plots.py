@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..simulation.results import scenario_of
-from ..simulation.scenario import Scenario
 from . import other_plots as others
-from .panels import COMMAND_STYLE, STYLES, Chart, Curve, Ground, Group, Panel
+from .panels import Chart, Curve, Ground, Group, Panel
+from .run_charts import run_charts
 from .thinning import thinned
 
 if TYPE_CHECKING:
@@ -139,71 +138,20 @@ def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tupl
     return low - margin, high + margin
 
 
-# The result variables that the overview shows.
-OVERVIEW = (
-    "command",
-    "motor_torque",
-    "motor_speed",
-    "load_speed",
-    "input_torque",
-    "output_torque",
-    "load_torque",
-    "twist",
-    "input_contact",
-    "twist_contact",
-)
-
-
 def overview(result: xarray.Dataset) -> Figure:
-    """A run at a glance: command and motor, speeds, torques, twist and contacts."""
-    t = result["time"].values
-    ink = STYLES["2-DOF-NL"]
-    second = STYLES["2-DOF-L"]
-    ratio = _ratio(result)
+    """A run at a glance: controlled axes with their following errors, commands, speeds, torques, twists, contacts as bars.
 
-    def curve(name: str, style: Mapping[str, Any], factor: float = 1.0, label: str = "") -> Curve:
-        return Curve(label or name.replace("_", " "), t, factor * result[name].values, style)
-
-    panels = [
-        Panel("", "time [s]", "command [-]", (curve("command", ink),)),
-        Panel("", "time [s]", "motor torque [N·m]", (curve("motor_torque", ink),)),
-        Panel(
-            "",
-            "time [s]",
-            "speed at the load [rad/s]",
-            (curve("motor_speed", second, 1.0 / ratio, "motor speed / ratio"), curve("load_speed", ink)),
-        ),
-        Panel(
-            "",
-            "time [s]",
-            "torque [N·m]",
-            (
-                curve("input_torque", second, ratio, "input torque x ratio"),
-                curve("output_torque", ink),
-                curve("load_torque", COMMAND_STYLE),
-            ),
-        ),
-        Panel("", "time [s]", "twist [mrad]", (curve("twist", ink, 1e3),)),
-        Panel(
-            "",
-            "time [s]",
-            "contact: -1, 0 stuck, +1",
-            (curve("input_contact", ink), curve("twist_contact", {**second, "linewidth": 1.0})),
-            y_range=(-1.15, 1.15),
-        ),
-    ]
-    figure = draw(panels, 2, (10.0, 8.0), note=result.attrs.get("warning", "") or result.attrs.get("note", ""))
+    Raises
+    ------
+    InputError
+        The dataset lacks what is shown.
+    """
+    charts = run_charts(result)
+    note = result.attrs.get("warning", "") or result.attrs.get("note", "")
+    figure = draw(charts, 2, (10.0, 2.7 * -(-len(charts) // 2)), note=note)
     if result.attrs.get("title"):
         figure.suptitle(result.attrs["title"])
     return figure
-
-
-def _ratio(result: xarray.Dataset) -> float:
-    if "gear_ratio" in result.attrs:  # a periodic motion, which knows its drive only
-        return float(result.attrs["gear_ratio"])
-    scenario = scenario_of(result)
-    assert isinstance(scenario, Scenario)
-    return scenario.gearbox.ratio
 
 
 @in_our_looks
