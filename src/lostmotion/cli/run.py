@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .arguments import Overrides, SourceArgument, number
-from .targets import try_file
+from .targets import try_file, try_page
 from .terminal import busy
 
 PICTURES = (".png", ".svg", ".pdf")
@@ -100,11 +100,10 @@ def run(
         print(f"Figure written to {plot}")
     if report is not None:
         with busy("Writing"):
-            from ..reports.page import render
-            from ..reports.pages import write_text
+            from ..reports.page import write_page
             from ..reports.run import run_report
 
-            write_text(report, render(run_report(Path(scenario).stem, result.dataset())))
+            write_page(report, run_report(Path(scenario).stem, result.dataset()))
         print(f"The page is at {report}")
 
 
@@ -122,9 +121,7 @@ def _try_files(output: Path | None, plot: Path | None, report: Path | None) -> N
             )
         try_file(plot)
     if report is not None:
-        if report.suffix not in (".html", ".htm"):
-            raise InputError(f"{report}: a report is a page; its name must end in .html")
-        try_file(report)
+        try_page(report)
 
 
 def _check_solver(solver: str, tolerance: float | None) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 PAGES = {
     "pointing.budget": ("PointingBudget", "pointing", "pointing_report"),
     "servo.commission": ("ServoReport", "servo", "servo_report"),
+    "sizing.drive_check": ("Findings", "drive_check", "check_report"),
     "test_rig.measurement": ("RigReport", "rig", "rig_report"),
 }
 
@@ -19,7 +20,7 @@ def attach(module: ModuleType) -> None:
     name, home, function = PAGES[module.__name__.partition(".")[2]]
 
     def shown(result: Any) -> str:
-        report = getattr(import_module(f".{home}", __package__), function)(name, result)
+        report = getattr(import_module(f".{home}", __package__), function)(name.lower(), result)
         return str(report._repr_html_())
 
     setattr(getattr(module, name), "_repr_html_", shown)  # noqa: B010

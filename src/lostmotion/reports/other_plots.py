@@ -34,7 +34,7 @@ def _bars(axes: Any, chart: Bars) -> None:
         label = chart.series[n] if chart.series else None
         axes.barh(y + (0.5 * (count - 1) - n) * 0.4, values, 0.8 / count, color=colour, label=label)
     axes.set_yticks(y, order)
-    axes.axvline(0.0, color="0.3", linewidth=0.8)
+    axes.axvline(0.0 if chart.limit is None else chart.limit, color="0.3", linewidth=0.8)
     axes.set(xlabel=chart.label, xlim=chart.x_range)
     if chart.series:
         axes.legend(fontsize=8)

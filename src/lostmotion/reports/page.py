@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..atomic_writer import write_bytes
 from ..errors import InputError
 from ..portable.checkout import made_here
 from .packed import packed
@@ -111,6 +112,11 @@ def render(report: Report) -> str:
 """
 
 
+def write_page(path: Path, report: Report) -> None:
+    """Write a page whole or not at all."""
+    write_bytes(path, render(report).encode())
+
+
 def style() -> str:
     """The style sheet, whose dark colours also hold where only the system asks for them."""
     shared = (HERE / "style.css").read_text(encoding="utf-8")
@@ -141,6 +147,8 @@ def _text(text: str) -> str:
 def _group(group: Group, charts: list[Chart]) -> str:
     title = f"<h2>{escape(group.title)}</h2>" if group.title else ""
     about = f'<p class="about">{_text(group.caption)}</p>' if group.caption else ""
+    if not group.charts:
+        return ""
     columns = {1: "charts one", 3: "charts three"}.get(group.columns, "charts")
     cards = "\n".join(_card(chart, charts) for chart in group.charts)
     return f'<section id="{escape(group.name)}">{title}{about}\n<div class="{columns}">{cards}</div></section>'

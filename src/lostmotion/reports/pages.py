@@ -14,7 +14,7 @@ import numpy as np
 
 from ..atomic_writer import write_bytes
 from ..errors import need
-from .page import Report, render
+from .page import Report, write_page
 from .panels import Chart, Group, Panel
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def write_report(
         Of the page.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    write_text(directory / file, render(report))
+    write_page(directory / file, report)
     data = {f"{group.name}.csv": panels_csv(group.charts) for group in report.groups() if _has_panels(group)}
     for name, text in (data | dict(tables)).items():
         write_text(directory / name, text)

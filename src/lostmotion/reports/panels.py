@@ -119,6 +119,8 @@ class Bars:
     series: tuple[str, ...] = ()
     """names of the values of a bar, where there are two"""
     x_range: tuple[float, float] | None = None
+    limit: float | None = None
+    """beyond which a bar stands out"""
 
 
 @dataclass(frozen=True)

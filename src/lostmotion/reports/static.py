@@ -224,9 +224,12 @@ def _bars(bars: Bars) -> str:
         thick = 16.0 / len(bars.values[name])
         for n, value in enumerate(bars.values[name]):
             a, b = sorted((float(to_x(0.0)), float(to_x(value))))
-            colour = ("first", "second")[n % 2]
+            colour = "warning" if bars.limit is not None and value > bars.limit else ("first", "second")[n % 2]
             box = f'x="{a:.1f}" y="{top + 4 + n * thick:.1f}" width="{b - a:.1f}" height="{thick - 1:.1f}"'
             parts.append(f'<rect {box} fill="var(--{colour})"><title>{escape(name)}: {_shown(value)}</title></rect>')
+    if bars.limit is not None:
+        end = f"{float(to_x(bars.limit)):.1f}"
+        parts.append(f'<path d="M{end} {TOP}V{height - BOTTOM}" stroke="var(--text)" stroke-dasharray="4 3"/>')
     parts.append(f'<text class="tick end" x="{WIDTH - RIGHT}" y="{height - 4:g}">{escape(bars.label)}</text>')
     return _svg(bars.title, height, parts)
 
