@@ -41,9 +41,9 @@ def charts(page: str) -> list[dict[str, Any]]:
             line |= {key: arrays[line[key]] for key in ("x", "y", "values") if key in line}
         for row in chart.get("rows", []):
             row["modes"] = arrays[row["modes"]]
-    titles = re.findall(
-        r"<figcaption><b>(.*?)</b>.*?</figcaption><div class=\"[^\"]*\" data-chart=\"(\d+)\"", page, re.S
-    )
+    figures = re.findall(r"<figure class=\"chart\"><figcaption><b>(.*?)</b>(.*?)</figure>", page, re.S)
+    found = ((title, re.search(r"data-chart=\"(\d+)\"", rest)) for title, rest in figures)
+    titles = [(title, place.group(1)) for title, place in found if place is not None]
     return [header["charts"][int(k)] | {"title": title} for title, k in titles]
 
 

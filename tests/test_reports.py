@@ -27,7 +27,7 @@ X = np.geomspace(1.0, 1000.0, 50)
 PANEL = Panel("gain", "frequency [Hz]", "[-]", (Curve("one", X, 10.0 / X, look(0)),), log_x=True, log_y=True, level=1.0,
               marks=(Mark(10.0, 1.0, "10 Hz", look(0)),))  # fmt: skip
 TIME = np.linspace(0.0, 1.0, 11)
-WITH_MATPLOTLIB = {"identification", "study", "study_selection"}
+WITH_MATPLOTLIB = {"identification"}
 
 
 @pytest.fixture(autouse=True)

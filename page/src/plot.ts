@@ -54,8 +54,9 @@ export interface Chart {
 }
 
 const ANGLE = /°|deg(rees)?\]/; // with ticks at halves and thirds of a right angle
+const NAMES = 8; // along an axis; more are told on demand
 const CELLS: [number, number] = [72, 48]; // of a shade
-const MARGIN = { left: 58, right: 12, top: 8, bottom: 34 };
+const MARGIN = { left: 66, right: 12, top: 8, bottom: 34 };
 
 export class Plot {
   private readonly canvas = document.createElement("canvas");
@@ -292,7 +293,7 @@ export class Plot {
     c.beginPath();
     const at = ([low, high]: [number, number], axis: Axis, s: { factor: number }, count: number): number[] =>
       axis.names
-        ? axis.names.map((_, k) => k)
+        ? axis.names.flatMap((_, k) => (axis.names!.length <= NAMES ? [k] : []))
         : axis.logarithmic
           ? logarithmicTicks(low, high)
           : ticks(low / s.factor, high / s.factor, count, ANGLE.test(axis.label + axis.unit)).map((v) => v * s.factor);

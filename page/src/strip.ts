@@ -1,5 +1,5 @@
 /** Which contacts are stuck, and which way the others slip, over time. */
-const [ROW, TEXT, BAR, LEFT, RIGHT] = [36, 17, 14, 58, 12];
+const [ROW, TEXT, BAR, LEFT, RIGHT] = [36, 17, 14, 66, 12];
 
 export class Strip {
   readonly canvas = document.createElement("canvas");

@@ -174,7 +174,7 @@ def _card(chart: Chart, charts: list[Chart]) -> str:
 def _legend(chart: Chart) -> str:
     if isinstance(chart, Panel):
         several = len(chart.curves) > 1
-        shown = [(k, c) for k, c in enumerate(chart.curves) if c.shown != "_" and (several or c.style.get("marker"))]
+        shown = [(k, c) for k, c in enumerate(chart.curves) if several and c.shown != "_"]
         found = [
             f'<span class="entry">{swatch(c)}{escape(c.shown)} <output data-line="{k}"></output></span>'
             for k, c in shown

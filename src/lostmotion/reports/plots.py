@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -34,6 +34,8 @@ LOOKS: Any = {
     "svg.fonttype": "path",
 }
 
+
+MAX_NAMES = 12  # of the points of a line
 
 # Decorates what makes or draws figures; the looks of the user's figures stay as they are.
 in_our_looks = mpl.rc_context(LOOKS)
@@ -100,6 +102,8 @@ def _panel(axes: Any, panel: Panel) -> None:
         axes.axhline(panel.level, color="0.45", linestyle="--", linewidth=0.9)
     for curve in panel.curves:
         axes.plot(*thinned(curve.x, curve.y), label=curve.shown, **curve.style)
+        if curve.names and curve.style.get("linestyle") != "none":
+            _names(axes, curve)
     for mark in panel.marks:
         axes.plot([mark.x, mark.x], [mark.y, mark.y if mark.to is None else mark.to], color=mark.style["color"])
         axes.plot([mark.x], [mark.y], ".", color=mark.style["color"])
@@ -117,6 +121,14 @@ def _panel(axes: Any, panel: Panel) -> None:
         axes.set_ylim(*panel.y_range)
     elif panel.x_range is not None and panel.curves:
         axes.set_ylim(*_range_within(panel.curves, panel.x_range))
+
+
+def _names(axes: Any, curve: Curve) -> None:
+    """The first points of a line with their names, and room for that of the last."""
+    for name, *point in zip(curve.names[:MAX_NAMES], curve.x, curve.y, strict=False):
+        axes.annotate(name, point, textcoords="offset points", xytext=(4, 4), fontsize=6)
+    low, high = axes.get_xlim()
+    axes.set_xlim(low, high + 0.25 * (high - low))
 
 
 def _contours(axes: Any, ground: Ground) -> None:
@@ -173,24 +185,4 @@ def loss_map(speeds: Any, loads: Any, values: Any, note: str = "") -> Figure:
     curves.legend(fontsize=8, ncols=2)
     if note:
         figure.supxlabel(note, fontsize=8, color="0.35")
-    return figure
-
-
-@in_our_looks
-def correlation_map(names: Sequence[str], values: Any) -> Figure:
-    """A matrix of correlations as a heat map: dark where strong, the number in each cell says the sign in grey too."""
-    n = len(names)
-    cells, label = 0.6 * n, 0.08 * max(map(len, names))  # [inch]
-    figure = Picture(figsize=(cells + label + 2.2, cells + label + 1.0))
-    axes = figure.add_subplot()
-    axes.grid(visible=False)
-    image = axes.imshow(values, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-    axes.set_xticks(range(n), names, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
-    axes.set_yticks(range(n), names, fontsize=8)
-    axes.tick_params(length=0)
-    axes.spines[:].set_visible(False)
-    for i, j in np.ndindex(n, n):
-        ink = "white" if abs(values[i, j]) > 0.6 else "black"
-        axes.text(j, i, f"{values[i, j]:+.2f}", ha="center", va="center", fontsize=7.5, color=ink)
-    figure.colorbar(image, ax=axes, label="correlation [-]", shrink=0.8)
     return figure

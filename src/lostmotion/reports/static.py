@@ -18,6 +18,8 @@ WIDTH, HEIGHT = 560.0, 240.0
 LEFT, RIGHT, TOP, BOTTOM = 56.0, 12.0, 10.0, 36.0
 POINTS = 1200  # of a curve, before those are dropped that no one sees
 CONSTANT = 1e-9  # relative differences up to which are rounding
+NAMES = 8  # along an axis
+DOTS = 600  # of a cloud
 SHADES = 16  # of a map
 SEEN = 0.3  # from a line between others, in units of the picture
 Scale = Callable[[Any], Any]
@@ -100,8 +102,8 @@ def _frame(panel: Panel, x: tuple[float, float], y: tuple[float, float], to_x: S
         at = f"{float(to_y(v)):.1f}"
         lines.append(f"M{LEFT} {at}H{WIDTH - RIGHT}")
         texts.append(f'<text class="tick end" x="{LEFT - 5}" y="{at}" dy="4">{_shown(v)}</text>')
-    places = [float(k) for k in range(len(panel.x_names))] if panel.x_names else None
-    for v in places or (_logarithmic_ticks(*x) if panel.log_x else ticks(*x, 6)):
+    places = [float(k) for k in range(len(panel.x_names))] if len(panel.x_names) <= NAMES else []
+    for v in places if panel.x_names else (_logarithmic_ticks(*x) if panel.log_x else ticks(*x, 6)):
         at = f"{float(to_x(v)):.1f}"
         lines.append(f"M{at} {TOP}V{HEIGHT - BOTTOM}")
         name = panel.x_names[int(v)] if panel.x_names else _shown(v)
@@ -188,6 +190,7 @@ def _curve(curve: Curve, to_x: Scale, to_y: Scale) -> str:
         out = f'<path fill="none" stroke="var(--{colour})" stroke-width="{style.get("linewidth", 1.5):g}"{dashed} d="{_path(points)}"/>'
     if style.get("marker"):
         seen = points[np.isfinite(points).all(axis=1)]
+        seen = seen[:: max(1, len(seen) // DOTS)]
         dots = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in seen.tolist())
         size = style.get("markersize", 5.0)
         out += f'<path stroke="var(--{colour})" stroke-width="{size:g}" stroke-linecap="round" d="{dots}"/>'
