@@ -13,7 +13,7 @@ import lostmotion as lm
 from html_pages import Page, charts
 from lostmotion.cli import app
 from lostmotion.reports import page as pages
-from lostmotion.reports.packed import MAX_POINTS, packed
+from lostmotion.reports.packed import packed
 from lostmotion.reports.page import Report, Table, Verdict, render
 from lostmotion.reports.panels import PALETTE, STEPS, Bars, Contacts, Curve, Flows, Group, Mark, Matrix, Panel, look
 from lostmotion.reports.pictures import endings
@@ -27,7 +27,6 @@ X = np.geomspace(1.0, 1000.0, 50)
 PANEL = Panel("gain", "frequency [Hz]", "[-]", (Curve("one", X, 10.0 / X, look(0)),), log_x=True, log_y=True, level=1.0,
               marks=(Mark(10.0, 1.0, "10 Hz", look(0)),))  # fmt: skip
 TIME = np.linspace(0.0, 1.0, 11)
-WITH_MATPLOTLIB = {"identification"}
 
 
 @pytest.fixture(autouse=True)
@@ -115,7 +114,7 @@ def test_a_long_curve_keeps_its_extremes() -> None:
     y[123_456] = 7.0
     (chart,) = charts(render(report(Panel("", "time [s]", "[-]", (Curve("y", np.arange(n) * 1e-4, y, look(0)),)))))
     (line,) = chart["lines"]
-    assert len(line["y"]) <= MAX_POINTS + 10
+    assert len(line["y"]) <= PANEL.max_points + 10
     assert line["y"].max() == 7.0
     assert len(packed(())) < 100
 
@@ -157,7 +156,7 @@ def test_figures_are_drawn_where_they_are_asked_for(axis: lm.ServoReport, tmp_pa
 def test_a_report_takes_no_plotting_library_along() -> None:
     modules = sorted(path.stem for path in Path(pages.__file__).parent.glob("*.py"))
     drawing = {"plots", "other_plots", "hunting_figures", "response_figures", "pictures"}
-    reports = [f"lostmotion.reports.{name}" for name in modules if name not in drawing | WITH_MATPLOTLIB]
+    reports = [f"lostmotion.reports.{name}" for name in modules if name not in drawing]
     code = f"import sys, {', '.join(reports)}; print('matplotlib' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"

@@ -277,7 +277,13 @@ _WITH_DATASETS = (
     "test_rig.rig",
 )
 # Modules whose results notebooks show as the page that the command writes.
-_WITH_PAGES = ("pointing.budget", "servo.commission", "sizing.drive_check", "test_rig.measurement")
+_WITH_PAGES = (
+    "identification.identify",
+    "pointing.budget",
+    "servo.commission",
+    "sizing.drive_check",
+    "test_rig.measurement",
+)
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = ["__version__", *_HOME_OF]  # noqa: PLE0604

@@ -17,7 +17,6 @@ COLOURS = {hexadecimal: name for name, hexadecimal in PALETTE.items()} | {
     hexadecimal: f"step{k}" for k, hexadecimal in enumerate(STEPS[:-1])
 }
 DASHES: Mapping[Any, list[int]] = {"-": [], "--": [7, 3], "-.": [7, 3, 2, 3], ":": [2, 3]}
-MAX_POINTS = 4000  # of a curve on a page; longer ones as the extremes of their neighbours
 
 
 def colour_name(style: Mapping[str, Any]) -> str:
@@ -81,7 +80,7 @@ def _panel(panel: Panel, pack: Packed) -> dict[str, Any]:
         "kind": "lines",
         "x": axis(panel.x_label, panel.log_x, panel.x_range) | ({"names": panel.x_names} if panel.x_names else {}),
         "y": axis(panel.y_label, panel.log_y and positive, panel.y_range),
-        "lines": [_curve(curve, pack) for curve in panel.curves],
+        "lines": [_curve(curve, pack, panel.max_points) for curve in panel.curves],
         "spans": [[float(low), float(high)] for low, high in panel.shaded],
         "marks": [_mark(mark) for mark in panel.marks if np.isfinite(mark.x) and np.isfinite(mark.y)],
     }
@@ -94,8 +93,8 @@ def _panel(panel: Panel, pack: Packed) -> dict[str, Any]:
     return out
 
 
-def _curve(curve: Curve, pack: Packed) -> dict[str, Any]:
-    x, y = (curve.x, curve.y) if curve.names else thinned(curve.x, curve.y, MAX_POINTS)
+def _curve(curve: Curve, pack: Packed, max_points: int) -> dict[str, Any]:
+    x, y = (curve.x, curve.y) if curve.names else thinned(curve.x, curve.y, max_points)
     style = curve.style
     line = style.get("linestyle", "-")
     out = {

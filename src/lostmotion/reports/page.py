@@ -24,6 +24,7 @@ SCRIPT = HERE / "report.js"  # `make page-report` puts it there, and the wheel c
 NO_SCRIPT = (
     "The charts do not move on this page: its script was not built. `make page-report` builds it; it needs node."
 )
+STILL = 120  # charts of a page from which on they are not drawn for readers without JavaScript
 ALIKE = re.compile(r"[+\-−±]?(\d|\.\d|nan|inf)")
 
 
@@ -150,25 +151,26 @@ def _group(group: Group, charts: list[Chart]) -> str:
     if not group.charts:
         return ""
     columns = {1: "charts one", 3: "charts three"}.get(group.columns, "charts")
-    cards = "\n".join(_card(chart, charts) for chart in group.charts)
+    cards = "\n".join(_card(chart, charts, still=len(charts) < STILL) for chart in group.charts)
     return f'<section id="{escape(group.name)}">{title}{about}\n<div class="{columns}">{cards}</div></section>'
 
 
-def _card(chart: Chart, charts: list[Chart]) -> str:
+def _card(chart: Chart, charts: list[Chart], *, still: bool) -> str:
     """A figure with its legend, and the place of the chart among the data."""
     caption = f"<b>{escape(chart.title)}</b>{_legend(chart)}"
     if isinstance(chart, Matrix):
         return f'<figure class="chart"><figcaption>{caption}</figcaption>{_matrix(chart)}</figure>'
-    number, svg = len(charts), svg_of(chart)
+    shown = still or isinstance(chart, Bars | Histogram)
+    number, svg = len(charts), svg_of(chart) if shown else ""
     charts.append(chart)
     if isinstance(chart, Flows):
         rows = [[name.replace("_", " "), f"{value:.5g}"] for name, value in chart.energies.items() if value]
         svg = _table(Table("", ("energy", "[J]"), rows))
     kind = {Panel: "plot", Contacts: "strip", Flows: "energy"}.get(type(chart), "plot still")
-    still = "" if isinstance(chart, Bars | Histogram) else f' data-chart="{number}"'
+    place = "" if isinstance(chart, Bars | Histogram) else f' data-chart="{number}"'
     if isinstance(chart, Panel):
         kind += " still"  # until the script takes over
-    return f'<figure class="chart"><figcaption>{caption}</figcaption><div class="{kind}"{still}>{svg}</div></figure>'
+    return f'<figure class="chart"><figcaption>{caption}</figcaption><div class="{kind}"{place}>{svg}</div></figure>'
 
 
 def _legend(chart: Chart) -> str:

@@ -106,6 +106,7 @@ class Panel:
     level: float | None = None  # y of a line across the panel
     ground: Ground | None = None
     x_names: tuple[str, ...] = ()  # of the values 0, 1, 2, ... of x
+    max_points: int = 4_000  # of a curve on a page; longer ones as the extremes of their neighbours
 
 
 @dataclass(frozen=True)
