@@ -24,7 +24,7 @@ demo: $(VENV)/built report-where-node
 	else echo 'Without node the live page was not built; with it, make demo leaves it at out/live.html.'; fi
 	$(BIN)/lostmotion reproduce -o out
 	@echo
-	@echo 'Made: out/report.html, the reproduction of the paper, with its figures beside it.'
+	@echo 'Made: out/report.html, the reproduction of the paper, with the data of its figures beside it.'
 	@! test -f out/live.html || echo 'Made: out/live.html, the drive of the paper to try out in a browser.'
 	@echo 'Next: $(BIN)/lostmotion run paper-2dof-nl-small --plot run.png'
 	@echo '      $(BIN)/lostmotion rig schaeffler-rt1-h-20-100'

@@ -21,7 +21,7 @@ OF_TAG = {
     "td": {"colspan", "style"},
     "th": {"colspan", "rowspan", "scope"},
 }
-DRAWING = {"svg", "path", "line", "rect", "circle", "text", "title"}  # any attribute of SVG
+DRAWING = {"svg", "path", "line", "rect", "circle", "text", "title", "tspan"}  # any attribute of SVG
 
 
 def charts(page: str) -> list[dict[str, Any]]:

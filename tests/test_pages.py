@@ -52,8 +52,8 @@ def identify(directory: Path) -> str:
 PAGES: dict[str, tuple[Callable[[Path], str], set[tuple[str, str]]]] = {
     "rig": (rig, {("tr", "differs"), ("td", "number"), ("th", "number")}),
     "servo": (servo, {("tr", "differs"), ("td", "number"), ("th", "number"), ("section", "bad")}),
-    "pointing": (track, {("td", "number"), ("td", "name"), ("th", "number")}),
-    "identification": (identify, {("tr", "differs"), ("td", "number"), ("th", "number")}),
+    "pointing": (track, {("tr", "chosen"), ("td", "number"), ("th", "number")}),
+    "identification": (identify, {("tr", "chosen"), ("td", "number"), ("th", "number"), ("td", "cell")}),
 }
 """Name -> what makes the page, and classes that must be on it."""
 

@@ -184,7 +184,7 @@ class Page {
     if (!this.run) return;
     this.drawing.use(this.d, this.run);
     this.charts.draw(this.d, this.run, this.pinned);
-    this.strip.draw(rowsOf(this.d, this.run));
+    this.strip.draw(rowsOf(this.d, this.run), this.run.time.at(-1)! / this.d.core.duration);
     this.loops.draw(this.d, this.run, this.pinned);
     this.maps.draw(this.d, this.run, this.pinned);
     this.energy.draw(this.run);

@@ -9,8 +9,8 @@ export class Strip {
     root.append(this.canvas);
   }
 
-  /** rows: each with its modes at instants of equal distance. */
-  draw(rows: { label: string; modes: Float64Array }[]): void {
+  /** rows: each with its modes at instants of equal distance; reach: share of the width that they take. */
+  draw(rows: { label: string; modes: Float64Array }[], reach = 1): void {
     const [width, height] = [this.root.clientWidth, ROW * rows.length + 4];
     const density = window.devicePixelRatio || 1;
     this.root.style.height = `${height}px`;
@@ -27,7 +27,7 @@ export class Strip {
     const shares: string[] = [];
     rows.forEach(({ label, modes }, row) => {
       const [top, last] = [row * ROW + 2, modes.length - 1];
-      const x = (k: number): number => LEFT + (k / last) * (width - LEFT - RIGHT);
+      const x = (k: number): number => LEFT + reach * (k / last) * (width - LEFT - RIGHT);
       let stuck = 0;
       for (let k = 0; k < last;) {
         let end = k + 1;

@@ -16,7 +16,12 @@ from .thinning import thinned
 COLOURS = {hexadecimal: name for name, hexadecimal in PALETTE.items()} | {
     hexadecimal: f"step{k}" for k, hexadecimal in enumerate(STEPS[:-1])
 }
-DASHES: Mapping[Any, list[int]] = {"-": [], "--": [7, 3], "-.": [7, 3, 2, 3], ":": [2, 3]}
+DASHES: Mapping[str, list[float]] = {"-": [], "--": [7, 3], "-.": [7, 3, 2, 3], ":": [2, 3]}
+
+
+def dashes(line: Any) -> list[float]:
+    """Lengths of strokes and gaps of a line style."""
+    return [2.0 * length for length in line[1]] if isinstance(line, tuple) else list(DASHES.get(line, []))
 
 
 def colour_name(style: Mapping[str, Any]) -> str:
@@ -103,7 +108,7 @@ def _curve(curve: Curve, pack: Packed, max_points: int) -> dict[str, Any]:
         "y": pack.add(y),
         "colour": colour_name(style),
         "width": style.get("linewidth", 1.5) if line not in ("none", "") else 0,
-        "dash": DASHES.get(line, []),
+        "dash": dashes(line),
         "faint": style.get("alpha", 1.0) < 1.0,
     }
     if style.get("marker"):

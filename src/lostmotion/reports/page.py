@@ -16,7 +16,7 @@ from ..atomic_writer import write_bytes
 from ..errors import InputError
 from ..portable.checkout import made_here
 from .packed import packed
-from .panels import Bars, Chart, Contacts, Flows, Ground, Group, Histogram, Matrix, Panel
+from .panels import Bars, Chart, Contacts, Drawing, Flows, Ground, Group, Histogram, Matrix, Panel
 from .static import svg_of, swatch
 
 HERE = Path(__file__).parent
@@ -91,23 +91,32 @@ def framed(page: str, height: int = 900) -> str:
 def render(report: Report) -> str:
     """The page as HTML; nothing in it refers to anything outside."""
     charts: list[Chart] = []
-    state = {"good": "Verdict", "bad": "Verdict: not in order", "open": "Verdict, with reservations"}[
-        report.verdict.state
+    parts = [verdict(report.verdict)]
+    parts += [
+        _group(part, charts) if isinstance(part, Group) else _words(part) for part in (report.main, *report.parts)
     ]
-    lines = "".join(f"<p>{_text(line)}</p>\n" for line in report.verdict.lines)
-    body = [f'<section class="verdict {report.verdict.state}"><h2>{state}</h2>\n{lines}</section>']
-    for part in (report.main, *report.parts):
-        body.append(_group(part, charts) if isinstance(part, Group) else _words(part))
+    return document(report.title, report.lead, "\n".join(parts), charts)
+
+
+def verdict(found: Verdict) -> str:
+    """What a report comes to, as HTML."""
+    state = {"good": "Verdict", "bad": "Verdict: not in order", "open": "Verdict, with reservations"}[found.state]
+    lines = "".join(f"<p>{_text(line)}</p>\n" for line in found.lines)
+    return f'<section class="verdict {found.state}"><h2>{state}</h2>\n{lines}</section>'
+
+
+def document(title: str, lead: str, body: str, charts: Sequence[Chart]) -> str:
+    """A page around its body, with the data of the charts in it."""
     script = _script()
     told = "" if script else f'<p class="note">{escape(NO_SCRIPT)}</p>'
     data = f'<script type="text/plain" id="data">{packed(charts)}</script>\n<script>{script}</script>' if script else ""
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark"><link rel="icon" href="data:,"><title>{escape(report.title)}</title>
+<meta name="color-scheme" content="light dark"><link rel="icon" href="data:,"><title>{escape(title)}</title>
 <style>{style()}</style></head>
-<body><header><div><h1>{escape(report.title)}</h1><p class="lead">{_text(report.lead)}</p></div><div id="actions"></div></header>
+<body><header><div><h1>{escape(title)}</h1><p class="lead">{_text(lead)}</p></div><div id="actions"></div></header>
 <main>{told}
-{"".join(f"{part}{chr(10)}" for part in body)}</main>
+{body}</main>
 {data}
 </body></html>
 """
@@ -150,9 +159,15 @@ def _group(group: Group, charts: list[Chart]) -> str:
     about = f'<p class="about">{_text(group.caption)}</p>' if group.caption else ""
     if not group.charts:
         return ""
-    columns = {1: "charts one", 3: "charts three"}.get(group.columns, "charts")
-    cards = "\n".join(_card(chart, charts, still=len(charts) < STILL) for chart in group.charts)
-    return f'<section id="{escape(group.name)}">{title}{about}\n<div class="{columns}">{cards}</div></section>'
+    return f'<section id="{escape(group.name)}">{title}{about}\n{cards(group.charts, charts, group.columns)}</section>'
+
+
+def cards(shown: Sequence[Chart], charts: list[Chart], columns: int = 2) -> str:
+    """Figures beside each other; their charts are added to those of the page."""
+    kind = {1: "charts one", 3: "charts three"}.get(columns, "charts")
+    return (
+        f'<div class="{kind}">{chr(10).join(_card(chart, charts, still=len(charts) < STILL) for chart in shown)}</div>'
+    )
 
 
 def _card(chart: Chart, charts: list[Chart], *, still: bool) -> str:
@@ -160,17 +175,18 @@ def _card(chart: Chart, charts: list[Chart], *, still: bool) -> str:
     caption = f"<b>{escape(chart.title)}</b>{_legend(chart)}"
     if isinstance(chart, Matrix):
         return f'<figure class="chart"><figcaption>{caption}</figcaption>{_matrix(chart)}</figure>'
-    shown = still or isinstance(chart, Bars | Histogram)
+    shown = still or isinstance(chart, Bars | Histogram | Drawing)
     number, svg = len(charts), svg_of(chart) if shown else ""
     charts.append(chart)
     if isinstance(chart, Flows):
         rows = [[name.replace("_", " "), f"{value:.5g}"] for name, value in chart.energies.items() if value]
         svg = _table(Table("", ("energy", "[J]"), rows))
     kind = {Panel: "plot", Contacts: "strip", Flows: "energy"}.get(type(chart), "plot still")
-    place = "" if isinstance(chart, Bars | Histogram) else f' data-chart="{number}"'
+    place = "" if isinstance(chart, Bars | Histogram | Drawing) else f' data-chart="{number}"'
     if isinstance(chart, Panel):
         kind += " still"  # until the script takes over
-    return f'<figure class="chart"><figcaption>{caption}</figcaption><div class="{kind}"{place}>{svg}</div></figure>'
+    figure = "chart wide" if isinstance(chart, Drawing) and chart.wide else "chart"
+    return f'<figure class="{figure}"><figcaption>{caption}</figcaption><div class="{kind}"{place}>{svg}</div></figure>'
 
 
 def _legend(chart: Chart) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import csv
 import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,19 +17,7 @@ from .page import Report, write_page
 from .panels import Chart, Group, Panel
 
 if TYPE_CHECKING:
-    from markupsafe import Markup
-    from matplotlib.figure import Figure
-
-
-def save_figure(figure: Figure, directory: Path, name: str) -> bytes:
-    """Write a figure as PNG and SVG; returns the PNG."""
-    png = io.BytesIO()
-    figure.savefig(png, format="png", metadata={"Software": None})
-    svg = io.BytesIO()
-    figure.savefig(svg, format="svg", metadata={"Date": None})
-    write_bytes(directory / f"{name}.png", png.getvalue())
-    write_bytes(directory / f"{name}.svg", svg.getvalue())
-    return png.getvalue()
+    pass
 
 
 def write_text(path: Path, text: str) -> None:
@@ -63,7 +50,7 @@ def panels_csv(panels: Iterable[Chart]) -> str:
 
 def _row(*labels: str) -> str:
     """Labels without their markup, as cells."""
-    return table_csv(map(_plain, labels), ()).rstrip("\n")
+    return table_csv(map(plain, labels), ()).rstrip("\n")
 
 
 def write_report(
@@ -99,22 +86,13 @@ def _has_panels(group: Group) -> bool:
     return any(isinstance(chart, Panel) and chart.curves for chart in group.charts)
 
 
-def _plain(label: str) -> str:
+def plain(label: str) -> str:
     """A label without its markup."""
     return label.replace("$", "").replace("{", "").replace("}", "")
 
 
-def embed(png: bytes, title: str, caption: Markup | str, anchor: str) -> Markup:
-    """A figure inside the page, with its caption."""
-    from markupsafe import Markup, escape
-
-    data = base64.b64encode(png).decode()
-    image = Markup('<img alt="{}" src="data:image/png;base64,{}">').format(title, data)
-    return Markup('<figure id="{}">{}<figcaption>{}</figcaption></figure>\n').format(anchor, image, escape(caption))
-
-
 def render_page(template: str, **context: Any) -> str:
-    """An HTML page from a template of the package; values are escaped, names that are missing raise."""
+    """HTML from a template of the package; values are escaped, names that are missing raise."""
     need("jinja2", "A page", "report")
     import jinja2
 

@@ -9,12 +9,6 @@ from typing import Any
 
 from ..simulation.variables import VARIABLES
 
-# Dark to light as nonlinear to simple, so that they differ in grey too.
-STYLES: dict[str, dict[str, Any]] = {
-    "2-DOF-NL": {"color": "#0b3c5d", "linestyle": "-", "linewidth": 1.7},
-    "2-DOF-L": {"color": "#d9730d", "linestyle": "--", "linewidth": 1.3},
-    "1-DOF-L": {"color": "#7fae3f", "linestyle": "-.", "linewidth": 1.3},
-}
 COMMAND_STYLE: dict[str, Any] = {"color": "0.45", "linestyle": ":", "linewidth": 1.3}
 
 # The colours of reports by their names in style.css, where each has a dark one too.
@@ -26,7 +20,13 @@ LOOKS: tuple[dict[str, Any], ...] = tuple(
     {"color": colour, "linestyle": line, "linewidth": width}
     for colour, line, width in zip(PALETTE.values(), ("-", "--", "-.", ":"), (1.6, 1.9, 1.7, 1.9), strict=True)
 )
-FAINT: dict[str, Any] = {"color": "0.45", "linestyle": ":", "linewidth": 1.3}
+# The models of the paper.
+STYLES: dict[str, dict[str, Any]] = {
+    "2-DOF-NL": {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.7},
+    "2-DOF-L": {"color": PALETTE["second"], "linestyle": "--", "linewidth": 1.3},
+    "1-DOF-L": {"color": PALETTE["third"], "linestyle": "-.", "linewidth": 1.3},
+}
+FAINT = COMMAND_STYLE
 DOTS: dict[str, Any] = {"color": PALETTE["second"], "linestyle": "none", "marker": "o", "markersize": 7}
 
 
@@ -160,7 +160,16 @@ class Flows:
     energies: Mapping[str, float]
 
 
-Chart = Panel | Bars | Histogram | Matrix | Contacts | Flows
+@dataclass(frozen=True)
+class Drawing:
+    """What is drawn as SVG, without data."""
+
+    title: str
+    svg: str
+    wide: bool = False
+
+
+Chart = Panel | Bars | Histogram | Matrix | Contacts | Flows | Drawing
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from .packed import DASHES, colour_name
-from .panels import Bars, Chart, Contacts, Curve, Ground, Histogram, Panel
+from .packed import colour_name, dashes
+from .panels import Bars, Chart, Contacts, Curve, Drawing, Ground, Histogram, Panel
 from .thinning import simplified, thinned
 
 WIDTH, HEIGHT = 560.0, 240.0
@@ -29,6 +29,8 @@ def svg_of(chart: Chart) -> str:
     """The picture of a chart; empty where a table says the same."""
     if isinstance(chart, Panel):
         return _panel(chart)
+    if isinstance(chart, Drawing):
+        return chart.svg
     if isinstance(chart, Bars):
         return _bars(chart)
     if isinstance(chart, Histogram):
@@ -39,7 +41,7 @@ def svg_of(chart: Chart) -> str:
 def swatch(curve: Curve) -> str:
     """The entry of a curve in a legend."""
     style, name = curve.style, colour_name(curve.style)
-    dash = " ".join(map(str, DASHES.get(style.get("linestyle", "-"), [])))
+    dash = " ".join(f"{v:g}" for v in dashes(style.get("linestyle", "-")))
     line = f'<line x1="0" x2="26" y1="4" y2="4" stroke="var(--{name})" stroke-width="{style.get("linewidth", 1.5):g}"'
     line += f' stroke-dasharray="{dash}"/>' if dash else "/>"
     dot = f'<circle cx="13" cy="4" r="3" fill="var(--{name})"/>' if style.get("marker") else ""
@@ -122,7 +124,8 @@ def _panel(panel: Panel) -> str:
         [*(c.x for c in panel.curves), *across], panel.log_x, 0.0 if panel.log_x or ground else 0.02
     )
     marked = [v for m in panel.marks for v in (m.y, m.y if m.to is None else m.to)]
-    y = panel.y_range or extent([*(c.y for c in panel.curves), marked, *along], log_y, 0.0 if ground else 0.06)
+    seen = [np.asarray(c.y)[(np.asarray(c.x) >= x[0]) & (np.asarray(c.x) <= x[1])] for c in panel.curves]
+    y = panel.y_range or extent([*seen, marked, *along], log_y, 0.0 if ground else 0.06)
     to_x = _scale(x, LEFT, WIDTH - RIGHT, panel.log_x)
     to_y = _scale(y, HEIGHT - BOTTOM, TOP, log_y)
     parts = [_frame(panel, x, y, to_x, to_y, log_y)]
@@ -135,7 +138,10 @@ def _panel(panel: Panel) -> str:
     if panel.level is not None:
         at = float(to_y(panel.level))
         parts.append(f'<path d="M{LEFT} {at:.1f}H{WIDTH - RIGHT}" stroke="var(--edge)" stroke-dasharray="4 3"/>')
-    parts += [_curve(curve, to_x, to_y) for curve in panel.curves]
+    inside = f'x="{LEFT}" y="{TOP}" width="{WIDTH - LEFT - RIGHT}" height="{HEIGHT - TOP - BOTTOM}"'
+    box = f"{LEFT} {TOP} {WIDTH - LEFT - RIGHT} {HEIGHT - TOP - BOTTOM}"
+    curves = "".join(_curve(curve, to_x, to_y) for curve in panel.curves)
+    parts.append(f'<svg {inside} viewBox="{box}">{curves}</svg>')  # which shows nothing outside
     for mark in panel.marks:
         a, b = float(to_x(mark.x)), float(to_y(mark.y))
         if not (LEFT <= a <= WIDTH - RIGHT and math.isfinite(b)):
@@ -185,7 +191,7 @@ def _curve(curve: Curve, to_x: Scale, to_y: Scale) -> str:
     colour, style = colour_name(curve.style), curve.style
     out = ""
     if style.get("linestyle", "-") not in ("none", ""):
-        dash = " ".join(map(str, DASHES.get(style.get("linestyle", "-"), [])))
+        dash = " ".join(f"{v:g}" for v in dashes(style.get("linestyle", "-")))
         dashed = f' stroke-dasharray="{dash}"' if dash else ""
         out = f'<path fill="none" stroke="var(--{colour})" stroke-width="{style.get("linewidth", 1.5):g}"{dashed} d="{_path(points)}"/>'
     if style.get("marker"):
