@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..simulation.variables import VARIABLES
-
 COMMAND_STYLE: dict[str, Any] = {"color": "0.45", "linestyle": ":", "linewidth": 1.3}
 
 # The colours of reports by their names in style.css, where each has a dark one too.
@@ -38,9 +36,6 @@ def look(k: int) -> dict[str, Any]:
 def step(k: int, count: int) -> dict[str, Any]:
     """Style of the k-th curve of an ordered series."""
     return {"color": STEPS[round((len(STEPS) - 1) * k / max(1, count - 1))], "linestyle": "-", "linewidth": 1.5}
-
-
-LABELS = {v.name: v for v in VARIABLES}
 
 
 def scientific(value: float) -> str:
