@@ -194,3 +194,17 @@ def test_a_report_of_a_run_is_a_page(tmp_path: Path) -> None:
     assert "Share of the time in which contacts are stuck: input" in path.read_text()
     wrong = CliRunner().invoke(app, ["run", "paper-2dof-nl-small", "--report", str(tmp_path / "r.pdf")])
     assert "its name must end in .html" in str(wrong.exception)
+
+
+def test_a_page_of_250_logs_stays_below_two_megabytes() -> None:
+    """Random walks of 2000 samples, which nothing compresses, with the points that an identification of 250 logs gives each curve."""
+    random = np.random.default_rng(1)
+    time = np.linspace(0.0, 2.0, 2000)
+    panels = []
+    for k in range(250):
+        walks = np.cumsum(random.normal(size=(2, 2000)), axis=1)
+        curves = tuple(Curve(str(n), time, walk, look(n)) for n, walk in enumerate(walks))
+        panels.append(Panel(f"log {k}", "time [s]", "position [rad]", curves, max_points=120))
+    page = render(report(*panels))
+    assert len(page) < 2e6
+    assert len(charts(page)) == 250

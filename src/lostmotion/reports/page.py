@@ -24,7 +24,7 @@ SCRIPT = HERE / "report.js"  # `make page-report` puts it there, and the wheel c
 NO_SCRIPT = (
     "The charts do not move on this page: its script was not built. `make page-report` builds it; it needs node."
 )
-STILL = 120  # charts of a page from which on they are not drawn for readers without JavaScript
+STILL = 40  # charts of a page from which on they are not drawn for readers without JavaScript
 ALIKE = re.compile(r"[+\-−±]?(\d|\.\d|nan|inf)")
 
 
