@@ -19,12 +19,12 @@ NODE := command -v npm >/dev/null
 # Not every ninja understands the job server of every make.
 unexport MAKEFLAGS
 
-demo: $(VENV)/built
+demo: $(VENV)/built report-where-node
 	@if $(NODE); then $(MAKE) --no-print-directory page-drive && mkdir -p out && $(BIN)/lostmotion live paper-2dof-nl-small -o out/live.html; \
 	else echo 'Without node the live page was not built; with it, make demo leaves it at out/live.html.'; fi
 	$(BIN)/lostmotion reproduce -o out
 	@echo
-	@echo 'Made: out/report.html, the reproduction of the paper, with its figures beside it.'
+	@echo 'Made: out/report.html, the reproduction of the paper, with the data of its figures beside it.'
 	@! test -f out/live.html || echo 'Made: out/live.html, the drive of the paper to try out in a browser.'
 	@echo 'Next: $(BIN)/lostmotion run paper-2dof-nl-small --plot run.png'
 	@echo '      $(BIN)/lostmotion rig schaeffler-rt1-h-20-100'
@@ -38,7 +38,7 @@ test: lint test-core test-sanitized test-page test-python
 test-python: c-library fmu-library page-where-node $(VENV)/examples
 	$(BIN)/pytest
 # Without what takes minutes: each such test says why it is worth its time.
-check-python: $(VENV)/dev fmu-library c-library
+check-python: $(VENV)/dev fmu-library c-library report-where-node
 	$(BIN)/pytest -m 'not slow' --durations=0 --durations-min=5
 
 # With the objects of the extension, and again under sanitizers with two of the kernels.
@@ -111,10 +111,17 @@ LIVE := $(PACKAGE)/live_page
 KERNELS := drive narrow middle wide
 NEED_NODE := $(NODE) || (echo 'npm is missing: without node the live page is not built'; false)
 WASM_SOURCES := $(SOURCES) $(wildcard bindings/c/*) page/src/core.ts
-.PHONY: page $(KERNELS:%=page-%)
-page: $(KERNELS:%=page-%)
+.PHONY: page page-report $(KERNELS:%=page-%)
+page: $(KERNELS:%=page-%) page-report
 $(KERNELS:%=page-%): page-%: $(LIVE)/page.html $(LIVE)/%.wasm.gz
-$(LIVE)/page.html: page/node_modules/installed $(wildcard page/*.ts page/*.html page/src/*)
+# The script of reports, which those who have none call by page-report.
+SCRIPT := $(PACKAGE)/reports/report.js
+PAGE_SOURCES := $(wildcard page/*.ts page/*.html page/src/*)
+page-report: $(SCRIPT)
+$(SCRIPT): page/node_modules/installed $(PAGE_SOURCES)
+	cd page && npm run --silent build-report
+	cp build/report/report.js $@
+$(LIVE)/page.html: page/node_modules/installed $(PAGE_SOURCES) $(PACKAGE)/reports/style.css
 	cd page && npm run --silent build
 	cp build/page/index.html $@
 $(KERNELS:%=$(LIVE)/%.wasm.gz): $(LIVE)/%.wasm.gz: $(WASM_SOURCES) | $(VENV)/zig page/node_modules/installed
@@ -132,9 +139,11 @@ $(VENV)/portable: $(VENV)/dev
 	touch $@
 
 # In Chromium; left out where there is no node.
-.PHONY: page-where-node test-page
+.PHONY: page-where-node report-where-node test-page
 page-where-node: $(VENV)/portable
 	@! $(NODE) || $(MAKE) page
+report-where-node:
+	@! $(NODE) || $(MAKE) --no-print-directory page-report
 test-page: page-where-node
 	@$(NODE) || exit 0; { command -v chromium >/dev/null || { apt-get update -q && apt-get install -qy chromium; }; } && cd page && npm run --silent lint && npm test --silent
 

@@ -28,7 +28,7 @@ BUILD = ROOT / "build" / "wheels"
 MODEL = room("analysis", "control", "elements", "model", "scenario", "simulation")
 MODULE = [HERE / f"{name}.cpp" for name in ("module", "elementary")]
 LIBRARIES = ROOT / "src" / "lostmotion" / "fmu_libraries"
-PAGE = ROOT / "src" / "lostmotion" / "live_page" / "page.html"
+PAGES = [ROOT / "src" / "lostmotion" / name for name in ("live_page/page.html", "reports/report.js")]
 # The builds of the core, as in CMakeLists.txt: the processors they are for.
 BUILDS = {
     "x86_64": {"any": "baseline", "avx2": "x86_64+avx2"},
@@ -225,8 +225,9 @@ def main() -> None:
     parser.add_argument("--platforms", nargs="+", choices=WHEELS, default=list(WHEELS))
     parser.add_argument("--pythons", nargs="+", choices=PYTHONS, default=list(PYTHONS))
     given = parser.parse_args()
-    if not PAGE.exists():
-        sys.exit(f"{PAGE.relative_to(ROOT)} is missing: make page")
+    for built in PAGES:
+        if not built.exists():
+            sys.exit(f"{built.relative_to(ROOT)} is missing: make page")
     fmu(LIBRARIES)
     base = pure()
     given.to.mkdir(parents=True, exist_ok=True)

@@ -193,8 +193,6 @@ def test_command_line(tmp_path: Path):
     assert done.exit_code == 0, done.output
     assert {p.name for p in out.iterdir()} == {
         "rig.html",
-        "rig.png",
-        "rig.svg",
         "rig.csv",
         "comparison.csv",
         "efficiency.csv",

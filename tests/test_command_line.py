@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, ROOT, SCENARIOS
 from lostmotion.cli import app, terminal
-from lostmotion.reports import plots
+from lostmotion.reports import plots, thinning
 from lostmotion.reports.listing import list_records
 from lostmotion.simulation.forecast import forecast
 from lostmotion.simulation.run import run
@@ -509,7 +509,7 @@ def test_a_run_of_a_million_samples_is_drawn_in_seconds() -> None:
     assert time.process_time() - begin < 5.0
     for axes in figure.axes:
         for line in axes.lines:
-            assert len(line.get_xdata()) <= plots.MAX_POINTS + 10
+            assert len(line.get_xdata()) <= thinning.MAX_POINTS + 10
     drawn = figure.axes[4].lines[0].get_ydata()
     assert np.max(drawn) == pytest.approx(1e3 * float(result["twist"].max()), rel=1e-15)
 

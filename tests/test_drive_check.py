@@ -1,6 +1,9 @@
 """The drive check: duty cycle and means, heat, holding, and that no verdict is the same for every drive."""
 
 import math
+import re
+from html import escape
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +11,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from conftest import ROOT, SCENARIOS
+from html_pages import Page
 from lostmotion.cli import app
 from lostmotion.paper import paper_scenario
 from lostmotion.simulation.scenario import from_tables
@@ -372,3 +376,19 @@ def test_the_drive_check_finds_what_is_wrong():
 def test_a_load_that_drives_is_no_dead_zone():
     findings = {f.what: f for f in check_drive(lm.load(ROOT / "scenarios" / "backlash-reversing-load.toml"))}
     assert findings["dead zone"].verdict == "ok"  # the command is 0 throughout
+
+
+def test_the_page_of_a_check_has_the_uses_and_verdicts_of_its_findings(tmp_path: Path) -> None:
+    findings, page = lm.check_drive(lm.load("catalogue-robot-joint")), tmp_path / "check.html"
+    done = CliRunner().invoke(app, ["drive", "check", "catalogue-robot-joint", "--report", str(page)])
+    assert done.exit_code == 0, done.output
+    text = page.read_text()
+    assert not Page(text).faults
+    shown = dict(re.findall(r"<title>([^<:]*): ([\d.e−]+)</title>", text))
+    wanted = {f.what: 100.0 * f.use for f in findings if f.use is not None}
+    assert len(wanted) > 2
+    assert {name: float(value.replace("−", "-")) for name, value in shown.items()} == pytest.approx(wanted, rel=1e-5)
+    rows = re.findall(r"<tr><td(?: class=\"words\")?>(.*?)</td><td[^>]*>.*?</td><td>(.*?)</td>", text)
+    words = {"ok": "ok", "warning": "WARNING", "unknown": "not judged"}
+    assert rows == [(escape(f.what), words[f.verdict]) for f in findings]
+    assert findings._repr_html_().startswith("<iframe")  # type: ignore[attr-defined]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 import tomllib
 from dataclasses import replace
@@ -26,6 +27,7 @@ from lostmotion.identification.logs import Channel
 from lostmotion.identification.prepare import prepared
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
+from lostmotion.reports import plots
 from lostmotion.reports.identification import (
     correlations,
     friction_curve,
@@ -34,7 +36,7 @@ from lostmotion.reports.identification import (
     loss_curves,
     write_identification,
 )
-from lostmotion.reports.plots import correlation_map
+from lostmotion.reports.panels import Matrix
 
 
 @pytest.fixture(scope="module")
@@ -119,11 +121,11 @@ def test_the_page_maps_all_correlations(found: IdentificationResult, tmp_path: P
     covariance = np.linalg.inv(found.fit.normal * np.outer(scale, scale)) * np.outer(scale, scale)
     d = np.sqrt(np.diag(covariance))
     np.testing.assert_allclose(C, covariance / np.outer(d, d), atol=1e-6)
-    axes, bar = correlation_map(names, C).axes
+    axes, _ = plots.draw([Matrix("correlation [-]", tuple(names), C)], 1, (7.0, 7.0)).axes
     assert [t.get_text() for t in axes.get_xticklabels()] == [t.get_text() for t in axes.get_yticklabels()] == names
     assert [t.get_text() for t in axes.texts] == [f"{x:+.2f}" for x in C.ravel()]
-    assert bar.get_ylabel() == "correlation [-]"
     page = write_identification(tmp_path, "servo", found).read_text()
+    assert re.findall(r'<td class="cell"[^>]*>([^<]*)</td>', page) == [f"{x:+.2f}" for x in C.ravel()]
     i, j = max(((i, j) for i in range(len(names)) for j in range(i)), key=lambda ij: abs(C[ij]))
     assert f"Strongest: {names[i]} and {names[j]} {C[i, j]:+.2f}" in page
     table = [line.split(",") for line in (tmp_path / "correlation.csv").read_text().splitlines()]

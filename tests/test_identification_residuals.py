@@ -108,7 +108,7 @@ def test_a_wrong_interpolation_is_reported_and_no_interval_is_narrow(tmp_path: P
     assert lost.startswith("backlash may have any value within its bounds")
     assert result.lines()[:2] == [size, lost]
     page = write_identification(tmp_path / "out", "axis", result).read_text()
-    assert page.index("times the stated") < page.index("<h2>")
+    assert page.index("times the stated") < page.index("</section>")  # in the verdict
     for name, value in TRUTH.items():
         assert result.intervals[name].low <= value <= result.intervals[name].high, name
 

@@ -16,7 +16,7 @@ from pydantic import BaseModel
 import lostmotion as lm
 from conftest import ROOT, SCENARIOS
 from lostmotion.inputs.part import Part
-from lostmotion.reports import plots
+from lostmotion.reports import thinning
 
 SMALL = lm.load("paper-2dof-nl-small")
 
@@ -184,17 +184,17 @@ def test_long_curves_are_drawn_from_few_points_that_keep_every_peak() -> None:
     x = np.linspace(0.0, 1.0, 1_000_003)
     y = np.sin(40.0 * x)
     y[123_457], y[777_777], y[500_000] = 5.0, -7.0, np.nan
-    thin_x, thin_y = plots.thinned(x, y)
-    assert len(thin_x) == len(thin_y) <= plots.MAX_POINTS + 10
+    thin_x, thin_y = thinning.thinned(x, y)
+    assert len(thin_x) == len(thin_y) <= thinning.MAX_POINTS + 10
     assert np.nanmax(thin_y) == 5.0
     assert np.nanmin(thin_y) == -7.0
     assert thin_x[0] == 0.0
     assert thin_x[-1] == 1.0
     assert np.all(np.diff(thin_x) > 0.0)
-    loop_x, loop_y = plots.thinned(np.cos(9 * x), np.sin(9 * x))  # also where x is no time
+    loop_x, loop_y = thinning.thinned(np.cos(9 * x), np.sin(9 * x))  # also where x is no time
     assert (loop_x.max(), loop_y.max()) == (np.cos(9 * x).max(), np.sin(9 * x).max())
     few = np.arange(10.0)
-    assert plots.thinned(few, few)[1] is few
+    assert thinning.thinned(few, few)[1] is few
 
 
 # --- step by step ---

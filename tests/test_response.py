@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from conftest import ROOT
+from html_pages import charts
 from lostmotion.cli import app
 from lostmotion.cli.grids import parse_grid
 from lostmotion.paper import paper_scenario
@@ -455,16 +456,9 @@ def test_the_command_writes_figures_and_tables(tmp_path: Path):
     assert "18 of 18 motions found" in done.output
     assert "dead zone" in done.output
     names = {p.name for p in (tmp_path / "out").iterdir()}
-    assert {
-        "bode.png",
-        "bode.svg",
-        "bode.csv",
-        "maps.png",
-        "maps.svg",
-        "response.csv",
-        "response.nc",
-        "characteristics.csv",
-    } == names
+    assert names == {"response.html", "bode.csv", "response.csv", "response.nc", "characteristics.csv"}
+    gain, _, *maps = charts((tmp_path / "out" / "response.html").read_text())
+    assert len(maps) == 4
     import xarray as xr
 
     with xr.open_dataset(tmp_path / "out" / "response.nc") as opened:
@@ -474,14 +468,17 @@ def test_the_command_writes_figures_and_tables(tmp_path: Path):
     table = np.genfromtxt(tmp_path / "out" / "response.csv", delimiter=",", skip_header=1, usecols=range(4))
     values = own["response"].sel(output="load_speed").values.ravel()
     assert np.allclose(table[:, 2], np.abs(values), rtol=1e-12)
+    for line, row in zip(gain["lines"][:3], own["response"].sel(output="load_speed").values, strict=True):
+        assert np.array_equal(np.nan_to_num(line["y"]), np.abs(row))  # no motion has no place on a logarithmic axis
 
 
 def test_a_drive_that_never_moves_still_gets_its_figures(tmp_path: Path):
     scenario = str(ROOT / "scenarios" / "paper-2dof-nl-large.toml")
-    words = ["--amplitudes", "0.001,0.002", "--frequencies", "1.0,5.0", "-o", str(tmp_path / "o")]
+    words = ["--amplitudes", "0.001,0.002", "--frequencies", "1.0,5.0", "-o", str(tmp_path / "o"), "--figures", "png"]
     done = CliRunner().invoke(app, ["response", scenario, *words])
     assert done.exit_code == 0, done.output
     assert (tmp_path / "o" / "bode.png").exists()
+    assert "no values" in (tmp_path / "o" / "response.html").read_text()
 
 
 def test_lists_of_values_are_read_alike() -> None:

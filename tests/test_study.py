@@ -20,6 +20,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from conftest import ROOT, rows_by_any_threads_and_executor
+from html_pages import Page, charts
 from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
@@ -653,10 +654,11 @@ def test_show_and_best_from_the_command_line(tmp_path: Path):
     out = tmp_path / "t"
     done = CliRunner().invoke(app, ["study", str(ROOT / "examples" / "tolerance.toml"), "-o", str(out)])
     assert done.exit_code == 0, done.output
-    shown = CliRunner().invoke(app, ["study", "show", str(out), "--best", "stuck_share"])
+    shown = CliRunner().invoke(app, ["study", "show", str(out), "--best", "stuck_share", "--figures", "png"])
     assert shown.exit_code == 0, shown.output
     assert "256 of 256 runs, 0 failed" in shown.output
     assert {p.name for p in (tmp_path / "t-figures").iterdir()} >= {
+        "study.html",
         "statistics.csv",
         "distributions.png",
         "tornado.png",
@@ -665,6 +667,11 @@ def test_show_and_best_from_the_command_line(tmp_path: Path):
     import pandas as pd
 
     table = read_table(out)
+    page = (tmp_path / "t-figures" / "study.html").read_text()
+    assert not Page(page).faults
+    first = next(chart for chart in charts(page) if chart["title"] == "stuck_share over motor.friction_torque")
+    assert np.array_equal(first["lines"][0]["x"], table["motor.friction_torque"].to_numpy())
+    assert np.array_equal(first["lines"][0]["y"], table["stuck_share"].to_numpy())
     assert len(pd.read_parquet(out)) == table.num_rows == 256  # nothing but data among the data
     best = best_runs(table, "stuck_share", 3)["stuck_share"].to_pylist()
     assert best == sorted(table["stuck_share"].to_pylist())[:3]

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from conftest import ROOT
+from html_pages import charts
 from lostmotion.cli import app
 from lostmotion.reports.study import best_lines
 from lostmotion.reports.study_selection import pareto_figure
@@ -83,11 +84,15 @@ def test_the_command_line_shows_the_selection(selection: tuple[lm.Study, Path]):
     ):
         assert text in done.output
     figures = directory.with_name("rows-figures")
-    assert {"selection.csv", "limits.csv", "pareto.png", "pareto.svg"} <= {p.name for p in figures.iterdir()}
+    assert {"study.html", "selection.csv", "limits.csv"} <= {p.name for p in figures.iterdir()}
     assert {p.suffix for p in directory.iterdir()} == {".parquet", ".json", ".txt"}
     with (figures / "selection.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [int(r["rank"]) for r in rows] == list(range(1, len(rows) + 1))
+    (chart,) = (c for c in charts((figures / "study.html").read_text()) if c["title"] == "Objectives of all candidates")
+    shown = {line["label"]: set(line["names"]) for line in chart["lines"]}
+    assert shown["fits"] == {r["gearbox"] for r in rows if r["fits"] == "yes"}
+    assert shown["Pareto front"] == {r["gearbox"] for r in rows if r["Pareto front"] == "yes"}
     assert all(r["why"] for r in rows if r["fits"] == "no")
     assert not any(r["why"] for r in rows if r["fits"] == "yes")
     assert {r["gearbox"] for r in rows} == set(lm.load_study(EXAMPLE).vary[0].names)

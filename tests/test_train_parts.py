@@ -95,9 +95,9 @@ def test_what_joins_shafts_makes_them_one_part() -> None:
 
 
 def test_speeds_are_shown_in_terms_of_the_last_shaft_of_their_own_part() -> None:
-    from lostmotion.reports.train_figures import train_overview
+    from lostmotion.reports.plots import overview
 
-    figure = train_overview(lm.simulate(lm.load("direction-finder", {"simulation.duration": 0.02})))
+    figure = overview(lm.simulate(lm.load("direction-finder", {"simulation.duration": 0.02})))
     shown = {a.get_ylabel(): [line.get_label() for line in a.get_lines()] for a in figure.axes}
     for axis in ("traverse", "elevation"):
         assert shown[f"speed at {axis} [rad/s]"] == [f"{axis}_motor / 100", axis]

@@ -245,6 +245,8 @@ def test_the_command_draws_the_response_of_a_train(tmp_path: Path) -> None:
         "1.0..20:3",
         "-o",
         str(tmp_path),
+        "--figures",
+        "png",
     ]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output

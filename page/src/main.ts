@@ -184,7 +184,7 @@ class Page {
     if (!this.run) return;
     this.drawing.use(this.d, this.run);
     this.charts.draw(this.d, this.run, this.pinned);
-    this.strip.draw(this.d, this.run);
+    this.strip.draw(rowsOf(this.d, this.run), this.run.time.at(-1)! / this.d.core.duration);
     this.loops.draw(this.d, this.run, this.pinned);
     this.maps.draw(this.d, this.run, this.pinned);
     this.energy.draw(this.run);
@@ -209,6 +209,12 @@ class Page {
     summary.textContent = text;
     summary.classList.toggle("failed", failed);
   }
+}
+
+/** Contacts as the strip shows them. */
+function rowsOf(d: Description, { values }: Run): { label: string; modes: Float64Array }[] {
+  const there = d.contacts.filter((c) => values.has(c.variable));
+  return there.map(({ label, variable }) => ({ label, modes: values.get(variable)! }));
 }
 
 /** Once what is drawn now is shown: it is with the next frame; the one after begins when that is shown. */

@@ -18,6 +18,8 @@ export interface Line {
   dash?: number[];
   /** of a pinned run: faint, and without an entry in the legend */
   faint?: boolean;
+  /** radius of a dot at each point; with width 0 there are dots alone */
+  points?: number;
 }
 
 export interface Axis {
@@ -25,6 +27,17 @@ export interface Axis {
   unit: string;
   logarithmic?: boolean;
   range?: [number, number];
+  /** of the values 0, 1, 2, ... */
+  names?: string[];
+}
+
+/** A point that is named, with a line from it to another y. */
+export interface Mark {
+  x: number;
+  y: number;
+  to?: number;
+  text: string;
+  colour: string;
 }
 
 export interface Chart {
@@ -33,10 +46,17 @@ export interface Chart {
   lines: Line[];
   /** a ground that is the darker, the higher the value there */
   shade?: { value: (x: number, y: number) => number };
+  /** intervals of x that are set apart */
+  spans?: [number, number][];
+  marks?: Mark[];
+  /** y of a line across the chart */
+  level?: number;
 }
 
+const ANGLE = /°|deg(rees)?\]/; // with ticks at halves and thirds of a right angle
+const NAMES = 8; // along an axis; more are told on demand
 const CELLS: [number, number] = [72, 48]; // of a shade
-const MARGIN = { left: 52, right: 12, top: 8, bottom: 34 };
+const MARGIN = { left: 66, right: 12, top: 8, bottom: 34 };
 
 export class Plot {
   private readonly canvas = document.createElement("canvas");
@@ -83,8 +103,13 @@ export class Plot {
   /** The value on the x axis below a pixel. */
   valueAt(pixel: number): number {
     const share = (pixel - MARGIN.left) / (this.width - MARGIN.left - MARGIN.right);
-    const [a, b] = this.xRange;
-    return a + Math.min(1, Math.max(0, share)) * (b - a);
+    return between(this.xRange, Math.min(1, Math.max(0, share)), this.chart?.x.logarithmic);
+  }
+
+  /** The values below a point. */
+  valuesAt(left: number, top: number): [number, number] {
+    const share = (this.height - MARGIN.bottom - top) / (this.height - MARGIN.top - MARGIN.bottom);
+    return [this.valueAt(left), between(this.yRange, Math.min(1, Math.max(0, share)), this.chart?.y.logarithmic)];
   }
 
   /** A line at x, or with y a point there; it does not redraw the chart. */
@@ -116,41 +141,51 @@ export class Plot {
     const colour = (name: string): string => style.getPropertyValue(`--${name}`).trim();
     this.xRange = x.range ?? padded(extent(lines.map((l) => l.x)), 0.06);
     this.yRange = y.range ?? padded(extent(lines.map((l) => l.y)));
+    const { spans = [], marks = [], level } = this.chart!;
     const [right, bottom] = [this.width - MARGIN.right, this.height - MARGIN.bottom];
     this.toX = scale(this.xRange, [MARGIN.left, right], x.logarithmic);
     this.toY = scale(this.yRange, [bottom, MARGIN.top], y.logarithmic);
     c.clearRect(0, 0, this.width, this.height);
     c.font = `12px ${style.fontFamily}`;
+    for (const [from, to] of spans) this.span(c, from, to, colour("grid"));
     if (this.chart!.shade) this.shade(c, this.chart!.shade.value, colour("text"));
     this.axes(c, x, y, colour);
     c.save();
     c.beginPath();
     c.rect(MARGIN.left, MARGIN.top, this.width - MARGIN.left - MARGIN.right, this.height - MARGIN.top - MARGIN.bottom);
     c.clip();
+    if (level !== undefined) this.across(c, level, colour("edge"));
     for (const line of lines) {
-      c.strokeStyle = colour(line.colour);
+      c.strokeStyle = c.fillStyle = colour(line.colour);
       c.globalAlpha = line.faint ? 0.5 : 1;
       c.lineWidth = line.width ?? 1.75;
       c.setLineDash(line.dash ?? []);
-      this.trace(c, line);
+      if (line.width !== 0) this.trace(c, line);
+      if (line.points) this.dots(c, line, line.points);
     }
+    c.globalAlpha = 1;
+    c.setLineDash([]);
+    this.name(c, marks, colour);
     c.restore();
     if (this.marked) this.mark(...this.marked);
   }
 
   private shade(c: CanvasRenderingContext2D, value: (x: number, y: number) => number, ink: string): void {
     const [columns, rows] = CELLS;
-    const [[x0, x1], [y0, y1]] = [this.xRange, this.yRange];
+    const { x, y } = this.chart!;
     const values = Array.from({ length: columns * rows }, (_, k) => {
       const [i, j] = [k % columns, Math.floor(k / columns)];
-      return value(x0 + ((i + 0.5) / columns) * (x1 - x0), y1 - ((j + 0.5) / rows) * (y1 - y0));
+      return value(
+        between(this.xRange, (i + 0.5) / columns, x.logarithmic),
+        between(this.yRange, 1 - (j + 0.5) / rows, y.logarithmic),
+      );
     });
     const [low, high] = extent([values]);
     const [red, green, blue] = channels(ink);
     const image = new ImageData(columns, rows);
     values.forEach((v, k) => {
       const share = high > low ? (v - low) / (high - low) : 0;
-      image.data.set([red, green, blue, Math.round(255 * (0.03 + 0.4 * share))], 4 * k);
+      if (!Number.isNaN(v)) image.data.set([red, green, blue, Math.round(255 * (0.03 + 0.4 * share))], 4 * k);
     });
     const cells = document.createElement("canvas");
     [cells.width, cells.height] = CELLS;
@@ -167,7 +202,14 @@ export class Plot {
     const per = rising ? Math.floor(n / (2 * this.width)) : 0;
     c.beginPath();
     if (per < 2) {
-      for (let k = 0; k < n; ++k) c.lineTo(toX(x[k]!), toY(y[k]!));
+      let drawing = false; // a value that is none makes a gap
+      for (let k = 0; k < n; ++k) {
+        const [left, top] = [toX(x[k]!), toY(y[k]!)];
+        const there = Number.isFinite(left) && Number.isFinite(top);
+        if (there && drawing) c.lineTo(left, top);
+        else if (there) c.moveTo(left, top);
+        drawing = there;
+      }
     } else {
       for (let k = 0; k < n; k += per) {
         let [low, high] = [k, k];
@@ -181,6 +223,64 @@ export class Plot {
     c.stroke();
   }
 
+  private dots(c: CanvasRenderingContext2D, { x, y }: Line, radius: number): void {
+    c.beginPath();
+    for (let k = 0; k < x.length; ++k) {
+      const [left, top] = this.place(x[k]!, y[k]!);
+      if (!Number.isFinite(left) || !Number.isFinite(top)) continue;
+      c.moveTo(left + radius, top);
+      c.arc(left, top, radius, 0, 2 * Math.PI);
+    }
+    c.fill();
+  }
+
+  private span(c: CanvasRenderingContext2D, from: number, to: number, ink: string): void {
+    const inside = (v: number): number => Math.min(this.width - MARGIN.right, Math.max(MARGIN.left, this.toX(v)));
+    c.fillStyle = ink;
+    c.fillRect(inside(from), MARGIN.top, inside(to) - inside(from), this.height - MARGIN.top - MARGIN.bottom);
+  }
+
+  private across(c: CanvasRenderingContext2D, value: number, ink: string): void {
+    c.strokeStyle = ink;
+    c.lineWidth = 1;
+    c.setLineDash([4, 3]);
+    c.beginPath();
+    c.moveTo(MARGIN.left, this.toY(value));
+    c.lineTo(this.width - MARGIN.right, this.toY(value));
+    c.stroke();
+  }
+
+  /** Points with their names, as far as these do not cover each other. */
+  private name(c: CanvasRenderingContext2D, marks: Mark[], colour: (name: string) => string): void {
+    const written: [number, number, number][] = []; // left, right, baseline
+    c.textBaseline = "middle";
+    c.textAlign = "left";
+    for (const { x, y, to, text, colour: ink } of marks) {
+      const [left, top] = this.place(x, y);
+      c.strokeStyle = c.fillStyle = colour(ink);
+      c.lineWidth = 2;
+      c.beginPath();
+      c.moveTo(left, top);
+      c.lineTo(left, to === undefined ? top : this.toY(to));
+      c.stroke();
+      c.beginPath();
+      c.arc(left, top, 3.5, 0, 2 * Math.PI);
+      c.fill();
+      const wide = c.measureText(text).width;
+      const begin = left + 7 + wide < this.width - MARGIN.right ? left + 7 : left - 7 - wide;
+      const line = [top - 9, top + 10, top - 24, top + 25].find((at) =>
+        written.every(([a, b, other]) => begin > b + 4 || begin + wide < a - 4 || Math.abs(other - at) > 13),
+      );
+      if (line === undefined || text === "") continue;
+      c.strokeStyle = colour("surface"); // so that it is read over lines
+      c.lineWidth = 3;
+      c.strokeText(text, begin, line);
+      c.fillStyle = colour("text");
+      c.fillText(text, begin, line);
+      written.push([begin, begin + wide, line]);
+    }
+  }
+
   private axes(c: CanvasRenderingContext2D, x: Axis, y: Axis, colour: (name: string) => string): void {
     const sx = shown(x.unit, Math.max(...this.xRange.map(Math.abs)));
     const sy = shown(y.unit, Math.max(...this.yRange.map(Math.abs)) / 1.06);
@@ -192,9 +292,11 @@ export class Plot {
     c.textAlign = "right";
     c.beginPath();
     const at = ([low, high]: [number, number], axis: Axis, s: { factor: number }, count: number): number[] =>
-      axis.logarithmic
-        ? logarithmicTicks(low, high)
-        : ticks(low / s.factor, high / s.factor, count).map((v) => v * s.factor);
+      axis.names
+        ? axis.names.flatMap((_, k) => (axis.names!.length <= NAMES ? [k] : []))
+        : axis.logarithmic
+          ? logarithmicTicks(low, high)
+          : ticks(low / s.factor, high / s.factor, count, ANGLE.test(axis.label + axis.unit)).map((v) => v * s.factor);
     for (const v of at(this.yRange, y, sy, Math.max(2, this.height / 42))) {
       const top = Math.round(this.toY(v)) + 0.5;
       c.moveTo(MARGIN.left, top);
@@ -207,7 +309,8 @@ export class Plot {
       const left = Math.round(this.toX(v)) + 0.5;
       c.moveTo(left, MARGIN.top);
       c.lineTo(left, bottom);
-      c.fillText(format(v / sx.factor, 6), left, bottom + 5);
+      const text = x.names?.[v] ?? format(v / sx.factor, 6);
+      c.fillText(text, Math.min(left, this.width - 0.5 * c.measureText(text).width), bottom + 5);
     }
     c.stroke();
     c.textBaseline = "bottom";
@@ -233,6 +336,11 @@ function scale([low, high]: [number, number], [from, to]: [number, number], loga
   if (logarithmic) return (v) => from + (to - from) * (Math.log(v / low) / Math.log(high / low));
   const factor = (to - from) / (high - low);
   return (v) => from + (v - low) * factor;
+}
+
+/** The value at a share of an axis. */
+function between([low, high]: [number, number], share: number, logarithmic = false): number {
+  return logarithmic ? low * (high / low) ** share : low + share * (high - low);
 }
 
 /** Red, green and blue of #rrggbb. */

@@ -1,8 +1,5 @@
 /** Which contacts are stuck, and which way the others slip, over time. */
-import type { Run } from "./core";
-import type { Description } from "./description";
-
-const [ROW, TEXT, BAR, LEFT, RIGHT] = [36, 17, 14, 52, 12];
+const [ROW, TEXT, BAR, LEFT, RIGHT] = [36, 17, 14, 66, 12];
 
 export class Strip {
   readonly canvas = document.createElement("canvas");
@@ -12,8 +9,8 @@ export class Strip {
     root.append(this.canvas);
   }
 
-  draw(d: Description, run: Run): void {
-    const rows = d.contacts.filter((c) => run.values.has(c.variable));
+  /** rows: each with its modes at instants of equal distance; reach: share of the width that they take. */
+  draw(rows: { label: string; modes: Float64Array }[], reach = 1): void {
     const [width, height] = [this.root.clientWidth, ROW * rows.length + 4];
     const density = window.devicePixelRatio || 1;
     this.root.style.height = `${height}px`;
@@ -28,10 +25,9 @@ export class Strip {
     c.font = `12px ${style.fontFamily}`;
     c.textBaseline = "middle";
     const shares: string[] = [];
-    rows.forEach(({ label, variable }, row) => {
-      const modes = run.values.get(variable)!;
+    rows.forEach(({ label, modes }, row) => {
       const [top, last] = [row * ROW + 2, modes.length - 1];
-      const x = (k: number): number => LEFT + ((k * d.core.interval) / d.core.duration) * (width - LEFT - RIGHT);
+      const x = (k: number): number => LEFT + reach * (k / last) * (width - LEFT - RIGHT);
       let stuck = 0;
       for (let k = 0; k < last;) {
         let end = k + 1;

@@ -2,6 +2,7 @@
 import { existsSync, readFileSync } from "node:fs";
 import { join } from "node:path";
 import { gunzipSync } from "node:zlib";
+import axe from "axe-core";
 import { type Browser, chromium, type Page } from "playwright-core";
 import type { Description } from "../src/description";
 
@@ -25,7 +26,7 @@ export function launch(): Promise<Browser> {
 function script(file: string, id: string): string {
   return new RegExp(`<script [^>]*id="${id}">(.*?)</script>`, "s").exec(readFileSync(file, "utf-8"))![1]!;
 }
-function unpacked(file: string, id: string): Buffer<ArrayBuffer> {
+export function unpacked(file: string, id: string): Buffer<ArrayBuffer> {
   return Buffer.from(gunzipSync(Buffer.from(script(file, id), "base64")));
 }
 export function coreOf(file: string): Buffer<ArrayBuffer> {
@@ -56,6 +57,14 @@ export function watch(page: Page): string[] {
     if (!/^(data|blob):/.test(url) && !url.startsWith("file:///tmp/")) seen.push(`request: ${url}`);
   });
   return seen;
+}
+
+/** What axe finds wrong with a page. */
+export async function barriers(page: Page): Promise<string[]> {
+  await page.evaluate(axe.source);
+  const { violations } = await page.evaluate(() => (globalThis as any).axe.run());
+  const places = (v: any): string[] => v.nodes.map((n: any) => n.html).slice(0, 3);
+  return violations.map((v: any) => `${v.id}: ${places(v).join(" ")}`);
 }
 
 /** Waits until the whole run is shown. */

@@ -9,8 +9,26 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import lostmotion as lm
 from lostmotion.live_page.page import write_page
+from lostmotion.reports.page import Prose, Report, Table, Verdict, render
+from lostmotion.reports.panels import (
+    DOTS,
+    Bars,
+    Contacts,
+    Curve,
+    Flows,
+    Ground,
+    Group,
+    Histogram,
+    Mark,
+    Matrix,
+    Panel,
+    look,
+)
+from lostmotion.reports.servo import servo_report
 
 # Page -> scenario, and what the test changes on it by its address.
 PAGES = {
@@ -64,9 +82,44 @@ def responses(scenario: lm.Scenario) -> list[dict[str, float]]:
     ]
 
 
+def write_reports(directory: Path) -> None:
+    """reports of an axis, and of each kind of chart with the numbers of one of them."""
+    axis = servo_report("speed-axis", lm.commission(lm.load("speed-axis")))
+    (directory / "servo.html").write_text(render(axis))
+    x = np.geomspace(0.1, 1000.0, 200)
+    y = np.where(x > 100.0, np.nan, 10.0 / x)
+    named = Curve("designs", np.arange(3.0), np.array([2.0, 1.0, 3.0]), DOTS, names=("first", "second", "third"))
+    bode = Panel("Gain", "frequency [Hz]", "gain [-]", (Curve("falling", x, y, look(0)), Curve("level", x, 0 * x + 1.0, look(1))),
+                 log_x=True, log_y=True, level=1.0, marks=(Mark(10.0, 1.0, "10 Hz", look(0)),))  # fmt: skip
+    phase = Panel(
+        "Phase", "frequency [Hz]", "phase [deg]", (Curve("falling", x, -90.0 * x / (x + 10.0), look(0)),), log_x=True
+    )
+    ground = Ground(x, np.array([1.0, 2.0]), np.vstack([np.log(x), 2.0 * np.log(x)]), "logarithm")
+    time = np.linspace(0.0, 1.0, 101)
+    charts = (
+        bode,
+        phase,
+        Panel("Map", "frequency [Hz]", "amplitude", (), log_x=True, ground=ground),
+        Panel("Designs", "cost", "mass", (named,)),
+        Contacts("Contacts", time, {"motor": np.sign(np.round(time - 0.5, 1)), "load": 0.0 * time}),
+        Flows("Energy", {"source": 2.0, "gear_losses": -1.5, "stored_change": 0.5}),
+        Bars("Influence", "rank correlation [-]", {"a": (0.5, 0.1), "b": (-0.7, 0.2)}, ("first", "total")),
+        Histogram("Peaks", "torque [N·m]", np.sin(np.arange(200.0))),
+        Matrix("Correlations", ("a", "b"), np.array([[1.0, -0.97], [-0.97, 1.0]])),
+    )
+    table = Table("Values", ("what", "value [N·m]"), [["one", "1.5"], ["two", "2"]], marked=frozenset({1}))
+    words = Prose("What is computed", ("All of it, from `x`.",))
+    verdict = Verdict("bad", ("Something is wrong.",))
+    page = Report("All charts", "Each kind of chart.", verdict, Group("main", "Charts", "", charts), (table, words))
+    (directory / "charts.html").write_text(render(page))
+    numbers = {"x": x.tolist(), "y": [None if math.isnan(v) else v for v in y]}
+    (directory / "charts.json").write_text(json.dumps(numbers))
+
+
 def main(directory: Path) -> None:
     """For each page NAME.html and NAME.json."""
     directory.mkdir(parents=True, exist_ok=True)
+    write_reports(directory)
     # So long that its beginning is shown before the whole is there.
     write_page(directory / "long.html", lm.load("joint-under-gravity", {"simulation.duration": 30.0}))
     for page, (name, changes) in PAGES.items():

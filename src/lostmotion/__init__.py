@@ -276,6 +276,14 @@ _WITH_DATASETS = (
     "test_rig.measurement",
     "test_rig.rig",
 )
+# Modules whose results notebooks show as the page that the command writes.
+_WITH_PAGES = (
+    "identification.identify",
+    "pointing.budget",
+    "servo.commission",
+    "sizing.drive_check",
+    "test_rig.measurement",
+)
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [*_HOME_OF]  # noqa: PLE0604
@@ -287,7 +295,10 @@ def __getattr__(name: str) -> Any:
     home = _HOME_OF[name]
     if home in _WITH_DATASETS:
         importlib.import_module(".reports.accessor", __name__)
-    value = getattr(importlib.import_module(f".{home}", __name__), name)
+    module = importlib.import_module(f".{home}", __name__)
+    if home in _WITH_PAGES:
+        importlib.import_module(".reports.notebook", __name__).attach(module)
+    value = getattr(module, name)
     globals()[name] = value
     return value
 

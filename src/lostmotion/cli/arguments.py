@@ -72,3 +72,9 @@ Overrides = Annotated[
         help='Change a value, e.g. --set command.amplitude=0.1 or "load.inertia=1 kg*m^2".',
     ),
 ]
+FiguresOption = Annotated[
+    str | None,
+    typer.Option(
+        "--figures", metavar="png,svg,pdf", help="Also draw the charts of the page as pictures of these kinds."
+    ),
+]

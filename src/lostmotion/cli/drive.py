@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
 from .arguments import Overrides, SourceArgument
+from .targets import try_page
 from .terminal import simulating
 
 
 def check(
     scenario: SourceArgument,
     overrides: Overrides = None,
+    report: Annotated[
+        Path | None, typer.Option("-o", "--report", metavar="FILE", help="Also write the findings as a page: .html.")
+    ] = None,
 ) -> None:
     """Torques, speeds, voltage, current, heat, inertia ratio, resonance, dead zone, lost motion, holding and self-locking.
 
@@ -16,11 +25,15 @@ def check(
 
     \b
     lostmotion drive check drive.toml --set task.cycle="2 s"
+    lostmotion drive check catalogue-robot-joint --report check.html
     """
     from ..errors import InputError
+    from ..reports.drive_check import check_report, counted
     from ..simulation.sources import load
     from ..sizing.drive_check import check_drive
 
+    if report is not None:
+        try_page(report)
     loaded = load(scenario, overrides or ())
     try:
         with simulating("Checking", loaded):
@@ -30,6 +43,9 @@ def check(
     print(loaded.title or scenario)
     for finding in findings:
         print(f"  {finding}")
-    warnings, unknown = (sum(f.verdict == verdict for f in findings) for verdict in ("warning", "unknown"))
-    counted = "No warnings." if warnings == 0 else f"{warnings} warning{'s' if warnings > 1 else ''}."
-    print(f"{counted} {unknown} not judged (?)." if unknown else counted)
+    print(counted(findings))
+    if report is not None:
+        from ..reports.page import write_page
+
+        write_page(report, check_report(Path(scenario).stem, findings, loaded.title))
+        print(f"The page is at {report}")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .arguments import FiguresOption
 from .targets import try_directory, writing
 from .terminal import busy
 
@@ -25,6 +26,7 @@ def identify(
     profiles: Annotated[
         bool, typer.Option("--profiles", help="Also intervals by the profile of the likelihood (takes longer).")
     ] = False,
+    figures: FiguresOption = None,
 ) -> None:
     """Identify a drive from measured logs: values with intervals, and what the logs cannot tell.
 
@@ -34,10 +36,10 @@ def identify(
     \b
     lostmotion identify servo/identify.toml -o servo
     """
-    from ..errors import need
+    from ..reports.pictures import endings
 
+    pictures = endings(figures)
     try_directory(output)
-    need("jinja2", "The page of an identification", "report")
     from ..identification.identify import identify as run
 
     with busy("Identifying") as tell:
@@ -46,10 +48,10 @@ def identify(
             tell(f"{rung}, iteration {iteration}, cost {cost:.5g}")
 
         result = run(file, profiles=profiles, progress=notify)
-    with writing(output), busy("Drawing"):
+    with writing(output), busy("Writing"):
         from ..reports.identification import write_identification
 
-        page = write_identification(output, file.stem, result)
+        page = write_identification(output, file.stem, result, pictures)
     _print_summary(result)
     print(f"The page is at {page}")
 

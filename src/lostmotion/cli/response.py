@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import Overrides, SourceArgument, number
+from .arguments import FiguresOption, Overrides, SourceArgument, number
 from .targets import try_directory, writing
 from .terminal import busy, progress
 
 if TYPE_CHECKING:
-    import xarray
-
     from ..simulation.scenario import Scenario
     from ..simulation.train_scenario import TrainScenario
 
@@ -64,19 +61,21 @@ def response(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
         "response"
     ),
+    figures: FiguresOption = None,
 ) -> None:
     """Frequency response over amplitude: each point from a periodic motion, on all cores.
 
-    Of the scenario the drive or train, its controllers and the constant parts of the inputs are taken. Writes Bode figures (bode.png, .svg, .csv), maps of gain, phase, efficiency and distortion over amplitude and
-    frequency (maps.png, .svg), and all numbers (response.csv, characteristics.csv, and response.nc where NetCDF is
-    installed).
+    Of the scenario the drive or train, its controllers and the constant parts of the inputs are taken. Writes response.html (gain and phase over frequency, maps of gain, phase, efficiency and distortion over
+    amplitude and frequency), and all numbers (bode.csv, response.csv, characteristics.csv, and response.nc where NetCDF is installed).
 
     \b
     lostmotion response drive.toml --amplitudes 0.025,1 --frequencies 0.1..100:60
     lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
     """
+    from ..reports.pictures import endings
     from ..simulation.sources import load
 
+    pictures = endings(figures)
     name = Path(scenario).stem
     loaded = {name: load(scenario, overrides or ())} | {Path(other).stem: load(other) for other in compare or ()}
     unit, variable = _known(loaded, source, variable)
@@ -91,14 +90,17 @@ def response(
         for title, s in loaded.items():
             responses[title] = frequency_response(s, grid, wanted, source=source, refine=refine, progress=step)
     first = loaded[name]
-    with writing(output), busy("Drawing"):
-        from ..reports.response import write_response
+    with writing(output), busy("Writing"):
+        from ..reports.response import amplitude_lines, motion_lines, write_response
 
-        figure, found = write_response(output, responses, first, variable)
+        page, found = write_response(output, responses, first, variable, pictures)
     print(first.title or name)
-    _print_characteristics(found)
-    _print_reasons(responses[name])
-    print(f"Figures and tables are in {figure.parent}")
+    lines = motion_lines(responses[name])
+    more = max(0, sum(line.startswith("not found") for line in lines) - 3)
+    print(*(f"  {line}" for line in (*amplitude_lines(found), *lines[: len(lines) - more])), sep="\n")
+    if more:
+        print(f"  {more} more reasons are in response.csv")
+    print(f"The page is at {page}")
     if not (output / "response.nc").exists():
         print('response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"')
 
@@ -121,49 +123,3 @@ def _known(loaded: Mapping[str, Scenario | TrainScenario], source: str | None, v
         except InputError as error:
             raise InputError(f"--variable {variable or variables[0]}: {error}") from None
     return "" if units[0] == "1" else units[0], variables[0]
-
-
-def _print_characteristics(found: xarray.Dataset) -> None:
-    for a in found["amplitude"].values:
-        band, cross = (float(found[k].sel(amplitude=a)) for k in ("bandwidth", "phase_crossover"))
-        text = [f"-3 dB at {band:.4g} Hz" if math.isfinite(band) else "-3 dB outside the frequencies, or no motion"]
-        text += [f"-180 degrees at {cross:.4g} Hz"] if math.isfinite(cross) else []
-        print(f"  amplitude {a:g}: {', '.join(text)}")
-    if "dead_zone_forward" in found.attrs:
-        print(
-            f"  dead zone: from rest the load moves above a constant command of {found.attrs['dead_zone_forward']:.4g} and "
-            f"below {found.attrs['dead_zone_backward']:.4g}"
-        )
-
-
-def _print_reasons(result: xarray.Dataset) -> None:
-    """How many points were found, and why others were not."""
-    reasons = [r for r in result["reason"].values.ravel() if r]
-    found_points = result["reason"].size - len(reasons)
-    repeating = (result["reason"] == "") & ~(result["spread"] > 0.0 if "spread" in result else False)
-    worst = float(result["residual"].where(repeating).max())
-    within = f", repeating within {worst:.1e} of their magnitude" if repeating.any() else ""
-    print(f"  {found_points} of {result['reason'].size} motions found{within}")
-    if "spread" in result:
-        _print_closed_loop(result)
-    different = list(dict.fromkeys(reasons))
-    for reason in different[:3]:
-        print(f"  not found at {reasons.count(reason)} point(s): {reason}")
-    if len(different) > 3:
-        print(f"  {len(different) - 3} more reasons are in response.csv")
-
-
-def _print_closed_loop(result: xarray.Dataset) -> None:
-    """Which frequencies had to fit the sample times, and which motions do not repeat."""
-    f, asked = result["frequency"].values, result["asked_frequency"].values
-    off = abs(f / asked - 1.0)
-    if off.max() > 1e-9:
-        print(
-            f"  {(off > 1e-9).sum()} of {len(f)} frequencies moved to the nearest that fits the sample times, by {off.max():.1%} at most"
-        )
-    spread = result["spread"].values
-    if (spread > 0.0).any():
-        print(
-            f"  {(spread > 0.0).sum()} motions do not repeat, as the encoder has steps: means over many periods, whose first harmonics "
-            f"vary by {spread[spread > 0.0].max():.2g} of their mean at most"
-        )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import InputError
-from .arguments import complete_gearbox
+from .arguments import FiguresOption, complete_gearbox
 from .targets import try_directory, writing
 from .terminal import busy, progress
 
@@ -49,10 +49,11 @@ def rig(
             help='With --logs: torque ripple of the input shaft, so many periods in one turn, e.g. --ripple "2 0.02 N*m".',
         ),
     ] = None,
+    figures: FiguresOption = None,
 ) -> None:
     """Measure a gearbox on the virtual test rig and compare with its data sheet.
 
-    Writes rig.html (a page like one of a catalogue), the figures as PNG and SVG, and the measurements as CSV.
+    Writes rig.html (one page) and the measurements as CSV.
 
     \b
     lostmotion rig schaeffler-rt1-h-20-100
@@ -61,15 +62,13 @@ def rig(
     """
     from ..data_sheets.gearbox_sheet import GearboxSheet
     from ..data_sheets.records import find
-    from ..errors import need
+    from ..reports.pictures import endings
     from ..simulation.scenario_files import gearbox_from_record
 
+    pictures = endings(figures)
     if ripple is not None and logs is None:
         raise InputError("--ripple: is for the logs of a campaign; give --logs DIR, too")
     try_directory(output if logs is None else logs)
-    if logs is None:
-        need("jinja2", "The page of the rig", "report")
-
     sheet = find(gearbox, "gearbox")
     assert isinstance(sheet, GearboxSheet)
     part, notes = gearbox_from_record(gearbox, overrides or ())
@@ -86,10 +85,10 @@ def rig(
 
     with progress(WORK, "Measuring") as step:
         report = measure(part, sheet, notes, step)
-    with writing(output), busy("Drawing"):
+    with writing(output), busy("Writing"):
         from ..reports.rig import summary_rows, write_sheet
 
-        page = write_sheet(output, sheet.name, report, sheet, notes)
+        page = write_sheet(output, sheet.name, report, sheet, notes, pictures)
     print(sheet.title or sheet.name)
     _print_comparisons(report)
     for what, value in summary_rows(report):

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .arguments import Overrides, SourceArgument, number
-from .targets import try_file
+from .targets import try_file, try_page
 from .terminal import busy, simulating
 
 PICTURES = (".png", ".svg", ".pdf")
@@ -22,6 +22,10 @@ def run(
     ] = None,
     plot: Annotated[
         Path | None, typer.Option("--plot", metavar="FILE", help="Figure of the run: .png, .svg or .pdf.")
+    ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", metavar="FILE", help="Page of the run with all charts and its data: .html."),
     ] = None,
     explain: Annotated[
         float | None,
@@ -45,19 +49,20 @@ def run(
         ),
     ] = None,
 ) -> None:
-    """Run a scenario: print, save, draw, explain.
+    """Run a scenario: print, save, draw, report, explain.
 
     \b
     lostmotion run drive.toml
     lostmotion run paper-2dof-nl-small --plot small.png
+    lostmotion run position-axis --report axis.html
     lostmotion run drive.toml --set command.amplitude=0.1 -o result.csv --plot result.png
     lostmotion run result.csv --explain 0.25
     """
     from ..errors import InputError
     from ..simulation.sources import load
-    from ..simulation.train_scenario import TrainScenario, need_open_loop
+    from ..simulation.train_scenario import need_open_loop
 
-    _try_files(output, plot)
+    _try_files(output, plot, report)
     loaded = load(scenario, overrides or ())
     if explain is not None and not 0.0 <= explain <= loaded.simulation.duration:
         raise InputError(
@@ -91,14 +96,19 @@ def run(
         with busy("Drawing"):
             from ..atomic_writer import write_whole
             from ..reports.plots import overview
-            from ..reports.train_figures import train_overview
 
-            figure = train_overview if isinstance(loaded, TrainScenario) else overview
-            write_whole(plot, figure(result.dataset()).savefig)
+            write_whole(plot, overview(result.dataset()).savefig)
         print(f"Figure written to {plot}")
+    if report is not None:
+        with busy("Writing"):
+            from ..reports.page import write_page
+            from ..reports.run import run_report
+
+            write_page(report, run_report(Path(scenario).stem, result.dataset()))
+        print(f"The page is at {report}")
 
 
-def _try_files(output: Path | None, plot: Path | None) -> None:
+def _try_files(output: Path | None, plot: Path | None, report: Path | None) -> None:
     """See, before the work, that the files can be written."""
     from ..errors import InputError
     from ..simulation.result_files import check_output
@@ -111,6 +121,8 @@ def _try_files(output: Path | None, plot: Path | None) -> None:
                 f"{plot}: the ending {plot.suffix or '(none)'} is not known; it must be one of {', '.join(PICTURES)}"
             )
         try_file(plot)
+    if report is not None:
+        try_page(report)
 
 
 def _check_solver(solver: str, tolerance: float | None) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import Overrides, SourceArgument, number
+from .arguments import FiguresOption, Overrides, SourceArgument, number
 from .targets import try_directory, writing
 from .terminal import busy, console, fail, progress
 
@@ -44,22 +44,23 @@ def servo(
         ),
     ] = None,
     overrides: Overrides = None,
+    figures: FiguresOption = None,
 ) -> None:
     """Commission a servo axis: margins, bandwidths, steps, following, settling, stiffness, limit cycle.
 
-    Writes servo.html (one page), its figures as PNG and SVG, and their data and the margins as CSV. Exit code 1 if the
-    complete loop is unstable in one of its regimes; the page is written all the same.
+    Writes servo.html (one page), the data of its charts and the margins as CSV. Exit code 1 if the complete loop is unstable
+    in one of its regimes; the page is written all the same.
 
     \b
     lostmotion servo position-axis
     lostmotion servo axis.toml --tune margins --window "1 arcmin" -o sheet
     """
-    from ..errors import need
+    from ..reports.pictures import endings
     from ..simulation.sources import load
 
+    pictures = endings(figures)
     loaded = load(scenario, overrides or ())
     try_directory(output)
-    need("jinja2", "The page of the axis", "report")
     from ..servo.commission import commission, work
 
     total = work(loaded, motor)
@@ -72,10 +73,10 @@ def servo(
         print(tuned)
     with progress(total, "Commissioning") as step:
         report = commission(loaded, motor=motor, window=window, progress=step)
-    with writing(output), busy("Drawing"):
+    with writing(output), busy("Writing"):
         from ..reports.servo import write_servo
 
-        page = write_servo(output, Path(scenario).stem, report)
+        page = write_servo(output, Path(scenario).stem, report, pictures)
     _print_summary(loaded.title or Path(scenario).stem, report)
     print(f"The sheet is at {page}")
     if not report.stable:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import count
+from .arguments import FiguresOption, count
 from .targets import try_directory, writing
 from .terminal import busy, fail, progress
 from .workers import workers
@@ -49,6 +49,7 @@ def study(
         ),
     ] = None,
     repair: Annotated[bool, typer.Option("--repair", help="Make damaged parts of the directory again.")] = False,
+    figures: FiguresOption = None,
 ) -> None:
     """Many runs: vary parameters, store selected results, resume after an interruption.
 
@@ -65,7 +66,7 @@ def study(
     if what in ("show", "resume") and shown is None:
         raise InputError(f"study {what}: name the directory of a study, as in `lostmotion study {what} DIR`")
     if what == "show" and shown is not None:
-        _show(shown, best)
+        _show(shown, best, figures)
         return
     if what == "resume" and shown is not None:
         from ..studies.engine import restore_note, study_of
@@ -112,12 +113,14 @@ def compute(
             fail(f"interrupted; what is in {directory} stays, and the same command resumes it", 130)
 
 
-def _show(directory: Path, best: str | None) -> None:
+def _show(directory: Path, best: str | None, figures: str | None) -> None:
+    from ..reports.pictures import endings
     from ..reports.study import best_lines, show
 
+    pictures = endings(figures)
     found = best_lines(directory, best) if best is not None else []
-    with busy("Drawing"):
-        lines = show(directory)
+    with busy("Writing"):
+        lines = show(directory, pictures)
     print("\n".join([*lines, *found]))
 
 

@@ -31,6 +31,18 @@ def try_file(path: Path) -> None:
         raise unwritable(path, error) from None
 
 
+def try_page(path: Path) -> None:
+    """As `try_file`, of the page of a report.
+
+    Raises
+    ------
+    InputError
+    """
+    if path.suffix not in (".html", ".htm"):
+        raise InputError(f"{path}: a report is a page; its name must end in .html")
+    try_file(path)
+
+
 def try_directory(path: Path) -> None:
     """See, before the work, that files can be written into a directory, made if missing; nothing is left behind.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import Overrides, SourceArgument, number
+from .arguments import FiguresOption, Overrides, SourceArgument, number
 from .targets import try_directory, writing
 from .terminal import busy, console, progress
 
@@ -39,22 +39,24 @@ def track(
         ),
     ] = None,
     overrides: Overrides = None,
+    figures: FiguresOption = None,
 ) -> None:
     """Pointing sheet: how far axes miss the direction that they follow, and what each cause contributes.
 
-    Writes track.html (one page) and its figures and tables: errors over time, over the speed of the target, and with wrong losses, at other temperatures, with
-    wear; what each cause contributes.
+    Writes track.html (one page) and its data as CSV: errors over time, over the speed of the target, and with wrong losses, at other temperatures, with wear;
+    what each cause contributes.
 
     \b
     lostmotion track tracking-loss-map
     lostmotion track axes.toml --view "traverse=6.65 deg" --view "elevation=5.27 deg" -o sheet
     """
-    from ..errors import InputError, need
+    from ..errors import InputError
+    from ..reports.pictures import endings
     from ..simulation.sources import load
 
+    pictures = endings(figures)
     loaded = load(scenario, overrides or ())
     try_directory(output)
-    need("jinja2", "The pointing sheet", "report")
     from ..pointing.budget import pointing_budget, runs_of
 
     angles = {}
@@ -65,10 +67,10 @@ def track(
         angles[motor.strip()] = angle.strip()
     with progress(runs_of(loaded), "Runs") as step:
         budget = pointing_budget(loaded, after=after, view=angles, progress=step)
-    with writing(output), busy("Drawing"):
+    with writing(output), busy("Writing"):
         from ..reports.pointing import write_pointing
 
-        page = write_pointing(output, Path(scenario).stem, budget)
+        page = write_pointing(output, Path(scenario).stem, budget, pictures)
     _print_summary(loaded.title or Path(scenario).stem, budget)
     print(f"The sheet is at {page}")
 

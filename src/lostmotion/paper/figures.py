@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model.losses import LossMap
-from ..reports.pages import panels_csv, table_csv
-from ..reports.panels import COMMAND_STYLE, STYLES, Curve, Panel, scientific
+from ..reports.pages import panels_csv, plain, table_csv
+from ..reports.panels import COMMAND_STYLE, STYLES, Chart, Curve, Drawing, Ground, Panel, scientific, step
 from ..response.bandwidth import THREE_DECIBELS
 from ..response.linear import rigid_constants
 from .drive import AMPLITUDES, MODELS, paper_scenario
 from .facts import Facts
 from .runs import FREQUENCIES, Results, stuck_intervals
+from .schematics import sketches
 
 if TYPE_CHECKING:
     import xarray
@@ -72,15 +73,11 @@ SCHEMATICS = FigureSpec(
 LOSS_MAP = FigureSpec(
     "05",
     "Loss coefficient over speed and load",
-    "Left, as a surface; right, as curves. The loss does not vanish at zero load, so no constant efficiency describes it.",
+    "Left, over speed and load; right, as curves. The loss does not vanish at zero load, so no constant efficiency describes it.",
 )
 
 
-LOOP_STYLES: tuple[dict[str, Any], ...] = (
-    {"color": "#0b3c5d", "linewidth": 1.5},
-    {"color": "#3a7ca5", "linewidth": 1.3, "linestyle": "--"},
-    {"color": "#7fae3f", "linewidth": 1.3, "linestyle": "-."},
-)
+LOOP_STYLES: tuple[dict[str, Any], ...] = (*(STYLES[name] for name in ("2-DOF-NL", "2-DOF-L", "1-DOF-L")),)
 
 CLOSED_FORM: dict[str, Any] = {**STYLES["1-DOF-L"], "linestyle": (0, (1, 1)), "linewidth": 2.2}
 LEVEL: dict[str, Any] = {"color": "0.45", "linestyle": "-", "linewidth": 0.8}
@@ -356,18 +353,49 @@ def draw(spec: FigureSpec) -> Figure:
 
     shaded = any(panel.shaded for panel in spec.panels)
     note = " ".join([SHADED] * shaded + [STAND_IN] * spec.stand_in)
-    if spec is SCHEMATICS:
+    if spec.number == SCHEMATICS.number:
         return schematics.draw()
-    if spec is LOSS_MAP:
+    if spec.number == LOSS_MAP.number:
         return plots.loss_map(*_stand_in_table(), note=note)
     return plots.draw(spec.panels, spec.columns, spec.size, note=note)
 
 
+def charts_of(spec: FigureSpec) -> tuple[Chart, ...]:
+    """What a page shows of a spec, with plain labels."""
+    if spec.number == SCHEMATICS.number:
+        return tuple(Drawing(sketch.title, sketch.svg(), sketch.width > 12.0) for sketch in sketches())
+    if spec.number == LOSS_MAP.number:
+        speeds, loads, values = _stand_in_table()
+        curves = tuple(
+            Curve(f"µ = {load:g}", speeds, row, step(k, len(loads)) | {"marker": "o", "markersize": 4})
+            for k, (load, row) in enumerate(zip(loads, values, strict=True))
+        )
+        labels = ("relative speed v [-]", "relative load µ [-]", "loss coefficient m_2B [-]")
+        ground = Ground(speeds, loads, values, "m_2B")
+        return Panel("Over speed and load", *labels[:2], (), ground=ground), Panel(
+            "As curves", labels[0], labels[2], curves
+        )
+    return tuple(map(_plainly, spec.panels))
+
+
+def _plainly(panel: Panel) -> Panel:
+    """Without TeX, and with both ends of the range of y."""
+    curves = tuple(
+        replace(c, label=plain(c.label), legend=None if c.legend is None else plain(c.legend)) for c in panel.curves
+    )
+    low, high = panel.y_range or (None, None)
+    if low is not None and high is None:
+        high = 1.06 * max(float(np.nanmax(c.y)) for c in curves)
+    limits = None if low is None or high is None else (low, high)
+    titles = {"title": plain(panel.title), "x_label": plain(panel.x_label), "y_label": plain(panel.y_label)}
+    return replace(panel, curves=curves, y_range=limits, **titles)  # type: ignore[arg-type]
+
+
 def figure_csv(spec: FigureSpec) -> str | None:
     """The data of a figure: long form, one row a point; none of the schematics."""
-    if spec is SCHEMATICS:
+    if spec.number == SCHEMATICS.number:
         return None
-    if spec is not LOSS_MAP:
+    if spec.number != LOSS_MAP.number:
         return panels_csv(spec.panels)
     speeds, loads, values = _stand_in_table()
     rows = [

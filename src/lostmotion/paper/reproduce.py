@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from ..reports.pages import save_figure, table_csv, write_text
+from ..reports.pages import table_csv, write_text
+from ..reports.pictures import save, side_by_side
 from . import runs
 from .drive import Constant, constants
 from .facts import facts
-from .figures import FIGURES, draw, figure_csv, figure_specs
+from .figures import FIGURES, FigureSpec, draw, figure_csv, figure_specs
 from .report import render
 
 WORK = runs.WORK + FIGURES  # units of work for the progress bar
 
 
-def reproduce(directory: Path, progress: Callable[[], None] = lambda: None) -> Path:
-    """Write figures (PNG, SVG), their data (CSV), the constants (CSV) and ``report.html`` into a directory.
+def reproduce(directory: Path, progress: Callable[[], None] = lambda: None, pictures: Sequence[str] = ()) -> Path:
+    """Write ``report.html``, the data of its figures (CSV) and the constants (CSV) into a directory.
 
     Parameters
     ----------
     progress
         Called `WORK` times.
+    pictures
+        Endings of the files in which matplotlib draws each figure of the paper: png, svg, pdf.
 
     Returns
     -------
@@ -32,19 +35,21 @@ def reproduce(directory: Path, progress: Callable[[], None] = lambda: None) -> P
     results = runs.compute(progress)
     table = constants()
     write_text(directory / "constants.csv", constants_csv(table))
-    images = {}
     found = facts(results)
     specs = figure_specs(results, found)
     for spec in specs:
-        figure = draw(spec)
-        name = f"figure-{spec.number}"
-        images[spec.number] = save_figure(figure, directory, name)
         if (data := figure_csv(spec)) is not None:
-            write_text(directory / f"{name}.csv", data)
+            write_text(directory / f"figure-{spec.number}.csv", data)
         progress()
+    if pictures:
+        side_by_side(_draw, [(directory, spec, tuple(pictures)) for spec in specs])
     report = directory / "report.html"
-    write_text(report, render(specs, images, table, found, live=(directory / "live.html").is_file()))
+    write_text(report, render(specs, table, found, live=(directory / "live.html").is_file()))
     return report
+
+
+def _draw(directory: Path, spec: FigureSpec, kinds: tuple[str, ...]) -> None:
+    save(draw(spec), directory, f"figure-{spec.number}", kinds)
 
 
 def constants_csv(table: list[Constant]) -> str:

@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.validation import shown
 from ..response.harmonic import of_output
-from ..simulation.results import energy_of, is_train_result, scenario_of
+from ..simulation.results import energy_of, scenario_of
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from .run import summary
@@ -49,7 +49,7 @@ class ResultAccessor:
         InputError
             The dataset is of another kind.
         """
-        from . import plots, response_figures, train_figures
+        from . import plots, response_figures
         from .hunting_figures import map_figure
 
         if "response" in self._dataset:
@@ -57,13 +57,6 @@ class ResultAccessor:
             return response_figures.bode_figure({"": self._dataset}, name)
         if "reason" in self._dataset and "amplitude" in self._dataset:
             return map_figure(self._dataset)
-        if is_train_result(self._dataset):
-            return train_figures.train_overview(self._dataset)
-        lacking = [name for name in plots.OVERVIEW if name not in self._dataset]
-        if len(lacking) == len(plots.OVERVIEW):
-            raise InputError("this dataset is neither a run nor a frequency response; there is no figure of it")
-        if lacking:
-            raise InputError(f"this dataset lacks {', '.join(lacking)}, which the figure of a run shows")
         return plots.overview(self._dataset)
 
     @checked
@@ -79,6 +72,15 @@ class ResultAccessor:
 
         name = str(of_output(self._dataset, output)["output"].item())
         return response_figures.maps_figure(self._dataset, name)
+
+    def _repr_html_(self) -> str:
+        """A run in a notebook: the page that `lostmotion run --report` writes."""
+        from .run import run_report
+
+        try:
+            return run_report("run", self._dataset)._repr_html_()
+        except InputError:  # not a run
+            return f"<code>{self!r}</code>"
 
     def summary(self) -> str:
         """A run in a few lines, as `lostmotion run` prints it."""

@@ -1,11 +1,12 @@
-"""The page of an identification: overlays, residuals, correlations, profiles, friction; tables as CSV."""
+"""The report of an identification: overlays, residuals, correlations, profiles, friction; tables as CSV."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,45 +16,112 @@ from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..simulation.train_scenario import TrainScenario
 from ..units.conversion import si_factor
-from . import plots
-from .pages import embed, panels_csv, render_page, save_figure, table_csv, write_text
-from .panels import Curve, Panel
+from .page import Prose, Report, Table, Verdict
+from .pages import table_csv, write_report, write_text
+from .panels import FAINT, PALETTE, Curve, Group, Matrix, Panel, look
 
-if TYPE_CHECKING:
-    from markupsafe import Markup
-
-MEASURED: dict[str, Any] = {"color": "0.45", "linestyle": "-", "linewidth": 1.0}
-COMPUTED: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.2}
-DOTS: dict[str, Any] = {"color": "#0b3c5d", "linestyle": "", "marker": ".", "markersize": 1.5, "alpha": 0.35}
-LINE: dict[str, Any] = {"color": "#0b3c5d", "linestyle": "-", "linewidth": 1.4}
-COLUMNS = 4
+MEASURED: dict[str, Any] = {"color": "0.45", "linestyle": "-", "linewidth": 1.3}
+CLOUD: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 1.6, "alpha": 0.4}
+FIRST = 4  # overlays before the tables
 PER_FIGURE = 24  # overlays
 LOOPS = 3  # logs whose loops are drawn
 PAIRS = 8  # of the strongest correlations, in words
-MANY = 20_000  # points of a cloud of residuals
+MANY = 5_000  # points of a cloud of residuals
+POINTS = (100, 4_000, 60_000)  # of a curve of an overlay, least and most, and of all together
+HEADER = ("log", "channel", "part", "MAE", "RMSE", "fit [%]", "unit of MAE and RMSE")
 
 
-def write_identification(directory: Path, name: str, result: IdentificationResult) -> Path:
-    """Figures (PNG, SVG), tables (CSV), the rig as a scenario, and ``identified.html`` in a directory, made if missing.
+# --- the page ---
+
+
+def write_identification(
+    directory: Path, name: str, result: IdentificationResult, pictures: Sequence[str] = ()
+) -> Path:
+    """``identified.html``, tables (CSV) and the rig as a scenario in a directory, made if missing; on request pictures.
 
     Returns
     -------
     Path
         Of the page.
     """
-    directory.mkdir(parents=True, exist_ok=True)
-    figures = []
-    for drawn, title, caption, panels, columns in _figures(result):
-        rows = -(-len(panels) // columns)
-        png = save_figure(plots.draw(panels, columns, (10.0, 0.6 + 2.4 * rows)), directory, drawn)
-        write_text(directory / f"{drawn}.csv", panels_csv(panels))
-        figures.append(embed(png, title, caption, drawn))
+    tables = {
+        "errors.csv": table_csv(HEADER, error_rows(result)),
+        "parameters.csv": table_csv(["parameter", "value", "low", "high", "unit", "method"], parameter_rows(result)),
+    }
     if result.fit.free:
-        figures.append(_correlation_figure(directory, result))
+        names, C = correlations(result)
+        rows = [[name, *(f"{value:.6g}" for value in row)] for name, row in zip(names, C, strict=True)]
+        tables["correlation.csv"] = table_csv(["parameter", *names], rows)
+    page = write_report(directory, "identified.html", identification_report(name, result), tables, pictures)
     write_text(directory / "identified.toml", result.scenario_text())
     if result.task.record:
         write_text(directory / "gearbox.toml", result.record_text())
-    errors = [
+    return page
+
+
+def identification_report(name: str, result: IdentificationResult) -> Report:
+    """The page of an identification."""
+    main, *groups = _groups(result)
+    unit = f" [{result.error_unit}]" if result.error_unit else ""
+    rungs = [[r.name, f"{r.train:.5g}", _held_out(r)] for r in result.rungs]
+    left_out = [list(pair) for pair in result.left_out.items()]
+    notes = [[log, line] for log, lines in result.notes.items() for line in lines]
+    lists = {
+        "Unidentifiable parameters": [*(u.text for u in result.undetermined), *result.at_bounds, *result.differences()],
+        "Inputs between samples, and start values": [*result.inputs, *result.starts()],
+        "Models without a result": [*result.failures(), *result.passed_over()],
+    }
+    return Report(
+        title=result.task.title or name,
+        lead=f"{result.source()}.",
+        verdict=_verdict(result),
+        main=main,
+        parts=(
+            Table(
+                "Model sequence",
+                ("model", f"mean absolute error, fitted{unit}", f"held out{unit}"),
+                rungs,
+                chosen=frozenset({result.chosen}),
+            ),
+            Table(
+                "Values", ("parameter", "value", "from", "to", "unit", "interval"), parameter_rows(result), INTERVALS
+            ),
+            *(Prose(title, texts, listed=True) for title, texts in lists.items() if texts),
+            *[group for group in groups if not group.name.startswith("overlays")],
+            Table(
+                "Errors of each log",
+                HEADER,
+                error_rows(result),
+                "Fit is 1 - RMSE/standard deviation of the measured values.",
+            ),
+            *([Table("Logs that are left out", ("log", "reason"), left_out)] if left_out else []),
+            *([Table("Notes on the logs", ("log", "note"), notes)] if notes else []),
+            *[group for group in groups if group.name.startswith("overlays")],
+        ),
+    )
+
+
+INTERVALS = (
+    "Values and 95 % intervals. Those of the bootstrap come from drawing blocks of half a second of the residuals anew."
+)
+
+
+def _verdict(result: IdentificationResult) -> Verdict:
+    """Warnings, the model that is taken, and what the logs leave open."""
+    warnings, rung = result.warnings(), result.rungs[result.chosen]
+    unit = f" {result.error_unit}".rstrip()
+    held_out = "" if math.isnan(rung.held_out) else f", held out {rung.held_out:.5g}{unit}"
+    found = [f"Model {rung.name}: mean absolute error {rung.train:.5g}{unit}{held_out}."]
+    open_ends = [*(u.text for u in result.undetermined), *result.at_bounds]
+    known = "All parameters are determined by the logs." if not open_ends else f"{open_ends[0].rstrip('.')}."
+    more = f" {len(open_ends) - 1} more below." if len(open_ends) > 1 else ""
+    lines = [f"{' '.join(warnings)}", *found, f"{known}{more}"] if warnings else [*found, f"{known}{more}"]
+    return Verdict("bad" if warnings else "open" if open_ends else "good", tuple(lines))
+
+
+def error_rows(result: IdentificationResult) -> list[list[str]]:
+    """Errors of each log and channel, as text."""
+    return [
         [
             e.log,
             e.channel,
@@ -63,32 +131,6 @@ def write_identification(directory: Path, name: str, result: IdentificationResul
         ]
         for e in result.errors
     ]
-    header = ["log", "channel", "part", "MAE", "RMSE", "fit [%]", "unit of MAE and RMSE"]
-    write_text(directory / "errors.csv", table_csv(header, errors))
-    parameters = parameter_rows(result)
-    write_text(
-        directory / "parameters.csv", table_csv(["parameter", "value", "low", "high", "unit", "method"], parameters)
-    )
-    page = directory / "identified.html"
-    context = {
-        "title": result.task.title or name,
-        "rungs": [[r.name, f"{r.train:.5g}", _held_out(r), k == result.chosen] for k, r in enumerate(result.rungs)],
-        "error_unit": result.error_unit,
-        "warnings": result.warnings(),
-        "failures": [*result.failures(), *result.passed_over()],
-        "parameters": parameters,
-        "undetermined": [u.text for u in result.undetermined],
-        "bounds": [*result.at_bounds, *result.differences()],
-        "starts": [*result.inputs, *result.starts()],
-        "header": header,
-        "errors": errors,
-        "left_out": result.left_out,
-        "notes": result.notes,
-        "figures": figures,
-        "source": result.source(),
-    }
-    write_text(page, render_page("reports/identification.html.jinja", **context))
-    return page
 
 
 def _held_out(rung: RungResult) -> str:
@@ -111,52 +153,36 @@ def parameter_rows(result: IdentificationResult) -> list[list[str]]:
     return rows
 
 
-def _figures(result: IdentificationResult) -> list[tuple[str, str, str, list[Panel], int]]:
-    """(name, title, caption, panels, columns) of all pictures."""
+# --- charts ---
+
+
+def _groups(result: IdentificationResult) -> list[Group]:
+    """All charts, those of some logs first."""
     variables = _variables(result)
     table = residual_table(result, tuple(variables))
-    found = []
-    overlays = [panel for log in result.logs for panel in _overlays(result, log.name, log.held_out, table[log.name])]
-    for k in range(0, len(overlays), PER_FIGURE):
-        number = "" if len(overlays) <= PER_FIGURE else f"-{k // PER_FIGURE + 1}"
-        found.append(
-            (
-                f"overlays{number}",
-                "Logs",
-                "What was measured, and the run of the identified rig.",
-                overlays[k : k + PER_FIGURE],
-                COLUMNS,
-            )
-        )
-    panels = _clouds(result, table, variables)
-    if panels:
-        found.append(
-            (
-                "residuals",
-                "Residuals",
-                "Measured less computed, all logs: what has a shape here, the model lacks.",
-                panels,
-                min(3, len(panels)),
-            )
-        )
+    logs = sorted(result.logs, key=lambda log: not log.held_out)  # those that were not fitted say most
+    overlays = [panel for log in logs for panel in _overlays(result, log.name, log.held_out, table[log.name])]
+    caption = "What was measured, and the run of the identified rig."
+    found = [Group("overlays", "Logs", caption, tuple(overlays[:FIRST]))]
+    if panels := _clouds(result, table, variables):
+        text = "Measured less computed, all logs: a shape here is missing in the model."
+        found.append(Group("residuals", "Residuals", text, tuple(panels)))
+    if result.fit.free:
+        found.append(_correlation_group(result))
     if result.profiles:
-        panels = [_profile(result, name) for name in result.profiles]
-        found.append(
-            (
-                "profiles",
-                "Profiles",
-                "Rise of the loss with one parameter given and all others fitted again; 1.92 is the 95 % interval.",
-                panels,
-                COLUMNS,
-            )
-        )
+        text = "Rise of the loss with one parameter given and all others fitted again; 1.92 is the 95 % interval."
+        found.append(Group("profiles", "Profiles", text, tuple(_profile(result, name) for name in result.profiles)))
     if laws := _laws(result, table):
-        caption = (
-            "Of the identified rig. What it adds to a shaft's viscous friction, such as the back-e.m.f. of a motor, is in there, but for a phase "
-            "that is without it: the curve of a phase with the motor off is the friction alone."
-        )
-        found.append(("laws", "Friction, losses and torsion", caption, laws, min(2, len(laws))))
+        found.append(Group("laws", "Friction, losses and torsion", LAWS, tuple(laws)))
+    for n, k in enumerate(range(FIRST, len(overlays), PER_FIGURE)):
+        found.append(Group(f"overlays-{n + 2}", "" if n else "Further logs", "", tuple(overlays[k : k + PER_FIGURE])))
     return found
+
+
+LAWS = (
+    "Of the identified rig. What it adds to a shaft's viscous friction, such as the back-e.m.f. of a motor, is included, but for a phase without it: the curve of a "
+    "phase with the motor off is the friction alone."
+)
 
 
 def _variables(result: IdentificationResult) -> dict[str, str]:
@@ -175,21 +201,22 @@ def _variables(result: IdentificationResult) -> dict[str, str]:
 
 
 def _overlays(result: IdentificationResult, log: str, held_out: bool, run: dict[str, np.ndarray]) -> list[Panel]:
-    panels = []
-    for channel in result.task.measured:
-        curves = (
-            Curve("measured", run["time"], run[f"measured {channel}"], MEASURED),
-            Curve("computed", run["time"], run[channel], COMPUTED),
+    least, most, together = POINTS
+    count = max(least, min(most, together // (2 * len(result.logs) * len(result.task.measured))))
+
+    return [
+        Panel(
+            f"{_short(log)}{' (held out)' if held_out else ''}",
+            "time [s]",
+            _labelled(result, channel),
+            (
+                Curve("measured", run["time"], run[f"measured {channel}"], MEASURED),
+                Curve("computed", run["time"], run[channel], look(1)),
+            ),
+            max_points=count,
         )
-        panels.append(
-            Panel(
-                f"{_short(log)}{' (held out)' if held_out else ''}",
-                "time [s]",
-                _labelled(result, channel),
-                curves,
-            )
-        )
-    return panels
+        for channel in result.task.measured
+    ]
 
 
 def _labelled(result: IdentificationResult, channel: str) -> str:
@@ -212,7 +239,7 @@ def _clouds(
                 f"over {name}",
                 label,
                 f"residual of {_labelled(result, channel)}",
-                (Curve("residual", x[::step], residual[::step], DOTS),),
+                (Curve("residual", x[::step], residual[::step], CLOUD),),
             )
         )
     return panels
@@ -230,23 +257,16 @@ def correlations(result: IdentificationResult) -> tuple[list[str], np.ndarray]:
     return names, C
 
 
-def _correlation_figure(directory: Path, result: IdentificationResult) -> Markup:
-    """The whole matrix as a heat map and as a table, and its strongest pairs in words."""
+def _correlation_group(result: IdentificationResult) -> Group:
+    """The whole matrix, and its strongest pairs in words."""
     names, C = correlations(result)
-    png = save_figure(plots.correlation_map(names, C), directory, "correlation")
-    rows = [[name, *(f"{value:.6g}" for value in row)] for name, row in zip(names, C, strict=True)]
-    write_text(directory / "correlation.csv", table_csv(["parameter", *names], rows))
     pairs = sorted(((i, j) for i in range(len(names)) for j in range(i)), key=lambda ij: -abs(C[ij]))[:PAIRS]
     words = "; ".join(f"{names[i]} and {names[j]} {C[i, j]:+.2f}" for i, j in pairs)
     caption = (
         "Of the errors of the parameters, from the logs alone: near +1 or -1 two of them can hardly be told apart."
     )
-    return embed(png, "Correlations", f"{caption} Strongest: {words}." if words else caption, "correlation")
-
-
-def _shade(k: int) -> str:
-    """A colour that is readable in grey."""
-    return ("#0b3c5d", "#d9730d", "#7fae3f", "#8a4f9e", "#b8b8b8", "#444444", "#c2a33a", "#5b9bd5")[k % 8]
+    text = f"{caption} Strongest: {words}." if words else caption
+    return Group("correlation", "Correlations", text, (Matrix("correlation [-]", tuple(names), C),), 1)
 
 
 def _profile(result: IdentificationResult, name: str) -> Panel:
@@ -258,8 +278,8 @@ def _profile(result: IdentificationResult, name: str) -> Panel:
         f"{name} [{unit}]",
         "rise of the loss",
         (
-            Curve("rise", values, rise, {**LINE, "marker": "o"}),
-            Curve("95 %", values, np.full(len(values), 1.92), MEASURED),
+            Curve("rise", values, rise, look(0) | {"marker": "o"}),
+            Curve("95 %", values, np.full(len(values), 1.92), FAINT),
         ),
     )
 
@@ -289,7 +309,7 @@ def friction_curves(result: IdentificationResult, shaft: str) -> tuple[Curve, ..
         curve = friction_curve(scenario, shaft, label)
         if curve is not None and not any(np.array_equal(curve.y, other.y) for other in found.values()):
             found[label] = curve
-    return tuple(replace(c, style={**LINE, "color": _shade(k)}) for k, c in enumerate(found.values()))
+    return tuple(replace(c, style=look(k)) for k, c in enumerate(found.values()))
 
 
 def _phases(result: IdentificationResult) -> list[tuple[str, TrainScenario]]:
@@ -310,17 +330,14 @@ def friction_curve(scenario: TrainScenario, name: str, label: str) -> Curve | No
     bearings = sum(m.friction_torque for m in scenario.motors.values() if m.shaft == name)
     if max(float(np.max(dry)), at_rest, bearings, shaft.viscous_friction) <= 0.0:
         return None
-    return Curve(label, w, dry + bearings + shaft.viscous_friction * w, LINE)
+    return Curve(label, w, dry + bearings + shaft.viscous_friction * w, look(0))
 
 
 def loop_curves(gear: str, table: dict[str, dict[str, np.ndarray]]) -> tuple[Curve, ...]:
     """Torque of a gear over its twist in the first logs, by the names of the logs."""
     twist, torque = f"{gear}_twist", f"{gear}_output_torque"
     runs = [(log, run) for log, run in table.items() if twist in run and torque in run][:LOOPS]
-    return tuple(
-        Curve(_short(log), 1e3 * run[twist], run[torque], {"color": _shade(k), "linewidth": 1.0})
-        for k, (log, run) in enumerate(runs)
-    )
+    return tuple(Curve(_short(log), 1e3 * run[twist], run[torque], look(k)) for k, (log, run) in enumerate(runs))
 
 
 def _short(log: str) -> str:
@@ -345,7 +362,7 @@ def loss_curves(gear: Gear) -> tuple[Curve, ...]:
             f"{speeds[k] * gear.rated_input_speed:.3g} rad/s",
             torque,
             table[:, k],
-            {"color": _shade(n), "linewidth": 1.4},
+            look(n),
         )
         for n, k in enumerate((0, len(speeds) - 1))
     )

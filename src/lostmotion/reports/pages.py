@@ -1,34 +1,23 @@
-"""What commands write: figures as PNG and SVG, their data as CSV, and self-contained HTML pages."""
+"""What commands write: self-contained HTML pages, the data of their charts and tables as CSV, pictures on request."""
 
 from __future__ import annotations
 
-import base64
 import csv
 import io
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..atomic_writer import write_bytes
 from ..errors import need
+from .page import Report, write_page
+from .panels import Chart, Group, Panel
 
 if TYPE_CHECKING:
-    from markupsafe import Markup
-    from matplotlib.figure import Figure
-
-    from .panels import Panel
-
-
-def save_figure(figure: Figure, directory: Path, name: str) -> bytes:
-    """Write a figure as PNG and SVG; returns the PNG."""
-    png = io.BytesIO()
-    figure.savefig(png, format="png", metadata={"Software": None})
-    svg = io.BytesIO()
-    figure.savefig(svg, format="svg", metadata={"Date": None})
-    write_bytes(directory / f"{name}.png", png.getvalue())
-    write_bytes(directory / f"{name}.svg", svg.getvalue())
-    return png.getvalue()
+    pass
 
 
 def write_text(path: Path, text: str) -> None:
@@ -45,33 +34,65 @@ def table_csv(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
     return out.getvalue()
 
 
-def panels_csv(panels: Iterable[Panel]) -> str:
-    """The data of a figure: long form, one row a point."""
-    rows = []
+def panels_csv(panels: Iterable[Chart]) -> str:
+    """The data of lines and points: long form, one row a point."""
+    rows = ["panel,curve,x,y,x_label,y_label"]
     for panel in panels:
-        labels = (_plain(panel.x_label), _plain(panel.y_label))
+        if not isinstance(panel, Panel):
+            continue
+        behind = _row(panel.x_label, panel.y_label)
         for curve in panel.curves:
-            for x, y in zip(curve.x.tolist(), curve.y.tolist(), strict=True):
-                rows.append([_plain(panel.title), _plain(curve.label), x, y, *labels])
-    return table_csv(["panel", "curve", "x", "y", "x_label", "y_label"], rows)
+            before = _row(panel.title, curve.label)
+            points = zip(np.asarray(curve.x).tolist(), np.asarray(curve.y).tolist(), strict=True)
+            rows += [f"{before},{x!r},{y!r},{behind}" for x, y in points]
+    return "\n".join([*rows, ""])
 
 
-def _plain(label: str) -> str:
+def _row(*labels: str) -> str:
+    """Labels without their markup, as cells."""
+    return table_csv(map(plain, labels), ()).rstrip("\n")
+
+
+def write_report(
+    directory: Path, file: str, report: Report, tables: Mapping[str, str], pictures: Sequence[str] = ()
+) -> Path:
+    """Write a page, the data of its charts and its tables into a directory, made if missing.
+
+    Parameters
+    ----------
+    tables
+        Text of further CSV files by their names.
+    pictures
+        Endings of the files in which matplotlib draws each group of charts: png, svg, pdf.
+
+    Returns
+    -------
+    Path
+        Of the page.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    write_page(directory / file, report)
+    data = {f"{group.name}.csv": panels_csv(group.charts) for group in report.groups() if _has_panels(group)}
+    for name, text in (data | dict(tables)).items():
+        write_text(directory / name, text)
+    if pictures:
+        from .pictures import draw_all
+
+        draw_all(directory, report.groups(), pictures)
+    return directory / file
+
+
+def _has_panels(group: Group) -> bool:
+    return any(isinstance(chart, Panel) and chart.curves for chart in group.charts)
+
+
+def plain(label: str) -> str:
     """A label without its markup."""
     return label.replace("$", "").replace("{", "").replace("}", "")
 
 
-def embed(png: bytes, title: str, caption: Markup | str, anchor: str) -> Markup:
-    """A figure inside the page, with its caption."""
-    from markupsafe import Markup, escape
-
-    data = base64.b64encode(png).decode()
-    image = Markup('<img alt="{}" src="data:image/png;base64,{}">').format(title, data)
-    return Markup('<figure id="{}">{}<figcaption>{}</figcaption></figure>\n').format(anchor, image, escape(caption))
-
-
 def render_page(template: str, **context: Any) -> str:
-    """An HTML page from a template of the package; values are escaped, names that are missing raise."""
+    """HTML from a template of the package; values are escaped, names that are missing raise."""
     need("jinja2", "A page", "report")
     import jinja2
 

@@ -1,4 +1,4 @@
-"""What a figure shows, before it is drawn: curves and panels. Drawing them is up to `plots`."""
+"""What a figure shows, before it is drawn. Pages carry it as data (`packed`, `static`); `plots` draws pictures of it."""
 
 from __future__ import annotations
 
@@ -7,17 +7,35 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..simulation.variables import VARIABLES
-
-# Dark to light as nonlinear to simple, so that they differ in grey too.
-STYLES: dict[str, dict[str, Any]] = {
-    "2-DOF-NL": {"color": "#0b3c5d", "linestyle": "-", "linewidth": 1.7},
-    "2-DOF-L": {"color": "#d9730d", "linestyle": "--", "linewidth": 1.3},
-    "1-DOF-L": {"color": "#7fae3f", "linestyle": "-.", "linewidth": 1.3},
-}
 COMMAND_STYLE: dict[str, Any] = {"color": "0.45", "linestyle": ":", "linewidth": 1.3}
 
-LABELS = {v.name: v for v in VARIABLES}
+# The colours of reports by their names in style.css, where each has a dark one too.
+PALETTE = {"first": "#0a5c9e", "second": "#e0701a", "third": "#1a7f5a", "fourth": "#8a3d8f"}
+STEPS = ("#14324f", "#16557a", "#16778f", "#1d8f7c", "#4f9a4a", "#8a9a26", "#bd8f1a", "#e0701a")
+"""colours of an ordered series: step0, step1, ..."""
+# Line styles and widths differ, so that curves differ in grey too.
+LOOKS: tuple[dict[str, Any], ...] = tuple(
+    {"color": colour, "linestyle": line, "linewidth": width}
+    for colour, line, width in zip(PALETTE.values(), ("-", "--", "-.", ":"), (1.6, 1.9, 1.7, 1.9), strict=True)
+)
+# The models of the paper.
+STYLES: dict[str, dict[str, Any]] = {
+    "2-DOF-NL": {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.7},
+    "2-DOF-L": {"color": PALETTE["second"], "linestyle": "--", "linewidth": 1.3},
+    "1-DOF-L": {"color": PALETTE["third"], "linestyle": "-.", "linewidth": 1.3},
+}
+FAINT = COMMAND_STYLE
+DOTS: dict[str, Any] = {"color": PALETTE["second"], "linestyle": "none", "marker": "o", "markersize": 7}
+
+
+def look(k: int) -> dict[str, Any]:
+    """Style of the k-th curve of a panel."""
+    return LOOKS[k % len(LOOKS)]
+
+
+def step(k: int, count: int) -> dict[str, Any]:
+    """Style of the k-th curve of an ordered series."""
+    return {"color": STEPS[round((len(STEPS) - 1) * k / max(1, count - 1))], "linestyle": "-", "linewidth": 1.5}
 
 
 def scientific(value: float) -> str:
@@ -37,10 +55,33 @@ class Curve:
     y: Any
     style: Mapping[str, Any]
     legend: str | None = None  # in the figure, if not the label; "_": none
+    names: tuple[str, ...] = ()  # of the points, shown on demand
 
     @property
     def shown(self) -> str:
         return self.label if self.legend is None else self.legend
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A point of a panel that is named, with a line from it to another y."""
+
+    x: float
+    y: float
+    text: str
+    style: Mapping[str, Any]
+    to: float | None = None
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A quantity over the whole panel, the darker the higher."""
+
+    x: Any
+    y: Any
+    values: Any
+    """[y, x]; NaN where there is none"""
+    label: str
 
 
 @dataclass(frozen=True)
@@ -56,3 +97,82 @@ class Panel:
     log_x: bool = False
     log_y: bool = False
     shaded: tuple[tuple[float, float], ...] = ()  # intervals of x
+    marks: tuple[Mark, ...] = ()
+    level: float | None = None  # y of a line across the panel
+    ground: Ground | None = None
+    x_names: tuple[str, ...] = ()  # of the values 0, 1, 2, ... of x
+    max_points: int = 4_000  # of a curve on a page; longer ones as the extremes of their neighbours
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Horizontal bars by name, of one or two values each."""
+
+    title: str
+    label: str
+    """of the values"""
+    values: Mapping[str, tuple[float, ...]]
+    series: tuple[str, ...] = ()
+    """names of the values of a bar, where there are two"""
+    x_range: tuple[float, float] | None = None
+    limit: float | None = None
+    """beyond which a bar stands out"""
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """How often a quantity takes which values."""
+
+    title: str
+    label: str
+    values: Any
+    quantiles: tuple[float, ...] = (0.05, 0.5, 0.95)
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Numbers from -1 to 1 of pairs of names."""
+
+    title: str
+    names: tuple[str, ...]
+    values: Any
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Which contacts are stuck, and which way the others slip: -1, 0, +1 at instants of equal distance."""
+
+    title: str
+    time: Any
+    modes: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Flows:
+    """Where energy comes from and where it goes [J]: the ledger of a run."""
+
+    title: str
+    energies: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What is drawn as SVG, without data."""
+
+    title: str
+    svg: str
+    wide: bool = False
+
+
+Chart = Panel | Bars | Histogram | Matrix | Contacts | Flows | Drawing
+
+
+@dataclass(frozen=True)
+class Group:
+    """Charts that belong together; `--figures` draws them as one picture of this name."""
+
+    name: str
+    title: str
+    caption: str
+    charts: tuple[Chart, ...]
+    columns: int = 2

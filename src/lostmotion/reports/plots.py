@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..simulation.results import scenario_of
-from ..simulation.scenario import Scenario
-from .panels import COMMAND_STYLE, STYLES, Curve, Panel
+from . import other_plots as others
+from .panels import Chart, Curve, Ground, Group, Panel
+from .run_charts import run_charts
+from .thinning import thinned
 
 if TYPE_CHECKING:
     import xarray
@@ -33,6 +34,8 @@ LOOKS: Any = {
     "svg.fonttype": "path",
 }
 
+
+MAX_NAMES = 12  # of the points of a line
 
 # Decorates what makes or draws figures; the looks of the user's figures stay as they are.
 in_our_looks = mpl.rc_context(LOOKS)
@@ -55,64 +58,88 @@ class Picture(Figure):
         return png.getvalue()
 
 
-MAX_POINTS = 10_000  # of a curve that is drawn; more than twice the pixels across any figure
-
-
-def thinned(x: Any, y: Any, max_points: int = MAX_POINTS) -> tuple[Any, Any]:
-    """Points of a curve that look the same: of each run of neighbours the first and the extremes of both coordinates."""
-    n = len(y)
-    if n <= max_points:
-        return x, y
-    x, y = np.asarray(x), np.asarray(y)
-    width = -(-n * 5 // max_points)
-    whole = n // width * width
-    firsts = np.arange(0, whole, width)
-    kept: list[Any] = [firsts, np.arange(whole, n), [n - 1]]
-    for values in (y,) if np.all(x[1:] >= x[:-1]) else (x, y):
-        rows = values[:whole].reshape(-1, width)
-        gaps = bool(np.isnan(rows.min()))
-        for extreme, fill in ((np.argmin, np.inf), (np.argmax, -np.inf)):
-            kept.append(firsts + extreme(np.where(np.isnan(rows), fill, rows) if gaps else rows, axis=1))
-    index: Any = np.unique(np.concatenate(kept))
-    return x[index], y[index]
-
-
 @in_our_looks
-def draw(panels: Iterable[Panel], columns: int, size: tuple[float, float], note: str = "") -> Figure:
-    """Panels in rows of `columns`, `size` [inch] in all; `note` stands below."""
-    panels = list(panels)
+def draw(charts: Iterable[Chart], columns: int, size: tuple[float, float], note: str = "") -> Figure:
+    """Charts in rows of `columns`, `size` [inch] in all; `note` stands below."""
+    charts = list(charts)
     figure = Picture(figsize=size)
-    rows = -(-len(panels) // columns)
-    for k, panel in enumerate(panels):
+    rows = -(-len(charts) // columns)
+    for k, chart in enumerate(charts):
         axes = figure.add_subplot(rows, columns, k + 1)
-        for low, high in panel.shaded:
-            axes.axvspan(low, high, color="0.88", linewidth=0)
-        for curve in panel.curves:
-            axes.plot(*thinned(curve.x, curve.y), label=curve.shown, **curve.style)
-        if panel.log_x:
-            axes.set_xscale("log")
-        if panel.log_y and any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves):
-            axes.set_yscale("log")
-        axes.set(title=panel.title, xlabel=panel.x_label, ylabel=panel.y_label)
+        if isinstance(chart, Panel):
+            _panel(axes, chart)
+        else:
+            others.draw(axes, chart)
+        axes.set_title(chart.title)
         axes.title.set_fontsize(10)
-        if panel.x_range is not None:
-            axes.set_xlim(*panel.x_range)
-        if panel.y_range is not None:
-            axes.set_ylim(*panel.y_range)
-        elif panel.x_range is not None:
-            axes.set_ylim(*_range_within(panel.curves, panel.x_range))
-    labels = [[c.shown for c in panel.curves] for panel in panels]
+    labels = [[c.shown for c in chart.curves] if isinstance(chart, Panel) else [] for chart in charts]
     if len(labels[0]) > 1 and all(names == labels[0] for names in labels):
         columns = len(labels[0]) if len(labels[0]) <= 4 else 3
         handles = figure.axes[0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside upper center", ncols=columns, fontsize=8.5)
     else:
-        for axes, names in zip(figure.axes, labels, strict=True):
+        for axes, names in zip(figure.axes, labels, strict=False):
             if len(names) > 1:
                 axes.legend(fontsize=8, loc="best")
     if note:
         figure.supxlabel(note, fontsize=8, color="0.35")
     return figure
+
+
+def draw_group(group: Group) -> Figure:
+    """The picture of a group of charts."""
+    columns = min(group.columns, len(group.charts))
+    rows = -(-len(group.charts) // columns)
+    return draw(group.charts, columns, (max(6.0, min(4.2 * columns, 12.0)), 0.6 + 2.7 * rows))
+
+
+def _panel(axes: Any, panel: Panel) -> None:
+    for low, high in panel.shaded:
+        axes.axvspan(low, high, color="0.88", linewidth=0)
+    if (ground := panel.ground) is not None:
+        _contours(axes, ground)
+    if panel.level is not None:
+        axes.axhline(panel.level, color="0.45", linestyle="--", linewidth=0.9)
+    for curve in panel.curves:
+        axes.plot(*thinned(curve.x, curve.y), label=curve.shown, **curve.style)
+        if curve.names and curve.style.get("linestyle") != "none":
+            _names(axes, curve)
+    for mark in panel.marks:
+        axes.plot([mark.x, mark.x], [mark.y, mark.y if mark.to is None else mark.to], color=mark.style["color"])
+        axes.plot([mark.x], [mark.y], ".", color=mark.style["color"])
+        axes.annotate(mark.text, (mark.x, mark.y), (4, 4), textcoords="offset points", fontsize=7)
+    if panel.log_x:
+        axes.set_xscale("log")
+    if panel.log_y and (panel.ground or any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves)):
+        axes.set_yscale("log")
+    axes.set(xlabel=panel.x_label, ylabel=panel.y_label)
+    if panel.x_names:
+        axes.set_xticks(range(len(panel.x_names)), panel.x_names, rotation=45, ha="right", fontsize=7)
+    if panel.x_range is not None:
+        axes.set_xlim(*panel.x_range)
+    if panel.y_range is not None:
+        axes.set_ylim(*panel.y_range)
+    elif panel.x_range is not None and panel.curves:
+        axes.set_ylim(*_range_within(panel.curves, panel.x_range))
+
+
+def _names(axes: Any, curve: Curve) -> None:
+    """The first points of a line with their names, and room for that of the last."""
+    for name, *point in zip(curve.names[:MAX_NAMES], curve.x, curve.y, strict=False):
+        axes.annotate(name, point, textcoords="offset points", xytext=(4, 4), fontsize=6)
+    low, high = axes.get_xlim()
+    axes.set_xlim(low, high + 0.25 * (high - low))
+
+
+def _contours(axes: Any, ground: Ground) -> None:
+    shown = np.ma.masked_invalid(ground.values)
+    axes.grid(visible=False)
+    if shown.count() == 0 or float(np.ptp(shown.compressed())) == 0.0:
+        axes.text(0.5, 0.5, "nothing to show", transform=axes.transAxes, ha="center", color="0.35")
+        return
+    filled = axes.contourf(ground.x, ground.y, shown, levels=14, cmap="cividis")
+    axes.figure.colorbar(filled, ax=axes, label=ground.label)
+    axes.contour(ground.x, ground.y, shown, levels=14, colors="0.15", linewidths=0.4)
 
 
 def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tuple[float, float]:
@@ -123,71 +150,20 @@ def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tupl
     return low - margin, high + margin
 
 
-# The result variables that the overview shows.
-OVERVIEW = (
-    "command",
-    "motor_torque",
-    "motor_speed",
-    "load_speed",
-    "input_torque",
-    "output_torque",
-    "load_torque",
-    "twist",
-    "input_contact",
-    "twist_contact",
-)
-
-
 def overview(result: xarray.Dataset) -> Figure:
-    """A run at a glance: command and motor, speeds, torques, twist and contacts."""
-    t = result["time"].values
-    ink = STYLES["2-DOF-NL"]
-    second = STYLES["2-DOF-L"]
-    ratio = _ratio(result)
+    """A run at a glance: controlled axes with their following errors, commands, speeds, torques, twists, contacts as bars.
 
-    def curve(name: str, style: Mapping[str, Any], factor: float = 1.0, label: str = "") -> Curve:
-        return Curve(label or name.replace("_", " "), t, factor * result[name].values, style)
-
-    panels = [
-        Panel("", "time [s]", "command [-]", (curve("command", ink),)),
-        Panel("", "time [s]", "motor torque [N·m]", (curve("motor_torque", ink),)),
-        Panel(
-            "",
-            "time [s]",
-            "speed at the load [rad/s]",
-            (curve("motor_speed", second, 1.0 / ratio, "motor speed / ratio"), curve("load_speed", ink)),
-        ),
-        Panel(
-            "",
-            "time [s]",
-            "torque [N·m]",
-            (
-                curve("input_torque", second, ratio, "input torque x ratio"),
-                curve("output_torque", ink),
-                curve("load_torque", COMMAND_STYLE),
-            ),
-        ),
-        Panel("", "time [s]", "twist [mrad]", (curve("twist", ink, 1e3),)),
-        Panel(
-            "",
-            "time [s]",
-            "contact: -1, 0 stuck, +1",
-            (curve("input_contact", ink), curve("twist_contact", {**second, "linewidth": 1.0})),
-            y_range=(-1.15, 1.15),
-        ),
-    ]
-    figure = draw(panels, 2, (10.0, 8.0), note=result.attrs.get("warning", "") or result.attrs.get("note", ""))
+    Raises
+    ------
+    InputError
+        The dataset lacks what is shown.
+    """
+    charts = run_charts(result)
+    note = result.attrs.get("warning", "") or result.attrs.get("note", "")
+    figure = draw(charts, 2, (10.0, 2.7 * -(-len(charts) // 2)), note=note)
     if result.attrs.get("title"):
         figure.suptitle(result.attrs["title"])
     return figure
-
-
-def _ratio(result: xarray.Dataset) -> float:
-    if "gear_ratio" in result.attrs:  # a periodic motion, which knows its drive only
-        return float(result.attrs["gear_ratio"])
-    scenario = scenario_of(result)
-    assert isinstance(scenario, Scenario)
-    return scenario.gearbox.ratio
 
 
 @in_our_looks
@@ -209,43 +185,4 @@ def loss_map(speeds: Any, loads: Any, values: Any, note: str = "") -> Figure:
     curves.legend(fontsize=8, ncols=2)
     if note:
         figure.supxlabel(note, fontsize=8, color="0.35")
-    return figure
-
-
-@in_our_looks
-def correlation_map(names: Sequence[str], values: Any) -> Figure:
-    """A matrix of correlations as a heat map: dark where strong, the number in each cell says the sign in grey too."""
-    n = len(names)
-    cells, label = 0.6 * n, 0.08 * max(map(len, names))  # [inch]
-    figure = Picture(figsize=(cells + label + 2.2, cells + label + 1.0))
-    axes = figure.add_subplot()
-    axes.grid(visible=False)
-    image = axes.imshow(values, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-    axes.set_xticks(range(n), names, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
-    axes.set_yticks(range(n), names, fontsize=8)
-    axes.tick_params(length=0)
-    axes.spines[:].set_visible(False)
-    for i, j in np.ndindex(n, n):
-        ink = "white" if abs(values[i, j]) > 0.6 else "black"
-        axes.text(j, i, f"{values[i, j]:+.2f}", ha="center", va="center", fontsize=7.5, color=ink)
-    figure.colorbar(image, ax=axes, label="correlation [-]", shrink=0.8)
-    return figure
-
-
-@in_our_looks
-def amplitude_maps(frequency: Any, amplitude: Any, maps: Mapping[str, tuple[str, Any]], amplitude_label: str) -> Figure:
-    """Contours over frequency [Hz] and amplitude: maps[title] = (label of the values, values[amplitude, frequency])."""
-    figure = Picture(figsize=(10.0, 3.4 * -(-len(maps) // 2)))
-    for k, (title, (label, values)) in enumerate(maps.items()):
-        axes = figure.add_subplot(-(-len(maps) // 2), 2, k + 1)
-        shown = np.ma.masked_invalid(values)
-        axes.set(xscale="log", yscale="log", title=title, xlabel="frequency [Hz]", ylabel=amplitude_label)
-        axes.title.set_fontsize(10)
-        axes.grid(visible=False)
-        if shown.count() == 0 or float(np.ptp(shown.compressed())) == 0.0:
-            axes.text(0.5, 0.5, "nothing to show", transform=axes.transAxes, ha="center", color="0.35")
-            continue
-        filled = axes.contourf(frequency, amplitude, shown, levels=14, cmap="cividis")
-        figure.colorbar(filled, ax=axes, label=label)
-        axes.contour(frequency, amplitude, shown, levels=14, colors="0.15", linewidths=0.4)
     return figure

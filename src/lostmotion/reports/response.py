@@ -1,11 +1,12 @@
-"""What `lostmotion response` writes: Bode figures, maps over amplitude and frequency, tables."""
+"""The report of a frequency response: Bode charts, maps over amplitude and frequency, tables."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,11 +14,14 @@ from ..atomic_writer import write_bytes
 from ..response.bandwidth import characteristics
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
-from .pages import panels_csv, save_figure, table_csv, write_text
-from .response_figures import bode, bode_figure, maps_figure
+from .page import Prose, Report, Table, Verdict
+from .pages import table_csv, write_report
+from .panels import Curve, Ground, Group, Panel, step
 
 if TYPE_CHECKING:
     import xarray
+
+BLANK = "A blank cell means that the curve does not come there within the frequencies."
 
 
 def for_file(response: xarray.Dataset) -> xarray.Dataset:
@@ -30,52 +34,203 @@ def for_file(response: xarray.Dataset) -> xarray.Dataset:
     return out.assign_coords({name: response[name].astype(str) for name in ("output", "unit")})
 
 
+NUMBERS = ("efficiency", "motor_power", "gear_loss", "angle_advance", "residual", "multiplier", "spread")
+
+
 def points_csv(response: xarray.Dataset, output: str) -> str:
     """One row a point."""
-    rows = []
-    for a in response["amplitude"].values:
-        for f in response["frequency"].values:
-            p = response.sel(amplitude=a, frequency=f)
-            value = complex(p["response"].sel(output=output))
-            numbers = [abs(value), np.degrees(np.angle(value)), float(p["distortion"].sel(output=output))]
-            numbers += [
-                float(p[k])
-                for k in ("efficiency", "motor_power", "gear_loss", "angle_advance", "residual", "multiplier")
-            ]
-            numbers += [float(p["spread"])] if "spread" in p else []
-            rows.append([a, f, *numbers, str(p["reason"].item())])
+    values = response["response"].sel(output=output).values
+    columns = [np.abs(values), np.degrees(np.angle(values)), response["distortion"].sel(output=output).values]
+    columns += [response[k].transpose("amplitude", "frequency").values for k in NUMBERS if k in response]
+    points = [[a, f] for a in response["amplitude"].values.tolist() for f in response["frequency"].values.tolist()]
+    numbers = zip(*(column.ravel().tolist() for column in columns), strict=True)
+    reasons = map(str, response["reason"].transpose("amplitude", "frequency").values.ravel())
+    rows = [[*point, *row, reason] for point, row, reason in zip(points, numbers, reasons, strict=True)]
     header = ["amplitude", "frequency [Hz]", "gain", "phase [degrees]", "distortion", "efficiency", "motor_power [W]"]
     header += ["gear_loss [W]", "angle advance [rad]", "residual", "multiplier"]
     return table_csv([*header, *(["spread"] if "spread" in response else []), "reason"], rows)
 
 
+MAP_DEPTH = 60.0  # [dB] of the gain that maps show
+MODELS: tuple[Any, ...] = ("-", "--", "-.", ":")
+
+
+def unit_of_source(response: xarray.Dataset) -> str:
+    """Unit of the input, for labels."""
+    unit = str(response["amplitude"].attrs["units"])
+    return "-" if unit == "1" else unit.replace("*", "·")
+
+
+def bode(responses: Mapping[str, xarray.Dataset], output: str) -> list[Panel]:
+    """Gain and phase over frequency: a colour for each amplitude, a line style for each model."""
+    first = next(iter(responses.values()))
+    amplitudes = first["amplitude"].values
+    gain, phase = [], []
+    for (name, response), line in zip(responses.items(), (MODELS * len(responses))[: len(responses)], strict=True):
+        f = response["frequency"].values
+        for k, amplitude in enumerate(amplitudes):
+            values = response["response"].sel(output=output, amplitude=amplitude).values
+            values = np.where(np.abs(values) > 0.0, values, np.nan)
+            # In the legend each amplitude stands once, and each further model once.
+            legend = f"{amplitude:.3g}" if response is first else name if amplitude == amplitudes[-1] else "_"
+            style = step(k, len(amplitudes)) | {"linestyle": line}
+            label = f"{name}, {amplitude:.6g}"
+            gain.append(Curve(label, f, np.abs(values), style, legend))
+            phase.append(Curve(label, f, np.degrees(np.unwrap(np.angle(values))), style, legend))
+    source, of_source = first.attrs["source"], unit_of_source(first)
+    unit = str(first["unit"].sel(output=output).item()).replace("*", "·")
+    title = f"{output.replace('_', ' ')} / {source.replace('_', ' ')} by amplitude [{of_source}]"
+    return [
+        Panel(title, "frequency [Hz]", f"gain [{unit} / {of_source}]", tuple(gain), log_x=True, log_y=True),
+        Panel("phase", "frequency [Hz]", "phase [degrees]", tuple(phase), log_x=True),
+    ]
+
+
+def maps(response: xarray.Dataset, output: str) -> list[Panel]:
+    """Gain, phase, efficiency and distortion over frequency and amplitude; none with fewer than two of either."""
+    if min(response.sizes["amplitude"], response.sizes["frequency"]) < 2:
+        return []
+    values = response["response"].sel(output=output).values
+    distortion = response["distortion"].sel(output=output).values
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gain = 20.0 * np.log10(np.abs(values))
+        shown = gain > np.nanmax(np.where(np.isfinite(gain), gain, -np.inf)) - MAP_DEPTH
+        harmonics = np.where(shown & (distortion > 0.0), np.log10(distortion), np.nan)
+    phase = np.degrees(np.unwrap(np.angle(np.where(np.isfinite(values), values, 1.0)), axis=1))
+    label = f"amplitude of the {response.attrs['source'].replace('_', ' ')} [{unit_of_source(response)}]"
+
+    def panel(title: str, unit: str, z: np.ndarray) -> Panel:
+        ground = Ground(response["frequency"].values, response["amplitude"].values, z, unit)
+        return Panel(title, "frequency [Hz]", label, (), log_x=True, log_y=True, ground=ground)
+
+    return [
+        panel(
+            f"gain of {output.replace('_', ' ')}, down to {MAP_DEPTH:g} dB below the largest",
+            "[dB]",
+            np.where(shown, gain, np.nan),
+        ),
+        panel("phase", "[degrees]", np.where(shown, phase, np.nan)),
+        panel("mean efficiency", "[-]", response["efficiency"].values),
+        panel("harmonics above the first / first", "power of ten", harmonics),
+    ]
+
+
+# --- verdict ---
+
+
+def amplitude_lines(found: xarray.Dataset) -> list[str]:
+    """Bandwidth and phase crossover at each amplitude, and the dead zone."""
+    lines = []
+    for a in found["amplitude"].values:
+        band, cross = (float(found[k].sel(amplitude=a)) for k in ("bandwidth", "phase_crossover"))
+        text = [f"-3 dB at {band:.4g} Hz" if math.isfinite(band) else "-3 dB outside the frequencies, or no motion"]
+        text += [f"-180 degrees at {cross:.4g} Hz"] if math.isfinite(cross) else []
+        lines.append(f"amplitude {a:g}: {', '.join(text)}")
+    return [*lines, *dead_zone_line(found)]
+
+
+def dead_zone_line(found: xarray.Dataset) -> list[str]:
+    """The constant commands beyond which the load moves, of a drive without a controller."""
+    if "dead_zone_forward" not in found.attrs:
+        return []
+    forward, backward = (found.attrs[f"dead_zone_{way}"] for way in ("forward", "backward"))
+    return [f"dead zone: from rest the load moves above a constant command of {forward:.4g} and below {backward:.4g}"]
+
+
+def motion_lines(result: xarray.Dataset) -> list[str]:
+    """How many motions were found, how well they repeat, and why others were not found."""
+    reasons = [r for r in result["reason"].values.ravel() if r]
+    repeating = (result["reason"] == "") & ~(result["spread"] > 0.0 if "spread" in result else False)
+    worst = float(result["residual"].where(repeating).max())
+    within = f", repeating within {worst:.1e} of their magnitude" if repeating.any() else ""
+    lines = [f"{result['reason'].size - len(reasons)} of {result['reason'].size} motions found{within}"]
+    lines += _closed_loop_lines(result) if "spread" in result else []
+    return lines + [f"not found at {reasons.count(r)} point(s): {r}" for r in dict.fromkeys(reasons)]
+
+
+def _closed_loop_lines(result: xarray.Dataset) -> list[str]:
+    """Which frequencies had to fit the sample times, and which motions do not repeat."""
+    f, asked = result["frequency"].values, result["asked_frequency"].values
+    off, lines = abs(f / asked - 1.0), []
+    if off.max() > 1e-9:
+        lines.append(
+            f"{(off > 1e-9).sum()} of {len(f)} frequencies moved to the nearest that fits the sample times, by {off.max():.1%} at most"
+        )
+    spread = result["spread"].values
+    if (spread > 0.0).any():
+        lines.append(
+            f"{(spread > 0.0).sum()} motions do not repeat, as the encoder has steps: means over many periods, whose first harmonics "
+            f"vary by {spread[spread > 0.0].max():.2g} of their mean at most"
+        )
+    return lines
+
+
+def _verdict(response: xarray.Dataset, found: xarray.Dataset) -> Verdict:
+    lines = amplitude_lines(found)
+    count = found.sizes["amplitude"]
+    ends = [lines[0], *([lines[count - 1]] if count > 1 else [])]
+    state: Any = "open" if np.any(response["reason"].values != "") else "good"
+    told = ["; ".join(ends), *dead_zone_line(found), motion_lines(response)[0]]
+    return Verdict(state, tuple(f"{line[0].upper()}{line[1:]}." for line in told))
+
+
+# --- the page ---
+
+
+def response_report(
+    responses: Mapping[str, xarray.Dataset], scenario: Scenario | TrainScenario, output: str
+) -> tuple[Report, xarray.Dataset]:
+    """The page of the first response, overlaid with the others, and its characteristics by amplitude."""
+    name, response = next(iter(responses.items()))
+    found = characteristics(response, scenario, output)
+    source, unit = response.attrs["source"].replace("_", " "), unit_of_source(response)
+    rows = [
+        [f"{a:g}", *("" if math.isnan(v) else f"{v:.4g}" for v in values)]
+        for a, *values in zip(
+            *(found[k].values.tolist() for k in ("amplitude", "bandwidth", "phase_crossover")), strict=True
+        )
+    ]
+    caption = f"First harmonic of the {output.replace('_', ' ')} over that of the {source}, of periodic motions."
+    compared = f" Compared with {', '.join(list(responses)[1:])}." if len(responses) > 1 else ""
+    parts: list[Table | Group | Prose] = [
+        Table("Characteristics", (f"amplitude [{unit}]", "-3 dB [Hz]", "-180 degrees [Hz]"), rows, BLANK),
+        Prose("Motions", motion_lines(response), listed=True),
+    ]
+    if grounds := maps(response, output):
+        parts.insert(0, Group("maps", "Over frequency and amplitude", "", tuple(grounds)))
+    report = Report(
+        title=scenario.title or name,
+        lead=f"Frequency response of `{name}` from {source} to {output.replace('_', ' ')}.{compared}",
+        verdict=_verdict(response, found),
+        main=Group("bode", "Gain and phase", caption, tuple(bode(responses, output)), 1),
+        parts=tuple(parts),
+    )
+    return report, found
+
+
 def write_response(
-    directory: Path, responses: Mapping[str, xarray.Dataset], scenario: Scenario | TrainScenario, output: str
+    directory: Path,
+    responses: Mapping[str, xarray.Dataset],
+    scenario: Scenario | TrainScenario,
+    output: str,
+    pictures: Sequence[str] = (),
 ) -> tuple[Path, xarray.Dataset]:
-    """Figures and tables of the first response, overlaid with the others, in a directory that is made if missing.
+    """``response.html`` and tables in a directory, made if missing; on request pictures with these endings.
 
     Returns
     -------
     (Path, xarray.Dataset)
-        Of the Bode figure; the characteristics by amplitude.
+        Of the page; the characteristics by amplitude.
     """
-    directory.mkdir(parents=True, exist_ok=True)
     response = next(iter(responses.values()))
-    save_figure(bode_figure(responses, output), directory, "bode")
-    write_text(directory / "bode.csv", panels_csv(bode(responses, output)))
-    if response.sizes["amplitude"] > 1 and response.sizes["frequency"] > 1:
-        save_figure(maps_figure(response, output), directory, "maps")
-    write_text(directory / "response.csv", points_csv(response, output))
+    report, found = response_report(responses, scenario, output)
+    names = ("amplitude", "bandwidth", "phase_crossover")
+    rows = zip(*(found[name].values.tolist() for name in names), strict=True)
+    tables = {
+        "response.csv": points_csv(response, output),
+        "characteristics.csv": table_csv(["amplitude", "bandwidth [Hz]", "phase_crossover [Hz]"], rows),
+    }
+    page = write_report(directory, "response.html", report, tables, pictures)
     if find_spec("h5netcdf") is not None:
         write_bytes(directory / "response.nc", bytes(for_file(response).to_netcdf(engine="h5netcdf")))
-    found = characteristics(response, scenario, output)
-    rows = zip(
-        found["amplitude"].values.tolist(),
-        found["bandwidth"].values.tolist(),
-        found["phase_crossover"].values.tolist(),
-        strict=True,
-    )
-    write_text(
-        directory / "characteristics.csv", table_csv(["amplitude", "bandwidth [Hz]", "phase_crossover [Hz]"], rows)
-    )
-    return directory / "bode.png", found
+    return page, found

@@ -1,10 +1,9 @@
-"""The test rig's data sheet: figures, tables as CSV, and an HTML page that looks like a page of a catalogue."""
+"""The report of the virtual test rig: the data sheet on the left, what is measured on the right."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,28 +12,28 @@ from ..model.torsion import Rigid
 from ..test_rig.measurement import RigReport
 from ..test_rig.rig import LOST_MOTION_LOAD
 from ..units.practical import RPM, practical
-from . import plots
-from .pages import embed, panels_csv, render_page, save_figure, table_csv, write_text
-from .panels import Curve, Panel
+from .page import Prose, Report, Table, Verdict
+from .pages import table_csv, write_report
+from .panels import DOTS, Curve, Group, Panel, step
 from .sheet_rows import rows_of, rows_of_part
 
-CATALOGUE_POINT: dict[str, Any] = {"color": "#d9730d", "linestyle": "none", "marker": "o", "markersize": 7}
-SHADES = ("#0b3c5d", "#3a7ca5", "#7fae3f", "#b8b8b8")
+MEASURED = (
+    "Steady state: a flywheel keeps the input at its speed, a torque holds the load; input and output torque are read once nothing changes. Torsion: the input is "
+    "locked and the load torque goes through slow ramps. Break-away: a slow ramp of torque on the input, or on the output with the input free, until the shaft turns.",
+    "Every run is exact, so the rig adds no error of its own: a difference between the two columns comes from the data.",
+)
 
 
 def panels(report: RigReport, sheet: GearboxSheet | None) -> list[Panel]:
     """The six panels of the sheet; the four without torsion of a rigid gearbox."""
     efficiency, lost = _over_load(report, "efficiency"), _over_load(report, "loss_torque")
     rpm, no_load = RPM * report.map["input_speed"].values, report.no_load[1]
-    running = [Curve("rig", rpm, no_load, _line(SHADES[0]))]
+    running = [Curve("rig", rpm, no_load, step(0, 4))]
     if sheet is not None:
         efficiency += _printed_efficiency(sheet)
         running += _printed_no_load_torque(sheet)
     load, values = report.map["load"].values, report.map["efficiency"].values
-    across = [
-        Curve(f"load {load[j]:g}", rpm, values[j], _line(shade))
-        for j, shade in zip((2, 4, 5, 7), SHADES[::-1], strict=True)
-    ]
+    across = [Curve(f"load {load[j]:g}", rpm, values[j], step(k, 4)) for k, j in enumerate((2, 4, 5, 7))]
     relative, share, at_input = "relative load [-]", "efficiency [-]", "at the input [N·m]"
     return [
         Panel("efficiency over load (motor drives)", relative, share, tuple(efficiency), y_range=(0.0, 1.0)),
@@ -50,12 +49,12 @@ def _torsion_panels(report: RigReport, sheet: GearboxSheet | None) -> list[Panel
     if report.initial_loading is None:
         return []
     twist, torque = report.initial_loading
-    torsion = [Curve("rig, first loading", 1e3 * twist, torque, _line(SHADES[0]))]
+    torsion = [Curve("rig, first loading", 1e3 * twist, torque, step(0, 4))]
     if sheet is not None:
         torsion += _printed_torsion(sheet)
     loops = [
-        Curve(f"±{loop.amplitude:.3g} N·m", 1e3 * loop.twist, loop.torque, _line(shade))
-        for loop, shade in zip(report.loops, SHADES, strict=False)
+        Curve(f"±{loop.amplitude:.3g} N·m", 1e3 * loop.twist, loop.torque, step(k, 4))
+        for k, loop in enumerate(report.loops)
     ]
     angle, output, rated = "twist [mrad]", "output torque [N·m]", report.gearbox.rated_output_torque
     return [
@@ -64,23 +63,18 @@ def _torsion_panels(report: RigReport, sheet: GearboxSheet | None) -> list[Panel
     ]
 
 
-def _line(shade: str) -> dict[str, Any]:
-    return {"color": shade, "linestyle": "-", "linewidth": 1.5}
-
-
 def _over_load(report: RigReport, name: str) -> list[Curve]:
     """A quantity of the map over the load, at 5, 20, 50 and 100 % of rated speed."""
     rpm, load = RPM * report.map["input_speed"].values, report.map["load"].values
     return [
-        Curve(f"{rpm[k]:.0f} rpm", load, report.map[name].values[:, k], _line(shade))
-        for k, shade in zip((1, 3, 5, 7), SHADES, strict=True)
+        Curve(f"{rpm[k]:.0f} rpm", load, report.map[name].values[:, k], step(n, 4)) for n, k in enumerate((1, 3, 5, 7))
     ]
 
 
 def _printed_efficiency(sheet: GearboxSheet) -> list[Curve]:
     points = sheet.losses.all_efficiencies()
     x, y = np.array([p.load for p in points]), np.array([p.efficiency for p in points])
-    return [Curve("catalogue", x, y, CATALOGUE_POINT)] if points else []
+    return [Curve("catalogue", x, y, DOTS)] if points else []
 
 
 def _printed_no_load_torque(sheet: GearboxSheet) -> list[Curve]:
@@ -90,14 +84,14 @@ def _printed_no_load_torque(sheet: GearboxSheet) -> list[Curve]:
     if not points:
         return []
     speeds, torques = np.array(points).T
-    return [Curve("catalogue (at 0: starting torque)", RPM * speeds, torques, CATALOGUE_POINT)]
+    return [Curve("catalogue (at 0: starting torque)", RPM * speeds, torques, DOTS)]
 
 
 def _printed_torsion(sheet: GearboxSheet) -> list[Curve]:
     if sheet.stiffness is None or not sheet.stiffness.torques:
         return []
     twist = 0.5 * (sheet.backlash or 0.0) + np.array(sheet.stiffness.breaks())
-    return [Curve("catalogue T1, T2", 1e3 * twist, np.array(sheet.stiffness.torques), CATALOGUE_POINT)]
+    return [Curve("catalogue T1, T2", 1e3 * twist, np.array(sheet.stiffness.torques), DOTS)]
 
 
 def summary_rows(report: RigReport) -> list[tuple[str, str]]:
@@ -145,27 +139,95 @@ def _overrunning_rows(report: RigReport) -> list[tuple[str, str]]:
     return rows
 
 
+# --- the page ---
+
+
+def _verdict(report: RigReport) -> Verdict:
+    """How far the rig is from the sheet, and what the torsion and the locking are."""
+    lines = []
+    differs = [c for c in report.comparisons if c.remark]
+    if report.comparisons:
+        worst = max(report.comparisons, key=lambda c: abs(c.difference))
+        counted = f"{len(report.comparisons)} quantities of the data sheet are measured"
+        lines.append(f"{counted}; the largest difference is {_percent(worst.difference)} ({worst.quantity}).")
+    else:
+        lines.append("There is no data sheet to compare with.")
+    for c in differs[:1]:
+        more = f", and {len(differs) - 1} more below" if len(differs) > 1 else ""
+        lines.append(f"With a remark: {c.quantity}: {c.remark}{more}.")
+    if len(lines) < 2:
+        lines.append(f"Starting torque at the input {report.starting_torque:.4g} N·m.")
+    rows = dict(summary_rows(report))
+    lost = next(
+        (f"{what} {value}" for what, value in rows.items() if what.startswith("lost motion")), "no lost motion: rigid"
+    )
+    lines.append(f"{lost[0].upper()}{lost[1:]}; self-locking: {rows['self-locking at rated load and speed']}.")
+    return Verdict("open" if differs or not report.comparisons else "good", tuple(lines))
+
+
+def _percent(share: float) -> str:
+    return f"{round(100.0 * share, 1) + 0.0:+.1f} %"  # no -0.0
+
+
+def rig_report(name: str, report: RigReport, sheet: GearboxSheet | None = None, notes: Iterable[str] = ()) -> Report:
+    """The page of a gearbox on the rig."""
+    kind = f"{sheet.manufacturer} {sheet.kind.replace('_', ' ')} gearbox, " if sheet is not None else ""
+    told = [sheet.note] if sheet is not None and sheet.note else []
+    parts: list[Table | Group | Prose] = []
+    if report.comparisons:
+        rows = [
+            [
+                c.quantity,
+                f"{c.catalogue:.5g}",
+                f"{c.rig:.5g}",
+                _percent(c.difference),
+                "" if c.unit == "1" else c.unit,
+                c.remark,
+            ]
+            for c in report.comparisons
+        ]
+        marked = frozenset(k for k, c in enumerate(report.comparisons) if c.remark)
+        head = ("quantity", "catalogue", "rig", "difference", "unit", "remark")
+        parts.append(Table("Catalogue and rig", head, rows, marked=marked))
+    if notes := [*told, *notes]:
+        parts.append(Prose("", notes, noted=True))
+    data = [list(row) for row in (rows_of(sheet) if sheet is not None else rows_of_part(report.gearbox))]
+    parts += [
+        Table("Further measurements", ("quantity", "value"), [list(row) for row in summary_rows(report)]),
+        Table("The data sheet", ("quantity", "value", "source"), data),
+    ]
+    if sheet is not None:
+        sources = [f"{s.status} ({', '.join(s.data)}): {s.text}" for s in sheet.sources]
+        parts += [Prose("Sources", sources)] if sources else []
+        gaps = [[gap.datum, gap.where] for gap in sheet.gaps]
+        parts += [Table("What the sheet lacks", ("datum", "where to read it"), gaps)] if gaps else []
+    caption = "Measured on the simulated gearbox; points: the catalogue."
+    return Report(
+        title=sheet.title if sheet is not None and sheet.title else name,
+        lead=f"{kind}`{name}`, on the virtual test rig.",
+        verdict=_verdict(report),
+        main=Group("rig", "Measurements", caption, tuple(panels(report, sheet))),
+        parts=(*parts, Prose("How it was measured", MEASURED)),
+    )
+
+
 def write_sheet(
-    directory: Path, name: str, report: RigReport, sheet: GearboxSheet | None, notes: Iterable[str] = ()
+    directory: Path,
+    name: str,
+    report: RigReport,
+    sheet: GearboxSheet | None,
+    notes: Iterable[str] = (),
+    pictures: Sequence[str] = (),
 ) -> Path:
-    """Figures (PNG, SVG), tables (CSV) and ``rig.html`` in a directory, made if missing.
+    """``rig.html`` and the measurements as CSV in a directory, made if missing; on request pictures with these endings.
 
     Returns
     -------
     Path
         Of the page.
     """
-    directory.mkdir(parents=True, exist_ok=True)
-    drawn = panels(report, sheet)
-    png = save_figure(plots.draw(drawn, 2, (10.0, 1.75 * len(drawn))), directory, "rig")
-    write_text(directory / "rig.csv", panels_csv(drawn))
-    write_text(
-        directory / "comparison.csv",
-        table_csv(
-            ["quantity", "unit", "catalogue", "rig", "relative difference", "remark"],
-            ([c.quantity, c.unit, c.catalogue, c.rig, c.difference, c.remark] for c in report.comparisons),
-        ),
-    )
+    header = ["quantity", "unit", "catalogue", "rig", "relative difference", "remark"]
+    compared = ([c.quantity, c.unit, c.catalogue, c.rig, c.difference, c.remark] for c in report.comparisons)
     table = report.map
     rows = [
         [float(mu), RPM * float(n), float(eta), float(loss)]
@@ -174,24 +236,6 @@ def write_sheet(
         )
         for n, eta, loss in zip(table["input_speed"].values, etas, losses, strict=True)
     ]
-    write_text(
-        directory / "efficiency.csv",
-        table_csv(["relative_load", "input_speed [rpm]", "efficiency", "loss_torque at the input [N*m]"], rows),
-    )
-    page = directory / "rig.html"
-    write_text(
-        page,
-        render_page(
-            "reports/rig.html.jinja",
-            name=name,
-            sheet=sheet,
-            rows=rows_of(sheet) if sheet is not None else rows_of_part(report.gearbox),
-            summary=summary_rows(report),
-            comparisons=report.comparisons,
-            notes=list(notes),
-            figure=embed(
-                png, f"Rig measurements of {name}", "Measured on the simulated gearbox; points: the catalogue.", "rig"
-            ),
-        ),
-    )
-    return page
+    head = ["relative_load", "input_speed [rpm]", "efficiency", "loss_torque at the input [N*m]"]
+    tables = {"comparison.csv": table_csv(header, compared), "efficiency.csv": table_csv(head, rows)}
+    return write_report(directory, "rig.html", rig_report(name, report, sheet, notes), tables, pictures)

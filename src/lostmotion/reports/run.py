@@ -1,4 +1,4 @@
-"""A run as text."""
+"""A run as text and as a page."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.switchings import names_in, unpacked
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.windings import errors_of
+from ..units.practical import practical
 
 if TYPE_CHECKING:
     import xarray
+
+    from .page import Report, Table
 
 
 def summary(result: xarray.Dataset | RawResult) -> str:
@@ -126,3 +129,84 @@ def train_summary(result: xarray.Dataset | RawResult) -> str:
     lines += [*contact_lines(result), *error_lines(result)]
     lines += [f"  {kind}: {result.attrs[kind]}" for kind in ("warning", "note") if kind in result.attrs]
     return "\n".join(lines)
+
+
+# --- the page ---
+
+
+def run_report(name: str, result: xarray.Dataset) -> Report:
+    """The page of a run.
+
+    Raises
+    ------
+    InputError
+        The dataset is no run.
+    """
+    from .page import Prose, Report, Verdict
+    from .panels import Flows, Group
+    from .run_charts import gear_charts, run_charts
+
+    charts = run_charts(result)
+    _, *lines = (line.strip() for line in summary(result).splitlines())
+    told = [line for line in lines if line.startswith(("warning:", "note:"))]
+    others = [line for line in lines if line not in told]
+    e = energy_of(result) if "energy" in result.attrs else {}
+    closes = (
+        f"; the energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}" if e.get("turned_over") else ""
+    )
+    last = float(result["time"][-1])
+    first = (
+        f"{last:g} s with {result.attrs['switching_count']} switchings, by the {result.attrs['solver']} solver{closes}."
+    )
+    more = gear_charts(result)
+    flows = [Flows("Energy of the whole run", e)] if e else []
+    gears = [Group("gears", "Torsion, losses and energy", "", (*more, *flows))] if more or flows else []
+    return Report(
+        title=result.attrs.get("title") or name,
+        lead=f"Run of `{name}`.",
+        verdict=Verdict("open" if "warning" in result.attrs else "good", (first, *_motion_lines(result), *told)[:3]),
+        main=Group("run", "The run", "Drag over a chart to zoom, double-click to see all of it.", tuple(charts)),
+        parts=(
+            *gears,
+            _variables(result),
+            Prose("Summary", [line for line in (*others, *told) if not line.endswith("at the end:")], listed=True),
+        ),
+    )
+
+
+def _motion_lines(result: xarray.Dataset) -> list[str]:
+    """Following error of controlled axes, and which contacts are stuck."""
+    errors: dict[str, str] = {}
+    for name in sorted(n for n in map(str, result) if n.endswith(("position_reference", "speed_reference"))):
+        axis, _, quantity = name.removesuffix("_reference").rpartition("_")
+        measured = f"{axis}_measured_{quantity}".removeprefix("_")
+        if axis not in errors and measured in result:  # the position, where there is one
+            error = result[name].values - result[measured].values
+            unit = str(result[name].attrs.get("units", ""))
+            peak, rms = (practical(float(v), unit) for v in (np.abs(error).max(), np.sqrt(np.mean(error**2))))
+            of = f"{axis.replace('_', ' ')} " if axis else ""
+            errors[axis] = f"{of}{quantity} peak {peak}, rms {rms}"
+    stuck = [
+        f"{name.removesuffix('_contact').replace('_', ' ')} {100.0 * float(np.mean(result[name].values == 0)):.3g} %"
+        for name in map(str, result)
+        if name.endswith("_contact")
+    ]
+    lines = [f"Following error, reference less measured: {'; '.join(errors.values())}."] if errors else []
+    return lines + ([f"Share of the time in which contacts are stuck: {', '.join(stuck)}."] if stuck else [])
+
+
+def _variables(result: xarray.Dataset) -> Table:
+    """Each variable at the end, and what it reaches."""
+    from .page import Table
+
+    rows = []
+    for name in map(str, result):
+        values = result[name].values.astype(float)
+        if values.ndim != 1 or name.endswith("_contact"):
+            continue
+        known = values[np.isfinite(values)]
+        if len(known):
+            numbers = (float(values[-1]), float(known.min()), float(known.max()), float(np.sqrt(np.mean(known**2))))
+            unit = str(result[name].attrs.get("units", "")).replace("*", "·")
+            rows.append([name, *(f"{v:.6g}" for v in numbers), "" if unit == "1" else unit])
+    return Table("Variables", ("variable", "at the end", "least", "largest", "rms", "unit"), rows)

@@ -1,23 +1,21 @@
-"""The sheet of a servo axis: figures, tables as CSV, and an HTML page."""
+"""The report of a servo axis: margins, bandwidths, steps, following, stiffness, limit cycle."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..servo.commission import LoopSheet, ServoReport
-from ..servo.motion import StepResponse
-from . import plots
-from .pages import embed, panels_csv, render_page, save_figure, table_csv, write_text
-from .panels import COMMAND_STYLE, Curve, Panel
+from ..servo.motion import LimitCycle, StepResponse
+from ..units.practical import practical
+from .page import Prose, Report, Table, Verdict
+from .pages import table_csv, write_report
+from .panels import FAINT, Curve, Group, Mark, Panel, look
 
-SHADES = ("#0b3c5d", "#d9730d", "#7fae3f", "#8a4f9e", "#b8b8b8")
-LINES = ("-", "--", "-.", ":", "-")
 DEGREES = 180.0 / math.pi
 HEADER = (
     "loop",
@@ -33,17 +31,17 @@ HEADER = (
     "sensitivity peak [-]",
     "sensitivity peak at [Hz]",
 )
+COMPUTED = (
+    "Margins, bandwidths and stiffness are those of the linear sampled loop in one regime of the plant, without approximation: the plant by the matrix exponential "
+    "over a base tick, the controller as it computes, sample times and delays as they are. Over the sample time of a loop, the faster loops within it make one "
+    "time-invariant system, whose frequency response at the samples is shown.",
+    "A loop is cut where its measured value enters its controller; loops within it are closed, those around it open. While the motor's own shaft sticks no loop is "
+    "closed: its gain is 0.",
+    "Limits, encoder steps and dead zones do not count there. They do in the runs: steps, following error, settling and rest are exact simulations of the scenario.",
+)
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """A picture of the report, before it is drawn."""
-
-    name: str
-    title: str
-    caption: str
-    panels: tuple[Panel, ...]
-    size: tuple[float, float]
+# --- tables ---
 
 
 def loop_rows(report: ServoReport) -> list[list[str]]:
@@ -53,16 +51,19 @@ def loop_rows(report: ServoReport) -> list[list[str]]:
 
 def _loop_row(row: LoopSheet) -> list[str]:
     m, b, fed = row.margins, row.bandwidth, row.with_feedforward
-    decibels = 20.0 * math.log10(m.gain_margin) if m.gain_margin > 0.0 else math.nan
     numbers = (
         b.three_decibels,
         b.ninety_degrees,
         math.nan if fed is None else fed.three_decibels,
-        decibels,
+        _decibels(m.gain_margin),
         m.gain_margin_frequency,
     )
     more = (DEGREES * m.phase_margin, m.crossover, m.sensitivity_peak, m.sensitivity_peak_frequency)
     return [row.loop, row.regime, row.verdict, *(_text(x) for x in (*numbers, *more))]
+
+
+def _decibels(factor: float) -> float:
+    return 20.0 * math.log10(factor) if factor > 0.0 else math.nan
 
 
 def _text(value: float) -> str:
@@ -83,62 +84,106 @@ def _step_text(step: StepResponse) -> str:
     return f"{size}: {', '.join(parts)}, overshoot {100.0 * step.overshoot:.3g} %"
 
 
-def figures(report: ServoReport) -> list[Drawn]:
-    """All pictures of the report."""
-    steps = Drawn(
-        "steps",
-        "Step responses",
-        "Each loop with those around it left out, simulated exactly.",
-        tuple(map(_step_panel, report.steps)),
-        (10.0, 3.2),
-    )
-    loops = Drawn(
-        "loops",
-        "Open and closed loops",
-        "Exact sampled loops up to half their sampling frequencies. Left, the loop cut where its measured value enters its controller; right, closed, from reference to measured value, nothing fed forward.",
-        tuple(panel for name in _loops(report) for panel in _loop_panels(report, name)),
-        (10.0, 3.0 * 2 * len(_loops(report))),
-    )
-    motion = Drawn(
-        "motion",
-        "Following and stiffness",
-        "The run of the scenario: reference less true value; and the load torque that turns its shaft by one radian.",
-        tuple(_motion_panels(report)),
-        (10.0, 3.2),
-    )
-    return [steps, loops, motion]
+def _cycle_table(cycle: LimitCycle) -> Table:
+    """The limit cycle, and what is left of it without each possible cause."""
+    rows = []
+    for what, rest in {"nothing": cycle.whole, **cycle.without}.items():
+        numbers = (1e3 * rest.motor_amplitude, 1e3 * rest.amplitude, rest.frequency)
+        rows.append([what, *(map(_text, numbers) if rest.cycles else ("none", "none", ""))])
+    header = ("left out", "amplitude at the motor [mrad]", "at the load [mrad]", "frequency [Hz]")
+    return Table("Causes of the limit cycle", header, rows)
+
+
+# --- verdict ---
+
+
+def _verdict(report: ServoReport) -> Verdict:
+    found = report.instabilities()
+    regimes = ", ".join(report.regimes)
+    first = f"Unstable: {'; '.join(map(str, found))}." if found else f"Stable in each regime ({regimes})."
+    f = report.following
+    unit = f.unit.replace("·", "*")
+    second = f"Following error over the run: peak {practical(f.peak, unit)}, rms {practical(f.rms, unit)}."
+    cycle = report.limit_cycle
+    state = "bad" if found or (cycle is not None and cycle.whole.cycles) else "good"
+    if state == "good" and cycle is not None and cycle.whole.verdict == "not decided":
+        state = "open"
+    return Verdict(state, (f"{first} {_least(report.loops)}", second, f"At rest: {report.rest()}."))  # type: ignore[arg-type]
+
+
+def _least(loops: Sequence[LoopSheet]) -> str:
+    """The least margins of all loops."""
+    words = []
+    with_phase = [row for row in loops if math.isfinite(row.margins.phase_margin)]
+    if with_phase:
+        row = min(with_phase, key=lambda r: r.margins.phase_margin)
+        words.append(f"phase margin {DEGREES * row.margins.phase_margin:.4g}° ({row.loop} loop, {row.regime})")
+    with_gain = [row for row in loops if math.isfinite(_decibels(row.margins.gain_margin))]
+    if with_gain:
+        row = min(with_gain, key=lambda r: r.margins.gain_margin)
+        words.append(f"gain margin {_decibels(row.margins.gain_margin):.4g} dB ({row.loop} loop, {row.regime})")
+    return f"Least {', least '.join(words)}." if words else ""
+
+
+# --- figures ---
 
 
 def _loops(report: ServoReport) -> list[str]:
     return list(dict.fromkeys(row.loop for row in report.loops))
 
 
-def _style(k: int) -> dict[str, Any]:
-    return {"color": SHADES[k % len(SHADES)], "linestyle": LINES[k % len(LINES)], "linewidth": 1.4}
-
-
 def _step_panel(step: StepResponse) -> Panel:
     time = 1e3 * step.time
     curves = (
-        Curve("reference", time[[0, -1]], np.ones(2), COMMAND_STYLE),
-        Curve("value", time, step.value / step.size, _style(0)),
+        Curve("reference", time[[0, -1]], np.ones(2), FAINT),
+        Curve("value", time, step.value / step.size, look(0)),
     )
     return Panel(f"{step.loop} loop, {step.size:.3g} {step.unit}", "time [ms]", "share of the step [-]", curves)
 
 
-def _loop_panels(report: ServoReport, loop: str) -> list[Panel]:
+def _panel(
+    report: ServoReport, loop: str, title: str, label: str, y: Callable[[LoopSheet], np.ndarray], **options: Any
+) -> Panel:
     rows = [row for row in report.loops if row.loop == loop]
+    curves = tuple(Curve(row.regime, row.frequency, y(row), look(k)) for k, row in enumerate(rows))
+    return Panel(f"{loop} loop, {title}", "frequency [Hz]", label, curves, log_x=True, **options)
 
-    def panel(title: str, label: str, y: Callable[[LoopSheet], np.ndarray], **options: Any) -> Panel:
-        curves = tuple(Curve(row.regime, row.frequency, y(row), _style(k)) for k, row in enumerate(rows))
-        return Panel(f"{loop} loop, {title}", "frequency [Hz]", label, curves, log_x=True, **options)
 
-    return [
-        panel("open: gain", "|L| [-]", lambda r: _seen(np.abs(r.open_loop)), log_y=True),
-        panel("closed: gain", "|T| [-]", lambda r: _seen(np.abs(r.closed_loop)), log_y=True),
-        panel("open: phase", "phase [deg]", lambda r: _phase(r.open_loop)),
-        panel("closed: phase", "phase [deg]", lambda r: _phase(r.closed_loop)),
-    ]
+def _open_panels(report: ServoReport, loop: str) -> tuple[Panel, Panel]:
+    """Gain and phase of the loop that is cut, with margins and crossovers."""
+    rows = [row for row in report.loops if row.loop == loop]
+    at_gain, at_phase = [], []
+    for k, row in enumerate(rows):
+        m = row.margins
+        if math.isfinite(m.crossover):
+            at_gain.append(Mark(m.crossover, 1.0, f"{m.crossover:.3g} Hz", look(k)))
+            phase = float(np.interp(m.crossover, row.frequency, _phase(row.open_loop)))
+            margin = DEGREES * m.phase_margin
+            at_phase.append(Mark(m.crossover, phase, f"{margin:.3g}°", look(k), to=phase - margin))
+        if m.gain_margin > 0.0 and math.isfinite(m.gain_margin):
+            mark = Mark(
+                m.gain_margin_frequency, 1.0 / m.gain_margin, f"{_decibels(m.gain_margin):.3g} dB", look(k), to=1.0
+            )
+            at_gain.append(mark)
+    gain = _panel(
+        report,
+        loop,
+        "open: gain",
+        "|L| [-]",
+        lambda r: _seen(np.abs(r.open_loop)),
+        log_y=True,
+        marks=tuple(at_gain),
+        level=1.0,
+    )
+    phase_panel = _panel(
+        report, loop, "open: phase", "phase [deg]", lambda r: _phase(r.open_loop), marks=tuple(at_phase), level=-180.0
+    )
+    return gain, phase_panel
+
+
+def _closed_panels(report: ServoReport, loop: str) -> tuple[Panel, Panel]:
+    gain = _panel(report, loop, "closed: gain", "|T| [-]", lambda r: _seen(np.abs(r.closed_loop)), log_y=True)
+    return gain, _panel(report, loop, "closed: phase", "phase [deg]", lambda r: _phase(r.closed_loop))
 
 
 def _seen(gain: np.ndarray) -> np.ndarray:
@@ -153,56 +198,86 @@ def _phase(response: np.ndarray) -> np.ndarray:
 def _motion_panels(report: ServoReport) -> Iterable[Panel]:
     f = report.following
     factor, unit = (1e3, "mrad") if f.unit == "rad" else (1.0, f.unit)
-    yield Panel(
-        "following error over the run",
-        "time [s]",
-        f"error [{unit}]",
-        (Curve("error", f.time, factor * f.error, _style(0)),),
+    quantity = {"rad": "position", "rad/s": "speed"}.get(f.unit, "torque")
+    both = (
+        Curve("reference", f.time, f.reference, look(1)),
+        Curve("true value", f.time, f.reference - f.error, look(0)),
     )
-    if report.stiffness:
-        curves = tuple(Curve(s.regime, s.frequency, s.stiffness, _style(k)) for k, s in enumerate(report.stiffness))
-        yield Panel(
-            f"stiffness against load at {report.stiffness[0].shaft}",
-            "frequency [Hz]",
-            "[N·m/rad]",
-            curves,
-            log_x=True,
-            log_y=True,
-        )
+    yield Panel(f"{quantity} over the run", "time [s]", f"{quantity} [{f.unit}]", both)
+    error = Curve("error", f.time, factor * f.error, look(0))
+    yield Panel("following error over the run", "time [s]", f"error [{unit}]", (error,))
 
 
-def write_servo(directory: Path, name: str, report: ServoReport) -> Path:
-    """Figures (PNG, SVG), tables (CSV) and ``servo.html`` in a directory, made if missing.
+def _stiffness_group(report: ServoReport) -> list[Group]:
+    if not report.stiffness:
+        return []
+    curves = tuple(Curve(s.regime, s.frequency, s.stiffness, look(k)) for k, s in enumerate(report.stiffness))
+    title = f"stiffness against load at {report.stiffness[0].shaft}"
+    panel = Panel(title, "frequency [Hz]", "[N·m/rad]", curves, log_x=True, log_y=True)
+    return [Group("stiffness", "Stiffness", "The load torque that turns its shaft by one radian.", (panel,), 1)]
+
+
+def _loop_groups(report: ServoReport) -> tuple[Group, Group]:
+    """What supports the verdict: the outermost loop and the run; then all other loops."""
+    *inner, outer = _loops(report)
+    main = Group(
+        "axis",
+        f"The {outer} loop, and the run",
+        "Above, the loop cut where its measured value enters its controller, with crossovers, gain and phase margins; below, the run of the scenario. "
+        "Drag over a chart to zoom, double-click to see all of it.",
+        (*_open_panels(report, outer), *_motion_panels(report)),
+    )
+    others = [p for loop in inner for p in (*_open_panels(report, loop), *_closed_panels(report, loop))]
+    caption = (
+        "Exact sampled loops up to half their sampling frequencies. Open, the loop cut where its measured value enters its controller; closed, from reference to "
+        "measured value, nothing fed forward."
+    )
+    return main, Group("loops", "Open and closed loops", caption, (*_closed_panels(report, outer), *others))
+
+
+# --- the page ---
+
+
+def servo_report(name: str, report: ServoReport) -> Report:
+    """The page of an axis."""
+    rows = loop_rows(report)
+    wrong = frozenset(k for k, row in enumerate(rows) if row[2] == "NO")
+    steps_and_motion = [list(row) for row in [*step_rows(report), *report.motion_rows()]]
+    cycle = report.limit_cycle
+    main, loops = _loop_groups(report)
+    blank = "A blank cell means that a curve does not cross below half the sampling frequency."
+    steps = Group(
+        "steps",
+        "Step responses",
+        "Each loop with those around it left out, simulated exactly.",
+        tuple(map(_step_panel, report.steps)),
+        len(report.steps),
+    )
+    return Report(
+        title=report.scenario.title or name,
+        lead=f"Commissioning report of the servo axis of `{report.motor}` in `{name}`.",
+        verdict=_verdict(report),
+        main=main,
+        parts=(
+            Table("Loops", HEADER, rows, blank, marked=wrong),
+            Table("Regimes", ("regime", "what it is"), [list(pair) for pair in report.regimes.items()]),
+            Table("Steps and motion", ("quantity", "value"), steps_and_motion),
+            *([_cycle_table(cycle)] if cycle is not None and cycle.without else []),
+            loops,
+            *([steps] if report.steps else []),
+            *_stiffness_group(report),
+            Prose("What is computed", COMPUTED),
+        ),
+    )
+
+
+def write_servo(directory: Path, name: str, report: ServoReport, pictures: Sequence[str] = ()) -> Path:
+    """``servo.html`` and its data as CSV in a directory, made if missing; on request pictures with these endings.
 
     Returns
     -------
     Path
         Of the page.
     """
-    directory.mkdir(parents=True, exist_ok=True)
-    embedded = []
-    for drawn in figures(report):
-        columns = 2 if drawn.name == "loops" else len(drawn.panels)
-        png = save_figure(plots.draw(drawn.panels, columns, drawn.size), directory, drawn.name)
-        write_text(directory / f"{drawn.name}.csv", panels_csv(drawn.panels))
-        embedded.append(embed(png, drawn.title, drawn.caption, drawn.name))
-    rows = loop_rows(report)
-    write_text(directory / "margins.csv", table_csv(HEADER, rows))
-    page = directory / "servo.html"
-    write_text(
-        page,
-        render_page(
-            "reports/servo.html.jinja",
-            name=name,
-            title=report.scenario.title or name,
-            motor=report.motor,
-            header=HEADER,
-            rows=rows,
-            regimes=report.regimes,
-            steps=step_rows(report),
-            motion=report.motion_rows(),
-            cycle=report.limit_cycle,
-            figures=embedded,
-        ),
-    )
-    return page
+    tables = {"margins.csv": table_csv(HEADER, loop_rows(report))}
+    return write_report(directory, "servo.html", servo_report(name, report), tables, pictures)

@@ -33,7 +33,7 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
         if name == "stiffness":
             for k, slope in enumerate(value.slopes):
                 upto = f" up to {value.torques[k]:g} N·m" if k < len(value.torques) else ""
-                add(name, f"torsional stiffness K{k + 1}{upto}", f"{slope:.4g} N·m/rad")
+                add(name, f"torsional stiffness K{k + 1}{upto}", f"{slope:.5g} N·m/rad")
             if value.scatter:
                 add(name, "scatter of the stiffness", f"±{100 * value.scatter:.0f} %")
         elif name == "rigid":

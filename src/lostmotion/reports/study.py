@@ -1,7 +1,8 @@
-"""The report of a study: statistics, distributions, correlations, Sobol indices, scatter, the best designs."""
+"""The report of a study: statistics, distributions, correlations, Sobol indices, scatter, selection, the best designs."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,21 +13,26 @@ from ..studies.engine import study_of
 from ..studies.study import Study
 from ..studies.table import labelled, read_table
 from ..studies.vary import Vary
-from .pages import save_figure, table_csv, write_text
-from .panels import STYLES
-from .plots import Picture, in_our_looks
+from .page import Prose, Report, Table, Verdict
+from .pages import table_csv, write_report
+from .panels import PALETTE, Bars, Curve, Group, Histogram, Panel
 from .study_selection import show_selection
 
 if TYPE_CHECKING:
     import pyarrow as pa
-    from matplotlib.figure import Figure
 
-MAX_LABELS = 20  # names along an axis
-INK, ACCENT = STYLES["2-DOF-NL"]["color"], STYLES["2-DOF-L"]["color"]
+MAX_POINTS = 5000  # of a scatter
+POINTS: dict[str, Any] = {
+    "color": PALETTE["first"],
+    "linestyle": "none",
+    "marker": "o",
+    "markersize": 2.5,
+    "alpha": 0.5,
+}
 
 
 def figures_of(directory: Path) -> Path:
-    """Where the figures go: not among the data, all of which readers of Parquet directories try to read."""
+    """Where the page goes: not among the data, all of which readers of Parquet directories try to read."""
     whole = directory.resolve()
     return whole.with_name(f"{whole.name}-figures")
 
@@ -127,109 +133,126 @@ def best_runs(table: pa.Table, name: str, count: int = 10, *, largest: bool = Fa
     return good.sort_by([(name, "descending" if largest else "ascending")]).slice(0, count)
 
 
-def _grid(count: int, width: float = 3.3, height: float = 2.6) -> tuple[Figure, int, int]:
-    columns = min(3, count)
-    rows = -(-count // columns)
-    return Picture(figsize=(max(4.5, width * columns), height * rows)), rows, columns
+# --- charts ---
 
 
-@in_our_looks
-def distributions(table: pa.Table, study: Study) -> Figure:
-    """A histogram of each kept value, with its 5, 50 and 95 %."""
-    figure, rows, columns = _grid(len(study.keep))
-    for k, name in enumerate(study.keep):
-        axes = figure.add_subplot(rows, columns, k + 1)
-        x = _finite(table, name)
-        if len(x):
-            axes.hist(x, bins=min(60, max(5, round(len(x) ** 0.5))), color=INK)
-            for q in np.quantile(x, [0.05, 0.5, 0.95]):
-                axes.axvline(q, color=ACCENT, linewidth=1.2)
-        axes.set(xlabel=labelled(table, name), ylabel="runs")
-    return figure
+def distributions(table: pa.Table, study: Study) -> Group:
+    """A histogram of each kept value."""
+    charts = [Histogram(name, labelled(table, name), x) for name in study.keep if len(x := _finite(table, name))]
+    return Group("distributions", "Distributions", "", tuple(charts))
 
 
-@in_our_looks
-def bars(values: dict[str, dict[str, Any]], label: str) -> Figure:
-    """Horizontal bars by parameter for each kept value, the longest on top (tornado); pairs as two bars."""
-    figure, rows, columns = _grid(len(values), 3.8, 0.7 + 0.35 * max(len(v) for v in values.values()) + 0.9)
-    for k, (name, by_parameter) in enumerate(values.items()):
-        axes = figure.add_subplot(rows, columns, k + 1)
-        order = sorted(by_parameter, key=lambda p: abs(np.max(by_parameter[p])))
-        y = np.arange(len(order))
-        if order and isinstance(by_parameter[order[0]], tuple):
-            axes.barh(y + 0.2, [by_parameter[p][1] for p in order], 0.4, color="0.7", label="total")
-            axes.barh(y - 0.2, [by_parameter[p][0] for p in order], 0.4, color=INK, label="first order")
-            axes.legend(fontsize=8)
-        else:
-            axes.barh(y, [by_parameter[p] for p in order], 0.7, color=INK)
-            axes.axvline(0.0, color="0.3", linewidth=0.8)
-            axes.set_xlim(-1.0, 1.0)
-        axes.set_yticks(y, order)
-        axes.set(title=name, xlabel=label)
-        axes.title.set_fontsize(10)
-    return figure
+def bars(name: str, title: str, values: dict[str, dict[str, Any]], label: str, series: tuple[str, ...] = ()) -> Group:
+    """Bars by parameter for each kept value, the longest on top (tornado); pairs as two bars."""
+    limits = None if series else (-1.0, 1.0)
+    charts = [
+        Bars(kept, label, {p: v if isinstance(v, tuple) else (v,) for p, v in by.items()}, series, limits)
+        for kept, by in values.items()
+    ]
+    return Group(name, title, "", tuple(charts), min(2, len(charts)))
 
 
-@in_our_looks
-def scatter(table: pa.Table, study: Study, max_columns: int = 6) -> Figure:
+def scatter(table: pa.Table, study: Study, max_columns: int = 6) -> Group:
     """Kept values over parameters, at most six of each and 5000 points."""
     keep, vary = list(study.keep)[:max_columns], study.vary[:max_columns]
-    some = table.take(np.linspace(0, table.num_rows - 1, min(table.num_rows, 5000)).astype(int))
-    figure = Picture(figsize=(max(4.5, 2.6 * len(vary)), 2.3 * len(keep)))
-    for r, name in enumerate(keep):
-        for c, v in enumerate(vary):
-            axes = figure.add_subplot(len(keep), len(vary), r * len(vary) + c + 1)
+    some = table.take(np.linspace(0, table.num_rows - 1, min(table.num_rows, MAX_POINTS)).astype(int))
+    charts = []
+    for name in keep:
+        for v in vary:
             x = some[v.title].to_pylist()
             places = [v.names.index(value) for value in x] if v.names is not None else x
-            axes.plot(places, some[name].to_numpy(), ".", markersize=2.5, color=INK, alpha=0.5)
-            axes.tick_params(labelsize=7)
-            if v.names is not None:
-                few = len(v.names) <= MAX_LABELS and r == len(keep) - 1
-                axes.set_xticks(range(len(v.names)), v.names if few else [""] * len(v.names), rotation=90, fontsize=6)
-            else:
-                axes.locator_params(axis="x", nbins=4)
-            if r == len(keep) - 1:
-                axes.set_xlabel(labelled(table, v.title), fontsize=8)
-            if c == 0:
-                axes.set_ylabel(labelled(table, name), fontsize=8)
-    return figure
+            curve = Curve("runs", np.asarray(places, float), some[name].to_numpy(), POINTS)
+            names = v.names if v.names is not None else ()
+            label = labelled(table, v.title)
+            charts.append(Panel(f"{name} over {v.title}", label, labelled(table, name), (curve,), x_names=tuple(names)))
+    return Group("scatter", "Values over parameters", "", tuple(charts), min(3, len(vary)))
 
 
-def _show_task(study: Study, table: pa.Table, view: Path) -> list[str]:
+# --- the page ---
+
+
+def _failures(table: pa.Table) -> list[str]:
+    """The reasons of runs that failed, the first five."""
+    failed = [e for e in table["error"].to_pylist() if e]
+    return [f"{failed.count(e)} x {e}" for e in list(dict.fromkeys(failed))[:5]]
+
+
+def _counted(table: pa.Table, study: Study) -> str:
+    failed = sum(bool(e) for e in table["error"].to_pylist())
+    return f"{table.num_rows} of {study.total} runs, {failed} failed"
+
+
+def _task_page(study: Study, table: pa.Table, name: str) -> tuple[Report, list[str], dict[str, str]]:
     """Of a task: its ranking alone, since what varies are names."""
-    view.mkdir(exist_ok=True)
-    return [study.title, *show_selection(table, study, view), f"selection.csv, limits.csv and pareto.png are in {view}"]
+    shown = show_selection(table, study)
+    main, *parts = shown.parts if isinstance(shown.parts[0], Group) else (Group("none", "", "", ()), *shown.parts)
+    assert isinstance(main, Group)
+    lead = f"Selection of motor and gearbox for the task `{name}`: {_counted(table, study)}."
+    report = Report(study.title or name, lead, shown.verdict, main, tuple(parts))
+    return report, [study.title, *shown.lines], shown.tables
 
 
-def show(directory: Path) -> list[str]:
-    """Writes figures and statistics.csv into a directory beside that of the data; returns what to print."""
-    need("pyarrow", "Showing a study", "study")
-    need("scipy", "Showing a study", "study")
-    study, table = study_of(directory), read_table(directory)
-    if study.axis is not None:
-        return _show_task(study, table, figures_of(directory))
+def _study_page(study: Study, table: pa.Table, name: str) -> tuple[Report, list[str], dict[str, str]]:
     rows = statistics(table, study)
     header = ["", "mean", "std. dev.", "min", "5 %", "50 %", "95 %", "max"]
-    failed = [e for e in table["error"].to_pylist() if e]
-    lines = [study.title or str(directory), f"  {table.num_rows} of {study.total} runs, {len(failed)} failed"]
-    lines += [f"    {failed.count(e)} x {e}" for e in list(dict.fromkeys(failed))[:5]]
+    failures = _failures(table)
+    lines = [study.title or name, f"  {_counted(table, study)}", *(f"    {line}" for line in failures)]
     width = max(len(r[0]) for r in rows) + 2
     lines.append("  " + header[0].ljust(width) + "".join(h.rjust(12) for h in header[1:]))
     lines += ["  " + r[0].ljust(width) + "".join(f"{x:12.5g}" for x in r[1:]) for r in rows]
-    view = figures_of(directory)
-    view.mkdir(exist_ok=True)
-    write_text(view / "statistics.csv", table_csv(["value", *header[1:]], rows))
-    save_figure(distributions(table, study), view, "distributions")
-    if _with_order(study):
-        save_figure(bars(influence(table, study), "rank correlation [-]"), view, "tornado")
-    save_figure(scatter(table, study), view, "scatter")
-    if study.design == "saltelli" and table.num_rows == study.total and not failed:
+    shown = [[row[0], *("" if np.isnan(x) else f"{x:.5g}" for x in row[1:])] for row in rows]
+    parts: list[Any] = [Table("Statistics", ("value", *header[1:]), shown)]
+    ranks = influence(table, study) if _with_order(study) else {}
+    if ranks:
+        parts.append(bars("tornado", "Influence of the parameters", ranks, "rank correlation [-]"))
+    if study.design == "saltelli" and table.num_rows == study.total and not failures:
         indices = sobol_indices(table, study)
-        save_figure(bars(indices, "Sobol index [-]"), view, "sobol")
-        for name, by_parameter in indices.items():
+        parts.append(bars("sobol", "Sobol indices", indices, "Sobol index [-]", ("first order", "total")))
+        for kept, by_parameter in indices.items():
             shares = ", ".join(f"{p} {s1:.3f} ({st:.3f})" for p, (s1, st) in by_parameter.items())
-            lines.append(f"  Sobol indices of {name}, first order (total): {shares}")
+            lines.append(f"  Sobol indices of {kept}, first order (total): {shares}")
+    parts.append(scatter(table, study))
+    tables = {"statistics.csv": table_csv(["value", *header[1:]], rows)}
+    verdict = _verdict(table, study, ranks)
     if study.select is not None:
-        lines += show_selection(table, study, view)
-    lines.append(f"Figures and statistics are in {view}")
-    return lines
+        selected = show_selection(table, study)
+        lines, tables, verdict = [*lines, *selected.lines], tables | selected.tables, selected.verdict
+        parts = [*selected.parts, *parts]
+    if failures:
+        parts.append(Prose("Runs that failed", failures, listed=True))
+    lead = f"Study `{name}`: {_counted(table, study)}."
+    return Report(study.title or name, lead, verdict, distributions(table, study), tuple(parts)), lines, tables
+
+
+def _verdict(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) -> Verdict:
+    """The spread of the first values, and what they depend on most."""
+    lines = []
+    for name in list(study.keep)[:2]:
+        x = _finite(table, name)
+        if len(x) == 0:
+            lines.append(f"{labelled(table, name)}: no run has a value.")
+            continue
+        low, high = np.quantile(x, [0.05, 0.95])
+        most = max(ranks.get(name, {}).items(), key=lambda pair: abs(pair[1]), default=None)
+        depends = f"; depends most on {most[0]} (rank correlation {most[1]:+.2f})" if most and most[1] else ""
+        lines.append(
+            f"{labelled(table, name)}: mean {x.mean():.5g}, 90 % of the runs within {low:.5g} and {high:.5g}{depends}."
+        )
+    whole = table.num_rows == study.total and not _failures(table)
+    return Verdict("good" if whole else "open", (f"{_counted(table, study)}.", *lines))
+
+
+def study_report(directory: Path) -> tuple[Report, list[str], dict[str, str]]:
+    """The page of a study in a directory, the lines to print, and its tables as CSV by their names."""
+    study, table = study_of(directory), read_table(directory)
+    make = _study_page if study.axis is None else _task_page
+    return make(study, table, directory.resolve().name)
+
+
+def show(directory: Path, pictures: Sequence[str] = ()) -> list[str]:
+    """Writes study.html and tables into a directory beside that of the data, on request pictures; returns what to print."""
+    need("pyarrow", "Showing a study", "study")
+    need("scipy", "Showing a study", "study")
+    report, lines, tables = study_report(directory)
+    page = write_report(figures_of(directory), "study.html", report, tables, pictures)
+    return [*lines, f"The page is at {page}; tables are beside it"]

@@ -1,35 +1,46 @@
-"""The selection of a study as text, tables and a Pareto plot."""
+"""The selection of a study as text, tables and a Pareto chart."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..studies.select import SHARES, USE, Selection
 from ..studies.selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
 from ..studies.study import Study
 from ..studies.table import labelled
-from .pages import save_figure, table_csv, write_text
-from .panels import STYLES
-from .plots import Picture, in_our_looks
+from .page import Table, Verdict
+from .pages import table_csv
+from .panels import PALETTE, Curve, Group, Panel, look
 
 if TYPE_CHECKING:
     import pyarrow as pa
     from matplotlib.figure import Figure
 
-INK, ACCENT = STYLES["2-DOF-NL"]["color"], STYLES["2-DOF-L"]["color"]
+PARETO = "Point at a candidate to read its name and values."
 MAX_LINES = 10  # lines of each list that are printed; selection.csv has all
-MAX_NAMES = 12  # along the front of the plot
+MAX_ROWS = 25  # of a table on the page
 
 
-def show_selection(table: pa.Table, study: Study, view: Path) -> list[str]:
-    """Writes selection.csv, limits.csv and, with two objectives, the Pareto plot; returns what to print."""
+@dataclass(frozen=True)
+class Shown:
+    """A selection as text, as parts of a page, and as the text of CSV files by their names."""
+
+    lines: list[str]
+    verdict: Verdict
+    parts: tuple[Table | Group, ...]
+    tables: dict[str, str]
+
+
+def show_selection(table: pa.Table, study: Study) -> Shown:
+    """The ranking, what limits cost, why others do not fit; with two objectives the Pareto chart."""
     select = study.select
     assert select is not None
     ranked = candidates(table, study)
     costs, front = prices(ranked, select), pareto_front(ranked, select)
-    write_text(view / "selection.csv", _selection_csv(table, study, ranked, front))
     objective = next(iter(select.objectives))
     header = ["limit", "excludes", "alone", "best without it", objective, "gain"]
     rows = [
@@ -43,10 +54,109 @@ def show_selection(table: pa.Table, study: Study, view: Path) -> list[str]:
         ]
         for p in costs
     ]
-    write_text(view / "limits.csv", table_csv(header, rows))
-    if len(select.objectives) > 1:
-        save_figure(pareto_figure(table, ranked, front, select), view, "pareto")
-    return [*_ranking(table, ranked, front, select), *_costs(table, costs, objective), *_misfits(ranked)]
+    lines = [*_ranking(table, ranked, front, select), *_costs(table, costs, objective), *_misfits(ranked)]
+    chart = [Group("pareto", "", PARETO, (pareto_panel(table, ranked, front, select),), 1)]
+    return Shown(
+        lines=lines,
+        verdict=_verdict(table, ranked, costs, select),
+        parts=(
+            *(chart if len(select.objectives) > 1 else []),
+            *_ranking_tables(table, ranked, front, select),
+            *([_costs_table(table, costs, objective)] if costs else []),
+            *_misfit_tables(ranked),
+        ),
+        tables={"selection.csv": _selection_csv(table, study, ranked, front), "limits.csv": table_csv(header, rows)},
+    )
+
+
+def _verdict(table: pa.Table, ranked: list[Candidate], costs: list[Price], select: Selection) -> Verdict:
+    """How many fit, which is best, and which limit costs most."""
+    fitting = [c for c in ranked if c.fits]
+    failed = sum(NOT_RUN in c.violated for c in ranked)
+    cannot = f", {failed} cannot be run" if failed else ""
+    lines = [f"{len(fitting)} of {len(ranked)} candidates fit{cannot}."]
+    objective, direction = next(iter(select.objectives.items()))
+    if fitting:
+        best = fitting[0]
+        tightest = f"; its most used limit: {best.tightest}" if best.tightest else ""
+        lines.append(
+            f"Best: {best.name}, {labelled(table, objective)} {best.values[objective]:.5g} ({direction}){tightest}."
+        )
+    dear = [p for p in costs if math.isfinite(p.gain) and p.gain > 0.0]
+    if dear:
+        p = max(dear, key=lambda price: price.gain)
+        lines.append(f"Without the limit {p.limit} the best would be {100.0 * p.gain:.1f} % better.")
+    return Verdict("good" if fitting else "bad", tuple(lines))
+
+
+def _ranking_tables(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> list[Table]:
+    fitting = [c for c in ranked if c.fits][:MAX_ROWS]
+    if not fitting:
+        return []
+    on_front = {c.run for c in front}
+    titles = [f"{labelled(table, column)}, {direction}" for column, direction in select.objectives.items()]
+    rows = [
+        [
+            c.name,
+            *(f"{v:.5g}" for v in c.values.values()),
+            "yes" if c.run in on_front else "",
+            c.tightest,
+            c.not_judged,
+        ]
+        for c in fitting
+    ]
+    note = f"The best {MAX_ROWS}; all are in `selection.csv`." if sum(c.fits for c in ranked) > MAX_ROWS else ""
+    header = ("candidate", *titles, "Pareto front", "most used limit", "not judged")
+    return [Table("Candidates that fit", header, rows, note)]
+
+
+def _costs_table(table: pa.Table, costs: list[Price], objective: str) -> Table:
+    rows = []
+    for p in costs:
+        found = p.best is not None and p.alone
+        best = p.best.name if p.best is not None and p.alone else "nothing more fits"
+        value = f"{p.best.values[objective]:.5g}" if p.best is not None and found else ""
+        gain = f"{100.0 * p.gain:.1f} %" if found and math.isfinite(p.gain) else ""
+        rows.append([p.limit, str(p.excludes), str(p.alone), best, value, gain])
+    header = ("limit", "excludes", "of these alone", "best without it", labelled(table, objective), "better by")
+    return Table("What each limit costs", header, rows)
+
+
+def _misfit_tables(ranked: list[Candidate]) -> list[Table]:
+    out = [c for c in ranked if not c.fits]
+    if not out:
+        return []
+    note = f"The first {MAX_ROWS} of {len(out)}; all are in `selection.csv`." if len(out) > MAX_ROWS else ""
+    return [
+        Table("Why the others do not fit", ("candidate", "reason"), [[c.name, c.why] for c in out[:MAX_ROWS]], note)
+    ]
+
+
+def pareto_panel(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> Panel:
+    """The first two objectives of all runs: those that fit, those that do not, and the front of those that fit."""
+    x, y = list(select.objectives)[:2]
+
+    def curve(label: str, found: list[Candidate], style: dict[str, Any]) -> Curve:
+        across, along = (np.array([c.values[name] for c in found]) for name in (x, y))
+        return Curve(label, across, along, style, names=tuple(c.name for c in found))
+
+    fits, fails = ([c for c in ranked if c.fits is wanted] for wanted in (True, False))
+    curves = (
+        curve(
+            "does not fit", fails, {"color": "0.6", "linestyle": "none", "marker": "x", "markersize": 4, "alpha": 0.6}
+        ),
+        curve("fits", fits, {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 5}),
+        curve("Pareto front", sorted(front, key=lambda c: c.values[x]), look(1) | {"marker": "o", "markersize": 6}),
+    )
+    label = [f"{labelled(table, name)}, {select.objectives[name]}" for name in (x, y)]
+    return Panel("Objectives of all candidates", label[0], label[1], tuple(c for c in curves if len(c.x)))
+
+
+def pareto_figure(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> Figure:
+    """The picture of `pareto_panel`."""
+    from . import plots
+
+    return plots.draw([pareto_panel(table, ranked, front, select)], 1, (6.4, 4.4))
 
 
 def _selection_csv(table: pa.Table, study: Study, ranked: list[Candidate], front: list[Candidate]) -> str:
@@ -106,29 +216,3 @@ def _misfits(ranked: list[Candidate]) -> list[str]:
     lines = ["Why the others do not fit:"] if out else []
     lines += [f"  {c.name}: {c.why}" for c in out[:MAX_LINES]]
     return [*lines, f"  and {len(out) - MAX_LINES} more, see selection.csv"] if len(out) > MAX_LINES else lines
-
-
-@in_our_looks
-def pareto_figure(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> Figure:
-    """The first two objectives of all runs: those that fit, those that do not, and the front of those that fit."""
-    x, y = list(select.objectives)[:2]
-    figure = Picture(figsize=(6.4, 4.4))
-    axes = figure.add_subplot()
-    groups = (
-        ([c for c in ranked if not c.fits], {"marker": "x", "color": "0.6", "label": "does not fit"}),
-        ([c for c in ranked if c.fits], {"marker": "o", "color": INK, "label": "fits"}),
-    )
-    for group, style in groups:
-        axes.plot([c.values[x] for c in group], [c.values[y] for c in group], linestyle="", markersize=4, **style)
-    ordered = sorted(front, key=lambda c: c.values[x])
-    axes.plot([c.values[x] for c in ordered], [c.values[y] for c in ordered], color=ACCENT, label="Pareto front")
-    for c in ordered[:MAX_NAMES]:
-        point = (c.values[x], c.values[y])
-        axes.annotate(c.name, point, textcoords="offset points", xytext=(4, 4), fontsize=6)
-    low, high = axes.get_xlim()
-    axes.set_xlim(low, high + 0.25 * (high - low))  # room for the name of the last
-    axes.set(
-        xlabel=f"{labelled(table, x)}, {select.objectives[x]}", ylabel=f"{labelled(table, y)}, {select.objectives[y]}"
-    )
-    axes.legend(fontsize=8)
-    return figure

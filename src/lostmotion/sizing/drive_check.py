@@ -13,7 +13,7 @@ from ..simulation.run import as_scenario, run
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
-from .finding import Finding
+from .finding import Finding, Findings
 from .gearbox_check import input_speeds, loads, locks, loss_map, lost_motion
 from .motion_check import dead_zone, holdings, inertia, load_torques, resonance, resonances
 from .motor_check import command_of_run, current, heat, largest_speed, voltage
@@ -27,7 +27,7 @@ MEANS = ("average_output_torque", "average_input_speed", "motor_torque", "windin
 
 
 @checked
-def check_drive(scenario: Scenario | TrainScenario) -> tuple[Finding, ...]:
+def check_drive(scenario: Scenario | TrainScenario) -> Findings:
     """Checks a drive, or a drive train, against its scenario.
 
     The scenario is run; loads, speeds, voltage, current and heat are those of that run, over the duty cycle that `task.cycle`
@@ -42,7 +42,7 @@ def check_drive(scenario: Scenario | TrainScenario) -> tuple[Finding, ...]:
         As `simulate`.
     """
     if isinstance(scenario, TrainScenario):
-        return check_train(scenario)
+        return Findings(check_train(scenario))
     result = _finely_sampled(scenario)
     cycle = duty_cycle(result, scenario.task.cycle)
     g, m, task = scenario.gearbox, scenario.motor, scenario.task
@@ -65,7 +65,7 @@ def check_drive(scenario: Scenario | TrainScenario) -> tuple[Finding, ...]:
     ]
     if g.losses.kind == "map":
         findings.append(loss_map(result))
-    return tuple(_with_sinking(f, result, cycle) if f.rule in MEANS else f for f in findings)
+    return Findings(_with_sinking(f, result, cycle) if f.rule in MEANS else f for f in findings)
 
 
 def _with_sinking(finding: Finding, result: RawResult, cycle: DutyCycle) -> Finding:

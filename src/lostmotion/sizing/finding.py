@@ -54,6 +54,12 @@ class Finding:
         return f"{mark}  {self.what}: {self.value}{remark} [{self.source}]"
 
 
+class Findings(tuple[Finding, ...]):
+    """All points of a check."""
+
+    __slots__ = ()
+
+
 def within(
     rule: str,
     what: str,

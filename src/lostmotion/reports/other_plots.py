@@ -1,0 +1,82 @@
+"""Pictures of the charts that are not made of lines: bars, histograms, matrices, contacts, energy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from .panels import PALETTE, Bars, Chart, Contacts, Flows, Histogram, Matrix
+
+FIRST, SECOND = PALETTE["first"], PALETTE["second"]
+
+
+def draw(axes: Any, chart: Chart) -> None:
+    """One chart on its axes."""
+    drawn: dict[type, Callable[[Any, Any], None]] = {
+        Bars: _bars,
+        Histogram: _histogram,
+        Matrix: _matrix,
+        Contacts: _contacts,
+        Flows: _flows,
+    }
+    drawn[type(chart)](axes, chart)
+
+
+def _bars(axes: Any, chart: Bars) -> None:
+    order = sorted(chart.values, key=lambda name: max(map(abs, chart.values[name])))
+    count = len(chart.series) or 1
+    y = np.arange(len(order))
+    for n, colour in zip(range(count), (FIRST, SECOND), strict=False):
+        values = [chart.values[name][n] for name in order]
+        label = chart.series[n] if chart.series else None
+        axes.barh(y + (0.5 * (count - 1) - n) * 0.4, values, 0.8 / count, color=colour, label=label)
+    axes.set_yticks(y, order)
+    axes.axvline(0.0 if chart.limit is None else chart.limit, color="0.3", linewidth=0.8)
+    axes.set(xlabel=chart.label, xlim=chart.x_range)
+    if chart.series:
+        axes.legend(fontsize=8)
+
+
+def _histogram(axes: Any, chart: Histogram) -> None:
+    values = np.asarray(chart.values)
+    axes.hist(values, bins=min(60, max(5, round(len(values) ** 0.5))), color=FIRST)
+    for value in np.quantile(values, chart.quantiles):
+        axes.axvline(value, color=SECOND, linewidth=1.2)
+    axes.set(xlabel=chart.label, ylabel="runs")
+
+
+def _matrix(axes: Any, chart: Matrix) -> None:
+    """The number in each cell gives the sign in grey too."""
+    n = len(chart.names)
+    axes.grid(visible=False)
+    image = axes.imshow(chart.values, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+    axes.set_xticks(range(n), chart.names, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
+    axes.set_yticks(range(n), chart.names, fontsize=8)
+    for i, j in np.ndindex(n, n):
+        ink = "white" if abs(chart.values[i, j]) > 0.6 else "black"
+        axes.text(j, i, f"{chart.values[i, j]:+.2f}", ha="center", va="center", fontsize=6.5, color=ink)
+    axes.figure.colorbar(image, ax=axes, shrink=0.8)
+
+
+def _contacts(axes: Any, chart: Contacts) -> None:
+    """Stuck: full height; forward: the upper half; backward: the lower half."""
+    time = np.asarray(chart.time)
+    for k, modes in enumerate(chart.modes.values()):
+        m = np.asarray(modes)[:-1]
+        edges = np.concatenate([[0], np.flatnonzero(np.diff(m)) + 1, [len(m)]])
+        for mode, (low, high) in {0: (-0.35, 0.7), 1: (0.0, 0.35), -1: (-0.35, 0.35)}.items():
+            spans = [(time[a], time[b] - time[a]) for a, b in pairwise(edges.tolist()) if m[a] == mode]
+            axes.broken_barh(spans, (low - k, high), facecolor="#39424e" if mode == 0 else "#b8c6d4")
+    axes.set_yticks([-k for k in range(len(chart.modes))], list(chart.modes), fontsize=8)
+    axes.set(xlabel="time [s]")
+
+
+def _flows(axes: Any, chart: Flows) -> None:
+    apart = ("residual", "turned_over")
+    _bars(
+        axes,
+        Bars("", "energy [J]", {n.replace("_", " "): (e,) for n, e in chart.energies.items() if e and n not in apart}),
+    )

@@ -1,0 +1,215 @@
+"""What is shown of a run: its axes, commands, speeds, torques, twists, contacts, energy, and the way through its loss maps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..live_page.drawn import axis_figures
+from ..model.losses import LossMap
+from ..model.train import DriveTrain
+from ..simulation.results import is_train_result, scenario_of
+from ..simulation.scenario import Scenario
+from ..simulation.train_parts import parts_of
+from ..simulation.train_scenario import TrainScenario
+from .panels import FAINT, Chart, Contacts, Curve, Ground, Panel, look
+
+if TYPE_CHECKING:
+    import xarray
+
+Series = tuple[str, str, float]
+"""variable, label, factor"""
+# The result variables that are shown of a run in the short form.
+OVERVIEW = (
+    "command",
+    "motor_torque",
+    "motor_speed",
+    "load_speed",
+    "input_torque",
+    "output_torque",
+    "load_torque",
+    "twist",
+    "input_contact",
+    "twist_contact",
+)
+CONTACTS = {"input_contact": "input shaft", "twist_contact": "gearbox twist", "load_contact": "load"}
+
+
+def run_charts(result: xarray.Dataset) -> list[Chart]:
+    """Charts over time: of controlled axes reference, measured value and following error; then what moves, and the contacts.
+
+    Raises
+    ------
+    InputError
+        The dataset lacks what is shown.
+    """
+    if is_train_result(result):
+        return [*_axes(result), *_train(result)]
+    lacking = [name for name in OVERVIEW if name not in result]
+    if len(lacking) == len(OVERVIEW):
+        raise InputError("this dataset is neither a run nor a frequency response; there is no figure of it")
+    if lacking:
+        raise InputError(f"this dataset lacks {', '.join(lacking)}, which the figure of a run shows")
+    return [*_axes(result), *_drive(result)]
+
+
+def _axes(result: xarray.Dataset) -> Iterator[Panel]:
+    """Reference, measured value and following error of each controlled axis."""
+    if "scenario" not in result.attrs:  # a periodic motion, which knows its drive only
+        return
+    scenario = scenario_of(result)
+    time = result["time"].values
+    for motor, controller in scenario.axes().items():
+        for figure in axis_figures(controller, motor, isinstance(scenario, TrainScenario)):
+            series = [s for s in figure["series"] if s["variable"] in result]
+            error = any("minus" in s for s in series)
+            factor, unit = (1e3, "mrad") if error and figure["unit"] == "rad" else (1.0, figure["unit"])
+            label = f"{'error' if error else figure['title'].split()[0].lower()} [{unit.replace('*', '·')}]"
+            curves = []
+            for k, s in enumerate(series):
+                values = result[s["variable"]].values - (result[s["minus"]].values if "minus" in s else 0.0)
+                curves.append(Curve(s["label"], time, factor * values, look(1 if len(series) > 1 and k == 0 else 0)))
+            if curves:
+                yield Panel(figure["title"], "time [s]", label, tuple(curves))
+
+
+def _panel(result: xarray.Dataset, title: str, label: str, series: list[Series]) -> Panel:
+    time = result["time"].values
+    there = [entry for entry in series if entry[0] in result]
+    curves = tuple(
+        Curve(text, time, factor * result[name].values, look(k)) for k, (name, text, factor) in enumerate(there)
+    )
+    return Panel(title, "time [s]", label, curves)
+
+
+def _drive(result: xarray.Dataset) -> Iterator[Chart]:
+    """Of a drive in the short form."""
+    time, ratio = result["time"].values, _ratio(result)
+
+    def curve(name: str, style: Mapping[str, Any], factor: float = 1.0, label: str = "") -> Curve:
+        return Curve(label or name.replace("_", " "), time, factor * result[name].values, style)
+
+    def panel(title: str, label: str, *curves: Curve) -> Panel:
+        return Panel(title, "time [s]", label, curves)
+
+    yield panel("Command", "command [-]", curve("command", look(0)))
+    yield panel("Motor torque", "motor torque [N·m]", curve("motor_torque", look(0)))
+    speed = curve("motor_speed", look(1), 1.0 / ratio, "motor speed / ratio")
+    yield panel("Speed", "speed at the load [rad/s]", speed, curve("load_speed", look(0)))
+    torque = curve("input_torque", look(1), ratio, "input torque x ratio")
+    yield panel("Torque", "torque [N·m]", torque, curve("output_torque", look(0)), curve("load_torque", FAINT))
+    yield panel("Twist", "twist [mrad]", curve("twist", look(0), 1e3))
+    yield _contacts(result, {name: label for name, label in CONTACTS.items() if name in result})
+
+
+def _ratio(result: xarray.Dataset) -> float:
+    if "gear_ratio" in result.attrs:
+        return float(result.attrs["gear_ratio"])
+    scenario = scenario_of(result)
+    assert isinstance(scenario, Scenario)
+    return scenario.gearbox.ratio
+
+
+def _contacts(result: xarray.Dataset, names: Mapping[str, str]) -> Contacts:
+    return Contacts("Contacts", result["time"].values, {label: result[name].values for name, label in names.items()})
+
+
+def _train(result: xarray.Dataset) -> Iterator[Chart]:
+    """Of a drive train: commands, speeds, torques, twists and contacts of all elements."""
+    scenario = scenario_of(result)
+    assert isinstance(scenario, TrainScenario)
+    train = scenario.train()
+    loads = [(f"{name}_load_torque", f"load on {name}", 1.0) for name in scenario.loaded()]
+    twists = [(f"{n}_twist", n, 1e3) for n, g in train.gears.items() if g.stiffness.kind != "rigid"]
+    wanted: list[tuple[str, str, list[Series]]] = [
+        ("Command", "command [-]", [(f"{name}_command", name, 1.0) for name in scenario.commanded()]),
+        ("Torque of motors", "torque of motor [N·m]", [(f"{name}_torque", name, 1.0) for name in train.motors]),
+        *(_speeds(part.train()) for part in parts_of(scenario)),
+        (
+            "Torque at outputs and loads",
+            "torque at output of gear, of load [N·m]",
+            [(f"{name}_output_torque", name, 1.0) for name in train.gears] + loads,
+        ),
+        ("Twist", "twist [mrad]", twists),
+    ]
+    for title, label, series in wanted:
+        panel = _panel(result, title, label, series)
+        if panel.curves:
+            yield panel
+    contacts = [str(name) for name in result if str(name).endswith("_contact")]
+    if contacts:
+        yield _contacts(result, {name: name.removesuffix("_contact").replace("_", " ") for name in contacts})
+
+
+def _speeds(train: DriveTrain) -> tuple[str, str, list[Series]]:
+    """Speeds of a train that hangs together, all in terms of its last shaft."""
+    last = list(train.shafts)[-1]
+    series = [
+        (f"{name}_speed", f"{name} / {ratio:.4g}".removesuffix(" / 1"), 1.0 / ratio)
+        for name, ratio in ratios_to(train, last).items()
+    ]
+    return f"Speed of {last}", f"speed at {last} [rad/s]", series
+
+
+def ratios_to(train: DriveTrain, last: str) -> dict[str, float]:
+    """For each shaft its speed over that of the last one, by the gears between them; 1 where there are none."""
+    ratios = {last: 1.0}
+    waiting = [last]
+    while waiting:
+        shaft = waiting.pop()
+        for gear in train.fixed_gears().values():
+            for near, far, ratio in (
+                (gear.output, gear.input, gear.ratio),
+                (gear.input, gear.output, 1.0 / gear.ratio),
+            ):
+                if near == shaft and far not in ratios:
+                    ratios[far] = ratio * ratios[near]
+                    waiting.append(far)
+    return {name: ratios.get(name, 1.0) for name in train.shafts}
+
+
+# --- over each other ---
+
+
+def gear_charts(result: xarray.Dataset) -> list[Panel]:
+    """Of each gear torque over twist, and the working point over its loss map."""
+    scenario = scenario_of(result)
+    gears: list[tuple[str, Any, str, str]] = (
+        [("gearbox", scenario.gearbox, "", "motor_speed")]
+        if isinstance(scenario, Scenario)
+        else [(name, gear, f"{name}_", f"{gear.input}_speed") for name, gear in scenario.gears.items()]
+    )
+    found = []
+    for name, gear, prefix, speed in gears:
+        twist, torque = f"{prefix}twist", f"{prefix}output_torque"
+        if gear.stiffness.kind != "rigid" and twist in result and torque in result:
+            loop = Curve(name, 1e3 * result[twist].values, result[torque].values, look(0))
+            found.append(Panel(f"Torsion and hysteresis of {name}", "twist [mrad]", "output torque [N·m]", (loop,)))
+        if (
+            isinstance(gear.losses, LossMap)
+            and getattr(gear, "housing", None) is None
+            and speed in result
+            and torque in result
+        ):
+            found.append(_working(name, gear, result[speed].values, result[torque].values))
+    return found
+
+
+def _working(name: str, gear: Any, speed: np.ndarray, torque: np.ndarray) -> Panel:
+    """The way of the working point through a loss map: relative load over relative speed, positive where the motor drives."""
+    speeds, loads, values = (np.asarray(table) for table in gear.losses.whole())
+    x = np.abs(speed) / gear.rated_input_speed
+    y = torque * np.where(speed != 0.0, np.sign(speed), np.sign(torque)) / gear.rated_output_torque
+    reach = (max(0.02, 1.15 * float(x.max())), max(0.02, 1.15 * float(np.abs(y).max())))
+    return Panel(
+        f"Loss map of {name}",
+        "speed / rated speed [-]",
+        "load / rated torque [-]",
+        (Curve("working point", x, y, look(0)),),
+        x_range=(0.0, reach[0]),
+        y_range=(-reach[1], reach[1]),
+        ground=Ground(speeds, loads, values, "loss coefficient"),
+    )

@@ -1,0 +1,210 @@
+"""Reports: the numbers of a page are those of the results; what it shows without its script; pictures on request."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import lostmotion as lm
+from html_pages import Page, charts
+from lostmotion.cli import app
+from lostmotion.reports import page as pages
+from lostmotion.reports.packed import packed
+from lostmotion.reports.page import Report, Table, Verdict, render
+from lostmotion.reports.panels import PALETTE, STEPS, Bars, Contacts, Curve, Flows, Group, Mark, Matrix, Panel, look
+from lostmotion.reports.pictures import endings
+from lostmotion.reports.run import run_report
+from lostmotion.reports.servo import servo_report, write_servo
+from lostmotion.reports.static import svg_of
+from lostmotion.reports.thinning import simplified
+from lostmotion.units.practical import practical
+
+X = np.geomspace(1.0, 1000.0, 50)
+PANEL = Panel("gain", "frequency [Hz]", "[-]", (Curve("one", X, 10.0 / X, look(0)),), log_x=True, log_y=True, level=1.0,
+              marks=(Mark(10.0, 1.0, "10 Hz", look(0)),))  # fmt: skip
+TIME = np.linspace(0.0, 1.0, 11)
+
+
+@pytest.fixture(autouse=True)
+def script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stands in for what node builds."""
+    (tmp_path / "report.js").write_text("void 0;")
+    monkeypatch.setattr(pages, "SCRIPT", tmp_path / "report.js")
+
+
+def report(*charts: object, table: Table | None = None) -> Report:
+    group = Group("main", "Main", "", charts)  # type: ignore[arg-type]
+    parts = () if table is None else (table,)
+    return Report("A <title>", "of `it`", Verdict("good", ("in order",)), group, parts)
+
+
+@pytest.fixture(scope="module")
+def axis() -> lm.ServoReport:
+    return lm.commission(lm.load("speed-axis"))
+
+
+def test_the_numbers_of_a_page_are_those_of_the_result(axis: lm.ServoReport) -> None:
+    found = {chart["title"]: chart for chart in charts(render(servo_report("speed-axis", axis)))}
+    (error,) = found["following error over the run"]["lines"]
+    assert np.array_equal(error["x"], axis.following.time)
+    assert np.array_equal(error["y"], axis.following.error)
+    for row in axis.loops:
+        gain, phase = (found[f"{row.loop} loop, {which}"] for which in ("open: gain", "open: phase"))
+        line = next(line for line in gain["lines"] if line["label"] == row.regime)
+        assert np.array_equal(line["x"], row.frequency)
+        assert np.array_equal(
+            line["y"], np.where(np.abs(row.open_loop) > 1e-9, np.abs(row.open_loop), np.nan), equal_nan=True
+        )
+        margin = next(m for m in phase["marks"] if m["x"] == row.margins.crossover)
+        assert np.radians(margin["y"] - margin["to"]) == pytest.approx(row.margins.phase_margin, rel=1e-12)
+        assert margin["to"] == pytest.approx(-180.0, abs=2.0)  # the curve is linear between its frequencies there
+
+
+def test_a_notebook_shows_the_page_of_the_command(axis: lm.ServoReport) -> None:
+    shown = axis._repr_html_()  # type: ignore[attr-defined]
+    assert shown.startswith("<iframe srcdoc=")
+    assert "Stable in each regime" in shown
+
+
+def test_a_page_is_well_formed_and_asks_for_nothing() -> None:
+    energies = {"source": 2.0, "gear_losses": -1.5, "stored_change": 0.5}
+    every = report(
+        PANEL,
+        Contacts("contacts", TIME, {"motor": np.sign(TIME - 0.5)}),
+        Flows("energy", energies),
+        Bars("bars", "rank correlation [-]", {"a": (0.5,), "b": (-0.7,)}),
+        Matrix("correlations", ("a", "b"), np.array([[1.0, -0.5], [-0.5, 1.0]])),
+        table=Table("Values", ("what", "value [N·m]"), [["a & b", "1.5"], ["c", ""]]),
+    )
+    page = render(every)
+    assert not Page(page).faults
+    assert not re.findall(r"(?:src|href)=\"(?!data:)", page)
+    assert "<h1>A &lt;title&gt;</h1>" in page
+    assert "<code>it</code>" in page
+    assert '<th scope="col" class="number">value [N·m]</th>' in page
+    assert [chart["kind"] for chart in charts(page)] == ["lines", "contacts", "flows"]
+
+
+def test_without_its_script_a_page_has_tables_and_figures_and_names_the_remedy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pages, "SCRIPT", tmp_path / "none.js")
+    monkeypatch.setattr(pages, "made_here", lambda *_: None)  # as in an installed package
+    page = render(report(PANEL, table=Table("Values", ("what", "value [N·m]"), [["a", "1.5"]])))
+    assert "make page-report" in page
+    assert "<script" not in page
+    assert page.count("<svg role=") == 1
+    assert "<td" in page
+
+
+def test_the_colours_of_pictures_and_pages_are_the_same() -> None:
+    sheet = (Path(pages.__file__).parent / "style.css").read_text()
+    light = dict(re.findall(r"--(\w+): (#\w+);", sheet.partition('[data-theme="dark"]')[0]))
+    assert {name: light[name] for name in PALETTE} == PALETTE
+    assert [light[f"step{k}"] for k in range(len(STEPS))] == list(STEPS)
+
+
+def test_a_long_curve_keeps_its_extremes() -> None:
+    n = 300_000
+    y = np.sin(np.arange(n) * 1e-3)
+    y[123_456] = 7.0
+    (chart,) = charts(render(report(Panel("", "time [s]", "[-]", (Curve("y", np.arange(n) * 1e-4, y, look(0)),)))))
+    (line,) = chart["lines"]
+    assert len(line["y"]) <= PANEL.max_points + 10
+    assert line["y"].max() == 7.0
+    assert len(packed(())) < 100
+
+
+def test_a_static_curve_stays_within_the_line_that_is_seen() -> None:
+    x = np.linspace(0.0, 500.0, 3000)
+    points = np.column_stack([x, 100.0 + 80.0 * np.sin(x / 40.0)])
+    kept = simplified(points, 0.3)
+    assert len(kept) < 150
+    assert np.abs(np.interp(x, *points[kept].T) - points[:, 1]).max() < 0.8  # 0.3 across a slope of up to 2
+
+
+def test_a_static_figure_has_its_points_where_the_axes_say() -> None:
+    """Over logarithmic axes 10/x is a straight line from corner to corner, and the mark is at a third of it."""
+    svg = svg_of(PANEL)
+    ends = [
+        tuple(map(float, p))
+        for p in re.findall(r"[ML]([\d.]+) ([\d.]+)", re.search(r'stroke-width="1.6" d="(.*?)"', svg)[1])
+    ]  # type: ignore[index]
+    (x0, y0), (x1, y1) = ends
+    cx, cy = map(float, re.search(r'<circle cx="([\d.]+)" cy="([\d.]+)"', svg).groups())  # type: ignore[union-attr]
+    assert (cx - x0) / (x1 - x0) == pytest.approx(1.0 / 3.0, abs=2e-3)  # coordinates have one decimal
+    assert (cy - y0) / (y1 - y0) == pytest.approx(1.0 / 3.0, abs=2e-3)
+    assert ">100<" in svg
+
+
+def test_figures_are_drawn_where_they_are_asked_for(axis: lm.ServoReport, tmp_path: Path) -> None:
+    write_servo(tmp_path, "speed-axis", axis, endings("png, svg"))
+    made = {p.name for p in tmp_path.iterdir()} - {"report.js"}
+    assert made == {"servo.html", "margins.csv"} | {
+        f"{n}.{e}" for n in ("axis", "loops", "steps") for e in ("csv", "png", "svg")
+    }
+    assert (tmp_path / "axis.png").read_bytes().startswith(b"\x89PNG")
+    assert endings(None) == ()
+    with pytest.raises(lm.InputError, match="gif is not known; write png, svg or pdf"):
+        endings("png,gif")
+
+
+def test_a_report_takes_no_plotting_library_along() -> None:
+    modules = sorted(path.stem for path in Path(pages.__file__).parent.glob("*.py"))
+    drawing = {"plots", "other_plots", "hunting_figures", "response_figures", "pictures"}
+    reports = [f"lostmotion.reports.{name}" for name in modules if name not in drawing]
+    code = f"import sys, {', '.join(reports)}; print('matplotlib' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
+
+
+def test_a_run_is_reported_with_the_numbers_of_its_dataset(tmp_path: Path) -> None:
+    scenario = lm.load("position-axis", {"simulation.duration": 0.3})
+    result = lm.simulate(scenario)
+    page = render(run_report("position-axis", result))
+    found = {chart["title"]: chart for chart in charts(page)}
+    (error,) = found["Following error"]["lines"]
+    wanted = result["position_reference"].values - result["measured_position"].values
+    assert np.array_equal(error["y"], 1e3 * wanted)
+    assert np.array_equal(found["Twist"]["lines"][0]["y"], 1e3 * result["twist"].values)
+    modes = {row["label"]: row["modes"] for row in found["Contacts"]["rows"]}
+    assert np.array_equal(modes["input shaft"], result["input_contact"].values)
+    assert found["Energy of the whole run"]["energies"] == lm.energy_of(result)
+    assert len(found["Loss map of gearbox"]["lines"][0]["x"]) == result.sizes["time"]
+    assert practical(float(np.abs(wanted).max()), "rad") in page
+    assert not Page(page).faults
+    assert result.lm._repr_html_().startswith("<iframe")
+
+
+def test_the_figure_of_a_run_shows_its_axis_and_its_contacts_as_bars() -> None:
+    figure = lm.simulate(lm.load("direction-finder", {"simulation.duration": 0.05})).lm.plot()
+    axes = {a.get_title(): a for a in figure.axes}
+    assert {"Position of traverse drive", "Following error of elevation drive"} <= axes.keys()
+    assert [t.get_text() for t in axes["Contacts"].get_yticklabels()][:2] == ["traverse motor", "traverse gear twist"]
+
+
+def test_a_report_of_a_run_is_a_page(tmp_path: Path) -> None:
+    path = tmp_path / "r.html"
+    done = CliRunner().invoke(app, ["run", "paper-2dof-nl-small", "--report", str(path)])
+    assert done.exit_code == 0, done.output
+    assert "Share of the time in which contacts are stuck: input" in path.read_text()
+    wrong = CliRunner().invoke(app, ["run", "paper-2dof-nl-small", "--report", str(tmp_path / "r.pdf")])
+    assert "its name must end in .html" in str(wrong.exception)
+
+
+def test_a_page_of_250_logs_stays_below_two_megabytes() -> None:
+    """Random walks of 2000 samples, which nothing compresses, with the points that an identification of 250 logs gives each curve."""
+    random = np.random.default_rng(1)
+    time = np.linspace(0.0, 2.0, 2000)
+    panels = []
+    for k in range(250):
+        walks = np.cumsum(random.normal(size=(2, 2000)), axis=1)
+        curves = tuple(Curve(str(n), time, walk, look(n)) for n, walk in enumerate(walks))
+        panels.append(Panel(f"log {k}", "time [s]", "position [rad]", curves, max_points=120))
+    page = render(report(*panels))
+    assert len(page) < 2e6
+    assert len(charts(page)) == 250
