@@ -224,6 +224,8 @@ inline nb::dict run_train(const TrainDescription& description, const std::vector
     out["end_state"] = named_end(report, a);
     out["left_data_at"] = report.left_data_at;
     out["steps"] = report.steps;
+    out["mode_trials"] = report.searches.trials;
+    out["mode_fallbacks"] = report.searches.fallbacks;
     return out;
 }
 

@@ -59,6 +59,7 @@ TrainReport run_train_exactly_in(const typename TrainReader<D>::Model& model, co
     std::optional<TrainWorkspace<D>> own;
     if (workspace == nullptr) workspace = &own.emplace(model.assembly);
     const model::TrainSystem<D>& system = workspace->system;
+    system.searches() = {};
     ExactSolver<model::TrainSystem<D>> solver(system, c.signals, options.sample_interval, system.balanced_scale(),
                                               &workspace->cache);
     if (watcher != nullptr) watcher->begin(solver);

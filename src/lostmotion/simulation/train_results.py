@@ -98,6 +98,8 @@ def _attributes(scenario: TrainScenario, result: dict[str, Any], how: str, *, le
         "switching_count": int(result["switching_count"]),
         "end_state": json.dumps(result["end_state"]),
         "steps": int(result["steps"]),
+        "mode_trials": int(result["mode_trials"]),
+        "mode_fallbacks": int(result["mode_fallbacks"]),
         SWITCHINGS: packed(result["switchings"]),
     }
     warnings = []
