@@ -301,7 +301,7 @@ TEST_CASE("pivoting and trying all combinations find the same accelerations, wit
 TEST_CASE("a jump that starts a chain with all its contacts at rest is found in few trials") {
     RandomTrains random(22);
     long worst = 0, contacts = 0;
-    for (int n = 0; n < cases(400); ++n) {
+    for (int n = 0; n < cases(1000); ++n) {
         Train t;
         t.shafts.resize(7);
         for (Shaft& s : t.shafts) {
@@ -336,7 +336,7 @@ TEST_CASE("a jump that starts a chain with all its contacts at rest is found in 
                   doctest::Approx(expected[s]).scale(1.0).epsilon(1e-6));
     }
     CHECK(contacts == 13);
-    CHECK(worst <= 100);
+    CHECK(worst <= 60);  // at both ends of the way of the torques, of 3^13 combinations
 }
 
 TEST_CASE("the search works on packed regimes and the kernel's own instant as on the train's") {
