@@ -27,7 +27,8 @@ TEST_CASE("both solvers agree on trains with hysteresis beside contacts at rest,
     for (int n = 0; n < cases(1000); ++n) {
         CAPTURE(n);
         const Train t = random.braked(random.pick(2, 4));
-        compare_solvers({t, random.signals(Assembly(named(t)), 0.5)}, {}, 0.5, tally, "braked");
+        compare_solvers({t, random.signals(Assembly(named(t)), 0.5)}, {}, 0.5, tally,
+                        ("braked " + std::to_string(n)).c_str());
     }
     MESSAGE(tally.compared << " trains compared, largest difference " << tally.worst << "; " << tally.undecided
                            << " that the adaptive solver does not settle, " << tally.jammed << " that jam");

@@ -167,16 +167,18 @@ Found SwitchedTrain<Sizes>::find(Cache& cache, Now& now, const Now& before, Even
     const Key from = key;
     bool may_hold_more = false;
     for (int c = 0; c < contacts(); ++c) may_hold_more = may_hold_more || (event.at_rest[c] && holds_more_[c]);
-    event.pivots = may_hold_more || combinations(event) > few;
-    if (event.pivots) event.path = follow(cache, now, before, event, from);
-    const Found found = search(cache, now, event, from, key);
+    const bool tries_all = !may_hold_more && combinations(event) <= few;
+    const Key path = tries_all ? from : follow(cache, now, before, event, from);
+    const auto search = [&] {
+        return tries_all ? enumerate(cache, now, event, from, key) : pivot(cache, now, event, path, from, key);
+    };
+    const Found found = search();
     if (found == Found::yes) return found;
     event.from_each_load =
         std::any_of(train().gears.begin(), train().gears.end(), [](const Gear& g) { return g.has_dry_losses(); });
-    if (event.from_each_load && search(cache, now, event, from, key) == Found::yes) return Found::yes;
+    if (event.from_each_load && search() == Found::yes) return Found::yes;
     event.closest = true;
-    if (search(cache, now, event, from, key) == Found::yes) return Found::yes;
-    return found;
+    return search() == Found::yes ? Found::yes : found;
 }
 
 // A contact that "slips" while those that are stuck keep its speed at zero, or that would have to slip against another
@@ -203,60 +205,35 @@ bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
     return false;
 }
 
-template <class Sizes>
-template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::search(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
-    return event.pivots ? pivot(cache, now, event, from, key) : enumerate(cache, now, event, from, key);
-}
-
 // Those with most contacts stuck first. While everything is at rest the torques stay as they were, and give way only if
 // neither that nor a motion is consistent, and then by as little as they can.
 template <class Sizes>
 template <class Cache, class Now>
 Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
-    std::array<std::array<int, 3>, max_contacts> choice{};
-    std::array<int, max_contacts> n{}, at{};
-    for (int c = 0; c < contacts(); ++c) {
-        const ContactPlace& p = places().contacts[c];
-        if (p.bilateral)
-            choice[c][n[c]++] = 0;
-        else if (!event.at_rest[c])
-            choice[c][n[c]++] = from.modes[c];
-        else
-            for (const int mode : {0, +1, -1})
-                if (!(p.one_way && mode > 0)) choice[c][n[c]++] = mode;
-    }
     struct Combination {
-        std::array<std::int8_t, max_contacts> modes{};
-        int slips = 0;
+        Key modes;
+        std::ptrdiff_t slips;
     };
     std::vector<Combination> all;
     all.reserve(27);
-    while (true) {
-        Combination& next = all.emplace_back();
-        for (int c = 0; c < contacts(); ++c) {
-            next.modes[c] = static_cast<std::int8_t>(choice[c][at[c]]);
-            next.slips += next.modes[c] != 0;
-        }
-        int c = contacts() - 1;
-        while (c >= 0 && ++at[c] == n[c]) at[c--] = 0;
-        if (c < 0) break;
+    for (std::uint64_t number = 0; number < combinations(event); ++number) {
+        const Key modes = combination(number, event, from);
+        all.push_back(
+            {modes, contacts() - std::ranges::count(modes.modes.begin(), modes.modes.begin() + contacts(), 0)});
     }
     const auto before = now.memory;  // all that a trial may change
     Found worst = Found::inconsistent;
     const double limit = event.closest ? max_violation : std::numeric_limits<double>::infinity();
     double smallest = limit;
-    Key modes, closest;
+    Key closest;
     auto of_closest = before;
     for (const bool at_limit : {false, true})
         for (int slips = 0; slips <= contacts(); ++slips)
             for (const Combination& next : all) {
-                if (next.slips != slips) continue;
-                modes.modes = next.modes;
-                if (at_its_limit(modes) != at_limit) continue;
+                if (next.slips != slips || at_its_limit(next.modes) != at_limit) continue;
                 now.memory = before;
-                const Found found = at_limit ? settle_at_limit(cache, now, modes, event, key)
-                                             : settle(cache, now, modes, event, key).found;
+                const Found found = at_limit ? settle_at_limit(cache, now, next.modes, event, key)
+                                             : settle(cache, now, next.modes, event, key).found;
                 if (found == Found::yes && !event.closest && !at_limit) return found;
                 if (found == Found::outside) worst = found;
                 if (found != Found::yes) continue;
@@ -280,8 +257,8 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
 
 template <class Sizes>
 template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
-    Key modes = event.path;
+Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, Key modes, const Key& from,
+                                  Key& key) const {
     const auto before = now.memory;
     struct Tried {
         Key modes;
@@ -310,22 +287,14 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
         return false;
     };
     // Where none of these leads on: combinations spread evenly over all, each once.
-    const auto all = static_cast<std::uint64_t>(combinations(event));
-    std::uint64_t drawn = 0;
+    std::uint64_t drawn = 1;
     std::size_t begun = 0;  // how many had been tried at the last start
     const auto start_again = [&] {
         constexpr std::uint64_t stride = 2654435761u;  // Knuth's prime near the golden section of 2^32
         path.clear();
         begun = tried.size();
-        while (drawn < all) {
-            std::uint64_t number = drawn++ * stride % all;
-            for (int c = 0; c < contacts(); ++c) {
-                const ContactPlace& p = places().contacts[c];
-                if (!event.at_rest[c] || p.bilateral) continue;
-                const std::uint64_t n = p.one_way ? 2 : 3;
-                modes.modes[c] = static_cast<std::int8_t>(static_cast<int>(number % n) - 1);
-                number /= n;
-            }
+        for (const auto all = static_cast<std::uint64_t>(combinations(event)); drawn <= all;) {
+            modes = combination(drawn++ * stride % all, event, from);
             if (is_new()) return true;
         }
         return false;

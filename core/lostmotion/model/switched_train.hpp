@@ -111,8 +111,6 @@ class SwitchedTrain {
         int contact = nowhere, branch = nowhere, neighbour = 0, memory = nowhere;
         double shift = 0.0;
         Key before{};
-        Key path{};                   // the modes that the torques lead to: where pivoting begins
-        bool pivots = false;          // rather than trying combinations
         bool from_each_load = false;  // begin the search for the cell of a loss law from each load
         bool by_value = false;        // a guard that is zero to rounding holds, whatever its derivatives
         bool closest = false;         // take the combination that violates its guards least
@@ -177,8 +175,6 @@ class SwitchedTrain {
     template <class Cache, class Now>
     Found find(Cache& cache, Now& now, const Now& before, Event event, Key& key) const;
     template <class Cache, class Now>
-    Found search(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
-    template <class Cache, class Now>
     bool conditions(Cache& cache, Now now, const Key& modes, const Event& event, Conditions& out) const;
     template <class Cache, class Now>
     Key follow(Cache& cache, const Now& now, const Now& before, const Event& event, const Key& from) const;
@@ -195,10 +191,24 @@ class SwitchedTrain {
             if (event.at_rest[c] && !places().contacts[c].bilateral) n *= places().contacts[c].one_way ? 2.0 : 3.0;
         return n;
     }
+    // One of them, by its number: the last contact changes first, from stuck to forward to backward.
+    Key combination(std::uint64_t number, const Event& event, const Key& from) const {
+        Key out;
+        for (int c = contacts(); c-- > 0;) {
+            const ContactPlace& p = places().contacts[c];
+            if (p.bilateral) continue;
+            out.modes[c] = from.modes[c];
+            if (!event.at_rest[c]) continue;
+            const std::uint64_t n = p.one_way ? 2 : 3, mode = number % n;
+            out.modes[c] = mode == 0 ? 0 : mode == 1 && !p.one_way ? +1 : -1;
+            number /= n;
+        }
+        return out;
+    }
     template <class Cache, class Now>
     Found enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
     template <class Cache, class Now>
-    Found pivot(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
+    Found pivot(Cache& cache, Now& now, const Event& event, Key modes, const Key& from, Key& key) const;
     template <class Cache, class Now>
     Trial settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const;
     template <class Cache, class Now>
