@@ -290,6 +290,8 @@ inline nb::dict run(const TrainDescription& description, const std::vector<Signa
     out["end_state"] = in_order(named_end(report, a));
     out["left_data_at"] = report.left_data_at;
     out["steps"] = report.steps;
+    out["mode_trials"] = report.searches.trials;
+    out["mode_fallbacks"] = report.searches.fallbacks;
     return out;
 }
 

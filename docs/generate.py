@@ -218,7 +218,8 @@ def variables() -> str:
         "",
         "`lm.switchings_of(result)` gives the switchings as a dataset of their own: instants, what ended the regime, the modes of the",
         "contacts before and after, and the left and right limit of the output torque; in a NetCDF file they are the group `switchings`.",
-        "Attributes: `scenario` (all values, can be run again), `energy`, `end_state`, `solver`, `switching_count`, and, where they apply,",
+        "Attributes: `scenario` (all values, can be run again), `energy`, `end_state`, `solver`, `switching_count`, `mode_trials` and",
+        "`mode_fallbacks` (combinations of contact modes that were tried, and how often the search began anew), and, where they apply,",
         "`note` and `warning`.",
         "",
     ]

@@ -338,3 +338,19 @@ def test_the_inertia_of_a_held_ring_does_not_matter(inertia: float, solver: str)
     model = lm.linearize(scenario, time=0.5)
     rate = model.B[list(model.states).index("carrier_speed"), list(model.inputs).index("m_command")]
     assert rate == pytest.approx(1.0 / (1.0 + 10.0 / 6.25) / 2.5, rel=1e-13)
+
+
+@pytest.mark.parametrize("solver", ["exact", "dormand-prince"])
+def test_a_clutch_does_not_break_away_when_another_contact_stops(solver: str) -> None:
+    """Friction of a reverses at the stop: 6.75 rad/s^2 before, then 2.25, where the clutch takes 0.995 of 1.2 N m."""
+    scenario = lm.TrainScenario(
+        shafts={"a": {"inertia": 0.02, "friction_torque": 0.45}, "b": {"inertia": 0.18, "torque": -1.4}},
+        motors={"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 0.0}},
+        clutches={"c": {"kind": "safety", "input": "a", "output": "b", "torque": 0.9, "breakaway_torque": 1.2}},
+        command={"m": -0.5},
+        initial={"speeds": {"a": -1.0, "b": -1.0}},
+        simulation={"duration": 1.0, "sample_interval": 0.1},
+    )
+    run = lm.simulate(scenario, solver=solver)
+    for shaft in "ab":
+        assert float(run[f"{shaft}_speed"][-1]) == pytest.approx(2.25 * (1.0 - 1.0 / 6.75), rel=1e-9)

@@ -35,6 +35,7 @@ struct RandomRun {
         while (lostmotion::TrainRun(train).error() != "");
         inputs = random.signals(Assembly(train), duration);
     }
+    RandomRun(Train t, std::vector<Signal> u) : train(named(std::move(t))), inputs(std::move(u)) {}
 };
 
 // Of about the torque 1, with a field that is weakened above the speed of 0.3 of an electrical turn in a tick, and
@@ -204,10 +205,8 @@ struct SolverTally {
     int failed() const { return wrong + jammed; }
 };
 
-inline void compare_solvers(RandomTrains& random, int shafts, double duration, SolverTally& tally,
-                            const char* tell = nullptr, bool closed_loop = false, bool windings = false) {
-    const RandomRun r(random, shafts, duration);
-    const Control control = closed_loop ? random_control(random, Assembly(r.train), windings) : Control{};
+inline void compare_solvers(const RandomRun& r, const Control& control, double duration, SolverTally& tally,
+                            const char* tell = nullptr) {
     const auto run = [&](double tolerance) {
         return Recorded(r.train, r.inputs, duration, duration / 50.0, tolerance, {}, {}, control);
     };
@@ -238,6 +237,13 @@ inline void compare_solvers(RandomTrains& random, int shafts, double duration, S
     if (tell != nullptr)
         std::printf("  %s: exact and adaptive run differ by %.2g, the adaptive one with itself by %.2g\n", tell, gap,
                     own);
+}
+
+inline void compare_solvers(RandomTrains& random, int shafts, double duration, SolverTally& tally,
+                            const char* tell = nullptr, bool closed_loop = false, bool windings = false) {
+    const RandomRun r(random, shafts, duration);
+    const Control control = closed_loop ? random_control(random, Assembly(r.train), windings) : Control{};
+    compare_solvers(r, control, duration, tally, tell);
 }
 
 // Balance and sign of the energies, mirror image, sampling, a split at which all signals begin anew.

@@ -121,6 +121,35 @@ class RandomTrains {
         return t;
     }
 
+    // Chains of values in wide ranges, whose gears have hysteresis beside contacts at rest on the same shafts:
+    // friction, brakes that engage and release, safety clutches.
+    Train braked(int shafts) {
+        Train t;
+        for (int s = 0; s < shafts; ++s) {
+            t.shafts.push_back(shaft(spread(1e-4, 10.0)));
+            t.shafts.back().loaded = true;
+            if (coin(0.6)) t.shafts.back().friction.torque = spread(1e-3, 3.0);
+            if (coin(0.4)) t.shafts.back().viscous_friction = spread(1e-3, 1.0);
+        }
+        t.motors.push_back(torque_motor(0));
+        for (int s = 1; s < shafts; ++s) {
+            if (coin(0.15)) {
+                const double torque = spread(0.1, 3.0);
+                t.clutches.push_back({"clutch", s - 1, s, torque, coin() ? torque * uniform(1.1, 2.0) : 0.0, true});
+                continue;
+            }
+            Gear g = spring(s - 1, s, spread(0.2, 30.0), TorsionCurve({}, {spread(1.0, 1e4)}));
+            if (coin(0.3)) g.law.curve = TorsionCurve({spread(1e-3, 0.1)}, {0.0, spread(1.0, 1e4)});
+            g.law.hysteresis_efficiency = uniform(0.3, 0.99);
+            t.gears.push_back(g);
+        }
+        for (int b = pick(1, 2); b > 0; --b) {
+            const double torque = spread(0.05, 10.0);
+            t.brakes.push_back({"brake", pick(0, shafts - 1), torque, coin() ? torque * uniform(1.0, 2.0) : 0.0});
+        }
+        return t;
+    }
+
     // As they are: the adaptive solver would take the sine.
     static PeriodicCurve chords(double amplitude, int n, double phase, double error) {
         const PeriodicCurve f = PeriodicCurve::sine(amplitude, n, phase, error);

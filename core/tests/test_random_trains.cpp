@@ -21,6 +21,40 @@ TEST_CASE("exact and adaptive solver agree on random trains of all elements") {
     CHECK(tally.jammed == 0);
 }
 
+TEST_CASE("both solvers agree on trains with hysteresis beside contacts at rest, of values in wide ranges") {
+    RandomTrains random(35);
+    SolverTally tally;
+    for (int n = 0; n < cases(1000); ++n) {
+        CAPTURE(n);
+        const Train t = random.braked(random.pick(2, 4));
+        compare_solvers({t, random.signals(Assembly(named(t)), 0.5)}, {}, 0.5, tally,
+                        ("braked " + std::to_string(n)).c_str());
+    }
+    MESSAGE(tally.compared << " trains compared, largest difference " << tally.worst << "; " << tally.undecided
+                           << " that the adaptive solver does not settle, " << tally.jammed << " that jam");
+    CHECK(tally.compared > share(900));
+    CHECK(tally.wrong == 0);
+    CHECK(tally.jammed == 0);
+}
+
+TEST_CASE("the search for modes begins anew only rarely on random trains of all elements") {
+    RandomTrains random(36);
+    long switchings = 0, trials = 0, fallbacks = 0, runs = 0;
+    for (int n = 0; n < cases(3000); ++n) {
+        const RandomRun r(random, 6, 0.3);
+        const Recorded run(r.train, r.inputs, 0.3, 0.1);
+        if (!run.done()) continue;
+        ++runs;
+        switchings += static_cast<long>(run.report.switching_count);
+        trials += run.report.searches.trials;
+        fallbacks += run.report.searches.fallbacks;
+    }
+    MESSAGE(runs << " runs, " << switchings << " switchings, " << trials << " trials, " << fallbacks << " fallbacks");
+    CHECK(runs > share(2990));
+    CHECK(200 * fallbacks < switchings);
+    CHECK(trials < 10 * switchings);
+}
+
 TEST_CASE("the laws that every run obeys hold on random trains of all elements") {
     RandomTrains random(34);
     LawTally tally;

@@ -152,9 +152,9 @@ TEST_CASE("pivoting and trying all combinations find the same accelerations, wit
         Key key, other_key;
         CAPTURE(n);
         const Found found = all.start(cache, now, key);
-        pivoting.trials = 0;
+        pivoting.searches = {};
         const Found other_found = pivoting.start(cache, other, other_key);
-        worst = std::max(worst, pivoting.trials);
+        worst = std::max(worst, pivoting.searches.trials);
         CHECK(static_cast<int>(found) == static_cast<int>(other_found));
         if (found != Found::yes || other_found != Found::yes) continue;
         // A self-locking gear may hold or lower its load, and a torque between break-away and sliding friction may hold
@@ -178,7 +178,7 @@ TEST_CASE("pivoting and trying all combinations find the same accelerations, wit
 TEST_CASE("a jump that starts a chain with all its contacts at rest is found in few trials") {
     RandomTrains random(22);
     long worst = 0, contacts = 0;
-    for (int n = 0; n < cases(400); ++n) {
+    for (int n = 0; n < cases(1000); ++n) {
         Train t;
         t.shafts.resize(7);
         for (Shaft& s : t.shafts) {
@@ -201,11 +201,11 @@ TEST_CASE("a jump that starts a chain with all its contacts at rest is found in 
         Key key;
         REQUIRE(system.start(cache, now, key) == Found::yes);
         for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-3.0, 3.0);
-        system.trials = 0;
+        system.searches = {};
         CAPTURE(n);
         REQUIRE(system.next(cache, now, static_cast<const Guard*>(nullptr), key, std::array<double, max_inputs>{}) ==
                 Found::yes);
-        worst = std::max(worst, system.trials);
+        worst = std::max(worst, system.searches.trials);
         contacts = a.layout().contacts;
         const std::vector<double> expected = least_constraint(a, now, 20000);
         for (std::size_t s = 0; s < expected.size(); ++s)
@@ -213,7 +213,7 @@ TEST_CASE("a jump that starts a chain with all its contacts at rest is found in 
                   doctest::Approx(expected[s]).scale(1.0).epsilon(1e-6));
     }
     CHECK(contacts == 13);
-    CHECK(worst <= 100);
+    CHECK(worst <= 60);  // at both ends of the way of the torques, of 3^13 combinations
 }
 
 TEST_CASE("the search works on packed regimes and the kernel's own instant as on the train's") {

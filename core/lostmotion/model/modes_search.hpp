@@ -53,6 +53,9 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
         snap = snap || (same && !p.bilateral && speed != 0.0);
     }
     if (snap) stop(now.x, event.at_rest);
+    Now before = now;  // as if nothing had acted on the train
+    before.x = {};
+    before.input = {};
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const Gear& gear = train().gears[g];
         const GearPlace& p = places().gears[g];
@@ -69,20 +72,20 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
     });
     for (const auto& e : places().acting)
         if (e->turn != nowhere) now.memory[e->turn] = e->turn_at(now.x[places().shafts[e->shaft].angle]);
-    return find(cache, now, event, key);
+    return find(cache, now, before, event, key);
 }
 
 template <class Sizes>
 template <class Cache, class Now, class G, class Input>
 Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& key, const Input& input) const {
     if (fired != nullptr ? goes_on(cache, now, *fired, key) : stays(cache, now, key, input)) return Found::yes;
-    const auto right = std::exchange(now.input[0], input);  // the torques before
+    Now past = now;
+    past.input[0] = input;
     const auto& old = cache.regime(key);
     Event event;
     event.before = key;
-    for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], now);
-    each_coupling_contact([&](int c) { event.coupling[c] = evaluate(n_, old.contact_torque[c], now); });
-    now.input[0] = right;
+    for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], past);
+    each_coupling_contact([&](int c) { event.coupling[c] = evaluate(n_, old.contact_torque[c], past); });
     double margin_size = 0.0, near = 0.0;
     if (fired != nullptr) {
         event.with_guard = true;
@@ -98,6 +101,8 @@ Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& ke
     event.at_rest = before;
     if (fired != nullptr && fired->kind == Guard::speed) event.at_rest[fired->contact] = true;
     stop(now.x, event.at_rest);
+    past.x = now.x;
+    for (int c = 0; c < contacts(); ++c) event.stopped[c] = event.at_rest[c] && !before[c];
     if (fired != nullptr) {
         margin_size = magnitude(n_, fired->form, now);
         near = near_event(fired->form);
@@ -109,7 +114,7 @@ Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& ke
     }
     if (event.with_guard && event.kind == Guard::capacity && breaks_away(cache, now, event, margin_size, near, key))
         return Found::yes;
-    return find(cache, now, event, key);
+    return find(cache, now, past, event, key);
 }
 
 // A contact whose capacity has been overcome begins to slip that way, from rest: there is nothing to decide as long as
@@ -158,16 +163,22 @@ bool SwitchedTrain<Sizes>::turns_the_other_way(const E& e, const Now& now, const
 // rise: then the combination that violates its guards least is taken. A train that jams violates them by more.
 template <class Sizes>
 template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::find(Cache& cache, Now& now, Event event, Key& key) const {
+Found SwitchedTrain<Sizes>::find(Cache& cache, Now& now, const Now& before, Event event, Key& key) const {
     const Key from = key;
-    const Found found = search(cache, now, event, from, key);
+    bool may_hold_more = false;
+    for (int c = 0; c < contacts(); ++c) may_hold_more = may_hold_more || (event.at_rest[c] && holds_more_[c]);
+    const bool tries_all = !may_hold_more && combinations(event) <= few;
+    const Key path = tries_all ? from : follow(cache, now, before, event, from);
+    const auto search = [&] {
+        return tries_all ? enumerate(cache, now, event, from, key) : pivot(cache, now, event, path, from, key);
+    };
+    const Found found = search();
     if (found == Found::yes) return found;
     event.from_each_load =
         std::any_of(train().gears.begin(), train().gears.end(), [](const Gear& g) { return g.has_dry_losses(); });
-    if (event.from_each_load && search(cache, now, event, from, key) == Found::yes) return Found::yes;
+    if (event.from_each_load && search() == Found::yes) return Found::yes;
     event.closest = true;
-    if (search(cache, now, event, from, key) == Found::yes) return Found::yes;
-    return found;
+    return search() == Found::yes ? Found::yes : found;
 }
 
 // A contact that "slips" while those that are stuck keep its speed at zero, or that would have to slip against another
@@ -194,70 +205,36 @@ bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
     return false;
 }
 
-template <class Sizes>
-template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::search(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
-    double combinations = 1.0;
-    for (int c = 0; c < contacts(); ++c)
-        if (event.at_rest[c] && !places().contacts[c].bilateral)
-            combinations *= places().contacts[c].one_way ? 2.0 : 3.0;
-    if (combinations <= few) return enumerate(cache, now, event, from, key);
-    const Found found = pivot(cache, now, event, from, key);
-    return found == Found::yes || combinations > max_tried ? found : enumerate(cache, now, event, from, key);
-}
-
 // Those with most contacts stuck first. While everything is at rest the torques stay as they were, and give way only if
 // neither that nor a motion is consistent, and then by as little as they can.
 template <class Sizes>
 template <class Cache, class Now>
 Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
-    std::array<std::array<int, 3>, max_contacts> choice{};
-    std::array<int, max_contacts> n{}, at{};
-    for (int c = 0; c < contacts(); ++c) {
-        const ContactPlace& p = places().contacts[c];
-        if (p.bilateral)
-            choice[c][n[c]++] = 0;
-        else if (!event.at_rest[c])
-            choice[c][n[c]++] = from.modes[c];
-        else
-            for (const int mode : {0, +1, -1})
-                if (!(p.one_way && mode > 0)) choice[c][n[c]++] = mode;
-    }
     struct Combination {
-        std::array<std::int8_t, max_contacts> modes{};
-        int slips = 0;
+        Key modes;
+        std::ptrdiff_t slips;
     };
     std::vector<Combination> all;
     all.reserve(27);
-    while (true) {
-        Combination& next = all.emplace_back();
-        for (int c = 0; c < contacts(); ++c) {
-            next.modes[c] = static_cast<std::int8_t>(choice[c][at[c]]);
-            next.slips += next.modes[c] != 0;
-        }
-        int c = contacts() - 1;
-        while (c >= 0 && ++at[c] == n[c]) at[c--] = 0;
-        if (c < 0) break;
+    for (std::uint64_t number = 0; number < combinations(event); ++number) {
+        const Key modes = combination(number, event, from);
+        all.push_back(
+            {modes, contacts() - std::ranges::count(modes.modes.begin(), modes.modes.begin() + contacts(), 0)});
     }
     const auto before = now.memory;  // all that a trial may change
     Found worst = Found::inconsistent;
     const double limit = event.closest ? max_violation : std::numeric_limits<double>::infinity();
     double smallest = limit;
-    Key modes, closest;
+    Key closest;
     auto of_closest = before;
     for (const bool at_limit : {false, true})
         for (int slips = 0; slips <= contacts(); ++slips)
             for (const Combination& next : all) {
-                if (next.slips != slips) continue;
-                modes.modes = next.modes;
-                if (at_its_limit(modes) != at_limit) continue;
+                if (next.slips != slips || at_its_limit(next.modes) != at_limit) continue;
                 now.memory = before;
-                const Found found = at_limit ? settle_at_limit(cache, now, modes, event, key)
-                                             : settle(cache, now, modes, event, key).found;
-                if (found == Found::yes && !event.closest && !at_limit) {
-                    hold_where_possible(cache, now, before, modes, event, key);
-                    return found;
-                }
+                const Found found = at_limit ? settle_at_limit(cache, now, next.modes, event, key)
+                                             : settle(cache, now, next.modes, event, key).found;
+                if (found == Found::yes && !event.closest && !at_limit) return found;
                 if (found == Found::outside) worst = found;
                 if (found != Found::yes) continue;
                 const double v = event.closest ? violation(look_up(cache, key), now, event)
@@ -280,10 +257,8 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
 
 template <class Sizes>
 template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
-    Key modes;
-    for (int c = 0; c < contacts(); ++c)
-        modes.modes[c] = event.at_rest[c] || places().contacts[c].bilateral ? std::int8_t{0} : from.modes[c];
+Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, Key modes, const Key& from,
+                                  Key& key) const {
     const auto before = now.memory;
     struct Tried {
         Key modes;
@@ -311,19 +286,19 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
         }
         return false;
     };
-    std::uint32_t drawn = 1;
+    // Where none of these leads on: combinations spread evenly over all, each once.
+    std::uint64_t drawn = 1;
     std::size_t begun = 0;  // how many had been tried at the last start
-    const auto start_again = [&](bool first) {
+    const auto start_again = [&] {
+        constexpr std::uint64_t stride = 2654435761u;  // Knuth's prime near the golden section of 2^32
         path.clear();
         begun = tried.size();
-        for (int c = 0; c < contacts(); ++c) {
-            if (!event.at_rest[c] || places().contacts[c].bilateral) continue;
-            drawn = 1664525u * drawn + 1013904223u;  // Numerical Recipes' generator: the same in every build
-            const int mode = first ? from.modes[c] : static_cast<int>(drawn >> 16) % 3 - 1;
-            modes.modes[c] = static_cast<std::int8_t>(places().contacts[c].one_way ? std::min(mode, 0) : mode);
+        for (const auto all = static_cast<std::uint64_t>(combinations(event)); drawn <= all;) {
+            modes = combination(drawn++ * stride % all, event, from);
+            if (is_new()) return true;
         }
+        return false;
     };
-    bool first = true;
     while (tried.size() < longest_pivoting) {
         now.memory = before;
         Trial trial = settle(cache, now, modes, event, key);
@@ -331,10 +306,7 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
             settle_at_limit(cache, now, modes, event, key) == Found::yes)
             return Found::yes;
         if (trial.found == Found::outside) worst = Found::outside;
-        if (trial.found == Found::yes && !event.closest) {
-            hold_where_possible(cache, now, before, modes, event, key);
-            return Found::yes;
-        }
+        if (trial.found == Found::yes && !event.closest) return Found::yes;
         if (trial.found == Found::yes) {
             const double v = violation(look_up(cache, key), now, event);
             if (v < smallest) {
@@ -353,11 +325,8 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, co
         tried.push_back({modes, std::move(trial.violations)});
         while (!path.empty() && !lead_on(tried[path.back()])) path.pop_back();
         if (!path.empty() && tried.size() - begun < from_one_start) continue;
-        for (int draw = 0; draw < 20; ++draw) {
-            start_again(std::exchange(first, false));
-            if (is_new()) break;
-        }
-        if (!is_new()) break;  // there are no others
+        ++searches.fallbacks;
+        if (!start_again()) break;
     }
     if (smallest < max_violation) {
         key = closest;
@@ -378,60 +347,6 @@ bool SwitchedTrain<Sizes>::holds_more(const ContactPlace& c) const {
     return friction.holding() > friction.at_zero(0) ||
            std::any_of(places().acting.begin(), places().acting.end(),
                        [&](const auto& e) { return e->shaft == c.element && e->holds_more(); });
-}
-
-// Where a contact holds more than it takes while it slips, both rest and slip may be consistent: it does not break away
-// by itself as long as rest is, be it that contact or others that are at their limits then. Of several rests, that with
-// most contacts at rest whose torques change least.
-template <class Sizes>
-template <class Cache, class Now, class Memory>
-void SwitchedTrain<Sizes>::hold_where_possible(Cache& cache, Now& now, const Memory& before, const Key& modes,
-                                               const Event& event, Key& key) const {
-    std::vector<int> breaking, others;  // contacts that are to slip from rest: those that hold more, and the others
-    for (int c = 0; c < contacts(); ++c)
-        if (modes.modes[c] != 0 && event.at_rest[c])
-            (holds_more(places().contacts[c]) ? breaking : others).push_back(c);
-    if (breaking.empty()) return;
-    const std::vector<int> holding_more = breaking;
-    breaking.insert(breaking.end(), others.begin(), others.end());
-    const std::size_t n = std::min(breaking.size(), most_held);
-    const auto slipping = now.memory;
-    auto of_best = slipping;
-    Key best;
-    std::ptrdiff_t most = 0;
-    double least = 0.0;
-    const auto take_if_better = [&](const Key& found) {
-        const auto& r = cache.regime(found);
-        const auto rest = [&](int c) { return r.at_rest[c]; };
-        if (std::ranges::none_of(holding_more, rest)) return;
-        const std::ptrdiff_t count = std::ranges::count_if(breaking, rest);
-        const double change = torque_change(r, now, event);
-        if (count < most || (count == most && !(change < least))) return;
-        most = count;
-        least = change;
-        best = found;
-        of_best = now.memory;
-    };
-    take_if_better(key);  // others may hold what is at its limit
-    // Those at their limits may hold against the way in which they would slip.
-    int combinations = 1;
-    for (std::size_t k = 0; k < n; ++k) combinations *= 3;
-    for (int number = 0; number < combinations; ++number) {
-        Key trial = modes, found;
-        bool possible = true;
-        for (std::size_t k = 0, left = static_cast<std::size_t>(number); k < n; ++k, left /= 3) {
-            const auto mode = static_cast<std::int8_t>(static_cast<int>(left % 3) - 1);
-            possible = possible && !(mode > 0 && places().contacts[breaking[k]].one_way);
-            trial.modes[breaking[k]] = mode;
-        }
-        if (!possible || trial.modes == modes.modes) continue;
-        now.memory = before;
-        if ((at_its_limit(trial) ? settle_at_limit(cache, now, trial, event, found)
-                                 : settle(cache, now, trial, event, found).found) == Found::yes)
-            take_if_better(found);
-    }
-    now.memory = most > 0 ? of_best : slipping;
-    if (most > 0) key = best;
 }
 
 // By how much the contacts' guards of a regime are violated, each in units of the sum of its terms' magnitudes: by the

@@ -103,7 +103,7 @@ template <class Sizes>
 template <class Cache, class Now>
 auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const
     -> Trial {
-    ++trials;
+    ++searches.trials;
     Key trial;
     trial.modes = modes.modes;
     locate(now, trial);

@@ -3,12 +3,12 @@
 // A regime holds just after t if each of its guards g is positive there. Since the flow of a regime is known, that is
 // decided at t itself: by the sign of the first of g, g', g'', ... that is not zero.
 //
-// Which contacts at rest stick is a linear complementarity problem in their torques and accelerations. Few contacts are
-// tried one combination after the other, those with most stuck first. Many are found by pivoting: from all stuck, the
-// contact whose condition is violated most changes its mode, until none is. Losses that grow with the load make the
-// problem unsymmetric, and pivoting may come back to where it was: a combination is tried once only, and where all that
-// it leads to have been tried, those before it lead on. Where a self-locking gear keeps all of these from a solution,
-// the search begins again from the modes before the event, then from others that are drawn.
+// Which contacts at rest stick is a mixed linear complementarity problem in their torques and accelerations. Of a few
+// contacts whose problem has one solution the combinations are tried, those with most stuck first. All others are found
+// on the way of the torques from before the event, along which one contact after the other changes its mode (Lemke's
+// parametric pivoting): `follow`. Where contacts hold more than they take while they slip, that way selects one of
+// several solutions. What it leaves violated, of a higher derivative or by losses, is mended by principal pivoting:
+// `pivot`.
 #pragma once
 
 #include <algorithm>
@@ -38,6 +38,7 @@ std::size_t guard_count(const R& r) {
 }
 
 using lostmotion::Found;
+using lostmotion::SearchCounts;
 
 // Sizes: Layout, or the kernel's dimensions. Cache: regime(key) gives a regime that stays where it is; that of the
 // kernel has entries, with the guards of a regime as a table.
@@ -47,7 +48,10 @@ class SwitchedTrain {
     explicit SwitchedTrain(const Assembly& assembly) : SwitchedTrain(assembly, assembly.layout()) {}
     SwitchedTrain(const Assembly& assembly, const Sizes& sizes) : assembly_(assembly), n_(sizes) {
         set_near_event();
-        for (const ContactPlace& c : places().contacts) some_redundant_ = some_redundant_ || c.locked != nowhere;
+        for (int c = 0; c < contacts(); ++c) {
+            some_redundant_ = some_redundant_ || places().contacts[c].locked != nowhere;
+            holds_more_[c] = !places().contacts[c].bilateral && holds_more(places().contacts[c]);
+        }
     }
 
     const Assembly& assembly() const { return assembly_; }
@@ -93,12 +97,13 @@ class SwitchedTrain {
         return key;
     }
 
-    double few = 27.0;        // up to so many combinations are tried one after the other; more are pivoted
-    mutable long trials = 0;  // combinations tried so far
+    double few = 27.0;  // up to so many combinations are tried one after the other; more are pivoted
+    mutable SearchCounts searches;
 
  private:
     struct Event {
         Rest at_rest{};
+        Rest stopped{};                               // those that have come to rest at this event
         std::array<double, max_contacts> gear{};      // T_2 of each gear before [N m]
         std::array<double, max_contacts> coupling{};  // torque of each coupling before [N m], by contact
         bool with_guard = false;                      // a guard has ended the regime before
@@ -120,6 +125,9 @@ class SwitchedTrain {
         bool has_ended(const Key& key) const { return with_guard && kind != Guard::speed && key == before; }
     };
     using Guards = std::bitset<max_guards>;
+    // For each contact at rest and each mode, -1, 0 and +1: negative where the contact has to change to that mode.
+    // Margins of what is stuck, accelerations of what slips; infinite where there is no condition.
+    using Conditions = std::array<std::array<double, 3>, max_contacts>;
     // A guard of a contact that is violated.
     struct Violation {
         int contact = nowhere, mode = 0;  // the mode that it suggests
@@ -165,16 +173,42 @@ class SwitchedTrain {
     bool at_its_limit(const Key& key) const;
     bool holds_more(const ContactPlace& c) const;
     template <class Cache, class Now>
-    Found find(Cache& cache, Now& now, Event event, Key& key) const;
+    Found find(Cache& cache, Now& now, const Now& before, Event event, Key& key) const;
     template <class Cache, class Now>
-    Found search(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
+    bool conditions(Cache& cache, Now now, const Key& modes, const Event& event, Conditions& out) const;
+    template <class Cache, class Now>
+    Key follow(Cache& cache, const Now& now, const Now& before, const Event& event, const Key& from) const;
+    struct Failure {
+        int contact = nowhere, mode = 0;
+        double way = 1.0;
+    };
+    Failure first_failure(const Key& begin, const Key& end, Conditions& first, const Conditions& last,
+                          const Conditions& before_change, double way) const;
+    // In how many ways contacts at rest may stick and slip.
+    double combinations(const Event& event) const {
+        double n = 1.0;
+        for (int c = 0; c < contacts(); ++c)
+            if (event.at_rest[c] && !places().contacts[c].bilateral) n *= places().contacts[c].one_way ? 2.0 : 3.0;
+        return n;
+    }
+    // One of them, by its number: the last contact changes first, from stuck to forward to backward.
+    Key combination(std::uint64_t number, const Event& event, const Key& from) const {
+        Key out;
+        for (int c = contacts(); c-- > 0;) {
+            const ContactPlace& p = places().contacts[c];
+            if (p.bilateral) continue;
+            out.modes[c] = from.modes[c];
+            if (!event.at_rest[c]) continue;
+            const std::uint64_t n = p.one_way ? 2 : 3, mode = number % n;
+            out.modes[c] = mode == 0 ? 0 : mode == 1 && !p.one_way ? +1 : -1;
+            number /= n;
+        }
+        return out;
+    }
     template <class Cache, class Now>
     Found enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
     template <class Cache, class Now>
-    Found pivot(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
-    template <class Cache, class Now, class Memory>
-    void hold_where_possible(Cache& cache, Now& now, const Memory& before, const Key& modes, const Event& event,
-                             Key& key) const;
+    Found pivot(Cache& cache, Now& now, const Event& event, Key modes, const Key& from, Key& key) const;
     template <class Cache, class Now>
     Trial settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const;
     template <class Cache, class Now>
@@ -347,14 +381,14 @@ class SwitchedTrain {
 
     static constexpr double max_violation = 1e-6;                                      // that rounding may make
     static constexpr double on_corner = 8.0 * std::numeric_limits<double>::epsilon();  // of an angle and its period
-    static constexpr std::size_t most_held = 5;  // contacts whose combinations are tried at rest
-    static constexpr double max_tried = 729.0;   // combinations that are tried as a last resort
+    static constexpr int most_changes = 4;  // of the mode of each contact along the way of the torques
     static constexpr std::size_t from_one_start = 300, longest_pivoting = 600;
 
     const Assembly& assembly_;
     Sizes n_;
     std::array<double, max_states> near_state_{};
     std::array<double, max_inputs> near_input_{};
+    Rest holds_more_{};            // contacts that hold more than they take while they slip
     bool some_redundant_ = false;  // while all contacts are at rest; else no one keeps another at rest
 };
 

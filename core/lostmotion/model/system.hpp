@@ -50,6 +50,7 @@ class TrainSystem {
     const Assembly& assembly() const { return assembly_; }
     // Whether a regime has had more guards than there is room for: then nothing that follows is certain.
     bool overflowed() const { return overflowed_; }
+    SearchCounts& searches() const { return search_.searches; }
 
     Regime build(const Key& key) const {
         model::Regime rows = assembly_.build(key);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "../model/power.hpp"
+#include "../solver/status.hpp"
 #include "result_names.hpp"
 #include "sample_times.hpp"
 #include "train_control.hpp"
@@ -79,6 +80,7 @@ struct TrainReport {
     double turned_over = 0.0;                                       // [J]
     double left_data_at = std::numeric_limits<double>::infinity();  // [s]
     long steps = 0;
+    SearchCounts searches;
     bool too_many_guards = false;  // a regime has more conditions than the kernel has room for
 
     template <class System, class Solver>
@@ -88,6 +90,7 @@ struct TrainReport {
         time = solver.time();
         contact = solver.stopped_at();
         switching_count = solver.switchings();
+        searches = system.searches();
         too_many_guards = system.overflowed();
         x.resize(static_cast<std::size_t>(n.states));
         const auto& r = solver.regime();

@@ -78,6 +78,7 @@ TrainReport run_train_exactly_in(const typename TrainReader<D>::Model& model, co
     auto& own = static_cast<TrainWorkspace<D>&>(*workspace);
     own.serve(model.assembly);
     const model::TrainSystem<D>& system = own.system;
+    system.searches() = {};
     ExactSolver<model::TrainSystem<D>> solver(system, c.signals, options.sample_interval, system.balanced_scale(),
                                               &own.cache);
     if (watcher != nullptr) watcher->begin(solver);

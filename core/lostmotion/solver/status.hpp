@@ -6,6 +6,12 @@ namespace lostmotion {
 // Of the search for the regime that follows at an event.
 enum class Found { yes, inconsistent, outside };
 
+// Of the searches of a run.
+struct SearchCounts {
+    long trials = 0;     // combinations of modes that were set up
+    long fallbacks = 0;  // times that pivoting began anew from other modes
+};
+
 enum class Status {
     done,
     interrupted,

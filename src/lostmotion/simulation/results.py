@@ -77,6 +77,8 @@ def raw_result(
         "switching_count": int(result["switching_count"]),
         "end_state": json.dumps(result["end_state"]),
         "steps": int(result["steps"]),
+        "mode_trials": int(result["mode_trials"]),
+        "mode_fallbacks": int(result["mode_fallbacks"]),
         SWITCHINGS: packed(result["switchings"]),
     }
     if not core.short_form:

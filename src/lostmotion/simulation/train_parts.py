@@ -128,7 +128,7 @@ def joined_results(
         "values": [rows[name] for name, *_ in core.channels()],
         "control": [signals[name] for name in whole.axes()],
         "switchings": _joined_switchings(core.contact_names(), rows, results)[:most],
-        "switching_count": sum(r["switching_count"] for r in results),
+        **{n: sum(r[n] for r in results) for n in ("switching_count", "steps", "mode_trials", "mode_fallbacks")},
         "end_state": dict(sorted(item for r in results for item in r["end_state"].items())),
         "energy": dict(
             sorted(
@@ -140,7 +140,6 @@ def joined_results(
             )
         ),
         "left_data_at": min(r["left_data_at"] for r in results),
-        "steps": sum(r["steps"] for r in results),
     }
 
 
