@@ -81,7 +81,7 @@ CORE_LAYERS = [
     {"solver", "parts"},
     {"control"},
     {"elements"},
-    {"drive", "model"},
+    {"model"},
     {"simulation"},
     {"analysis"},
     {"scenario"},
@@ -108,7 +108,7 @@ def test_no_headers_include_each_other_in_a_circle() -> None:
 
 # What ties code to a platform: threads, exceptions, and functions of the mathematical library that it need not round
 # correctly, so that their last bits differ from system to system (sqrt, fma, floor, ldexp and the like are exact).
-PORTABLE = ("kernel", "solver", "parts", "control", "elements", "model", "drive", "simulation", "scenario")
+PORTABLE = ("kernel", "solver", "parts", "control", "elements", "model", "simulation", "scenario")
 PLATFORM = (
     r"\b(thread_local|throw|try|catch)\b"
     r"|#include <(thread|mutex|atomic|condition_variable|future|exception|stdexcept|iostream)>"

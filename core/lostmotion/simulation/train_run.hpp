@@ -114,17 +114,22 @@ class TrainRun {
     TrainReport run(const std::vector<Signal>& inputs, const TrainStart& start, const TrainOptions& options,
                     double* out, std::unique_ptr<AnyWorkspace>& workspace) const {
         const auto [x, memory] = in_layout(start);
-        if (!(options.tolerance > 0.0)) return run_exactly(inputs, x, memory, options, out, workspace);
-        // The adaptive solver takes smooth laws as they are.
-        return in_kernel(model::Assembly(assembly_->train(), true),
-                         [&, &x = x, &memory = memory]<class D>(const typename TrainReader<D>::Model& model) {
-                             return run_train_adaptively_in<D>(model, inputs, x, memory, options, out);
-                         });
+        if (options.tolerance > 0.0) return run(inputs, x, memory, options, out);
+        return run_exactly(inputs, x, memory, options, out, workspace);
     }
     TrainReport run(const std::vector<Signal>& inputs, const TrainStart& start, const TrainOptions& options,
                     double* out) const {
-        std::unique_ptr<AnyWorkspace> own;
-        return run(inputs, start, options, out, own);
+        const auto [x, memory] = in_layout(start);
+        return run(inputs, x, memory, options, out);
+    }
+    TrainReport run(const std::vector<Signal>& inputs, std::span<const double> start, std::span<const double> memory,
+                    const TrainOptions& options, double* out) const {
+        if (!(options.tolerance > 0.0)) return run_exactly(inputs, start, memory, options, out);
+        // The adaptive solver takes smooth laws as they are.
+        return in_kernel(model::Assembly(assembly_->train(), true),
+                         [&]<class D>(const typename TrainReader<D>::Model& model) {
+                             return run_train_adaptively_in<D>(model, inputs, start, memory, options, out);
+                         });
     }
     // By the exact solver, whatever the tolerance.
     TrainReport run_exactly(const std::vector<Signal>& inputs, std::span<const double> start,
