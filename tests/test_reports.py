@@ -14,7 +14,7 @@ from html_pages import Page, charts
 from lostmotion.cli import app
 from lostmotion.reports import page as pages
 from lostmotion.reports.packed import packed
-from lostmotion.reports.page import Report, Table, Verdict, render
+from lostmotion.reports.page import Headline, Report, Table, render
 from lostmotion.reports.panels import PALETTE, STEPS, Bars, Contacts, Curve, Flows, Group, Mark, Matrix, Panel, look
 from lostmotion.reports.pictures import endings
 from lostmotion.reports.run import run_report
@@ -39,7 +39,7 @@ def script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def report(*charts: object, table: Table | None = None) -> Report:
     group = Group("main", "Main", "", charts)  # type: ignore[arg-type]
     parts = () if table is None else (table,)
-    return Report("A <title>", "of `it`", Verdict("good", ("in order",)), group, parts)
+    return Report("A <title>", "of `it`", Headline("good", ("in order",)), group, parts)
 
 
 @pytest.fixture(scope="module")

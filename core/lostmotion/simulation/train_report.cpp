@@ -112,7 +112,9 @@ constexpr ShortFlow short_flows[] = {
 
 }  // namespace
 
-NamedInOrder named_ledger(const TrainReport& report, const model::Assembly& a) {
+namespace {
+
+NamedInOrder ledger_of(const TrainReport& report, const model::Assembly& a) {
     NamedInOrder ledger;
     const auto flow = [&](const std::string& name) {
         const auto found = std::ranges::find(report.energy, name, &TrainEnergy::name);
@@ -132,6 +134,13 @@ NamedInOrder named_ledger(const TrainReport& report, const model::Assembly& a) {
         ledger.emplace_back("residual", report.residual());
     }
     ledger.emplace_back("turned_over", report.turned_over);
+    return ledger;
+}
+
+}  // namespace
+
+NamedInOrder named_ledger(const TrainReport& report, const model::Assembly& a) {
+    NamedInOrder ledger = ledger_of(report, a);
     if (!a.train().short_form) std::ranges::sort(ledger);
     return ledger;
 }
@@ -149,7 +158,7 @@ std::string error_text(const TrainReport& report, const model::Assembly& a) {
 
 std::vector<std::string> ledger_names(const model::Assembly& a) {
     std::vector<std::string> names;
-    for (const auto& [name, energy] : named_ledger({}, a)) names.push_back(name);
+    for (const auto& [name, energy] : ledger_of({}, a)) names.push_back(name);
     return names;
 }
 

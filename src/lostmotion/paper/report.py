@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from ..reports.page import Verdict, cards, document, verdict
+from ..reports.page import Headline, cards, document, verdict
 from ..reports.pages import render_page
 from ..reports.panels import Chart, scientific
 from .drive import AMPLITUDES, MODELS, Constant
@@ -49,11 +49,11 @@ def render(specs: list[FigureSpec], table: list[Constant], facts: Facts, *, live
     return document(TITLE, lead, f"{verdict(_verdict(facts))}\n{glance}\n{body}", charts)
 
 
-def _verdict(facts: Facts) -> Verdict:
+def _verdict(facts: Facts) -> Headline:
     """What the three models agree on, and what they do not."""
     stuck = {model: f"{100.0 * facts.stuck[model, 'small']:.0f} %" for model in MODELS}
     traditional = " and ".join(f"{stuck[model]} ({model})" for model in MODELS if model != "2-DOF-NL")
-    return Verdict(
+    return Headline(
         "open",
         (
             f"At rated voltage the motor torque of the three models differs by at most {100.0 * facts.torque_gap:.0f} % of its peak.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..sizing.finding import Finding
-from .page import Report, Table, Verdict
+from .page import Headline, Report, Table
 from .panels import Bars, Group
 
 MARKS = {"ok": "ok", "warning": "WARNING", "unknown": "not judged"}
@@ -18,7 +18,7 @@ def counted(findings: Sequence[Finding]) -> str:
     return f"{text} {unknown} not judged (?)." if unknown else text
 
 
-def _verdict(findings: Sequence[Finding]) -> Verdict:
+def _verdict(findings: Sequence[Finding]) -> Headline:
     warnings = [f for f in findings if f.verdict == "warning"]
     lines = [counted(findings).replace(" (?)", "")]
     lines += [f"{f.what}: {f.value}{f' ({f.remark})' if f.remark else ''}." for f in warnings[:1]]
@@ -28,7 +28,7 @@ def _verdict(findings: Sequence[Finding]) -> Verdict:
         lines.append(f"The most used limit is {most.what}: {100.0 * (most.use or 0.0):.3g} %.")
     unknown = [f.what for f in findings if f.verdict == "unknown"]
     lines += [f"Not judged: {', '.join(unknown)}."] if unknown else []
-    return Verdict("bad" if warnings else "open" if unknown else "good", tuple(lines[:3]))
+    return Headline("bad" if warnings else "open" if unknown else "good", tuple(lines[:3]))
 
 
 def check_report(name: str, findings: Sequence[Finding], title: str = "") -> Report:

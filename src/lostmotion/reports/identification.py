@@ -16,7 +16,7 @@ from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..simulation.train_scenario import TrainScenario
 from ..units.conversion import si_factor
-from .page import Prose, Report, Table, Verdict
+from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report, write_text
 from .panels import FAINT, PALETTE, Curve, Group, Matrix, Panel, look
 
@@ -106,7 +106,7 @@ INTERVALS = (
 )
 
 
-def _verdict(result: IdentificationResult) -> Verdict:
+def _verdict(result: IdentificationResult) -> Headline:
     """Warnings, the model that is taken, and what the logs leave open."""
     warnings, rung = result.warnings(), result.rungs[result.chosen]
     unit = f" {result.error_unit}".rstrip()
@@ -116,7 +116,7 @@ def _verdict(result: IdentificationResult) -> Verdict:
     known = "All parameters are determined by the logs." if not open_ends else f"{open_ends[0].rstrip('.')}."
     more = f" {len(open_ends) - 1} more below." if len(open_ends) > 1 else ""
     lines = [f"{' '.join(warnings)}", *found, f"{known}{more}"] if warnings else [*found, f"{known}{more}"]
-    return Verdict("bad" if warnings else "open" if open_ends else "good", tuple(lines))
+    return Headline("bad" if warnings else "open" if open_ends else "good", tuple(lines))
 
 
 def error_rows(result: IdentificationResult) -> list[list[str]]:

@@ -33,7 +33,7 @@ class Html(str):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Headline:
     """What a report comes to, in at most three lines."""
 
     state: Literal["good", "bad", "open"]
@@ -71,7 +71,7 @@ class Report:
 
     title: str
     lead: str
-    verdict: Verdict
+    verdict: Headline
     main: Group
     parts: tuple[Table | Group | Prose, ...]
 
@@ -98,7 +98,7 @@ def render(report: Report) -> str:
     return document(report.title, report.lead, "\n".join(parts), charts)
 
 
-def verdict(found: Verdict) -> str:
+def verdict(found: Headline) -> str:
     """What a report comes to, as HTML."""
     state = {"good": "Verdict", "bad": "Verdict: not in order", "open": "Verdict, with reservations"}[found.state]
     lines = "".join(f"<p>{_text(line)}</p>\n" for line in found.lines)

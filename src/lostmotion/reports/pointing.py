@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..pointing.budget import Errors, PointingBudget, PointingError
-from .page import Prose, Report, Table, Verdict
+from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import Bars, Curve, Group, Panel, look
 
@@ -155,7 +155,7 @@ def _bars(budget: PointingBudget) -> Group:
     return Group("contributions", "Contributions of the causes", CONTRIBUTED, charts, max(1, len(charts)))
 
 
-def _verdict(budget: PointingBudget) -> Verdict:
+def _verdict(budget: PointingBudget) -> Headline:
     """The error of each axis, what causes most of it, how long the target is in view."""
     errors, causes = [], []
     factor, unit = _unit(budget)
@@ -175,7 +175,7 @@ def _verdict(budget: PointingBudget) -> Verdict:
     lines += [f"Largest contribution, {'; '.join(causes)}."] if causes else []
     last = f"The target is {view}; {budget.after_line}." if view else f"{budget.after_line.capitalize()}."
     seen = budget.view is None or budget.view.share == 1.0
-    return Verdict("good" if seen else "open", (*lines, last))
+    return Headline("good" if seen else "open", (*lines, last))
 
 
 CONTRIBUTED = (

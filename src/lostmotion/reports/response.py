@@ -14,7 +14,7 @@ from ..atomic_writer import write_bytes
 from ..response.bandwidth import characteristics
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
-from .page import Prose, Report, Table, Verdict
+from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import Curve, Ground, Group, Panel, step
 
@@ -165,13 +165,13 @@ def _closed_loop_lines(result: xarray.Dataset) -> list[str]:
     return lines
 
 
-def _verdict(response: xarray.Dataset, found: xarray.Dataset) -> Verdict:
+def _verdict(response: xarray.Dataset, found: xarray.Dataset) -> Headline:
     lines = amplitude_lines(found)
     count = found.sizes["amplitude"]
     ends = [lines[0], *([lines[count - 1]] if count > 1 else [])]
     state: Any = "open" if np.any(response["reason"].values != "") else "good"
     told = ["; ".join(ends), *dead_zone_line(found), motion_lines(response)[0]]
-    return Verdict(state, tuple(f"{line[0].upper()}{line[1:]}." for line in told))
+    return Headline(state, tuple(f"{line[0].upper()}{line[1:]}." for line in told))
 
 
 # --- the page ---

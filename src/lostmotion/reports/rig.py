@@ -12,7 +12,7 @@ from ..model.torsion import Rigid
 from ..test_rig.measurement import RigReport
 from ..test_rig.rig import LOST_MOTION_LOAD
 from ..units.practical import RPM, practical
-from .page import Prose, Report, Table, Verdict
+from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import DOTS, Curve, Group, Panel, step
 from .sheet_rows import rows_of, rows_of_part
@@ -142,7 +142,7 @@ def _overrunning_rows(report: RigReport) -> list[tuple[str, str]]:
 # --- the page ---
 
 
-def _verdict(report: RigReport) -> Verdict:
+def _verdict(report: RigReport) -> Headline:
     """How far the rig is from the sheet, and what the torsion and the locking are."""
     lines = []
     differs = [c for c in report.comparisons if c.remark]
@@ -162,7 +162,7 @@ def _verdict(report: RigReport) -> Verdict:
         (f"{what} {value}" for what, value in rows.items() if what.startswith("lost motion")), "no lost motion: rigid"
     )
     lines.append(f"{lost[0].upper()}{lost[1:]}; self-locking: {rows['self-locking at rated load and speed']}.")
-    return Verdict("open" if differs or not report.comparisons else "good", tuple(lines))
+    return Headline("open" if differs or not report.comparisons else "good", tuple(lines))
 
 
 def _percent(share: float) -> str:

@@ -142,7 +142,7 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
     InputError
         The dataset is no run.
     """
-    from .page import Prose, Report, Verdict
+    from .page import Headline, Prose, Report
     from .panels import Flows, Group
     from .run_charts import gear_charts, run_charts
 
@@ -164,7 +164,7 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
     return Report(
         title=result.attrs.get("title") or name,
         lead=f"Run of `{name}`.",
-        verdict=Verdict("open" if "warning" in result.attrs else "good", (first, *_motion_lines(result), *told)[:3]),
+        verdict=Headline("open" if "warning" in result.attrs else "good", (first, *_motion_lines(result), *told)[:3]),
         main=Group("run", "The run", "Drag over a chart to zoom, double-click to see all of it.", tuple(charts)),
         parts=(
             *gears,

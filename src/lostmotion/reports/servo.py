@@ -12,7 +12,7 @@ import numpy as np
 from ..servo.commission import LoopSheet, ServoReport
 from ..servo.motion import LimitCycle, StepResponse
 from ..units.practical import practical
-from .page import Prose, Report, Table, Verdict
+from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import FAINT, Curve, Group, Mark, Panel, look
 
@@ -97,7 +97,7 @@ def _cycle_table(cycle: LimitCycle) -> Table:
 # --- verdict ---
 
 
-def _verdict(report: ServoReport) -> Verdict:
+def _verdict(report: ServoReport) -> Headline:
     found = report.instabilities()
     regimes = ", ".join(report.regimes)
     first = f"Unstable: {'; '.join(map(str, found))}." if found else f"Stable in each regime ({regimes})."
@@ -108,7 +108,7 @@ def _verdict(report: ServoReport) -> Verdict:
     state = "bad" if found or (cycle is not None and cycle.whole.cycles) else "good"
     if state == "good" and cycle is not None and cycle.whole.verdict == "not decided":
         state = "open"
-    return Verdict(state, (f"{first} {_least(report.loops)}", second, f"At rest: {report.rest()}."))  # type: ignore[arg-type]
+    return Headline(state, (f"{first} {_least(report.loops)}", second, f"At rest: {report.rest()}."))  # type: ignore[arg-type]
 
 
 def _least(loops: Sequence[LoopSheet]) -> str:

@@ -13,7 +13,7 @@ from ..studies.engine import study_of
 from ..studies.study import Study
 from ..studies.table import labelled, read_table
 from ..studies.vary import Vary
-from .page import Prose, Report, Table, Verdict
+from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import PALETTE, Bars, Curve, Group, Histogram, Panel
 from .study_selection import show_selection
@@ -224,7 +224,7 @@ def _study_page(study: Study, table: pa.Table, name: str) -> tuple[Report, list[
     return Report(study.title or name, lead, verdict, distributions(table, study), tuple(parts)), lines, tables
 
 
-def _verdict(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) -> Verdict:
+def _verdict(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) -> Headline:
     """The spread of the first values, and what they depend on most."""
     lines = []
     for name in list(study.keep)[:2]:
@@ -239,7 +239,7 @@ def _verdict(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) 
             f"{labelled(table, name)}: mean {x.mean():.5g}, 90 % of the runs within {low:.5g} and {high:.5g}{depends}."
         )
     whole = table.num_rows == study.total and not _failures(table)
-    return Verdict("good" if whole else "open", (f"{_counted(table, study)}.", *lines))
+    return Headline("good" if whole else "open", (f"{_counted(table, study)}.", *lines))
 
 
 def study_report(directory: Path) -> tuple[Report, list[str], dict[str, str]]:

@@ -12,7 +12,7 @@ from ..studies.select import SHARES, USE, Selection
 from ..studies.selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
 from ..studies.study import Study
 from ..studies.table import labelled
-from .page import Table, Verdict
+from .page import Headline, Table
 from .pages import table_csv
 from .panels import PALETTE, Curve, Group, Panel, look
 
@@ -30,7 +30,7 @@ class Shown:
     """A selection as text, as parts of a page, and as the text of CSV files by their names."""
 
     lines: list[str]
-    verdict: Verdict
+    verdict: Headline
     parts: tuple[Table | Group, ...]
     tables: dict[str, str]
 
@@ -55,12 +55,13 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
         for p in costs
     ]
     lines = [*_ranking(table, ranked, front, select), *_costs(table, costs, objective), *_misfits(ranked)]
-    chart = [Group("pareto", "", PARETO, (pareto_panel(table, ranked, front, select),), 1)]
+    several = len(select.objectives) > 1
+    chart = [Group("pareto", "", PARETO, (pareto_panel(table, ranked, front, select),), 1)] if several else []
     return Shown(
         lines=lines,
         verdict=_verdict(table, ranked, costs, select),
         parts=(
-            *(chart if len(select.objectives) > 1 else []),
+            *chart,
             *_ranking_tables(table, ranked, front, select),
             *([_costs_table(table, costs, objective)] if costs else []),
             *_misfit_tables(ranked),
@@ -69,7 +70,7 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
     )
 
 
-def _verdict(table: pa.Table, ranked: list[Candidate], costs: list[Price], select: Selection) -> Verdict:
+def _verdict(table: pa.Table, ranked: list[Candidate], costs: list[Price], select: Selection) -> Headline:
     """How many fit, which is best, and which limit costs most."""
     fitting = [c for c in ranked if c.fits]
     failed = sum(NOT_RUN in c.violated for c in ranked)
@@ -86,7 +87,7 @@ def _verdict(table: pa.Table, ranked: list[Candidate], costs: list[Price], selec
     if dear:
         p = max(dear, key=lambda price: price.gain)
         lines.append(f"Without the limit {p.limit} the best would be {100.0 * p.gain:.1f} % better.")
-    return Verdict("good" if fitting else "bad", tuple(lines))
+    return Headline("good" if fitting else "bad", tuple(lines))
 
 
 def _ranking_tables(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> list[Table]:

@@ -52,5 +52,7 @@ def forecast(scenario: Scenario | TrainScenario, tolerance: float = 0.0) -> Fore
             break
     last = len(taken) - 1
     rate = (taken[last] - taken[last - 1]) / (SHARES[last] - SHARES[last - 1])  # without what every run begins with
+    if rate <= 0.0:  # too short to tell the two apart
+        rate = taken[last] / SHARES[last]
     runs = 2.0 if any(oriented(scenario)) else 1.0  # with coarser exchanges, for the error bound
-    return Forecast(runs * max(0.0, rate), part, switchings)
+    return Forecast(runs * rate, part, switchings)
