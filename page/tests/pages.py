@@ -13,7 +13,7 @@ import numpy as np
 
 import lostmotion as lm
 from lostmotion.live_page.page import write_page
-from lostmotion.reports.page import Prose, Report, Table, Verdict, render
+from lostmotion.reports.page import Headline, Prose, Report, Table, render
 from lostmotion.reports.panels import (
     DOTS,
     Bars,
@@ -109,7 +109,7 @@ def write_reports(directory: Path) -> None:
     )
     table = Table("Values", ("what", "value [N·m]"), [["one", "1.5"], ["two", "2"]], marked=frozenset({1}))
     words = Prose("What is computed", ("All of it, from `x`.",))
-    verdict = Verdict("bad", ("Something is wrong.",))
+    verdict = Headline("bad", ("Something is wrong.",))
     page = Report("All charts", "Each kind of chart.", verdict, Group("main", "Charts", "", charts), (table, words))
     (directory / "charts.html").write_text(render(page))
     numbers = {"x": x.tolist(), "y": [None if math.isnan(v) else v for v in y]}
