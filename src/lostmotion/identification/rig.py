@@ -12,7 +12,6 @@ from .. import _core
 from ..errors import InputError
 from ..inputs.validation import did_you_mean
 from ..simulation.keys import set_values
-from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import find_scenario, load
 from ..simulation.sensitivities import channels_of
 from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form
@@ -89,7 +88,7 @@ class Rig:
     def __init__(self, task: Identification, directory: Path) -> None:
         self.task = task
         loaded = load(find_scenario(task.scenario, directory))
-        self.scenario = in_long_form(loaded) if isinstance(loaded, Scenario) else loaded
+        self.scenario = in_long_form(loaded)
         self._variants = Variants(self.scenario)
         self._built: dict[Any, Built] = {}
         self.units = self._units()

@@ -137,7 +137,7 @@ def pointing_budget(
         An axis has no controller with a reference of the position, or `view` names none.
     SolverError
     """
-    loaded = in_long_form(scenario) if isinstance(scenario, Scenario) else scenario
+    loaded = in_long_form(scenario)
     given = None if after is None else argument("after", after, "s")
     _check(loaded, given or 0.0)
     start, line = (
@@ -241,7 +241,7 @@ def _cases(scenario: TrainScenario, *, robustness: bool = True) -> dict[Case, Se
 
 def runs_of(scenario: Scenario | TrainScenario) -> int:
     """How many runs a budget makes, but for those that find the end of the start-up transient."""
-    return len(_cases(in_long_form(scenario) if isinstance(scenario, Scenario) else scenario))
+    return len(_cases(in_long_form(scenario)))
 
 
 def _check(scenario: TrainScenario, after: float) -> None:

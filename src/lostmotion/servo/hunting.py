@@ -98,7 +98,7 @@ def limit_cycle(scenario: Scenario | TrainScenario, *, motor: str | None = None,
     InputError
         An input never comes to rest, or there are both sampled and continuous controllers.
     """
-    train = _long_form(scenario)
+    train = in_long_form(scenario)
     if train.axes():
         if train.continuous():
             raise InputError(
@@ -227,7 +227,7 @@ def hunting_map(
     """
     import xarray as xr
 
-    train = _long_form(scenario)
+    train = in_long_form(scenario)
     keys = {key: np.atleast_1d(np.asarray(values)) for key, values in grid.items()}
     if not 1 <= len(keys) <= 2 or not all(v.ndim == 1 and len(v) for v in keys.values()):
         raise InputError(f"grid: {shown(dict(grid))} must give values for one or two keys")
@@ -240,7 +240,7 @@ def hunting_map(
     def point(index: tuple[int, ...]) -> tuple[float, float, bool, str, str]:
         nonlocal done
         changes = {key: values[k].item() for (key, values), k in zip(keys.items(), index, strict=True)}
-        result = _point(_long_form(scenario.replace(**changes)), of)
+        result = _point(in_long_form(scenario.replace(**changes)), of)
         done += 1
         if progress is not None:
             progress(done)
@@ -260,10 +260,6 @@ def hunting_map(
     data = {name: (names, column, attrs) for (name, attrs), column in zip(about, columns, strict=True)}
     coords = {n: (n, values, {"long_name": key}) for n, (key, values) in zip(names, keys.items(), strict=True)}
     return xr.Dataset(data, coords=coords, attrs={"variable": of})
-
-
-def _long_form(scenario: Scenario | TrainScenario) -> TrainScenario:
-    return scenario if isinstance(scenario, TrainScenario) else in_long_form(scenario)
 
 
 def _point(train: TrainScenario, variable: str) -> tuple[float, float, bool, str, str]:

@@ -117,7 +117,7 @@ def axis_of(scenario: Scenario | TrainScenario, motor: str | None = None) -> Axi
         raise InputError(
             f"the controller of {name} has law = true, a function whose loops are not known; give it loops"
         )
-    axis = _loaded(Axis(scenario if isinstance(scenario, TrainScenario) else in_long_form(scenario), name))
+    axis = _loaded(Axis(in_long_form(scenario), name))
     if not axis.loops:
         raise InputError(
             f'the controller of {name} closes no loop; give it a speed loop, or current.kind = "pi" or "field_oriented"'

@@ -352,8 +352,10 @@ def file_schema() -> dict[str, Any]:
     return {"title": "Scenario file", "anyOf": [of_drive, of_train], "$defs": definitions}
 
 
-def in_long_form(scenario: Scenario) -> TrainScenario:
-    """A scenario in the short form as one in the long form: shafts `motor` and `load`, gear `gearbox`, motor `motor`."""
+def in_long_form(scenario: Scenario | TrainScenario) -> TrainScenario:
+    """The scenario in the long form; from the short form: shafts `motor` and `load`, gear `gearbox`, motor `motor`."""
+    if isinstance(scenario, TrainScenario):
+        return scenario
     train = scenario.drive().train()
     start = scenario.initial
     load = {key: getattr(train.shafts["load"], key) for key in Shaft.model_fields}
