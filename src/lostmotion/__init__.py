@@ -154,6 +154,7 @@ if TYPE_CHECKING:
     from .simulation.variables import Variable as Variable
     from .sizing.drive_check import check_drive as check_drive
     from .sizing.finding import Finding as Finding
+    from .sizing.finding import Findings as Findings
     from .sizing.motor_run import motor_current as motor_current
     from .sizing.motor_run import temperatures as temperatures
     from .studies.engine import study as study
@@ -250,7 +251,7 @@ _HOMES = {
     "servo.motion": ("AtRest", "Following", "LimitCycle", "Settling", "StepResponse"),
     "servo.tuning": ("Tuning", "tune"),
     "sizing.drive_check": ("check_drive",),
-    "sizing.finding": ("Finding",),
+    "sizing.finding": ("Finding", "Findings"),
     "sizing.motor_run": ("motor_current", "temperatures"),
     "studies.engine": ("study",),
     "studies.file": ("load_study",),

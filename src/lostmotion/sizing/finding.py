@@ -55,7 +55,17 @@ class Finding:
 
 
 class Findings(tuple[Finding, ...]):
-    """All points of a check."""
+    """Findings of one check, as an immutable sequence of `Finding`.
+
+    In a notebook it is shown as the page that `lostmotion drive check` writes.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> findings = lm.check_drive(lm.load("catalogue-robot-joint"))
+    >>> {finding.verdict for finding in findings} <= {"ok", "warning", "unknown"}
+    True
+    """
 
     __slots__ = ()
 
