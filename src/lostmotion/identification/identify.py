@@ -21,6 +21,7 @@ from .identifiability import Undetermined, at_bounds, resting_on
 from .intervals import Interval, bootstrap, profile, widest
 from .ladder import GAIN, RungResult, begun_with, chosen, climb, first_fit, free_on, is_rough, problem_of, start_point
 from .misfit import Misfit, hidden, misfits
+from .odd_logs import OddLog, odd_logs
 from .pauses import split_at_pauses
 from .prepare import DEFAULT, Prepared
 from .record import gear_sheet, scenario_text, sheet_text
@@ -56,6 +57,8 @@ class IdentificationResult:
     """how inputs go on between samples, of those that the task leaves open: and why"""
     misfits: list[Misfit] = field(default_factory=list, kw_only=True)
     """channels whose residuals are no noise, or far above the stated deviation"""
+    odd: list[OddLog] = field(default_factory=list, kw_only=True)
+    """logs that disagree with the others, and the fault that explains each"""
     scenario: TrainScenario
     """the rig with the values that were found, of the first log"""
     profiles: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
@@ -147,7 +150,8 @@ class IdentificationResult:
             "may have any value within its bounds: the motion does not depend smoothly on it, and no start led to residuals of the "
             "stated deviation"
         )
-        return [*(m.text(self.unit(m.channel)) for m in self.misfits), *(f"{name} {text}" for name in lost)]
+        odd = [f"{o.text}{', so that it is left out of the fit' if o.left_out else ''}" for o in self.odd]
+        return [*odd, *(m.text(self.unit(m.channel)) for m in self.misfits), *(f"{name} {text}" for name in lost)]
 
     def passed_over(self) -> list[str]:
         """Rungs with a smaller error that were not taken, since the logs do not tell what they free."""
@@ -288,17 +292,35 @@ def identify_logs(
 ) -> IdentificationResult:
     """As `identify`, of logs that have been prepared."""
     rig, logs, left_out = split_at_pauses(rig, logs)
+    odd: list[OddLog] = []
+    while True:
+        result, more = _identified(rig, logs, threads, profiles, notify)
+        spoiled = [o for o in more if o.left_out]
+        if not spoiled:
+            break
+        odd += spoiled
+        logs = [log for log in logs if log.name not in {o.log for o in spoiled}]
+    result.left_out = left_out | {o.log: o.text for o in odd}
+    result.odd = [*odd, *more]
+    return result
+
+
+def _identified(
+    rig: Rig, logs: list[Prepared], threads: int | None, profiles: bool, notify: Notify
+) -> tuple[IdentificationResult, list[OddLog]]:
+    """(answer from all of the logs, logs that disagree with the others)."""
     rig, logs, point, start, ways = _begun(rig, logs, threads, notify)
     task, engine = rig.task, Engine(rig, threads)
     rungs = climb(rig, engine, logs, point, notify)
     best = chosen(rungs)
+    odd = odd_logs(rig, engine, logs, point, rungs[best].fit, best)
     fit, free = rungs[best].fit, free_on(task, best)
     train = [log for log in logs if not log.held_out]
     problem: Problem = problem_of(rig, engine, train, best)
     misfit = misfits(problem, engine.residuals(train, fit.point, best))
     intervals, found = _intervals(problem, fit, misfit, rungs[best].minima, profiles)
     first = logs[0]
-    return IdentificationResult(
+    result = IdentificationResult(
         task,
         rungs,
         best,
@@ -313,10 +335,10 @@ def identify_logs(
         start,
         rig,
         logs,
-        left_out=left_out,
         inputs=ways,
         misfits=[m for m in misfit if m.large or m.structured],
     )
+    return result, odd
 
 
 def _begun(

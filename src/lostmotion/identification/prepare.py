@@ -67,6 +67,22 @@ class Prepared:
         """Of its file."""
         return self.log.name
 
+    def changed(
+        self, task: Identification, channels: Mapping[str, np.ndarray], *, time: np.ndarray | None = None
+    ) -> Prepared:
+        """The log with other values of some channels of its file [SI], or at other times [s]."""
+        values = {name: replace(self.log.channels[name], values=x) for name, x in channels.items()}
+        own = replace(self.log, time=self.log.time if time is None else time, channels={**self.log.channels, **values})
+        return replace(
+            self,
+            log=own,
+            time=own.time - own.time[0],
+            inputs={name: own.values(i.channel) for name, i in task.inputs.items()},
+            measured={name: own.values(m.channel) for name, m in task.measured.items()},
+            facts=self.facts | _facts(own),
+            cache={},
+        )
+
     def part(self, begin: int, end: int) -> Prepared:
         """Some of its samples as a log of their own, whose time begins at 0; all of them as they are."""
         if (begin, end) == (0, len(self.time)):

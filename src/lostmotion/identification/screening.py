@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -19,6 +20,10 @@ LONGEST = 1e5  # [s] of a log
 HUGE = 1e30  # beyond which a value is none
 STALL = 0.1  # share of the samples in which no channel changes, from which on it is noted
 SLOW = 10.0  # samples for each change of a channel that otherwise changes, from which on it is called slow
+WRAP = 20.0  # times the usual change between samples (99th percentile), that does not come back: a counter that wraps
+SAME = 0.1  # share by which jumps of one counter may differ: it moves while it wraps
+NOISY = 0.9  # share of samples at which a channel changes, from which on one that does not is taken to be frozen
+FROZEN = 20  # samples in a row
 CONTRADICTION = 0.03  # share by which the mean of a channel may depart from what the header says
 
 
@@ -183,8 +188,15 @@ def _without_glitches(log: Log, name: str, acts: bool) -> Log:
 
 
 def _noted(log: Log, name: str) -> Log:
-    """Notes on a channel that ends at a limit, or is slower than its samples."""
+    """Notes on a channel that wraps, is frozen for a while, ends at a limit, or is slower than its samples."""
     x = log.values(name)[np.isfinite(log.values(name))]
+    if (period := wrapped_by(x)) is not None:
+        log = log.noted(
+            f"{name} jumps by {period:.6g} between two samples, as a counter that wraps; unwrap it in the file"
+        )
+    for begin, end in constant_stretches(log.values(name)):
+        text = f"{name} is {log.values(name)[begin]:.6g} from {log.time[begin]:.4g} to {log.time[end - 1]:.4g} s and changes at all"
+        log = log.noted(f"{text} other samples; the sensor may have been frozen")
     changes = int(np.sum(np.diff(x) != 0.0))
     if changes <= SLOW:
         return log
@@ -198,6 +210,38 @@ def _noted(log: Log, name: str) -> Log:
         text = f"{name} changes only {changes / log.duration:.3g} times in a second, and is sampled {1 / log.interval:.4g} times"
         log = log.noted(text)
     return log
+
+
+def wrapped_by(x: np.ndarray) -> float | None:
+    """Period of a counter that wraps, from jumps of one size that do not come back; None without such jumps."""
+    there = x[np.isfinite(x)]
+    step = np.diff(there)
+    if len(step) < 10:
+        return None
+    usual = float(np.percentile(np.abs(step), 95.0))
+    jumps = np.abs(step) > WRAP * max(usual, 1e-300)
+    size = np.abs(step[jumps])
+    if not len(size) or usual == 0.0 or np.ptp(size) > SAME * np.max(size) or np.max(size) < 0.5 * np.ptp(there):
+        return None
+    # The change over the jump, without what the motion adds to it on both sides.
+    at = np.flatnonzero(jumps)
+    sides = np.array([np.mean([*step[max(k - 2, 0) : k], *step[k + 1 : k + 3]]) for k in at.tolist()])
+    period = float(np.mean(np.abs(step[at] - sides)))
+    for whole in (2.0 * np.pi, np.pi, 360.0, 1.0):
+        if abs(period - whole) < SAME * whole:
+            return float(whole)
+    return period
+
+
+def constant_stretches(x: np.ndarray) -> list[tuple[int, int]]:
+    """(begin, end) of samples at which a channel stays exactly the same, though it changes at nearly all others."""
+    moved = np.diff(x) != 0.0
+    edges = np.concatenate([[-1], np.flatnonzero(moved), [len(moved)]])
+    found = [(int(a) + 1, int(b) + 1) for a, b in itertools.pairwise(edges) if b - a > FROZEN]
+    within = sum(end - begin - 1 for begin, end in found)
+    if not found or np.sum(moved) < NOISY * (len(moved) - within):
+        return []
+    return found
 
 
 def _stalls(log: Log) -> Log:
