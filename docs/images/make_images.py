@@ -1,6 +1,7 @@
 """Draws the pictures of README and tutorial: python docs/images/make_images.py"""
 
 import re
+import sys
 import tempfile
 from pathlib import Path
 
@@ -52,8 +53,16 @@ def selection(study: lm.Study, name: str) -> None:
     figure.savefig(HERE / name, dpi=110, metadata={"Software": None})
 
 
+def tracking() -> None:
+    sys.path.insert(0, str(HERE.parent))
+    import tracking_figures
+
+    tracking_figures.over_amplitude(HERE)
+
+
 if __name__ == "__main__":
     why()
+    tracking()
     tutorial()
     examples = HERE.parents[1] / "examples"
     selection(lm.load_study(examples / "select-gearbox.toml"), "selection.png")
