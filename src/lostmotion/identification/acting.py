@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,13 +10,41 @@ import numpy as np
 
 from .. import _core
 from ..control.axis import OPEN_LOOP, Bound
+from ..errors import InputError
 from .formulas import number
+from .goal_shaping import shaped
 from .prepare import Prepared
 from .rig import Built
 from .task import Identification
 
-NUMBERS = ("scale", "offset", "delay")
+NUMBERS = ("scale", "offset", "delay", "rate_limit", "acceleration_limit", "filter_time")
+DELAY = NUMBERS.index("delay")
 Points = list[tuple[float, float, float]]
+
+
+def numbers_of_input(task: Identification, name: str, known: Mapping[str, Any]) -> tuple[float, ...]:
+    """Values of `NUMBERS` of an input; a limit that is left out is infinite."""
+    given = [(key, getattr(task.inputs[name], key)) for key in NUMBERS]
+    found = tuple(math.inf if x is None else number(x, known, f"inputs.{name}.{key}") for key, x in given)
+    for key, value in zip(NUMBERS[3:], found[3:], strict=True):
+        if not (value >= 0.0 if key == "filter_time" else value > 0.0):
+            raise InputError(
+                f"key inputs.{name}.{key}: is {value:g}; it must be {'at least' if key == 'filter_time' else 'above'} 0"
+            )
+    return found
+
+
+def course_of_input(
+    task: Identification, log: Prepared, name: str, numbers: tuple[float, ...]
+) -> tuple[np.ndarray, np.ndarray, bool, int]:
+    """(instants without the delay [s], values there in SI, whether they are held, points for one sample)."""
+    scale, offset, _, rate, acceleration, filter_time = numbers
+    t, v = log.time, scale * log.inputs[name] + offset
+    held = task.inputs[name].interpolation != "linear"
+    if math.isinf(rate) and math.isinf(acceleration) and filter_time == 0.0:
+        return t, v, held, 1
+    fine, course, count = shaped(t, v, held=held, rate=rate, acceleration=acceleration, filter_time=filter_time)
+    return fine, course, False, count
 
 
 class Acting:
@@ -54,14 +83,13 @@ class Acting:
         return control
 
     def _numbers(self, name: str, known: Mapping[str, Any]) -> tuple[float, ...]:
-        channel = self._task.inputs[name]
-        return tuple(number(getattr(channel, key), known, f"inputs.{name}.{key}") for key in NUMBERS)
+        return numbers_of_input(self._task, name, known)
 
     def _samples(self, name: str, known: Mapping[str, Any]) -> tuple[int, int, bool]:
         """First and last of those that act between begin and end, and whether the first comes late: beside a value of a
         parameter they are the same.
         """
-        time = self._log.time + (self._numbers(name, known)[2] - self._begin)
+        time = self._log.time + (self._numbers(name, known)[DELAY] - self._begin)
         first = max(0, int(np.searchsorted(time, 0.0, side="right")) - 1)
         last = int(np.searchsorted(time, self._end - self._begin, side="left"))
         return first, last + 1, bool(time[first] > 0.0)
@@ -76,13 +104,12 @@ class Acting:
         return self._kept((name, *numbers, *self._pieces[name], self._begin), lambda: self._made(name, numbers))  # type: ignore[no-any-return]
 
     def _made(self, name: str, numbers: tuple[float, ...]) -> Points:
-        scale, offset, delay = numbers
         first, end, late = self._pieces[name]
-        which = slice(first, end)
-        t = self._log.time[which] + (delay - self._begin)
-        v = scale * self._log.inputs[name][which] + offset
+        t, v, held, count = course_of_input(self._task, self._log, name, numbers)
+        which = slice(first * count, (end - 1) * count + 1)
+        t, v = t[which] + (numbers[DELAY] - self._begin), v[which]
         slope = np.zeros(len(t))
-        if self._task.inputs[name].interpolation == "linear" and len(t) > 1:
+        if not held and len(t) > 1:
             slope[:-1] = np.diff(v) / np.diff(t)
         if late:
             t, v, slope = np.append(0.0, t), np.append(v[0], v), np.append(0.0, slope)

@@ -22,8 +22,7 @@ from ..model.angle_torques import STANDARD_GRAVITY, AngleTorque, Gravity, Torque
 from ..model.losses import ConstantEfficiency, MeshEfficiency
 from ..model.motor import ShaftMotor
 from ..simulation.train_scenario import TrainScenario
-from .acting import NUMBERS
-from .formulas import number
+from .acting import DELAY, course_of_input, numbers_of_input
 from .motion import Position, measured_course
 from .prepare import Prepared
 from .rig import Rig
@@ -175,8 +174,9 @@ def _acting(rig: Rig, s: Stretch, known: Mapping[str, Any], scenario: TrainScena
         if signal.sine_list() or len(points) > 1 or any(points[0][2:]):
             raise InputError(f"{name} changes with time, and is not among the inputs")
         return np.full(len(s.time), points[0][1])
-    scale, offset, delay = (number(getattr(channel, key), known, f"inputs.{name}.{key}") for key in NUMBERS)
-    at, values = s.log.time + delay, s.log.inputs[name]
-    if channel.interpolation == "linear":
-        return np.asarray(scale * np.interp(s.time, at, values) + offset)
-    return np.asarray(scale * values[np.maximum(np.searchsorted(at, s.time, side="right") - 1, 0)] + offset)
+    numbers = numbers_of_input(rig.task, name, known)
+    at, values, held, _ = course_of_input(rig.task, s.log, name, numbers)
+    at = at + numbers[DELAY]
+    if not held:
+        return np.asarray(np.interp(s.time, at, values))
+    return np.asarray(values[np.maximum(np.searchsorted(at, s.time, side="right") - 1, 0)])

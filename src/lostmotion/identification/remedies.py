@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from .formulas import names_within
 from .rig import Rig
-from .task import Identification
+from .task import CHANNEL_FORMULAS, Identification
 
 OTHERWISE = "give a value with a tolerance as a prior, or a log in which they act apart"
 
@@ -59,9 +59,5 @@ def keys_of(task: Identification, name: str) -> list[str]:
     tables = [task.set, *(rung.set for rung in task.ladder), *(phase.set for phase in task.phases)]
     found = [key for table in tables for key, value in table.items() if name in names_within(value)]
     for entry in (*task.inputs.values(), *task.measured.values()):
-        found += [
-            key
-            for key in ("delay", "scale", "offset", "filter_time")
-            if name in names_within(getattr(entry, key, None))
-        ]
+        found += [key for key in CHANNEL_FORMULAS if name in names_within(getattr(entry, key, None))]
     return found

@@ -18,7 +18,7 @@ from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_for
 from .formulas import Formula, names_in
 from .prepare import Prepared
 from .shaft_angles import angle_terms
-from .task import Identification, Rung
+from .task import CHANNEL_FORMULAS, Identification, Rung
 from .variants import Variants
 
 KEPT = 4000  # scenarios that are kept ready, a tenth of a megabyte each; few serve again once the search has moved on
@@ -126,7 +126,7 @@ class Rig:
         task = self.task
         entered = names_of([self._set, *self._phases, *self._rungs])
         for channel in (*task.inputs.values(), *task.measured.values()):
-            numbers = (getattr(channel, key, None) for key in ("scale", "offset", "delay", "filter_time"))
+            numbers = (getattr(channel, key, None) for key in CHANNEL_FORMULAS)
             entered |= frozenset().union(*(names_in(n) for n in numbers if n is not None))
         sought = [("parameters", name) for rung in task.rungs() for name in rung.free]
         for table, name in [*sought, *(("nuisance", name) for name in task.nuisance)]:

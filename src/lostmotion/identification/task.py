@@ -21,6 +21,8 @@ from .formulas import CONSTANTS, FUNCTIONS, Formula
 from .parameters import FreeParameter, in_unit
 
 FormulaText = str | float
+# Keys of inputs and measured channels that are formulas.
+CHANNEL_FORMULAS = ("scale", "offset", "delay", "rate_limit", "acceleration_limit", "filter_time", "resolution")
 Setting = FormulaText | tuple["Setting", ...] | dict[str, Any]
 
 
@@ -64,6 +66,12 @@ class InputChannel(Part):
     """by which it acts later: dead time [s]"""
     interpolation: Literal["hold", "linear"] | None = None
     """between samples; left out, held where the channel repeats its values or moves in steps, else the way that is nearer to the logs"""
+    rate_limit: FormulaText | None = None
+    """largest rate with which the rig follows the channel, such as a firmware's limit of the goal's speed; SI; left out, none"""
+    acceleration_limit: FormulaText | None = None
+    """largest rate of that rate, SI; left out, none"""
+    filter_time: FormulaText = 0.0
+    """time constant of a first-order filter of the channel, before the limits [s]"""
 
 
 class MeasuredChannel(Part):
@@ -220,8 +228,8 @@ class Identification(Part):
             (f"{table}.{name}.{key}", [getattr(entry, key)])
             for table in ("inputs", "measured")
             for name, entry in getattr(self, table).items()
-            for key in ("scale", "offset", "delay", "filter_time", "resolution")
-            if hasattr(entry, key)
+            for key in CHANNEL_FORMULAS
+            if getattr(entry, key, None) is not None
         ]
         found += [(f"phases[{k}].when", [phase.when]) for k, phase in enumerate(self.phases)]
         found.append(("logs.weight", [self.logs.weight]))
