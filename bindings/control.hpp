@@ -262,8 +262,17 @@ inline void bind_control(nb::module_& m) {
     m.attr("COMMAND_SLOT") = Axis::command_slot();
     m.attr("SPEED_ANGLE_SLOT") = Axis::speed_angle_slot();
     m.def(
-        "axis_signals", [] { return signal_names(axis_signal_names); },
-        nb::sig("def axis_signals() -> list[tuple[str, str, str]]"), "Name, unit, meaning of what each axis shows.");
+        "axis_signals",
+        [](bool motor_slides, bool position_slides) {
+            auto names = axis_signal_names;
+            for (int k = 0; k < n_axis_signals; ++k)
+                names[static_cast<std::size_t>(k)] = axis_signal_name(k, motor_slides, position_slides);
+            return signal_names(names);
+        },
+        "motor_slides"_a = false, "position_slides"_a = false,
+        nb::sig("def axis_signals(motor_slides: bool = False, position_slides: bool = False) -> list[tuple[str, str, "
+                "str]]"),
+        "Name, unit, meaning of what each axis shows, where the motor moves a slide, or the position is that of one.");
     m.def(
         "winding_signals", [] { return signal_names(winding_signal_names); },
         nb::sig("def winding_signals() -> list[tuple[str, str, str]]"),

@@ -108,6 +108,11 @@ class TrainDescription : public model::TrainDescription {
         s.loaded = loaded;
         model::TrainDescription::add_shaft(std::move(s));
     }
+    void set_domain(const std::string& shaft, const std::string& domain) {
+        for (model::Shaft& s : train.shafts)
+            if (s.name == shaft)
+                s.domain = domain == "translation" ? model::Domain::translation : model::Domain::rotation;
+    }
     void add_motor(const std::string& name, const std::string& shaft, const Named& parameters, bool torque_source,
                    double torque_limit) {
         Motor law = with_parameters(parameters).motors[0].law;
@@ -372,6 +377,7 @@ inline void bind_train(nb::module_& m) {
         .def("add_gear", &TrainDescription::add_gear, "name"_a, "input"_a, "output"_a, "parameters"_a,
              "torsion_curve"_a.none(), "loss_map"_a.none(), "efficiencies"_a.none(), "mesh_damping"_a,
              "transmission_error"_a.none())
+        .def("set_domain", &TrainDescription::set_domain, "shaft"_a, "domain"_a)
         .def("set_housing", &TrainDescription::set_housing, "gear"_a, "shaft"_a)
         .def("add", &TrainDescription::add, "table"_a, "name"_a, "shaft"_a, "fields"_a,
              nb::sig("def add(self, table: str, name: str, shaft: str, fields: collections.abc.Mapping[str, "

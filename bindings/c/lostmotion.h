@@ -200,6 +200,10 @@ LM_API int lm_add_motor(lm_train* train, const char* name, const char* shaft, co
 LM_API int lm_add_gear(lm_train* train, const char* name, const char* input, const char* output,
                        const lm_parameter* parameters, size_t n, const lm_curve* stiffness, const lm_loss_map* losses,
                        const double* efficiencies, double mesh_damping, const lm_periodic_curve* transmission_error);
+/* Makes a slide of a shaft: its inertia is a mass [kg], its angle a position [m], torques on it are forces [N], and
+ * results have the names "<name>_position" and "<name>_load_force". The ratio of a screw of lead p that drives it is 2
+ * pi/p. LM_INVALID: there is none of that name. */
+LM_API int lm_set_slide(lm_train* train, const char* shaft);
 /* Puts the housing of a gear, by default on the frame, on a shaft. LM_INVALID: there is none of that name. */
 LM_API int lm_set_housing(lm_train* train, const char* gear, const char* shaft);
 /* torque while it slips, breakaway_torque at rest (0: the same), at command 1. */

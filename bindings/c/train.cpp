@@ -173,6 +173,17 @@ int lm_add_gear(lm_train* train, const char* name, const char* input, const char
     });
 }
 
+int lm_set_slide(lm_train* train, const char* shaft) {
+    return train->attempt([&] {
+        for (lm::model::Shaft& s : train->description.train.shafts)
+            if (s.name == text(shaft)) {
+                s.domain = lm::model::Domain::translation;
+                return std::string{};
+            }
+        return "there is no shaft '" + text(shaft) + "'";
+    });
+}
+
 int lm_set_housing(lm_train* train, const char* gear, const char* shaft) {
     return train->attempt([&] {
         const auto named = [](const char* name) {

@@ -71,6 +71,16 @@ if TYPE_CHECKING:
     from .model.gear import Gear as Gear
     from .model.gearbox import Gearbox as Gearbox
     from .model.gearbox import GearboxLimits as GearboxLimits
+    from .model.linear import Belt as Belt
+    from .model.linear import EndStops as EndStops
+    from .model.linear import ForceCurve as ForceCurve
+    from .model.linear import LinearMotor as LinearMotor
+    from .model.linear import PitchCurve as PitchCurve
+    from .model.linear import PitchHarmonic as PitchHarmonic
+    from .model.linear import Rack as Rack
+    from .model.linear import Screw as Screw
+    from .model.linear import Slide as Slide
+    from .model.linear import StiffnessCurve as StiffnessCurve
     from .model.load import Load as Load
     from .model.losses import ConstantEfficiency as ConstantEfficiency
     from .model.losses import LossMap as LossMap
@@ -88,6 +98,7 @@ if TYPE_CHECKING:
     from .model.shaft import QuadraticDrag as QuadraticDrag
     from .model.shaft import Shaft as Shaft
     from .model.signals import CommandSignal as CommandSignal
+    from .model.signals import ForceSignal as ForceSignal
     from .model.signals import TorqueSignal as TorqueSignal
     from .model.springs import Spring as Spring
     from .model.synchronous_motor import PhaseValues as PhaseValues
@@ -148,6 +159,7 @@ if TYPE_CHECKING:
     from .simulation.stepping import SimulationState as SimulationState
     from .simulation.switchings import switchings_of as switchings_of
     from .simulation.train_scenario import ShaftTable as ShaftTable
+    from .simulation.train_scenario import SlideTable as SlideTable
     from .simulation.train_scenario import TrainInitial as TrainInitial
     from .simulation.train_scenario import TrainScenario as TrainScenario
     from .simulation.variables import VARIABLES as VARIABLES
@@ -213,11 +225,23 @@ _HOMES = {
     "model.gear": ("Gear",),
     "model.gearbox": ("Gearbox", "GearboxLimits"),
     "model.load": ("Load",),
+    "model.linear": (
+        "Belt",
+        "EndStops",
+        "ForceCurve",
+        "LinearMotor",
+        "PitchCurve",
+        "PitchHarmonic",
+        "Rack",
+        "Screw",
+        "Slide",
+        "StiffnessCurve",
+    ),
     "model.losses": ("ConstantEfficiency", "LossMap", "MeshEfficiency", "WormMesh"),
     "model.motor": ("Motor", "MotorLimits", "ShaftMotor"),
     "model.self_locking": ("Overrunning", "SelfLocking", "overrunning", "self_locking"),
     "model.shaft": ("DragCurve", "FrictionCurve", "QuadraticDrag", "Shaft"),
-    "model.signals": ("CommandSignal", "TorqueSignal"),
+    "model.signals": ("CommandSignal", "ForceSignal", "TorqueSignal"),
     "model.springs": ("Spring",),
     "model.synchronous_motor": ("PhaseValues", "Winding"),
     "model.torsion": ("Hysteresis", "LinearStiffness", "Rigid", "TorsionCurve"),
@@ -239,7 +263,7 @@ _HOMES = {
     "simulation.sources": ("load",),
     "simulation.stepping": ("Simulation", "SimulationState"),
     "simulation.switchings": ("switchings_of",),
-    "simulation.train_scenario": ("ShaftTable", "TrainInitial", "TrainScenario"),
+    "simulation.train_scenario": ("ShaftTable", "SlideTable", "TrainInitial", "TrainScenario"),
     "simulation.variables": ("VARIABLES", "Variable"),
     "servo.commission": ("LoopSheet", "ServoReport", "Stiffness", "commission"),
     "servo.hunting": ("Hunting", "hunting_map", "limit_cycle"),

@@ -147,8 +147,10 @@ COMMAND_SLOT: int = 14
 
 SPEED_ANGLE_SLOT: int = 10
 
-def axis_signals() -> list[tuple[str, str, str]]:
-    """Name, unit, meaning of what each axis shows."""
+def axis_signals(motor_slides: bool = False, position_slides: bool = False) -> list[tuple[str, str, str]]:
+    """
+    Name, unit, meaning of what each axis shows, where the motor moves a slide, or the position is that of one.
+    """
 
 def winding_signals() -> list[tuple[str, str, str]]:
     """The same of what one with a winding shows beside it."""
@@ -177,6 +179,8 @@ class Train:
     def add_motor(self, name: str, shaft: str, parameters: Mapping[str, float], torque_source: bool, torque_limit: float) -> None: ...
 
     def add_gear(self, name: str, input: str, output: str, parameters: Mapping[str, float], torsion_curve: TorsionCurve | None, loss_map: LossMap | None, efficiencies: tuple[float, float] | None, mesh_damping: float, transmission_error: PeriodicCurve | None) -> None: ...
+
+    def set_domain(self, shaft: str, domain: str) -> None: ...
 
     def set_housing(self, gear: str, shaft: str) -> None: ...
 

@@ -20,7 +20,7 @@ std::vector<NamedComponent> train_components(const model::Assembly& a) {
         out.push_back({states[static_cast<std::size_t>(k)], k, !t.short_form && !moves[static_cast<std::size_t>(k)]});
     for (int part = 0; part < a.layout().angles; ++part)
         if (p.shafts[p.last_shaft[part]].angle == model::nowhere)
-            out.push_back({t.shafts[p.last_shaft[part]].name + "_angle", D::coupled + part, true});
+            out.push_back({model::angle_of(t, static_cast<std::size_t>(p.last_shaft[part])), D::coupled + part, true});
     if (t.short_form) {  // both torques, whether there are such or not
         const int locked =
             p.gears[0].contact == model::nowhere ? model::nowhere : p.contacts[p.gears[0].contact].locked;

@@ -95,6 +95,19 @@ inline constexpr std::array<AxisSignalName, n_axis_signals> axis_signal_names{{
     {"target_direction", "rad", "direction of the target by the last frame that has shown it"},
     {"target_seen", "1", "whether the last frame has shown the target"},
 }};
+// The same where the motor moves a slide, or the position is that of one.
+inline AxisSignalName axis_signal_name(int signal, bool motor_slides, bool position_slides) {
+    AxisSignalName named = axis_signal_names[static_cast<std::size_t>(signal)];
+    const bool position = signal == position_reference || signal == measured_position;
+    if (position && position_slides)
+        named.meaning = signal == position_reference ? "position that the controller wants"
+                                                     : "position that the controller has read";
+    if ((position || signal == target_direction) && position_slides) named.unit = "m";
+    if ((signal == speed_reference || signal == measured_speed) && motor_slides) named.unit = "m/s";
+    if ((signal == torque_reference || signal == friction_torque) && motor_slides) named.unit = "N";
+    if (signal == load_torque && position_slides) named.unit = "N";
+    return named;
+}
 
 // What an axis with a winding shows beside them, at any instant.
 enum WindingSignal : int {

@@ -1,15 +1,46 @@
 #include "names.hpp"
 
+#include <string_view>
+#include <utility>
+
 namespace lostmotion::model {
 
+bool is_slide(const Train& t, int shaft) {
+    return t.shafts[static_cast<std::size_t>(shaft)].domain == Domain::translation;
+}
+const char* angle_unit(const Train& t, int shaft) { return is_slide(t, shaft) ? "m" : "rad"; }
+const char* speed_unit(const Train& t, int shaft) { return is_slide(t, shaft) ? "m/s" : "rad/s"; }
+const char* angle_meaning(const Train& t, int shaft) {
+    return is_slide(t, shaft) ? "position of the slide" : "angle of the shaft";
+}
+const char* torque_unit(const Train& t, int shaft) { return is_slide(t, shaft) ? "N" : "N*m"; }
+const char* torque_word(const Train& t, int shaft) { return is_slide(t, shaft) ? "force" : "torque"; }
+std::string angle_of(const Train& t, std::size_t shaft) {
+    return t.shafts[shaft].name + (is_slide(t, static_cast<int>(shaft)) ? "_position" : "_angle");
+}
+std::string motor_torque_of(const Train& t, std::size_t motor) {
+    return t.motors[motor].name + "_" + torque_word(t, t.motors[motor].shaft);
+}
+std::string twist_of(const Train& t, std::size_t gear) { return gear_result(t, gear, "twist"); }
+const char* twist_meaning(const Train& t, std::size_t gear) {
+    return is_slide(t, t.gears[gear].output) ? "angle of input/ratio less position of output"
+                                             : "angle of input/ratio less that of output";
+}
+
 std::string gear_result(const Train& t, std::size_t gear, const char* what) {
-    return t.short_form ? what : t.gears[gear].name + "_" + what;
+    if (t.short_form) return what;
+    std::string name = what;
+    if (is_slide(t, t.gears[gear].output))
+        for (const auto& [rotary, linear] : {std::pair{"twist", "deflection"}, std::pair{"torque", "force"}})
+            if (const std::size_t at = name.find(rotary); at != std::string::npos)
+                name.replace(at, std::string_view(rotary).size(), linear);
+    return t.gears[gear].name + "_" + name;
 }
 std::string command_of(const Train& t, std::size_t motor) {
     return t.short_form ? "command" : t.motors[motor].name + "_command";
 }
 std::string load_torque_of(const Train& t, std::size_t shaft) {
-    return t.short_form ? "load_torque" : t.shafts[shaft].name + "_load_torque";
+    return t.short_form ? "load_torque" : t.shafts[shaft].name + "_load_" + torque_word(t, static_cast<int>(shaft));
 }
 
 std::vector<std::string> state_names(const Assembly& a) {
@@ -19,10 +50,10 @@ std::vector<std::string> state_names(const Assembly& a) {
     const auto set = [&names](int state, const std::string& name) {
         if (state != nowhere) names[static_cast<std::size_t>(state)] = name;
     };
-    for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].torque, t.motors[k].name + "_torque");
+    for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].torque, motor_torque_of(t, k));
     for (std::size_t k = 0; k < t.shafts.size(); ++k) {
         set(p.shafts[k].speed, t.shafts[k].name + "_speed");
-        set(p.shafts[k].angle, t.shafts[k].name + "_angle");
+        set(p.shafts[k].angle, angle_of(t, k));
     }
     for (std::size_t k = 0; k < t.gears.size(); ++k) set(p.gears[k].twist, gear_result(t, k, "twist"));
     for (std::size_t k = 0; k < t.controllers.size(); ++k)
@@ -31,7 +62,7 @@ std::vector<std::string> state_names(const Assembly& a) {
                 t.controllers[k].name + "_" + t.controllers[k].states[j]);
     for (int part = 0; part < a.layout().angles; ++part) {
         const auto last = static_cast<std::size_t>(p.last_shaft[static_cast<std::size_t>(part)]);
-        set(a.layout().coupled + part, t.shafts[last].name + "_angle");
+        set(a.layout().coupled + part, angle_of(t, last));
     }
     return names;
 }
@@ -79,6 +110,16 @@ std::string contact_name(const Assembly& a, int contact) {
     }
 }
 
+int contact_shaft(const Assembly& a, int contact) {
+    const ContactPlace& c = a.places().contacts[static_cast<std::size_t>(contact)];
+    const auto k = static_cast<std::size_t>(c.element);
+    switch (c.kind) {
+        case ContactPlace::shaft: return c.element;
+        case ContactPlace::gear: return a.train().gears[k].output;
+        default: return a.places().couplings[k]->input;
+    }
+}
+
 std::string contact_text(const Assembly& a, int contact) {
     const ContactPlace& c = a.places().contacts[static_cast<std::size_t>(contact)];
     if (!a.train().short_form) return contact_name(a, contact);
@@ -98,7 +139,8 @@ std::vector<std::string> branch_names(const Assembly& a) {
         set(p.shafts[k].friction_piece, t.shafts[k].name + ": piece of the friction curve");
     for (std::size_t k = 0; k < t.gears.size(); ++k) {
         const std::string& name = t.gears[k].name;
-        set(p.gears[k].piece, name + ": piece of the torsion curve");
+        set(p.gears[k].piece, name + (is_slide(t, t.gears[k].output) ? ": piece of the stiffness curve"
+                                                                     : ": piece of the torsion curve"));
         set(p.gears[k].cell, name + ": cell of the losses");
         set(p.gears[k].cell_back, name + ": cell of the losses backward");
         set(p.gears[k].parted, name + ": flanks parted");

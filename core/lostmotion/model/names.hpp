@@ -8,7 +8,20 @@
 
 namespace lostmotion::model {
 
-// NAME_WHAT of an element; in the short form what a gear has stands alone.
+// What is an angle of a shaft is a position of a slide, and so on: the names and units of both domains.
+bool is_slide(const Train& t, int shaft);
+const char* angle_unit(const Train& t, int shaft);
+const char* speed_unit(const Train& t, int shaft);
+const char* angle_meaning(const Train& t, int shaft);
+const char* torque_unit(const Train& t, int shaft);
+const char* torque_word(const Train& t, int shaft);  // "torque" or "force"
+std::string angle_of(const Train& t, std::size_t shaft);
+std::string motor_torque_of(const Train& t, std::size_t motor);
+std::string twist_of(const Train& t, std::size_t gear);
+const char* twist_meaning(const Train& t, std::size_t gear);
+
+// NAME_WHAT of an element; in the short form what a gear has stands alone. Of a gear with a slide on its output a twist
+// is a deflection, a torque a force.
 std::string gear_result(const Train& t, std::size_t gear, const char* what);
 std::string command_of(const Train& t, std::size_t motor);
 std::string load_torque_of(const Train& t, std::size_t shaft);
@@ -23,6 +36,8 @@ std::vector<bool> moved_states(const Assembly& a);
 std::vector<std::string> input_names(const Assembly& a);
 
 std::string contact_name(const Assembly& a, int contact);
+// The shaft in whose domain its torque is.
+int contact_shaft(const Assembly& a, int contact);
 // The same in a sentence.
 std::string contact_text(const Assembly& a, int contact);
 

@@ -1,4 +1,5 @@
-// A shaft: a speed with inertia, viscous friction, dry friction, drag over speed and an external torque.
+// A shaft, or a slide in its place: a speed with inertia, viscous friction, dry friction, drag over speed and an
+// external torque.
 #pragma once
 
 #include <string>
@@ -8,8 +9,13 @@
 
 namespace lostmotion::model {
 
+// Of a slide angles are positions [m], torques forces [N], the inertia is a mass [kg]. No equation depends on it, only
+// names and units.
+enum class Domain { rotation, translation };
+
 struct Shaft {
     std::string name;
+    Domain domain = Domain::rotation;
     double inertia = 0.0;           // [kg m2], without the rotors and gear inertias on it
     double viscous_friction = 0.0;  // [N m s/rad]
     DryFriction friction;

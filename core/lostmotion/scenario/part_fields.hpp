@@ -153,6 +153,7 @@ void describe(F& f, DryFriction& d) {
 template <class F>
 void describe(F& f, Shaft& s) {
     f.text("name", s.name);
+    f.choice("domain", s.domain, 2);
     f.number("inertia", s.inertia, Range::not_negative);
     f.number("viscous_friction", s.viscous_friction, Range::not_negative);
     f.part("friction", [&] { describe(f, s.friction); });

@@ -231,7 +231,7 @@ void ScenarioSimulation::name_all(const Scenario& scenario) {
     end_ = begin_;
     for (const ControlledAxis& axis : control_.axes) {
         const auto m = static_cast<std::size_t>(axis.motor);
-        torques_.push_back(static_cast<std::size_t>(variables_.place(scenario.train.motors[m].name + "_torque")));
+        torques_.push_back(static_cast<std::size_t>(variables_.place(model::motor_torque_of(scenario.train, m))));
     }
     identity_ = 0xcbf29ce484222325u;
     for (const auto* list : {&names_.states, &names_.inputs})
@@ -241,13 +241,19 @@ void ScenarioSimulation::name_all(const Scenario& scenario) {
 void ScenarioSimulation::name_reference(const Scenario& scenario, const ControlledAxis& axis) {
     const std::string of = scenario.prefix(axis);
     const control::Axis::Mode mode = axis.law.mode;
+    const model::Train& t = scenario.train;
+    const int motor = t.motors[static_cast<std::size_t>(axis.motor)].shaft;
     names_.references.push_back({of + "reference",
-                                 mode == control::Axis::position_mode ? "rad"
-                                 : mode == control::Axis::speed_mode  ? "rad/s"
-                                                                      : "N*m",
-                                 mode == control::Axis::position_mode ? "angle that the controller is to follow"
-                                 : mode == control::Axis::speed_mode  ? "speed that the controller is to follow"
-                                                                      : "torque of the motor that is to act"});
+                                 mode == control::Axis::position_mode ? model::angle_unit(t, axis.reference_shaft)
+                                 : mode == control::Axis::speed_mode  ? model::speed_unit(t, axis.reference_shaft)
+                                                                      : model::torque_unit(t, motor),
+                                 mode == control::Axis::position_mode
+                                     ? model::is_slide(t, axis.reference_shaft)
+                                           ? "position that the controller is to follow"
+                                           : "angle that the controller is to follow"
+                                 : mode == control::Axis::speed_mode
+                                     ? "speed that the controller is to follow"
+                                     : std::string(model::torque_word(t, motor)) + " of the motor that is to act"});
     names_.inputs.push_back(names_.references.back().name);
 }
 

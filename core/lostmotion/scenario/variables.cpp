@@ -9,22 +9,27 @@ Variables::Variables(const Scenario& s) : train_(s.train) {
     if (train_.short_form) {
         add_efficiency();
     } else {
-        for (const model::Gear& g : train_.gears)
-            if (place(g.name + "_twist") < 0) {
+        for (const model::Gear& g : train_.gears) {
+            const auto k = static_cast<std::size_t>(&g - train_.gears.data());
+            if (const std::string name = model::twist_of(train_, k); place(name) < 0) {
                 derived_.push_back({Derived::nothing});
-                all_.push_back({g.name + "_twist", "rad", "angle of input/ratio less that of output"});
+                all_.push_back({name, model::angle_unit(train_, g.output), model::twist_meaning(train_, k)});
             }
+        }
         add_angles();
     }
     for (std::size_t a = 0; a < s.control.axes.size(); ++a) {
         const control::Axis& law = s.control.axes[a].law;
         const std::string prefix = s.prefix(s.control.axes[a]);
+        const bool motor =
+                       model::is_slide(train_, train_.motors[static_cast<std::size_t>(s.control.axes[a].motor)].shaft),
+                   load = model::is_slide(train_, s.control.axes[a].reference_shaft);
         const auto add = [&](int signal, const control::AxisSignalName& named) {
             shown_.push_back({static_cast<int>(a), signal});
             all_.push_back({prefix + named.name, named.unit, named.meaning});
         };
         for (int k = 0; k < control::n_axis_signals; ++k)
-            if (shows(law, k)) add(k, control::axis_signal_names[static_cast<std::size_t>(k)]);
+            if (shows(law, k)) add(k, control::axis_signal_name(k, motor, load));
         for (int k = 0; k < control::n_winding_signals && law.field_orientation; ++k)
             add(control::n_axis_signals + k, control::winding_signal_names[static_cast<std::size_t>(k)]);
     }
@@ -69,9 +74,9 @@ void Variables::add_efficiency() {
 
 void Variables::add_angles() {
     std::vector<std::size_t> waiting;
-    const auto name = [&](int shaft) { return train_.shafts[static_cast<std::size_t>(shaft)].name; };
+    const auto angle = [&](int shaft) { return model::angle_of(train_, static_cast<std::size_t>(shaft)); };
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
-        if (place(train_.shafts[s].name + "_angle") >= 0) waiting.push_back(s);
+        if (place(model::angle_of(train_, s)) >= 0) waiting.push_back(s);
     while (!waiting.empty()) {
         const int shaft = static_cast<int>(waiting.back());
         waiting.pop_back();
@@ -80,10 +85,10 @@ void Variables::add_angles() {
             if (gear.housing >= 0 || (gear.input != shaft && gear.output != shaft)) continue;
             const bool forward = gear.input == shaft;
             const int other = forward ? gear.output : gear.input;
-            if (place(name(other) + "_angle") >= 0) continue;
-            derived_.push_back({forward ? Derived::angle_of_output : Derived::angle_of_input,
-                                place(name(shaft) + "_angle"), place(gear.name + "_twist"), -1, static_cast<int>(g)});
-            all_.push_back({name(other) + "_angle", "rad", "angle of the shaft"});
+            if (place(angle(other)) >= 0) continue;
+            derived_.push_back({forward ? Derived::angle_of_output : Derived::angle_of_input, place(angle(shaft)),
+                                place(model::twist_of(train_, g)), -1, static_cast<int>(g)});
+            all_.push_back({angle(other), model::angle_unit(train_, other), model::angle_meaning(train_, other)});
             waiting.push_back(static_cast<std::size_t>(other));
         }
     }

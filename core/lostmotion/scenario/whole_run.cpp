@@ -18,7 +18,7 @@ void add_signals(const Scenario& s, const Variables& variables, const std::vecto
     for (std::size_t a = 0; a < s.control.axes.size(); ++a) {
         const ControlledAxis& axis = s.control.axes[a];
         if (!axis.law.field_orientation) continue;
-        const int place = variables.place(s.train.motors[static_cast<std::size_t>(axis.motor)].name + "_torque");
+        const int place = variables.place(model::motor_torque_of(s.train, static_cast<std::size_t>(axis.motor)));
         const std::size_t first = control::n_axis_signals;
         const double *i_d = recorded(a, first + control::direct_current),
                      *i_q = recorded(a, first + control::quadrature_current);

@@ -12,12 +12,14 @@ void add_controller_channels(const model::Assembly& a, int controller, std::vect
     const auto k = static_cast<std::size_t>(controller);
     const model::LinearController& c = a.train().controllers[k];
     const model::ControllerPlace& p = a.places().controllers[k];
-    const std::string unit = c.compared.kind == model::LinearController::Signal::angle ? "rad" : "rad/s";
+    const model::Train& t = a.train();
+    const bool angle = c.compared.kind == model::LinearController::Signal::angle;
+    const std::string unit = angle ? model::angle_unit(t, c.compared.shaft) : model::speed_unit(t, c.compared.shaft);
     out.push_back({C::output, controller, c.name + "_command", "", "command that the controller gives"});
     out.push_back({C::input, p.reference, c.name + "_reference", unit, "reference of the controller"});
     out.push_back({C::error, controller, c.name + "_error", unit, "reference less what is measured"});
     if (p.reference_rate != model::nowhere)
-        out.push_back({C::input, p.reference_rate, c.name + "_reference_rate", unit + (unit == "rad" ? "/s" : "^2"),
+        out.push_back({C::input, p.reference_rate, c.name + "_reference_rate", unit + (angle ? "/s" : "^2"),
                        "rate of the reference"});
     for (std::size_t j = 0; j < c.states.size(); ++j)
         out.push_back(
@@ -63,37 +65,52 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
     const auto inputs = model::input_names(a);
     for (std::size_t k = 0; k < inputs.size(); ++k) {
         if (k >= first_reference(a)) break;
-        const bool load = inputs[k].ends_with("_load_torque");
-        out.push_back({C::input, static_cast<int>(k), inputs[k], load ? "N*m" : "",
-                       load ? "torque against the shaft" : "command"});
+        const auto loaded = std::ranges::find(p.shafts, static_cast<int>(k), &model::ShaftPlace::load);
+        if (loaded == p.shafts.end()) {
+            out.push_back({C::input, static_cast<int>(k), inputs[k], "", "command"});
+        } else {
+            const int s = static_cast<int>(loaded - p.shafts.begin());
+            out.push_back({C::input, static_cast<int>(k), inputs[k], model::torque_unit(t, s),
+                           model::is_slide(t, s) ? "force against the slide" : "torque against the shaft"});
+        }
     }
     for (std::size_t k = 0; k < t.controllers.size(); ++k) add_controller_channels(a, static_cast<int>(k), out);
     for (std::size_t k = 0; k < t.motors.size(); ++k)
+        out.push_back({C::motor_torque, static_cast<int>(k), model::motor_torque_of(t, k),
+                       model::torque_unit(t, t.motors[k].shaft),
+                       std::string(model::torque_word(t, t.motors[k].shaft)) + " of the motor"});
+    for (std::size_t k = 0; k < t.shafts.size(); ++k)
+        out.push_back({C::state, p.shafts[k].speed, t.shafts[k].name + "_speed",
+                       model::speed_unit(t, static_cast<int>(k)),
+                       model::is_slide(t, static_cast<int>(k)) ? "speed of the slide" : "speed of the shaft"});
+    const auto add_angle = [&](int state, std::size_t k) {
+        const int shaft = static_cast<int>(k);
         out.push_back(
-            {C::motor_torque, static_cast<int>(k), t.motors[k].name + "_torque", "N*m", "torque of the motor"});
+            {C::state, state, model::angle_of(t, k), model::angle_unit(t, shaft), model::angle_meaning(t, shaft)});
+    };
     for (std::size_t k = 0; k < t.shafts.size(); ++k)
-        out.push_back({C::state, p.shafts[k].speed, t.shafts[k].name + "_speed", "rad/s", "speed of the shaft"});
-    for (std::size_t k = 0; k < t.shafts.size(); ++k)
-        if (p.shafts[k].angle != model::nowhere)
-            out.push_back({C::state, p.shafts[k].angle, t.shafts[k].name + "_angle", "rad", "angle of the shaft"});
+        if (p.shafts[k].angle != model::nowhere) add_angle(p.shafts[k].angle, k);
     for (int part = 0; part < a.layout().angles; ++part) {
         const auto last = static_cast<std::size_t>(p.last_shaft[static_cast<std::size_t>(part)]);
-        if (p.shafts[last].angle == model::nowhere)
-            out.push_back(
-                {C::state, a.layout().coupled + part, t.shafts[last].name + "_angle", "rad", "angle of the shaft"});
+        if (p.shafts[last].angle == model::nowhere) add_angle(a.layout().coupled + part, last);
     }
     for (std::size_t k = 0; k < t.gears.size(); ++k) {
         const int gear = static_cast<int>(k);
-        const std::string& name = t.gears[k].name;
+        const int input = t.gears[k].input, output = t.gears[k].output;
         if (!t.gears[k].rigid())
-            out.push_back(
-                {C::state, p.gears[k].twist, name + "_twist", "rad", "angle of input/ratio less that of output"});
-        out.push_back({C::output_torque, gear, name + "_output_torque", "N*m", "torque on the output shaft"});
-        out.push_back({C::input_torque, gear, name + "_input_torque", "N*m", "torque taken from the input shaft"});
+            out.push_back({C::state, p.gears[k].twist, model::twist_of(t, k), model::angle_unit(t, output),
+                           model::twist_meaning(t, k)});
+        out.push_back({C::output_torque, gear, model::gear_result(t, k, "output_torque"), model::torque_unit(t, output),
+                       model::is_slide(t, output) ? "force on the slide" : "torque on the output shaft"});
+        out.push_back({C::input_torque, gear, t.gears[k].name + "_input_" + model::torque_word(t, input),
+                       model::torque_unit(t, input),
+                       model::is_slide(t, input) ? "force taken from the slide" : "torque taken from the input shaft"});
     }
     for (int c = 0; c < a.layout().contacts; ++c) {
         const std::string name = model::contact_name(a, c);
-        out.push_back({C::contact_torque, c, name + "_torque", "N*m", "what the dry contact takes"});
+        const int shaft = model::contact_shaft(a, c);
+        out.push_back({C::contact_torque, c, name + "_" + model::torque_word(t, shaft), model::torque_unit(t, shaft),
+                       "what the dry contact takes"});
         out.push_back({C::contact_mode, c, name, "", "slips forward (+1) or backward (-1), or is stuck (0)"});
     }
     return out;

@@ -85,19 +85,24 @@ def drawn_train(scenario: TrainScenario) -> dict[str, Any]:
     }
 
 
-def axis_figures(controller: Controller, motor: str, named: bool) -> list[dict[str, Any]]:
+def axis_figures(
+    controller: Controller, motor: str, named: bool, sliding: tuple[bool, bool] = (False, False)
+) -> list[dict[str, Any]]:
     """Charts over time of a controller.
 
     Parameters
     ----------
     named
         Its variables begin with the name of its motor.
+    sliding
+        Whether the motor moves a slide, and whether the position is that of one.
     """
     prefix, of = (f"{motor}_", f" of {motor.replace('_', ' ')}") if named else ("", "")
     kind = controller.reference.kind
     if kind == "torque":
         return []
-    quantity, unit = ("position", "rad") if kind == "position" else ("speed", "rad/s")
+    quantity = "position" if kind == "position" else "speed"
+    unit = ("m" if sliding[1] else "rad") if kind == "position" else "m/s" if sliding[0] else "rad/s"
     reference, measured = f"{prefix}{quantity}_reference", f"{prefix}measured_{quantity}"
     followed = [{"variable": reference, "label": "reference"}, {"variable": measured, "label": "measured"}]
     error = [{"variable": reference, "minus": measured, "label": "reference − measured"}]

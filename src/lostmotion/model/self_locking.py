@@ -91,6 +91,8 @@ class SelfLocking:
     """of the motor, breaks the load loose downward, with the dry friction up to it [N·m]; < 0: the load drives the motor"""
     motor: str
     """whose torque that is; empty: there is none, and it is that at the input of the gear"""
+    moves_slide: bool = False
+    """whether the load torque is a force [N] on a slide"""
 
     @property
     def notable(self) -> bool:
@@ -115,7 +117,7 @@ class SelfLocking:
 
     def __str__(self) -> str:
         at = self.overrunning
-        return f"{self.gear}: {at}; lowering {at.load_torque:.4g} N·m {self.brief}"
+        return f"{self.gear}: {at}; lowering {at.load_torque:.4g} {'N' if self.moves_slide else 'N·m'} {self.brief}"
 
     def _motion(self) -> str:
         critical = self.overrunning.critical_inertia_ratio
@@ -236,6 +238,7 @@ def self_locking(
         inertia_ratio=J_2 / (J_1 * part.ratio**2),
         least_torque=least,
         motor=motor,
+        moves_slide=train.is_slide(part.output),
     )
 
 
@@ -247,7 +250,7 @@ def _growth(names: list[str], rate: np.ndarray) -> tuple[list[complex], float]:
     limit = ROUNDING * float(abs(values).max(initial=0.0))
     growing = [complex(v.real, v.imag if abs(v.imag) > limit else 0.0) for v in values if v.real > limit]
     speeds = [k for k, name in enumerate(names) if name.endswith("_speed")]
-    twists = [k for k, name in enumerate(names) if name.endswith("_twist")]
+    twists = [k for k, name in enumerate(names) if name.endswith(("_twist", "_deflection"))]
     # w' = a d, d' = b w: the squares of the rates are the eigenvalues of b a.
     squares = np.linalg.eigvals(rate[np.ix_(twists, speeds)] @ rate[np.ix_(speeds, twists)]).astype(complex)
     fastest = float(abs(squares).max(initial=0.0))

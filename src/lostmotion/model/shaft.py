@@ -23,10 +23,10 @@ from ..inputs.quantities import (
 SHARE = 1e-3  # of the largest value, by which straight lines depart from a smooth law if no error is given
 
 
-def _check_points(speeds: tuple[float, ...], torques: tuple[float, ...]) -> None:
+def check_points(speeds: tuple[float, ...], torques: tuple[float, ...], what: str = "torques") -> None:
     """Refuse points that are no curve over speed."""
     if len(speeds) != len(torques):
-        raise ValueError(f"has {len(speeds)} speeds and {len(torques)} torques; give as many of each")
+        raise ValueError(f"has {len(speeds)} speeds and {len(torques)} {what}; give as many of each")
     if speeds[0] != 0.0:
         raise ValueError(f"has speeds that begin at {speeds[0]}; the first must be 0")
     for k, (a, b) in enumerate(itertools.pairwise(speeds)):
@@ -44,7 +44,7 @@ class FrictionCurve(Part):
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
-        _check_points(self.speeds, self.torques)
+        check_points(self.speeds, self.torques)
         return self
 
 
@@ -59,7 +59,7 @@ class DragCurve(Part):
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
-        _check_points(self.speeds, self.torques)
+        check_points(self.speeds, self.torques)
         if self.torques[0] != 0.0:
             raise ValueError(f"has a torque of {self.torques[0]} N*m at rest; what holds at rest is friction_torque")
         if self.torques[-1] < self.torques[-2]:
@@ -91,6 +91,8 @@ class QuadraticDrag(Part):
 class Shaft(Part):
     """A shaft of a drive train. Rotors of motors and inertias of gears on it are added to it."""
 
+    domain: Literal["rotation", "translation"] = "rotation"
+    """translation: a slide, which scenarios have in the table `slides`; its numbers are in kg, m and N"""
     inertia: Annotated[Inertia, NotNegative] = 0.0
     viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
     friction_torque: Annotated[Torque, NotNegative] = 0.0
@@ -106,7 +108,8 @@ class Shaft(Part):
     drag: Annotated[DragCurve | QuadraticDrag, Field(discriminator="kind")] | None = None
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.inertia:.4g} kg·m²)"
+        unit = "kg" if self.domain == "translation" else "kg·m²"
+        return f"{type(self).__name__}({self.inertia:.4g} {unit})"
 
     @model_validator(mode="after")
     def _friction_is_clear(self) -> Self:

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..inputs.part import Part
-from ..inputs.quantities import Angle, Frequency, NotNegative, Number, Positive, Time, Torque, Whole
+from ..inputs.quantities import Angle, Force, Frequency, NotNegative, Number, Positive, Time, Torque, Whole
 from ..reproducible import sin, total
 from ..units.scalars import is_number, scalar
 from .wind import AnyWind
@@ -283,6 +283,10 @@ def _polyline(times: Any, values: list[float]) -> list[Breakpoint]:
 
 class CommandSignal(Signal[Number]):
     """A command E_C over time: the sum of all that is given."""
+
+
+class ForceSignal(Signal[Force]):
+    """A force [N] over time: the sum of all that is given."""
 
 
 class TorqueSignal(Signal[Torque]):

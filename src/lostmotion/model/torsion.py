@@ -25,6 +25,18 @@ from ..inputs.quantities import (
 MAX_PIECES = 100  # of a torsion curve, on each side
 
 
+def check_segments(slopes: tuple[float, ...], breaks: tuple[float, ...], what: str) -> None:
+    """Refuse segments that are no curve of a torque or a force."""
+    if len(breaks) != len(slopes) - 1:
+        raise ValueError(f"has {len(slopes)} slopes and {len(breaks)} breaks; it needs one break fewer")
+    for k, (a, b) in enumerate(itertools.pairwise(breaks)):
+        if b <= a:
+            raise ValueError(f"breaks must rise, but breaks[{k + 1}] = {b} follows {a}")
+    check_apart((0.0, *breaks), "breaks")
+    if slopes[-1] <= 0.0:
+        raise ValueError(f"ends with slope 0; the last segment must carry {what}")
+
+
 class TorsionCurve(Part):
     """Torque against twist (eq. 14): odd, continuous, piecewise linear.
 
@@ -42,14 +54,7 @@ class TorsionCurve(Part):
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
-        if len(self.breaks) != len(self.slopes) - 1:
-            raise ValueError(f"has {len(self.slopes)} slopes and {len(self.breaks)} breaks; it needs one break fewer")
-        for k, (a, b) in enumerate(itertools.pairwise(self.breaks)):
-            if b <= a:
-                raise ValueError(f"breaks must rise, but breaks[{k + 1}] = {b} follows {a}")
-        check_apart((0.0, *self.breaks), "breaks")
-        if self.slopes[-1] <= 0.0:
-            raise ValueError("ends with slope 0; the last segment must carry torque")
+        check_segments(self.slopes, self.breaks, "torque")
         if self.backlash > 0.0 and self.preload > 0.0:
             raise ValueError("has backlash and preload; a preload removes the backlash, so give only one")
         return self

@@ -38,15 +38,15 @@ COUPLINGS = ("clutches", "freewheels", "dampers")
 
 # What the core calls an element (core/lostmotion/model/check.hpp), and the tables that it may stand in.
 TABLES = {
-    "shaft": ("shafts",),
-    "motor": ("motors",),
-    "gear": ("gears",),
+    "shaft": ("shafts", "slides"),
+    "motor": ("motors", "linear_motors"),
+    "gear": ("gears", "screws", "racks", "belts"),
     "brake": ("brakes",),
     "clutch": ("clutches",),
     "freewheel": ("freewheels",),
     "damper": ("dampers",),
     "angle torque": ("gravity", "angle_torques"),
-    "spring": ("springs",),
+    "spring": ("springs", "slides"),
 }
 
 
@@ -90,6 +90,52 @@ class DriveTrain(TrainElements):
 
     shafts: Elements[Shaft] = Field(min_length=1)
 
+    def is_slide(self, shaft: str) -> bool:
+        """Whether it moves along a straight line."""
+        return self.shafts[shaft].domain == "translation"
+
+    # Names of result variables and their units, as the core has them (core/lostmotion/model/names.cpp).
+
+    def angle_of(self, shaft: str) -> str:
+        """NAME_angle of a shaft, NAME_position of a slide."""
+        return f"{shaft}_position" if self.is_slide(shaft) else f"{shaft}_angle"
+
+    def load_torque_of(self, shaft: str) -> str:
+        """NAME_load_torque of a shaft, NAME_load_force of a slide."""
+        return f"{shaft}_load_{self.torque_word(shaft)}"
+
+    def motor_torque_of(self, motor: str) -> str:
+        """NAME_torque, NAME_force of a linear motor."""
+        return f"{motor}_{self.torque_word(self.motors[motor].shaft)}"
+
+    def twist_of(self, gear: str) -> str:
+        """NAME_twist of a gear, NAME_deflection of what moves a slide."""
+        return f"{gear}_deflection" if self.is_slide(self.gears[gear].output) else f"{gear}_twist"
+
+    def output_torque_of(self, gear: str) -> str:
+        """NAME_output_torque of a gear, NAME_output_force of what moves a slide."""
+        return f"{gear}_output_{self.torque_word(self.gears[gear].output)}"
+
+    def input_torque_of(self, gear: str) -> str:
+        """NAME_input_torque of a gear."""
+        return f"{gear}_input_{self.torque_word(self.gears[gear].input)}"
+
+    def torque_word(self, shaft: str) -> str:
+        """Torque or force."""
+        return "force" if self.is_slide(shaft) else "torque"
+
+    def angle_unit(self, shaft: str) -> str:
+        """Unit of the angle of a shaft, or of the position of a slide."""
+        return "m" if self.is_slide(shaft) else "rad"
+
+    def speed_unit(self, shaft: str) -> str:
+        """Unit of its speed."""
+        return f"{self.angle_unit(shaft)}/s"
+
+    def torque_unit(self, shaft: str) -> str:
+        """Unit of torques on a shaft, or of forces on a slide."""
+        return "N" if self.is_slide(shaft) else "N*m"
+
     def __repr__(self) -> str:
         names = {table: ", ".join(getattr(self, table)) for table in ("shafts", *TrainElements.model_fields)}
         return f"DriveTrain({'; '.join(f'{table} {listed}' for table, listed in names.items() if listed)})"
@@ -111,13 +157,15 @@ class DriveTrain(TrainElements):
         self.check(self.shafts)
         return self
 
-    def check(self, loaded: Collection[str]) -> None:
+    def check(self, loaded: Collection[str], tables: TrainElements | None = None) -> None:
         """Refuse a train that cannot move, or whose motion is not determined.
 
         Parameters
         ----------
         loaded
             Names of the shafts that a load torque acts on.
+        tables
+            What the elements were written as, for messages; left out, this train.
 
         Raises
         ------
@@ -131,7 +179,7 @@ class DriveTrain(TrainElements):
         if found is None:
             raise InputError(problem)
         kind, name, text = found.groups()
-        table = next((table for table in TABLES[kind] if name in getattr(self, table)), TABLES[kind][0])
+        table = next((t for t in TABLES[kind] if name in getattr(tables or self, t, ())), TABLES[kind][0])
         raise InputError(f"key {table}.{name}: {text}")
 
     def core(self, loaded: Collection[str], driven: Mapping[str, MotorLaw | None] = {}) -> _core.Train:
@@ -143,6 +191,8 @@ class DriveTrain(TrainElements):
         for name, s in self.shafts.items():
             drag = None if s.drag is None else s.drag.core()
             train.add_shaft(name, s.inertia, s.viscous_friction, s.friction(), drag, name in loaded)
+            if s.domain != "rotation":
+                train.set_domain(name, s.domain)
         for name, m in self.motors.items():
             law = driven.get(name)
             limit = m.torque_limit if m.torque_limit is not None and law is None else math.inf

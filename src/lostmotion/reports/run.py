@@ -12,7 +12,7 @@ from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.switchings import names_in, unpacked
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.windings import errors_of
-from ..units.practical import practical
+from ..units.practical import charted, practical
 
 if TYPE_CHECKING:
     import xarray
@@ -101,9 +101,10 @@ def train_summary(result: xarray.Dataset | RawResult) -> str:
     scenario = TrainScenario.from_json(result.attrs["scenario"])
     train = scenario.train()
 
-    def end_and_peak(name: str, unit: str, factor: float = 1.0) -> str:
+    def end_and_peak(name: str, unit: str, *, small: bool = False) -> str:
+        shown, factor = charted(unit, small=small)
         values = factor * np.asarray(result[name])
-        return f"{values[-1]:.5g} {unit}, peak {np.max(np.abs(values)):.5g}"
+        return f"{values[-1]:.5g} {shown}, peak {np.max(np.abs(values)):.5g}"
 
     time = float(np.asarray(result["time"])[-1])
     lines = [
@@ -111,14 +112,20 @@ def train_summary(result: xarray.Dataset | RawResult) -> str:
         f"  {time:g} s, {result.attrs['switching_count']} events, solver {result.attrs['solver']}; at the end:",
     ]
     for name in train.motors:
-        lines.append(f"  motor {name}: {end_and_peak(f'{name}_torque', 'N·m')}")
+        unit = train.torque_unit(train.motors[name].shaft)
+        lines.append(f"  motor {name}: {end_and_peak(train.motor_torque_of(name), unit)}")
     for name in train.shafts:
-        angle = f"{name}_angle"
-        at = f"; at {float(np.asarray(result[angle])[-1]):.6g} rad" if angle in result else ""
-        lines.append(f"  shaft {name}: {end_and_peak(f'{name}_speed', 'rad/s')}{at}")
+        angle, (unit, factor) = train.angle_of(name), charted(train.angle_unit(name))
+        at = f"; at {factor * float(np.asarray(result[angle])[-1]):.6g} {unit}" if angle in result else ""
+        kind = "slide" if train.is_slide(name) else "shaft"
+        lines.append(f"  {kind} {name}: {end_and_peak(f'{name}_speed', train.speed_unit(name))}{at}")
     for name, gear in train.gears.items():
-        twist = "" if gear.stiffness.kind == "rigid" else f"; twist {end_and_peak(f'{name}_twist', 'mrad', 1e3)}"
-        lines.append(f"  gear {name}: {end_and_peak(f'{name}_output_torque', 'N·m')}{twist}")
+        twist, unit, of = train.twist_of(name), train.angle_unit(gear.output), scenario.kind_of(name)
+        bends = twist.removeprefix(f"{name}_")
+        bent = "" if gear.stiffness.kind == "rigid" else f"; {bends} {end_and_peak(twist, unit, small=True)}"
+        lines.append(
+            f"  {of} {name}: {end_and_peak(train.output_torque_of(name), train.torque_unit(gear.output))}{bent}"
+        )
     if "energy" in result.attrs:
         e = energy_of(result)
         apart = ("residual", "turned_over")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from ..simulation.results import is_train_result, scenario_of
 from ..simulation.scenario import Scenario
 from ..simulation.train_parts import parts_of
 from ..simulation.train_scenario import TrainScenario
+from ..units.practical import charted
 from .panels import FAINT, Chart, Contacts, Curve, Ground, Panel, look
 
 if TYPE_CHECKING:
@@ -62,12 +64,15 @@ def _axes(result: xarray.Dataset) -> Iterator[Panel]:
         return
     scenario = scenario_of(result)
     time = result["time"].values
+    sliding = scenario.sliding()
     for motor, controller in scenario.axes().items():
-        for figure in axis_figures(controller, motor, isinstance(scenario, TrainScenario)):
+        for figure in axis_figures(
+            controller, motor, isinstance(scenario, TrainScenario), sliding.get(scenario.prefix(motor), (False, False))
+        ):
             series = [s for s in figure["series"] if s["variable"] in result]
             error = any("minus" in s for s in series)
-            factor, unit = (1e3, "mrad") if error and figure["unit"] == "rad" else (1.0, figure["unit"])
-            label = f"{'error' if error else figure['title'].split()[0].lower()} [{unit.replace('*', '·')}]"
+            unit, factor = charted(figure["unit"], small=error)
+            label = f"{'error' if error else figure['title'].split()[0].lower()} [{unit}]"
             curves = []
             for k, s in enumerate(series):
                 values = result[s["variable"]].values - (result[s["minus"]].values if "minus" in s else 0.0)
@@ -122,18 +127,22 @@ def _train(result: xarray.Dataset) -> Iterator[Chart]:
     scenario = scenario_of(result)
     assert isinstance(scenario, TrainScenario)
     train = scenario.train()
-    loads = [(f"{name}_load_torque", f"load on {name}", 1.0) for name in scenario.loaded()]
-    twists = [(f"{n}_twist", n, 1e3) for n, g in train.gears.items() if g.stiffness.kind != "rigid"]
+    loads = [(train.load_torque_of(name), f"load on {name}", name) for name in scenario.loaded()]
+    outputs = [(train.output_torque_of(name), name, gear.output) for name, gear in train.gears.items()]
+    motors = [(train.motor_torque_of(name), name, motor.shaft) for name, motor in train.motors.items()]
+    twists = [(train.twist_of(n), n, g.output) for n, g in train.gears.items() if g.stiffness.kind != "rigid"]
     wanted: list[tuple[str, str, list[Series]]] = [
         ("Command", "command [-]", [(f"{name}_command", name, 1.0) for name in scenario.commanded()]),
-        ("Torque of motors", "torque of motor [N·m]", [(f"{name}_torque", name, 1.0) for name in train.motors]),
+        *_by_domain(train, "{Torque} of motors", "{torque} of motor [{unit}]", "torque", motors),
         *(_speeds(part.train()) for part in parts_of(scenario)),
-        (
-            "Torque at outputs and loads",
-            "torque at output of gear, of load [N·m]",
-            [(f"{name}_output_torque", name, 1.0) for name in train.gears] + loads,
+        *_by_domain(
+            train,
+            "{Torque} at outputs and loads",
+            "{torque} at output of gear, of load [{unit}]",
+            "torque",
+            outputs + loads,
         ),
-        ("Twist", "twist [mrad]", twists),
+        *_by_domain(train, "{Twist}", "{twist} [{unit}]", "twist", twists),
     ]
     for title, label, series in wanted:
         panel = _panel(result, title, label, series)
@@ -144,14 +153,39 @@ def _train(result: xarray.Dataset) -> Iterator[Chart]:
         yield _contacts(result, {name: name.removesuffix("_contact").replace("_", " ") for name in contacts})
 
 
+LINEAR_WORDS = {"torque": "force", "twist": "deflection"}
+
+
+def _by_domain(
+    train: DriveTrain, title: str, label: str, what: str, variables: list[tuple[str, str, str]]
+) -> Iterator[tuple[str, str, list[Series]]]:
+    """One panel for the variables of shafts and one for those of slides: (name, legend, shaft) of each."""
+    for slides in (False, True):
+        chosen = [(name, text, shaft) for name, text, shaft in variables if train.is_slide(shaft) == slides]
+        if not chosen:
+            continue
+        shaft, word = chosen[0][2], LINEAR_WORDS[what] if slides else what
+        si = train.torque_unit(shaft) if what == "torque" else train.angle_unit(shaft)
+        unit, factor = charted(si, small=what == "twist")
+        words = {what: word, what.capitalize(): word.capitalize(), "unit": unit}
+        yield title.format(**words), label.format(**words), [(name, text, factor) for name, text, _ in chosen]
+
+
 def _speeds(train: DriveTrain) -> tuple[str, str, list[Series]]:
     """Speeds of a train that hangs together, all in terms of its last shaft."""
     last = list(train.shafts)[-1]
+    unit, factor = charted(train.speed_unit(last))
     series = [
-        (f"{name}_speed", f"{name} / {ratio:.4g}".removesuffix(" / 1"), 1.0 / ratio)
+        (f"{name}_speed", _in_terms_of(train, name, last, ratio), factor / ratio)
         for name, ratio in ratios_to(train, last).items()
     ]
-    return f"Speed of {last}", f"speed at {last} [rad/s]", series
+    return f"Speed of {last}", f"speed at {last} [{unit}]", series
+
+
+def _in_terms_of(train: DriveTrain, name: str, last: str, ratio: float) -> str:
+    if train.is_slide(last) and not train.is_slide(name):
+        return f"{name}, {2e3 * math.pi / ratio:.4g} mm to a turn"
+    return f"{name} / {ratio:.4g}".removesuffix(" / 1")
 
 
 def ratios_to(train: DriveTrain, last: str) -> dict[str, float]:
@@ -177,17 +211,25 @@ def ratios_to(train: DriveTrain, last: str) -> dict[str, float]:
 def gear_charts(result: xarray.Dataset) -> list[Panel]:
     """Of each gear torque over twist, and the working point over its loss map."""
     scenario = scenario_of(result)
-    gears: list[tuple[str, Any, str, str]] = (
-        [("gearbox", scenario.gearbox, "", "motor_speed")]
-        if isinstance(scenario, Scenario)
-        else [(name, gear, f"{name}_", f"{gear.input}_speed") for name, gear in scenario.gears.items()]
-    )
+    gears: list[tuple[str, Any, str, str, str]]
+    slides: set[str] = set()
+    if isinstance(scenario, Scenario):
+        gears = [("gearbox", scenario.gearbox, "twist", "output_torque", "motor_speed")]
+    else:
+        train = scenario.train()
+        slides = {name for name, gear in train.gears.items() if train.is_slide(gear.output)}
+        gears = [
+            (name, gear, train.twist_of(name), train.output_torque_of(name), f"{gear.input}_speed")
+            for name, gear in train.gears.items()
+        ]
     found = []
-    for name, gear, prefix, speed in gears:
-        twist, torque = f"{prefix}twist", f"{prefix}output_torque"
+    for name, gear, twist, torque, speed in gears:
         if gear.stiffness.kind != "rigid" and twist in result and torque in result:
-            loop = Curve(name, 1e3 * result[twist].values, result[torque].values, look(0))
-            found.append(Panel(f"Torsion and hysteresis of {name}", "twist [mrad]", "output torque [N·m]", (loop,)))
+            linear = name in slides
+            loop = Curve(name, (1e6 if linear else 1e3) * result[twist].values, result[torque].values, look(0))
+            title = f"{'Deflection' if linear else 'Torsion'} and hysteresis of {name}"
+            labels = ("deflection [µm]", "output force [N]") if linear else ("twist [mrad]", "output torque [N·m]")
+            found.append(Panel(title, *labels, (loop,)))
         if (
             isinstance(gear.losses, LossMap)
             and getattr(gear, "housing", None) is None

@@ -86,7 +86,7 @@ class Loop:
                 )
             settled = max(settled, time)
             constants.append(_core.Signal([(0.0, value, 0.0)], []))
-        controlled, last = scenario.continuous(), list(scenario.shafts)[-1]
+        controlled, last = scenario.continuous(), list(scenario.train().shafts)[-1]
         watched = f"{next(iter(controlled))}_error" if controlled else f"{last}_speed"
         channels = tuple(name for name, *_ in core.channels())
         return cls(core, inputs, constants, start, capacities, settled, watched, channels, scenario)

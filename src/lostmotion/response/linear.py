@@ -347,10 +347,11 @@ def train_model(
     of = dict(zip(outputs, rows, strict=True))
     nothing = np.zeros(n + m + 1)
     if all(gear.transmission_error is None for gear in train.gears.values()):  # else the angles are not linear
-        known = [name for name in train.shafts if f"{name}_angle" in of]
+        known = [name for name in train.shafts if train.angle_of(name) in of]
         for shaft, source, name, forward in angles_through_gears(train, known):
-            twist = of.get(f"{name}_twist", nothing)
-            of[f"{shaft}_angle"] = angle_through(train.gears[name], of[f"{source}_angle"], twist, forward=forward)
+            twist = of.get(train.twist_of(name), nothing)
+            angle = of[train.angle_of(source)]
+            of[train.angle_of(shaft)] = angle_through(train.gears[name], angle, twist, forward=forward)
     whole = np.array(list(of.values()))
     units = {v.name: v.unit for v in train_variables(train, core) if v.name in {*states, *inputs, *of}}
     return LinearModel(
@@ -385,7 +386,7 @@ def _why_several_regimes(drive: Drive) -> str:
 def _why_several_regimes_of(train: DriveTrain, core: _core.Train) -> str:
     """What gives a train more than one regime; empty if it has one."""
     gears, motors, shafts = train.gears.values(), train.motors.values(), train.shafts.values()
-    rigid = {f"{name}_twist_contact" for name, g in train.gears.items() if isinstance(g.stiffness, Rigid)}
+    rigid = {f"{train.twist_of(name)}_contact" for name, g in train.gears.items() if isinstance(g.stiffness, Rigid)}
     dry = [name for name in core.contact_names() if name not in rigid]
     limits = any(m.command_limit is not None or m.torque_limit is not None for m in motors)
     curves = any(not isinstance(g.stiffness, Rigid) and len(g.stiffness.pieces()[1]) > 1 for g in gears)

@@ -135,7 +135,7 @@ def plant_or_loop(what: Drive | Scenario | TrainScenario) -> Plant:
     axes = what.axes()
     references = {f"{what.prefix(motor)}reference": c.reference for motor, c in axes.items()}
     commands = [f"{what.prefix(motor)}command" for motor in axes]
-    shown_by = [v for v in axis_variables(what.by_prefix()) if v.unit != "J"]  # which add up
+    shown_by = [v for v in axis_variables(what.by_prefix(), what.sliding()) if v.unit != "J"]  # which add up
     first, controller = next(iter(axes.items()))
     measured = {"position": "measured_position", "speed": "measured_speed", "torque": "torque"}[
         controller.reference.kind
@@ -151,7 +151,7 @@ def plant_or_loop(what: Drive | Scenario | TrainScenario) -> Plant:
         source=next(iter(references)) if len(references) == 1 else None,
         channels=(*plant.channels, *(v.name for v in own)),
         variables=(*plant.variables, *own),
-        output=f"{first}_torque" if measured == "torque" else what.prefix(first) + measured,
+        output=what.train().motor_torque_of(first) if measured == "torque" else what.prefix(first) + measured,
         closed=what,
     )
 
@@ -205,7 +205,7 @@ def _plant_of_train(scenario: TrainScenario) -> Plant:
 
     floors = {f"{name}_speed": 0.0 for name in train.shafts}
     for name, gear in train.gears.items():
-        floors |= {f"{name}_output_torque": gear.rated_output_torque or 0.0, f"{name}_twist": 0.0}
+        floors |= {train.output_torque_of(name): gear.rated_output_torque or 0.0, train.twist_of(name): 0.0}
         if gear.rated_input_speed is not None:
             floors |= {
                 f"{gear.input}_speed": gear.rated_input_speed,
@@ -216,13 +216,13 @@ def _plant_of_train(scenario: TrainScenario) -> Plant:
         signals={name: signals[name] for name in core.input_names()},
         source=source,
         start=start_of(scenario.initial),
-        rest=start_of(TrainInitial(angles=scenario.initial.angles, twists=scenario.initial.twists)),
+        rest=start_of(TrainInitial(angles=scenario.initial.of_all("angles"), twists=scenario.initial.of_all("twists"))),
         start_of=start_of,
         channels=tuple(name for name, *_ in core.channels()),
         variables=variables,
         derive=partial(add_angles, train),
         output=f"{last}_speed",
-        angle=f"{last}_angle",
+        angle=train.angle_of(last),
         floors=floors,
         attributes={},
     )

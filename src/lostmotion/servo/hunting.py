@@ -184,7 +184,8 @@ def _sampled(train: TrainScenario, motor: str | None, *, causes: bool) -> Huntin
     rest = cycle.whole if cycle is not None else at_rest(axis)
     if not rest.cycles:
         return Hunting(rest.verdict, rest.described(), False, NAN, {}, None, np.array([]), ())
-    amplitudes = {f"{axis.motor_shaft}_angle": rest.motor_amplitude, f"{axis.shaft}_angle": rest.amplitude}
+    angles = (axis.train.angle_of(axis.motor_shaft), axis.train.angle_of(axis.shaft))
+    amplitudes = dict(zip(angles, (rest.motor_amplitude, rest.amplitude), strict=True))
     found = tuple(cycle.causes) if cycle is not None else ()
     return Hunting("hunts", "", False, rest.frequency, amplitudes, None, np.array([]), found)
 
@@ -234,7 +235,8 @@ def hunting_map(
     shape = tuple(len(v) for v in keys.values())
     if math.prod(shape) > MAX_POINTS:
         raise InputError(f"grid: {math.prod(shape)} points are more than {MAX_POINTS}; give fewer values")
-    of = f"{list(train.shafts)[-1]}_angle" if variable is None else known_output(variable, Loop.of(train).channels)
+    plain = train.train()
+    of = plain.angle_of(list(plain.shafts)[-1]) if variable is None else known_output(variable, Loop.of(train).channels)
     done = 0
 
     def point(index: tuple[int, ...]) -> tuple[float, float, bool, str, str]:

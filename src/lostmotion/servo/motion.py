@@ -105,17 +105,14 @@ def step_response(axis: Axis, loop: str) -> StepResponse:
         if not (limited := _is_limited(axis, loop, data)):
             break
         size *= 0.5
-    name = {"current": f"{axis.motor}_torque", "speed": f"{axis.motor_shaft}_speed", "position": f"{axis.shaft}_angle"}[
-        loop
-    ]
+    name, unit = axis.measured["torque" if loop == "current" else loop]
     value = data[name].values
-    unit = {"current": "N·m", "speed": "rad/s", "position": "rad"}[loop]
     return StepResponse(loop, size, unit, limited, data["time"].values, value - value[0])
 
 
 def _first_size(axis: Axis, loop: str) -> float:
     if loop == "current":
-        return 0.5 * axis.scenario.motors[axis.motor].rated_torque
+        return 0.5 * axis.train.motors[axis.motor].rated_torque
     if loop == "speed":
         return speed_of(axis) * abs(axis.ratio)
     reference = axis.controller.reference
@@ -156,7 +153,7 @@ def _step(axis: Axis, loop: str, size: float) -> xarray.Dataset:
 
 
 def _is_limited(axis: Axis, loop: str, data: xarray.Dataset) -> bool:
-    c, motor = axis.controller, axis.scenario.motors[axis.motor]
+    c, motor = axis.controller, axis.train.motors[axis.motor]
     within = 1.0 - 1e-9
     found = []
     if c.speed is not None and c.speed.torque_limit is not None and loop != "current":
@@ -166,7 +163,7 @@ def _is_limited(axis: Axis, loop: str, data: xarray.Dataset) -> bool:
     if motor.command_limit is not None and isinstance(c.current, CurrentLoop):
         found.append((f"{axis.motor}_command", motor.command_limit))
     if motor.torque_limit is not None:
-        found.append((f"{axis.motor}_torque", motor.torque_limit))
+        found.append((axis.train.motor_torque_of(axis.motor), motor.torque_limit))
     most = {name: float(np.abs(data[name].values).max()) for name, _ in found}
     if isinstance(c.current, FieldOriented) and motor.winding is not None and motor.winding.max_current is not None:
         for what, limit in (("voltage", motor.phase_voltage), ("current", math.sqrt(2.0) * motor.winding.max_current)):
@@ -208,11 +205,10 @@ def following(axis: Axis) -> Following:
     data = ran(axis)
     time, reference = data["time"].values, axis.controller.reference
     wanted = reference.at(time)[0]
-    name = {"position": f"{axis.shaft}_angle", "speed": f"{axis.shaft}_speed", "torque": f"{axis.motor}_torque"}[
-        reference.kind
-    ]
+    name, unit = axis.measured[reference.kind]
+    if reference.kind == "speed":
+        name, unit = f"{axis.shaft}_speed", axis.train.speed_unit(axis.shaft)
     error = wanted - data[name].values
-    unit = {"position": "rad", "speed": "rad/s", "torque": "N·m"}[reference.kind]
     rms = math.sqrt(float(np.mean(error**2)))
     return Following(unit, time, wanted, error, float(np.abs(error).max()), rms)
 
@@ -332,14 +328,14 @@ def at_rest(axis: Axis, most: float = math.inf) -> AtRest:
     """
     c, reference = axis.controller, axis.controller.reference
     assert c.position is not None
-    start = axis.scenario.begin().angles.get(axis.shaft, 0.0)
+    start = axis.scenario.begin().of_all("angles").get(axis.shaft, 0.0)
     at_start = reference.duration == 0.0 and float(reference.at(0.0)[0]) == start
     if at_start or reference.sine_list() or any(reference.pieces()[-1][2:]):
         axis = with_controller(axis, reference={"kind": "position", "mean": start + _first_size(axis, "position")})
     if name := moving_input(axis.scenario):
         return AtRest("not decided", f"{name} never comes to rest", 0.0, math.nan, math.nan, math.nan)
     first = max(REST * slowest(c), 4.0 * step_duration(axis, "position"), axis.scenario.simulation.duration)
-    watch = Watch(axis.scenario, (f"{axis.motor_shaft}_angle", f"{axis.shaft}_angle"))
+    watch = Watch(axis.scenario, (axis.train.angle_of(axis.motor_shaft), axis.train.angle_of(axis.shaft)))
     found = decide(watch, first, min(most, max(MOST_TICKS * c.sample_time, 4.0 * first)))
     motor, load = 0.5 * found.swing
     return AtRest(found.verdict, found.reason, found.watched, motor, load, found.frequency)

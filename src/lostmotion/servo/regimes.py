@@ -15,11 +15,13 @@ from ..control.controller import Controller
 from ..errors import InputError, need
 from ..inputs.validation import shown
 from ..model.gear import Gear
+from ..model.signals import ForceSignal, TorqueSignal
 from ..model.torsion import Rigid
 from ..response.linear import LinearModel, train_model
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form
 from ..simulation.train_state import start_values
+from ..units.practical import charted
 from .winding import OrientedWinding
 
 if TYPE_CHECKING:
@@ -48,12 +50,22 @@ class Axis:
 
     @property
     def motor_shaft(self) -> str:
-        return self.scenario.motors[self.motor].shaft
+        return self.train.motors[self.motor].shaft
 
     @property
     def shaft(self) -> str:
         """That position and speed of the reference are of."""
-        return self.controller.shaft or list(self.scenario.shafts)[-1]
+        return self.controller.shaft or list(self.train.shafts)[-1]
+
+    @cached_property
+    def measured(self) -> dict[str, tuple[str, str]]:
+        """Result variable and unit of what its loops control: torque and speed of the motor, position at the reference's shaft."""
+        train = self.train
+        return {
+            "torque": (train.motor_torque_of(self.motor), train.torque_unit(self.motor_shaft).replace("*", "·")),
+            "speed": (f"{self.motor_shaft}_speed", train.speed_unit(self.motor_shaft)),
+            "position": (train.angle_of(self.shaft), train.angle_unit(self.shaft)),
+        }
 
     @cached_property
     def ratio(self) -> float:
@@ -127,11 +139,15 @@ def axis_of(scenario: Scenario | TrainScenario, motor: str | None = None) -> Axi
 
 def _loaded(axis: Axis) -> Axis:
     """The axis with its reference's shaft open to a load torque, against which it has a stiffness."""
-    shafts = axis.scenario.shafts
-    if shafts[axis.shaft].torque is not None:
+    scenario = axis.scenario
+    if axis.shaft in scenario.loads():
         return axis
-    open_to_load = shafts[axis.shaft].model_copy(update={"torque": 0.0})
-    return Axis(axis.scenario.model_copy(update={"shafts": {**shafts, axis.shaft: open_to_load}}), axis.motor)
+    table, key, none = (
+        ("slides", "force", ForceSignal()) if axis.train.is_slide(axis.shaft) else ("shafts", "torque", TorqueSignal())
+    )
+    elements = getattr(scenario, table)
+    open_to_load = elements[axis.shaft].model_copy(update={key: none})
+    return Axis(scenario.model_copy(update={table: {**elements, axis.shaft: open_to_load}}), axis.motor)
 
 
 @dataclass(frozen=True)
@@ -158,7 +174,7 @@ class Regime:
         over_tick = expm(block * axis.controller.sample_time)[:n]
         winding, law = None, axis.law[0]
         if law.is_oriented:
-            winding = OrientedWinding.of(axis.scenario.motors[axis.motor], axis.motor, axis.controller, law, model)
+            winding = OrientedWinding.of(axis.train.motors[axis.motor], axis.motor, axis.controller, law, model)
         return cls(name, meaning, model, over_tick, winding)
 
 
@@ -175,7 +191,7 @@ def regimes(axis: Axis) -> list[Regime]:
 def _model(axis: Axis, state: TrainInitial) -> LinearModel:
     scenario = axis.scenario
     core = scenario.core()
-    values, capacities = start_values(axis.train, state), dict(state.hysteresis_capacities)
+    values, capacities = start_values(axis.train, state), state.of_all("hysteresis_capacities")
     ramps = [_core.Signal([(0.0, 0.0, 0.0)], []) for _ in core.input_names()]
     rows = _core.linearize_at(core, ramps, values, capacities, 0.0)
     return train_model(axis.train, core, *rows)
@@ -185,11 +201,12 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
     """Name, meaning, state, and the modes of contacts without which the regime is not there."""
     train, v = axis.train, speed_of(axis)
     main = axis.main_gear()
-    moving = f"moving forward at {v:.4g} rad/s"
+    moving = f"moving forward at {_text(v, train.speed_unit(axis.shaft))}"
     if main is None:
         yield "rigid", f"all gears rigid, {moving}", TrainInitial(speeds=_speeds(axis, v, SLIP)), {}
         return
     breaks, slopes = train.gears[main].stiffness.pieces()  # type: ignore[union-attr]
+    bends = train.twist_of(main).removeprefix(f"{main}_")
     twists = {name: _last(gear) for name, gear in train.gears.items() if not isinstance(gear.stiffness, Rigid)}
     first = 1 if slopes[0] == 0.0 and len(slopes) > 1 else 0
     edges = [0.0, *breaks, BEYOND * _last(train.gears[main])]
@@ -200,7 +217,7 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
         else {"stiffness": first}
     )
     for name, k in pieces.items():
-        what = f"{main} with {slopes[k]:.5g} N·m/rad" if slopes[k] else f"{main} within its gap"
+        what = f"{main} with {_stiffness(train, main, slopes[k])}" if slopes[k] else f"{main} within its gap"
         state = TrainInitial(speeds=_speeds(axis, v, SLIP), twists=twists | {main: 0.5 * (edges[k] + edges[k + 1])})
         yield name, f"{what}, {moving}", state, {}
     within = 0.5 * (edges[first] + edges[first + 1])
@@ -209,7 +226,12 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
     if hysteresis is not None and hysteresis.efficiency < 1.0:
         holding = 1e3 * (train.gears[main].rated_output_torque or slopes[-1] * edges[-1])  # more than it ever has to
         state = TrainInitial(speeds=_speeds(axis, v, 0.0), twists=at, hysteresis_capacities={main: holding})
-        yield "twist stuck", f"hysteresis holds the twist of {main}, {moving}", state, {f"{main}_twist_contact": 0}
+        yield (
+            "twist stuck",
+            f"hysteresis holds the {bends} of {main}, {moving}",
+            state,
+            {f"{train.twist_of(main)}_contact": 0},
+        )
     output = train.gears[main].output
     if train.shafts[output].friction_torque > 0.0:
         held = {shaft: w for shaft, w in _speeds(axis, v, SLIP).items() if shaft not in (output, axis.shaft)}
@@ -218,6 +240,16 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
         )
         state = TrainInitial(speeds=held, twists=twists | {main: near})
         yield "load stuck", f"{output} sticks, the motor turns", state, {f"{output}_contact": 0}
+
+
+def _text(value: float, si: str) -> str:
+    unit, factor = charted(si)
+    return f"{factor * value:.4g} {unit}"
+
+
+def _stiffness(train: DriveTrain, gear: str, value: float) -> str:
+    """A slope of its curve at its output."""
+    return f"{1e-6 * value:.5g} N/µm" if train.is_slide(train.gears[gear].output) else f"{value:.5g} N·m/rad"
 
 
 def _last(gear: Gear) -> float:
@@ -235,7 +267,7 @@ def speed_of(axis: Axis) -> float:
     top = 0.5 * float(np.abs(speeds).max())
     if top > 0.0:
         return top
-    motor = axis.scenario.motors[axis.motor].as_dc()
+    motor = axis.train.motors[axis.motor].as_dc()
     return 0.1 * (motor.rated_speed or 100.0) / abs(axis.ratio)
 
 

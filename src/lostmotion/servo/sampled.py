@@ -107,7 +107,13 @@ class SampledLoop:
         currents = np.zeros((4, 0)) if winding is None else winding.step(oriented, self.cut, tick)
         counts = (self._plant_states, len(step), len(currents) - 4, len(INPUTS))
         plant, slots, own, inputs = np.split(np.eye(sum(counts)), np.cumsum(counts)[:-1])
-        sampled = (f"{position_shaft}_angle", f"{speed_shaft}_angle", f"{speed_shaft}_speed", f"{motor}_torque")
+        train = self.axis.train
+        sampled = (
+            train.angle_of(position_shaft),
+            train.angle_of(speed_shaft),
+            f"{speed_shaft}_speed",
+            train.motor_torque_of(motor),
+        )
         # What a controller does not read need not follow from the states.
         read = [
             self._output(name, plant) if column.any() else np.zeros(sum(counts))
@@ -115,14 +121,15 @@ class SampledLoop:
         ]
         after = step @ np.vstack([slots, *read, 0.0 * inputs if oriented else inputs])
         rows = {name: after[j] for j, (name, _, _) in enumerate(_core.axis_signals())}
-        rows |= {f"{s}_angle": self._output(f"{s}_angle", plant) for s in (self.axis.motor_shaft, self.axis.shaft)}
+        angles = [train.angle_of(s) for s in (self.axis.motor_shaft, self.axis.shaft)]
+        rows |= {angle: self._output(angle, plant) for angle in angles}
         rows |= {f"{name}_measured": rows[f"measured_{name}"] for name in ("speed", "position")}
         if winding is None:
             acting, over_tick = after[[_core.COMMAND_SLOT]], self.regime.over_tick
             if loop == "current":
                 rows["current_measured"] = self._output(sampled[3], plant)
         else:
-            rotor = rows[f"{self.axis.motor_shaft}_angle"]
+            rotor = rows[angles[0]]
             angle = after[_core.SPEED_ANGLE_SLOT] if law.commutates_by_encoder else rotor
             taken = [rows["torque_reference"], rows["measured_speed"], angle, rotor, *plant[-2:], inputs[0], inputs[3]]
             own, acting, measured = np.split(currents @ np.vstack([own, *taken]), [len(own), len(own) + 2])
@@ -207,9 +214,9 @@ class SampledLoop:
         return -self._samples(f"{self.loop}_measured", w, lambda k, G: (one if k == 0 else 0.0 * one) @ G.T, one)
 
     def compliance(self, frequency: Any, shaft: str, load: str) -> np.ndarray:
-        """Angle of a shaft [rad] at the samples, for one N·m of a load torque that is a sine of continuous time [Hz]."""
+        """Angle of a shaft [rad], or position of a slide [m], at the samples, for a load torque of 1 N·m or force of 1 N that is a sine of continuous time [Hz]."""
         m, n, winding = self.model, len(self.model.states), self.regime.winding
-        w, b = _angular(frequency), m.B[:, m.inputs.index(f"{load}_load_torque")]
+        w, b = _angular(frequency), m.B[:, m.inputs.index(self.axis.train.load_torque_of(load))]
         force = np.zeros((len(w), len(self.transition)), complex)
         nothing = np.zeros((len(w), len(INPUTS)))
 
@@ -219,11 +226,11 @@ class SampledLoop:
             return force
 
         if winding is not None:
-            return self._samples(f"{shaft}_angle", w, of_winding, nothing)
+            return self._samples(self.axis.train.angle_of(shaft), w, of_winding, nothing)
         z, eye = np.exp(1j * w * self.tick), np.eye(n)
         over_tick = (z[:, None, None] * eye - self.regime.over_tick[:, :-1]) @ b
         force[:, :n] = np.linalg.solve(1j * w[:, None, None] * eye - m.A, over_tick[:, :, None])[:, :, 0]
-        return self._samples(f"{shaft}_angle", w, lambda _, __: force, nothing)
+        return self._samples(self.axis.train.angle_of(shaft), w, lambda _, __: force, nothing)
 
 
 def _angular(frequency: Any) -> np.ndarray:

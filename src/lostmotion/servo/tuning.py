@@ -372,7 +372,7 @@ def _tuning(
         changed = scenario.model_copy(update={"controllers": {**scenario.controllers, axis.motor: controller}})
     else:
         changed = scenario.model_copy(update={"controller": controller})
-    motor = axis.scenario.motors[axis.motor]
+    motor = axis.train.motors[axis.motor]
     constant = None if motor.limits is None else motor.limits.torque_constant
     if motor.winding is not None:
         constant = motor.winding.phase_values().torque_constant

@@ -14,6 +14,7 @@ from ..inputs.quantities import Time
 from ..model.drive import Drive
 from ..model.self_locking import SelfLocking, self_locking
 from ..model.train import DriveTrain
+from ..units.practical import charted
 from .core_runs import core_case
 from .scenario import Scenario
 from .stepping import Simulation
@@ -31,6 +32,7 @@ class ContactState:
     capacity_forward: float  # it holds torques up to this before it slips forward
     capacity_backward: float  # and down to minus this before it slips in reverse
     shares: dict[str, tuple[float, float]] = field(default_factory=dict)  # of a train: of the capacities, by element
+    slides: bool = False  # along a straight line: [m/s] and [N] in the place of [rad/s] and [N·m]
 
     @property
     def to_free_forward(self) -> float:
@@ -43,18 +45,25 @@ class ContactState:
         return self.capacity_backward + self.torque
 
     def __str__(self) -> str:
+        unit = "N" if self.slides else "N·m"
         if self.mode != 0:
             way = "forward" if self.mode > 0 else "backward"
-            return f"{self.name}: slips {way} at {self.speed:.4g} rad/s, taking {abs(self.torque):.4g} N·m"
+            speed = _shown(self.speed, "m/s" if self.slides else "rad/s")
+            return f"{self.name}: slips {way} at {speed}, taking {abs(self.torque):.4g} {unit}"
         if math.isinf(self.capacity_forward):
-            return f"{self.name}: rigid, holds {self.torque:.4g} N·m"
+            return f"{self.name}: rigid, holds {self.torque:.4g} {unit}"
         parts = [f"{name} +{forward:.4g} / -{backward:.4g}" for name, (forward, backward) in self.shares.items()]
         of = f" ({', '.join(parts)})" if len(parts) > 1 else ""
         return (
-            f"{self.name}: stuck, holds {self.torque:.4g} N·m of +{self.capacity_forward:.4g} / "
-            f"-{self.capacity_backward:.4g} N·m{of}; {self.to_free_forward:.4g} N·m more frees it forward, "
-            f"{self.to_free_backward:.4g} N·m in reverse"
+            f"{self.name}: stuck, holds {self.torque:.4g} {unit} of +{self.capacity_forward:.4g} / "
+            f"-{self.capacity_backward:.4g} {unit}{of}; {self.to_free_forward:.4g} {unit} more frees it forward, "
+            f"{self.to_free_backward:.4g} {unit} in reverse"
         )
+
+
+def _shown(speed: float, si: str) -> str:
+    unit, factor = charted(si)
+    return f"{factor * speed:.4g} {unit}"
 
 
 @dataclass(frozen=True)
@@ -73,10 +82,12 @@ class MotorState:
     command_forward: float  # above it the shaft turns forward; infinite: never; NaN: not determined by statics
     command_backward: float  # below it, backward
     command_limit: float  # that the motor can follow
+    slides: bool = False  # a linear motor: its torque is a force [N]
 
     def __str__(self) -> str:
         ways = (("forward", "above", self.command_forward), ("backward", "below", self.command_backward))
         turns = []
+        moves = "slide moves" if self.slides else "shaft turns"
         for way, beyond, command in ways:
             if math.isnan(command):
                 turns.append(f"{way} at a command that statics do not determine (gears in a loop)")
@@ -89,7 +100,7 @@ class MotorState:
                     else ""
                 )
                 turns.append(f"{way} with a constant command {beyond} {command:.4g}{limit}")
-        return f"motor {self.name}: its shaft turns {', '.join(turns)}"
+        return f"motor {self.name}: its {moves} {', '.join(turns)}"
 
 
 @dataclass(frozen=True)
@@ -101,9 +112,12 @@ class Explanation:
     contacts: tuple[ContactState, ...]
     motors: tuple[MotorState, ...]
     shafts: tuple[str, ...]
+    """shafts and slides"""
     self_locking: tuple[
         SelfLocking, ...
     ]  # of the gears that lock or chatter under their present torque, or the rated one
+    slides: tuple[str, ...] = ()
+    """those of the shafts that move along a straight line"""
 
     @property
     def command_forward(self) -> float:
@@ -124,8 +138,13 @@ class Explanation:
         return motor.command_backward
 
     def __str__(self) -> str:
-        motors = [f"{m.name} {m.torque:.4g} N·m at command {m.command:.4g}" for m in self.motors]
-        speeds = [f"{name} {self.values[f'{name}_speed']:.4g} rad/s" for name in self.shafts]
+        motors = [
+            f"{m.name} {m.torque:.4g} {'N' if m.slides else 'N·m'} at command {m.command:.4g}" for m in self.motors
+        ]
+        speeds = [
+            f"{name} {_shown(self.values[f'{name}_speed'], 'm/s' if name in self.slides else 'rad/s')}"
+            for name in self.shafts
+        ]
         lines = [
             f"t = {self.time:.6g} s: {', '.join([*motors, *speeds])}",
             *(f"  {contact}" for contact in self.contacts),
@@ -189,24 +208,30 @@ def _explanation(
 ) -> Explanation:
     named = dict(zip((name for name, *_ in core.channels()), values, strict=True))
     states = []
+    slides = tuple(name for name in train.shafts if train.is_slide(name))
+    sliding = {f"{name}_contact" for name in slides}
+    sliding |= {f"{train.twist_of(n)}_contact" for n, gear in train.gears.items() if train.is_slide(gear.output)}
     for name, mode, speed, torque, forward, backward, elements in contacts:
         shares = {element: (one, other) for element, one, other in elements}
-        states.append(ContactState(name, mode, speed, torque, forward, backward, shares))
+        states.append(ContactState(name, mode, speed, torque, forward, backward, shares, name in sliding))
     turned = []
     for name, forward, backward in motors:
         motor = train.motors[name]
         limits = (motor.command_limit, None if motor.torque_limit is None else motor.torque_limit / motor.rated_torque)
         limit = min(limit for limit in (*limits, math.inf) if limit is not None)
         command = named["command" if core.short_form else f"{name}_command"]
-        turned.append(MotorState(name, command, named[f"{name}_torque"], forward, backward, limit))
+        torque = named[train.motor_torque_of(name)]
+        turned.append(MotorState(name, command, torque, forward, backward, limit, train.is_slide(motor.shaft)))
     locking = tuple(_verdicts(train, named, short=core.short_form))
-    return Explanation(time, named, tuple(states), tuple(turned), tuple(train.shafts), locking)
+    return Explanation(time, named, tuple(states), tuple(turned), tuple(train.shafts), locking, slides)
 
 
 def _verdicts(train: DriveTrain, named: dict[str, float], *, short: bool) -> Iterator[SelfLocking]:
     if train.fixed_gears() != train.gears:
         return
     for name, gear in train.gears.items():
-        torque = (named["load_torque"] if short else abs(named[f"{name}_output_torque"])) or gear.rated_output_torque
+        torque = (
+            named["load_torque"] if short else abs(named[train.output_torque_of(name)])
+        ) or gear.rated_output_torque
         if torque and (verdict := self_locking(train, name, torque)).notable:
             yield verdict

@@ -46,14 +46,14 @@ _FIRST = tuple(
     )
 )
 _SIGNALS = re.compile(r"command|load\.torque")
-_TRAIN_SIGNALS = re.compile(r"command\.[^.]+|shafts\.[^.]+\.torque")
+_TRAIN_SIGNALS = re.compile(r"command\.[^.]+|shafts\.[^.]+\.torque|slides\.[^.]+\.force")
 
 
 def set_values(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None:
     """Changes values by dotted key. What others depend on comes before them, in whatever order they are given."""
     changes = [(key, plain(value)) for key, value in changes]
     given = [key for key, _ in changes]
-    signals = _TRAIN_SIGNALS if "shafts" in data else _SIGNALS
+    signals = _TRAIN_SIGNALS if "shafts" in data or "slides" in data else _SIGNALS
     own = _Copies()
 
     def rank(change: tuple[str, Any]) -> int:

@@ -31,6 +31,7 @@ def pointing_errors(scenario: Scenario | TrainScenario, result: RawResult) -> di
 
 def _angle(scenario: Scenario | TrainScenario, result: RawResult, shaft: str | None) -> np.ndarray:
     if isinstance(scenario, TrainScenario):
-        return result[f"{shaft or list(scenario.shafts)[-1]}_angle"]
+        train = scenario.train()
+        return result[train.angle_of(shaft or list(train.shafts)[-1])]
     angle = result["load_angle"]
     return angle if shaft != "motor" else np.asarray(scenario.gearbox.ratio * (angle + result["twist"]))

@@ -137,7 +137,7 @@ def is_train_result(result: xarray.Dataset | RawResult) -> bool:
 def variables_of(scenario: Scenario | TrainScenario) -> tuple[Variable, ...]:
     """The variables that a result of this scenario may have."""
     own = VARIABLES if isinstance(scenario, Scenario) else train_variables(scenario.train(), scenario.core())
-    return (*own, *axis_variables(scenario.by_prefix()))
+    return (*own, *axis_variables(scenario.by_prefix(), scenario.sliding()))
 
 
 def recorded_variables(attributes: Mapping[str, Any]) -> tuple[Variable, ...]:
@@ -168,11 +168,11 @@ def add_angles(train: DriveTrain, data: dict[str, Any], time: Any) -> None:
     """Adds what the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
     for name, gear in train.gears.items():
         if isinstance(gear.stiffness, Rigid):
-            data.setdefault(f"{name}_twist", np.zeros_like(time))
-    known = [name for name in train.shafts if f"{name}_angle" in data]
+            data.setdefault(train.twist_of(name), np.zeros_like(time))
+    known = [name for name in train.shafts if train.angle_of(name) in data]
     for shaft, source, name, forward in angles_through_gears(train, known):
-        angle, twist = data[f"{source}_angle"], data[f"{name}_twist"]
-        data[f"{shaft}_angle"] = angle_through(train.gears[name], angle, twist, forward=forward)
+        angle, twist = data[train.angle_of(source)], data[train.twist_of(name)]
+        data[train.angle_of(shaft)] = angle_through(train.gears[name], angle, twist, forward=forward)
 
 
 def gear_efficiency(data: dict[str, Any], ratio: Any) -> Any:

@@ -163,6 +163,10 @@ class Scenario(Part):
         """What the names of the variables of a motor's controller begin with."""
         return ""
 
+    def sliding(self) -> dict[str, tuple[bool, bool]]:
+        """Which of its controllers move slides: none."""
+        return {}
+
     def note(self) -> str:
         """What the sheet of the gearbox says beside its numbers."""
         return self.gearbox.note

@@ -171,7 +171,7 @@ class Simulation:
         for prefix, _, phase in oriented(scenario):
             self._derived[f"{prefix or 'motor_'}torque"] = self._torque_of(prefix, phase)
             self._channel = {n: c for n, c in self._channel.items() if n != f"{prefix or 'motor_'}torque"}
-        self._variables += axis_variables(scenario.by_prefix())
+        self._variables += axis_variables(scenario.by_prefix(), scenario.sliding())
 
     def _torque_of(self, prefix: str, phase: PhaseValues) -> Derived:
         def torque(values: list[float]) -> float:
@@ -376,9 +376,13 @@ class Simulation:
         )
 
     def _no_input(self, name: str) -> InputError:
-        shaft = name.removesuffix("_load_torque")
-        if shaft != name and shaft in self._train.shafts:
-            return InputError(f'{name}: no load torque acts on this shaft; make the simulation with loaded=["{shaft}"]')
+        shaft = name.removesuffix("_load_torque").removesuffix("_load_force")
+        if shaft in self._train.shafts and name == self._train.load_torque_of(shaft):
+            word = self._train.torque_word(shaft)
+            kind = "slide" if word == "force" else "shaft"
+            return InputError(
+                f'{name}: no load {word} acts on this {kind}; make the simulation with loaded=["{shaft}"]'
+            )
         meant = did_you_mean(name, self.inputs, f"the inputs are {', '.join(self.inputs)}")
         return InputError(f"{name}: is no input of this train; {meant}")
 
@@ -435,17 +439,17 @@ class Simulation:
         """What the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
 
         def angle_of(source: str, name: str, forward: bool) -> Derived:
-            gear, twist = train.gears[name], f"{name}_twist"
+            gear, twist, angle = train.gears[name], train.twist_of(name), train.angle_of(source)
             return lambda values: float(
-                angle_through(gear, self._value(f"{source}_angle", values), self._value(twist, values), forward=forward)
+                angle_through(gear, self._value(angle, values), self._value(twist, values), forward=forward)
             )
 
-        known = [name for name in train.shafts if f"{name}_angle" in self._channel]
+        known = [name for name in train.shafts if train.angle_of(name) in self._channel]
         derived: dict[str, Derived] = {
-            f"{name}_twist": lambda _: 0.0 for name in train.gears if f"{name}_twist" not in self._channel
+            twist: lambda _: 0.0 for twist in map(train.twist_of, train.gears) if twist not in self._channel
         }
         for shaft, source, gear, forward in angles_through_gears(train, known):
-            derived[f"{shaft}_angle"] = angle_of(source, gear, forward)
+            derived[train.angle_of(shaft)] = angle_of(source, gear, forward)
         return derived
 
     @property

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..control.axis import Bound
 from ..inputs.named import Named
-from ..model.train import COUPLINGS, TrainElements
+from ..model.linear_train import LinearElements
+from ..model.train import COUPLINGS
 from .train_scenario import TrainInitial, TrainScenario
 
 INSTANT, LEADING = 0, 2  # of a switching: the column of its instant, and how many come before those of contacts
@@ -28,58 +29,66 @@ def parts_of(scenario: TrainScenario) -> list[TrainScenario]:
 
 
 def _groups(scenario: TrainScenario) -> list[list[str]]:
-    group = {shaft: {shaft} for shaft in scenario.shafts}
+    shafts = scenario.train().shafts
+    group = {shaft: {shaft} for shaft in shafts}
     for joined in _joined(scenario):
         together = set().union(*(group[shaft] for shaft in joined))
         for shaft in together:
             group[shaft] = together
     found: list[list[str]] = []
-    for shaft in scenario.shafts:
+    for shaft in shafts:
         if not any(shaft in others for others in found):
-            found.append([s for s in scenario.shafts if s in group[shaft]])
+            found.append([s for s in shafts if s in group[shaft]])
     return found
 
 
 def _joined(scenario: TrainScenario) -> Iterator[list[str]]:
     """Shafts that something joins."""
+    train = scenario.train()
     for table in ("gears", *COUPLINGS):
-        for element in getattr(scenario, table).values():
+        for element in getattr(train, table).values():
             yield [element.input, element.output, *filter(None, [getattr(element, "housing", None)])]
-    last = list(scenario.shafts)[-1]
+    last = list(train.shafts)[-1]
     for name, controller in scenario.controllers.items():
-        shafts = [scenario.motors[name].shaft, controller.shaft or last]
+        shafts = [train.motors[name].shaft, controller.shaft or last]
         encoders = [getattr(controller, key, None) for key in ("encoder", "position_encoder")]
         yield shafts + [encoder.shaft for encoder in encoders if encoder is not None and encoder.shaft is not None]
 
 
 def _part(scenario: TrainScenario, shafts: Collection[str]) -> TrainScenario:
     """The scenario of some of its shafts, whose values have been checked with the whole."""
-    kept: dict[str, Any] = {"shafts": Named({name: s for name, s in scenario.shafts.items() if name in shafts})}
-    for table in TrainElements.model_fields:
-        elements = getattr(scenario, table).items()
-        kept[table] = Named({name: e for name, e in elements if getattr(e, "shaft", getattr(e, "input", "")) in shafts})
-    last = list(scenario.shafts)[-1]
+    train = scenario.train()
+    kept: dict[str, Any] = {
+        table: Named({name: s for name, s in getattr(scenario, table).items() if name in shafts})
+        for table in ("shafts", "slides")
+    }
+    for table in LinearElements.model_fields:
+        kept[table] = Named({name: e for name, e in getattr(scenario, table).items() if _stands_on(e) in shafts})
+    motors = {name for name, motor in train.motors.items() if motor.shaft in shafts}
+    gears = {name for name, gear in train.gears.items() if gear.input in shafts}
+    last = list(train.shafts)[-1]
     kept["controllers"] = Named(
         {
             name: c if c.shaft is not None else c.model_copy(update={"shaft": last})
             for name, c in scenario.controllers.items()
-            if name in kept["motors"]
+            if name in motors
         }
     )
-    commanded = [*kept["motors"], *kept["brakes"], *kept["clutches"]]
+    commanded = [*motors, *kept["brakes"], *kept["clutches"]]
     kept["command"] = Named({name: c for name, c in scenario.command.items() if name in commanded})
     states = {
-        f"{name}_{state}"
-        for name, c in scenario.continuous().items()
-        if name in kept["motors"]
-        for state in c.system().states
+        f"{name}_{state}" for name, c in scenario.continuous().items() if name in motors for state in c.system().states
     }
     mine: dict[str, Collection[str]] = {
         "speeds": shafts,
         "angles": shafts,
-        "twists": kept["gears"],
-        "hysteresis_capacities": kept["gears"],
-        "motor_torques": kept["motors"],
+        "positions": shafts,
+        "slide_speeds": shafts,
+        "twists": gears,
+        "deflections": gears,
+        "hysteresis_capacities": gears,
+        "hysteresis_forces": gears,
+        "motor_torques": motors,
         "controller_states": states,
     }
     initial = {
@@ -91,12 +100,17 @@ def _part(scenario: TrainScenario, shafts: Collection[str]) -> TrainScenario:
     )
 
 
+def _stands_on(element: Any) -> str:
+    """One of the shafts and slides that an element acts on."""
+    return str(next(name for key in ("shaft", "input", "slide") if (name := getattr(element, key, None)) is not None))
+
+
 def control_of_part(control: Bound, whole: TrainScenario, part: TrainScenario) -> Bound:
     """Those controllers that are of a part."""
     tick, axes = control
-    motors, shafts = list(whole.motors), list(whole.shafts)
-    motor_of = {motors.index(name): k for k, name in enumerate(part.motors)}
-    shaft_of = {shafts.index(name): k for k, name in enumerate(part.shafts)}
+    motors, shafts = list(whole.train().motors), list(whole.train().shafts)
+    motor_of = {motors.index(name): k for k, name in enumerate(part.train().motors)}
+    shaft_of = {shafts.index(name): k for k, name in enumerate(part.train().shafts)}
     return tick, [
         (axis, motor_of[motor], shaft_of[position], shaft_of[speed], shaft_of[reference])
         for axis, motor, position, speed, reference in axes

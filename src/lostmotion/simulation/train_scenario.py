@@ -18,11 +18,13 @@ from ..data_sheets.train_components import RECORDS, use_train_records
 from ..errors import InputError
 from ..inputs.named import Named, nothing
 from ..inputs.part import Part
-from ..inputs.quantities import Angle, NotNegative, Number, Speed, Switch, Torque
+from ..inputs.quantities import Angle, Force, Length, LinearSpeed, NotNegative, Number, Speed, Switch, Torque
 from ..inputs.validation import did_you_mean, shown
+from ..model.linear import Slide
+from ..model.linear_train import LinearElements
 from ..model.shaft import Shaft
-from ..model.signals import CommandSignal, Signal, TorqueSignal
-from ..model.train import DriveTrain, Elements, TrainElements
+from ..model.signals import CommandSignal, ForceSignal, Signal, TorqueSignal
+from ..model.train import DriveTrain, Elements
 from .keys import set_values
 from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, check_on_reference, json_schema
 from .train_state import angles_at_start, start_values
@@ -36,6 +38,13 @@ class ShaftTable(Shaft):
     """M_Z, against its motion; left out, none can act on it"""
 
 
+class SlideTable(Slide):
+    """A slide and the load force on it."""
+
+    force: ForceSignal | None = None
+    """against its motion, beside its weight; left out, none can act on it unless it is inclined"""
+
+
 class TrainInitial(Part):
     """State at t = 0; what is left out is 0."""
 
@@ -45,6 +54,12 @@ class TrainInitial(Part):
     """of shafts; those of others follow through the gears"""
     twists: Elements[Angle] = Field(default_factory=nothing)
     """of gears with a stiffness"""
+    positions: Elements[Length] = Field(default_factory=nothing)
+    """of slides"""
+    slide_speeds: Elements[LinearSpeed] = Field(default_factory=nothing)
+    """of slides"""
+    deflections: Elements[Length] = Field(default_factory=nothing)
+    """of screws, racks and belts with a stiffness"""
     motor_torques: Elements[Torque] = Field(default_factory=nothing)
     """of DC motors"""
     controller_states: Elements[Number] = Field(default_factory=nothing)
@@ -52,11 +67,26 @@ class TrainInitial(Part):
     left out has settled"""
     hysteresis_capacities: Elements[Annotated[Torque, NotNegative]] = Field(default_factory=nothing)
     """of gears with hysteresis: what the last turning point before t = 0 left behind"""
+    hysteresis_forces: Elements[Annotated[Force, NotNegative]] = Field(default_factory=nothing)
+    """the same of screws, racks and belts"""
     on_reference: Switch = False
     """angles of the shafts of controllers, and the speeds of all that turns with them, are those of their references at t = 0"""
 
+    def of_all(self, key: str) -> dict[str, float]:
+        """The values of a key with those of slides or what moves them."""
+        return {**getattr(self, key), **getattr(self, LINEAR_INITIAL[key])}
 
-class TrainScenario(TrainElements):
+
+# Keys of `initial` for shafts and gears, and those of the same quantity for slides and what moves them.
+LINEAR_INITIAL = {
+    "angles": "positions",
+    "speeds": "slide_speeds",
+    "twists": "deflections",
+    "hysteresis_capacities": "hysteresis_forces",
+}
+
+
+class TrainScenario(LinearElements):
     """A drive train, what acts on it, and what is wanted of it."""
 
     # Why it is refused where another object is wanted, and what to use.
@@ -67,7 +97,9 @@ class TrainScenario(TrainElements):
     }
 
     title: str = ""
-    shafts: Elements[ShaftTable] = Field(min_length=1)
+    shafts: Elements[ShaftTable] = Field(default_factory=nothing)
+    slides: Elements[SlideTable] = Field(default_factory=nothing)
+    """what moves along a straight line; in the order of results, and where a last shaft is meant, they follow the shafts"""
     command: Elements[CommandSignal] = Field(default_factory=nothing)
     """of each motor (1 is rated voltage, or with a torque source rated torque; left out, 0), brake and friction clutch (0: open, 1: the full torque)"""
     controllers: Elements[AnyController] = Field(default_factory=nothing)
@@ -78,20 +110,21 @@ class TrainScenario(TrainElements):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        self._check_shafts()
         train = self.train()
-        train.check(self.loaded())
+        train.check(self.loaded(), self)
         self._check_controllers()
-        check_on_reference(self.initial, self.axes(), ("angles", "speeds"))
+        check_on_reference(self.initial, self.axes(), ("angles", "speeds", "positions", "slide_speeds"))
         core = self.core()
         if self.continuous() and (problem := core.check()):
             raise InputError(problem)
-        check_names(train, core, self.axes())
+        check_names(train, core, self.axes(), self)
         known = self.commanded()
         for name in self.command:
             if name not in known:
                 meant = did_you_mean(name, known, f"those with a command are {', '.join(known) or 'none'}")
                 raise InputError(f"key command.{name}: is no motor, brake or friction clutch of this train; {meant}")
-        idle = [f"command.{name}" for name in known if name not in self.command and name not in self.motors]
+        idle = [f"command.{name}" for name in known if name not in self.command and name not in train.motors]
         if idle:
             keys = f"key {idle[0]}: is" if len(idle) == 1 else f"keys {', '.join(idle)}: are"
             raise InputError(f"{keys} missing; add a number from 0 (open) to 1 (full torque), or a signal")
@@ -104,10 +137,34 @@ class TrainScenario(TrainElements):
         self.control()
         return self
 
+    def _check_shafts(self) -> None:
+        if not self.shafts and not self.slides:
+            raise InputError("key shafts: there is neither a shaft nor a slide; add [shafts.NAME] or [slides.NAME]")
+        for name, shaft in self.shafts.items():
+            if shaft.domain != "rotation":
+                raise InputError(
+                    f"key shafts.{name}.domain: is translation; write the slide as [slides.{name}], with its mass"
+                )
+        self.check_places(self.shafts, self.slides)
+        for key, linear in LINEAR_INITIAL.items():
+            of_slides = self.linear_drives() if key in ("twists", "hysteresis_capacities") else self.slides
+            for given, other in ((key, linear), (linear, key)):
+                for name in getattr(self.initial, given):
+                    if (name in of_slides) == (given == key):
+                        what = (
+                            "moves along a straight line"
+                            if given == key
+                            else "is none that moves along a straight line"
+                        )
+                        raise InputError(
+                            f"key initial.{given}.{name}: {shown(name)} {what}; give initial.{other}.{name}"
+                        )
+
     def _check_controllers(self) -> None:
+        motors = self.train().motors
         for name in self.controllers:
-            if name not in self.motors:
-                meant = did_you_mean(name, self.motors, f"the motors are {', '.join(self.motors) or 'none'}")
+            if name not in motors:
+                meant = did_you_mean(name, motors, f"the motors are {', '.join(motors) or 'none'}")
                 raise InputError(f"key controllers.{name}: is no motor of this train; {meant}")
             if name in self.command:
                 raise InputError(
@@ -127,9 +184,28 @@ class TrainScenario(TrainElements):
         """The sampled controllers, by what the names of their variables begin with."""
         return {self.prefix(name): c for name, c in self.axes().items()}
 
+    def sliding(self) -> dict[str, tuple[bool, bool]]:
+        """Of each controller, by what the names of its variables begin with: whether its motor moves a slide, and whether its
+        position is that of one."""
+        train = self.train()
+        return {
+            self.prefix(name): (train.is_slide(train.motors[name].shaft), train.is_slide(self.controlled(name)))
+            for name in self.axes()
+        }
+
+    def controlled(self, motor: str) -> str:
+        """The shaft or slide that the reference of a motor's controller is for."""
+        return self.controllers[motor].shaft or list(self.train().shafts)[-1]
+
+    def commanded(self) -> list[str]:
+        """Names of what has a command: motors, brakes and friction clutches."""
+        return self.train().commanded()
+
     def note(self) -> str:
         """What the sheets of the gears say beside their numbers."""
-        return " ".join(f"{name}: {gear.note}" for name, gear in self.gears.items() if gear.note)
+        notes = {name: part.note for name, part in self.train().gears.items()}
+        notes |= {name: part.note for name, part in self.linear_motors.items()}
+        return " ".join(f"{name}: {note}" for name, note in notes.items() if note)
 
     def prefix(self, motor: str) -> str:
         """What the names of the variables of a motor's controller begin with."""
@@ -137,7 +213,8 @@ class TrainScenario(TrainElements):
 
     def capacities(self, initial: TrainInitial | None = None) -> dict[str, float]:
         """Hysteresis capacities at t = 0 [N·m] by gear; what is not among them is 0."""
-        return {name: h for name, h in (initial or self.initial).hysteresis_capacities.items() if h}
+        given = (initial or self.initial).of_all("hysteresis_capacities")
+        return {name: h for name, h in given.items() if h}
 
     def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
         """The solver's controllers."""
@@ -175,11 +252,13 @@ class TrainScenario(TrainElements):
         train = self.train()
         initial = self.begin() if initial is None else initial
         values = start_values(train, initial)
-        angles = angles_at_start(train, initial.angles, initial.twists)
+        angles = angles_at_start(train, initial.of_all("angles"), initial.of_all("twists"))
         known = []
         for name, controller in self.continuous().items():
             shaft = controller.shaft or list(train.shafts)[-1]
-            measured = angles[shaft] if controller.reference.kind == "position" else initial.speeds.get(shaft, 0.0)
+            measured = (
+                angles[shaft] if controller.reference.kind == "position" else initial.of_all("speeds").get(shaft, 0.0)
+            )
             values |= controller.start(name, measured)
             known += [f"{name}_{state}" for state in controller.system().states]
         for name in initial.controller_states:
@@ -196,13 +275,18 @@ class TrainScenario(TrainElements):
             return self.initial
         angles: dict[str, float] = {}
         speeds: dict[str, float] = {}
+        train = self.train()
         for controller in self.axes().values():
             if controller.reference.kind == "position":
-                shaft = controller.shaft or list(self.shafts)[-1]
+                shaft = controller.shaft or list(train.shafts)[-1]
                 angles[shaft], speed = (float(value) for value in controller.reference.at(0.0)[:2])
-                ratios = {other: turns(self.train(), other, shaft) for other in self.shafts}
+                ratios = {other: turns(train, other, shaft) for other in train.shafts}
                 speeds |= {other: i * speed for other, i in ratios.items() if i is not None}
-        return self.initial.model_copy(update={"angles": Named(angles), "speeds": Named(speeds)})
+        found: dict[str, Any] = {}
+        for key, values in (("angles", angles), ("speeds", speeds)):
+            found[key] = Named({name: v for name, v in values.items() if not train.is_slide(name)})
+            found[LINEAR_INITIAL[key]] = Named({name: v for name, v in values.items() if train.is_slide(name)})
+        return self.initial.model_copy(update=found)
 
     def train(self) -> DriveTrain:
         """The drive train without its surroundings."""
@@ -212,21 +296,34 @@ class TrainScenario(TrainElements):
 
     def plain_shafts(self) -> dict[str, Shaft]:
         """The shafts without the torques on them."""
-        return {name: Shaft(**{key: getattr(s, key) for key in Shaft.model_fields}) for name, s in self.shafts.items()}
+        shafts = {
+            name: Shaft(**{key: getattr(s, key) for key in Shaft.model_fields}) for name, s in self.shafts.items()
+        }
+        return self.with_drag(shafts) | {name: slide.shaft() for name, slide in self.slides.items()}
 
     def elements(self) -> dict[str, Any]:
         """The tables of all else that makes the train."""
-        return {table: getattr(self, table) for table in TrainElements.model_fields}
+        return self.plain_elements(self.slides)
 
     def loaded(self) -> list[str]:
-        """Names of the shafts that a load torque acts on."""
-        return [name for name, shaft in self.shafts.items() if shaft.torque is not None]
+        """Names of the shafts and slides that a load acts on."""
+        return list(self.loads())
+
+    def loads(self) -> dict[str, Signal[Any]]:
+        """The load torques of shafts and load forces of slides, with the weight of inclined ones."""
+        found: dict[str, Signal[Any]] = {n: s.torque for n, s in self.shafts.items() if s.torque is not None}
+        for name, slide in self.slides.items():
+            weight = slide.weight(slide.mass + sum(m.mass for m in self.linear_motors.values() if m.slide == name))
+            if slide.force is not None or weight != 0.0:
+                force = ForceSignal() if slide.force is None else slide.force
+                found[name] = force.model_copy(update={"mean": force.mean + weight}) if weight != 0.0 else force
+        return found
 
     def signals(self) -> dict[str, Signal[Any]]:
         """All that acts on the train, after delays of brakes and clutches, by the name of its result variable."""
         controllers = self.continuous()
         commands = {f"{name}_command": self._acting(name) for name in self.commanded() if name not in controllers}
-        torques = {f"{name}_load_torque": s.torque for name, s in self.shafts.items() if s.torque is not None}
+        torques = {self.train().load_torque_of(name): load for name, load in self.loads().items()}
         references = {name: s for motor, c in controllers.items() for name, s in c.signals(motor).items()}
         return {**commands, **torques, **references}
 
@@ -306,7 +403,7 @@ def need_open_loop(scenario: Scenario | TrainScenario, function: str) -> None:
 
 def is_train(tables: Mapping[str, Any]) -> bool:
     """Whether the tables of a scenario are in the long form."""
-    return any(table in tables for table in ("shafts", *TrainElements.model_fields))
+    return any(table in tables for table in ("shafts", "slides", *LinearElements.model_fields))
 
 
 def train_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
@@ -325,7 +422,9 @@ def train_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
 def train_schema() -> dict[str, Any]:
     """JSON Schema of scenario files in the long form, for editors."""
     schema = TrainScenario.model_json_schema()
-    schema["properties"] = {key: schema["properties"][key] for key in ("title", "shafts")} | schema["properties"]
+    schema["properties"] = {key: schema["properties"][key] for key in ("title", "shafts", "slides")} | schema[
+        "properties"
+    ]
     schema["properties"]["base"] = BASE
     schema["required"] = []  # with a base, none
     for table, (key, own) in RECORDS.items():

@@ -26,19 +26,21 @@ def start_values(train: DriveTrain, initial: Any) -> dict[str, float]:
     stiff = [name for name, g in train.gears.items() if not isinstance(g.stiffness, Rigid)]
     lossy = [name for name in stiff if (h := train.gears[name].hysteresis) is not None and h.efficiency < 1.0]
     electric = [name for name, m in train.motors.items() if m.kind != "torque_source"]
-    _check("speeds", initial.speeds, train.shafts, "shaft")
-    _check("angles", initial.angles, train.shafts, "shaft")
+    speeds, twists = initial.of_all("speeds"), initial.of_all("twists")
+    for keys, what in ((("speeds", "angles"), "shaft"), (("slide_speeds", "positions"), "slide")):
+        for key in keys:
+            _check(key, getattr(initial, key), train.shafts, what)
     _check("twists", initial.twists, stiff, "gear with a stiffness")
+    _check("deflections", initial.deflections, stiff, "screw, rack or belt with a stiffness")
     _check("motor_torques", initial.motor_torques, electric, 'motor of kind "dc" or "synchronous"')
     _check("hysteresis_capacities", initial.hysteresis_capacities, lossy, "gear with hysteresis")
-    if problem := train.core(()).check_start([initial.speeds.get(name, 0.0) for name in train.shafts]):
+    _check("hysteresis_forces", initial.hysteresis_forces, lossy, "screw, rack or belt with hysteresis")
+    if problem := train.core(()).check_start([speeds.get(name, 0.0) for name in train.shafts]):
         raise InputError(f"key initial.speeds: {problem}")
-    angles = angles_at_start(train, initial.angles, initial.twists)
-    values = {
-        f"{name}_{what}": v for what, of in (("speed", initial.speeds), ("angle", angles)) for name, v in of.items()
-    }
-    values |= {f"{name}_twist": v for name, v in initial.twists.items()}
-    values |= {f"{name}_torque": v for name, v in initial.motor_torques.items()}
+    values = {f"{name}_speed": v for name, v in speeds.items()}
+    values |= {train.angle_of(s): v for s, v in angles_at_start(train, initial.of_all("angles"), twists).items()}
+    values |= {train.twist_of(name): v for name, v in twists.items()}
+    values |= {train.motor_torque_of(name): v for name, v in initial.motor_torques.items()}
     return values
 
 
@@ -81,9 +83,10 @@ def angles_at_start(train: DriveTrain, given: Mapping[str, float], twists: Mappi
                 angles[other], angle, rel_tol=ROUNDING, abs_tol=ROUNDING
             ):
                 one, two = origin[other], origin[shaft]
+                key = "positions" if train.is_slide(two) else "angles"
+                a, b = (f"{given[s]} {train.angle_unit(s)}" for s in (two, one))
                 raise InputError(
-                    f"key initial.angles.{two}: {given[two]} rad does not fit {one} = {given[one]} rad through the gear {name} and "
-                    "its twist; give one of them"
+                    f"key initial.{key}.{two}: {a} does not fit {one} = {b} through the gear {name} and its twist; give one of them"
                 )
     return angles
 

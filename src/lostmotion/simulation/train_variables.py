@@ -11,7 +11,8 @@ from .. import _core
 from ..control.controller import Controller
 from ..errors import InputError
 from ..model.gear import Gear
-from ..model.train import DriveTrain, TrainElements
+from ..model.linear_train import LinearElements
+from ..model.train import DriveTrain
 from .variables import Variable
 
 
@@ -25,17 +26,29 @@ def train_variables(train: DriveTrain, core: _core.Train) -> tuple[Variable, ...
     """
     channels = [Variable(*row) for row in core.channels()]
     known = {channel.name for channel in channels}
-    integrated = [name for name in train.shafts if f"{name}_angle" in known]
+    integrated = [name for name in train.shafts if train.angle_of(name) in known]
     following = {shaft for shaft, *_ in angles_through_gears(train, integrated)}
     angles = (
-        Variable(f"{name}_angle", "", "rad", "angle of the shaft", derived=True)
+        Variable(
+            train.angle_of(name),
+            "",
+            train.angle_unit(name),
+            "position of the slide" if train.is_slide(name) else "angle of the shaft",
+            derived=True,
+        )
         for name in train.shafts
         if name in following
     )
     twists = (
-        Variable(f"{name}_twist", "", "rad", "angle of input/ratio less that of output", derived=True)
-        for name in train.gears
-        if f"{name}_twist" not in known
+        Variable(
+            train.twist_of(name),
+            "",
+            train.angle_unit(gear.output),
+            f"angle of input/ratio less {'position' if train.is_slide(gear.output) else 'that'} of output",
+            derived=True,
+        )
+        for name, gear in train.gears.items()
+        if train.twist_of(name) not in known
     )
     return (*channels, *angles, *twists)
 
@@ -65,12 +78,23 @@ def signals_of(controller: Controller) -> Iterator[str]:
         yield from WINDING_SIGNALS
 
 
-def axis_variables(controllers: Mapping[str, Controller]) -> tuple[Variable, ...]:
-    """What the controllers of a run show, by what its names begin with."""
+def axis_variables(
+    controllers: Mapping[str, Controller], sliding: Mapping[str, tuple[bool, bool]] = {}
+) -> tuple[Variable, ...]:
+    """What the controllers of a run show, by what its names begin with.
+
+    Parameters
+    ----------
+    sliding
+        By the same key, whether the motor moves a slide, and whether the position is that of one; left out, neither.
+    """
     return tuple(
         Variable(f"{prefix}{name}", "", unit, meaning)
         for prefix, controller in controllers.items()
-        for name, unit, meaning in (*_core.axis_signals(), *_core.winding_signals())
+        for name, unit, meaning in (
+            *_core.axis_signals(*sliding.get(prefix, (False, False))),
+            *_core.winding_signals(),
+        )
         if name in signals_of(controller)
     )
 
@@ -121,8 +145,18 @@ def angle_through(gear: Gear, angle: Any, twist: Any, *, forward: bool) -> Any:
     return angle / gear.ratio - twist - e
 
 
-def check_names(train: DriveTrain, core: _core.Train, controllers: Mapping[str, Controller] = {}) -> None:
+def check_names(
+    train: DriveTrain,
+    core: _core.Train,
+    controllers: Mapping[str, Controller] = {},
+    written: LinearElements | None = None,
+) -> None:
     """Refuse two elements whose result variables have the same name.
+
+    Parameters
+    ----------
+    written
+        The elements as they were written, for messages; left out, those of the train.
 
     Raises
     ------
@@ -134,8 +168,8 @@ def check_names(train: DriveTrain, core: _core.Train, controllers: Mapping[str, 
         *axis_variables({f"{name}_": c for name, c in controllers.items()}),
     ):
         if variable.name in seen:
-            tables = ("shafts", *TrainElements.model_fields)
-            keys = [f"{table}.{name}" for table in tables for name in getattr(train, table)]
+            tables = ("shafts", "slides", *LinearElements.model_fields)
+            keys = [f"{table}.{name}" for table in tables for name in getattr(written or train, table, ())]
             both = [key for key in keys if variable.name.startswith(f"{key.partition('.')[2]}_")]
             raise InputError(
                 f"keys {', '.join(both)}: have a result variable of the same name, {variable.name}; rename one of them"

@@ -40,7 +40,7 @@ OF_DRIVES = Vocabulary(
 
 def _controlled(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str]]:
     """What controllers add: their signals, by how much each axis misses its reference, and how far windings may be wrong."""
-    for variable in axis_variables(scenario.by_prefix()):
+    for variable in axis_variables(scenario.by_prefix(), scenario.sliding()):
         yield variable.name, variable.unit
     for _, name in pointing_names(scenario):
         yield name, "rad"

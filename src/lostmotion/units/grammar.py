@@ -11,11 +11,22 @@ from itertools import product as pairs
 Product = dict[str, int]
 """unit of the table: its power"""
 
-PREFIXES = {"n": "nano", "u": "micro", "m": "milli", "c": "centi", "d": "deci", "da": "deca", "k": "kilo", "M": "mega"}
+PREFIXES = {
+    "n": "nano",
+    "u": "micro",
+    "m": "milli",
+    "c": "centi",
+    "d": "deci",
+    "da": "deca",
+    "k": "kilo",
+    "M": "mega",
+    "G": "giga",
+}
 # Symbol: unit of the table, and the prefixes that are in use with it.
 PREFIXED = {
     "N": ("newton", "u m c d da k M"),
-    "m": ("meter", "u m c d"),
+    "m": ("meter", "n u m c d"),
+    "Pa": ("pascal", "k M G"),
     "g": ("gram", "m k"),
     "s": ("second", "n u m"),
     "rad": ("radian", "n u m"),
@@ -33,6 +44,7 @@ PREFIXED = {
 # Other spellings of a unit of the table; the first is the one that messages show.
 SPELLINGS = {
     "newton": "newton newtons",
+    "pascal": "pascal pascals",
     "meter": "meter metre meters metres",
     "second": "sec second seconds",
     "minute": "min minute minutes",

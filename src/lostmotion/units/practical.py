@@ -12,12 +12,25 @@ ARCMIN = 10800.0 / math.pi  # of one rad
 PRACTICAL = {
     "rad/s": ("rpm", RPM),
     "rad": ("arcmin", ARCMIN),
+    "m": ("mm", 1e3),
+    "m/s": ("mm/s", 1e3),
     "kg*m^2": ("kg·cm²", 1e4),
     "s": ("ms", 1e3),
     "H": ("mH", 1e3),
     "degC": ("°C", 1.0),
     "ohm": ("Ω", 1.0),
 }
+
+
+# Units of charts and summaries, where they are not SI, and those of small values such as twists and errors.
+CHARTED = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "m/s^2": ("mm/s²", 1e3)}
+CHARTED_SMALL = {"rad": ("mrad", 1e3), "m": ("µm", 1e6)}
+
+
+def charted(unit: str, *, small: bool = False) -> tuple[str, float]:
+    """Unit of a chart or a summary for an SI unit, and how many of them one is."""
+    found = CHARTED_SMALL.get(unit) if small else None
+    return found or CHARTED.get(unit, (unit.replace("*", "·"), 1.0))
 
 
 def practical(value: Any, unit: str, digits: int = 5) -> str:

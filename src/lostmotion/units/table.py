@@ -10,6 +10,7 @@ from functools import cache
 UNITS = {
     "newton": ("1", "kg m s-2"),
     "meter": ("1", "m"),
+    "pascal": ("1", "kg m-1 s-2"),
     "gram": ("0.001", "kg"),
     "second": ("1", "s"),
     "radian": ("1", ""),
@@ -56,6 +57,7 @@ PREFIXES = {
     "deca": "1e1",
     "kilo": "1e3",
     "mega": "1e6",
+    "giga": "1e9",
 }
 
 

@@ -1,0 +1,640 @@
+"""Linear motion: slides, the screws, racks and belts that move them, and linear motors.
+
+The equations are those of shafts and gears. A slide is a shaft whose inertia is a mass [kg], whose angle is a position [m] and
+whose torques are forces [N]; a screw of lead p is a gear of ratio 2 pi/p between a shaft and a slide.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from .. import _core
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Angle,
+    AxialStiffness,
+    Current,
+    Density,
+    Force,
+    ForceConstant,
+    Inertia,
+    Length,
+    Limit,
+    LinearSpeed,
+    LinearViscousFriction,
+    Mass,
+    NotNegative,
+    Number,
+    Positive,
+    Pressure,
+    Torque,
+    ViscousFriction,
+    Whole,
+)
+from ..reproducible import arctan, cos, sin
+from .angle_torques import STANDARD_GRAVITY, AngleCurve, ErrorCurve, ErrorHarmonic, Harmonic, TorqueCurve
+from .gear import Gear
+from .losses import ConstantEfficiency, MeshEfficiency
+from .motor import ShaftMotor
+from .shaft import FrictionCurve, Shaft, check_points
+from .springs import Spring
+from .torsion import MAX_PIECES, Hysteresis, LinearStiffness, Rigid, TorsionCurve, check_segments
+
+STEEL = 7850.0  # [kg/m^3]
+ELASTIC_MODULUS = 206e9  # of steel [Pa]
+COGGING_POINTS = 72  # in a period: chords that depart from the sine by less than 0.1 % of its amplitude
+
+
+class ForceCurve(Part):
+    """Dry friction force over the magnitude of the speed: straight lines through the points, constant beyond the last."""
+
+    speeds: tuple[Annotated[LinearSpeed, NotNegative], ...] = Field(min_length=2, max_length=100)
+    """rising from 0"""
+    forces: tuple[Annotated[Force, NotNegative], ...]
+
+    @model_validator(mode="after")
+    def _is_a_curve(self) -> Self:
+        check_points(self.speeds, self.forces, "forces")
+        return self
+
+
+class EndStops(Part):
+    """Elastic stops at both ends of the travel: free between them, a spring beyond."""
+
+    lower: Length
+    upper: Length
+    stiffness: Annotated[AxialStiffness, Positive]
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.upper <= self.lower:
+            raise ValueError(f"has upper = {self.upper} m, which is not above lower = {self.lower} m; exchange them")
+        return self
+
+    def spring(self, slide: str) -> Spring:
+        """The same as a spring on the slide."""
+        curve = TorsionCurve(slopes=(self.stiffness,), backlash=self.upper - self.lower)
+        return Spring(shaft=slide, stiffness=curve, rest_angle=0.5 * (self.lower + self.upper))
+
+
+class Slide(Part):
+    """What moves along a straight line: a table, a carriage, a ram. Masses of linear motors on it are added to it.
+
+    Examples
+    --------
+    >>> Slide(mass="20 kg", friction_force="30 N", inclination="90 deg").weight()
+    196.133
+    """
+
+    mass: Annotated[Mass, NotNegative] = 0.0
+    viscous_friction: Annotated[LinearViscousFriction, NotNegative] = 0.0
+    friction_force: Annotated[Force, NotNegative] = 0.0
+    """dry friction while it slips"""
+    breakaway_force: Annotated[Force, NotNegative] | None = None
+    """dry friction at rest; left out, the same"""
+    stribeck_speed: Annotated[LinearSpeed, Positive] | None = None
+    """v_S: the friction falls from breakaway_force to friction_force by ``exp(-(v/v_S)^2)``; left out, at once"""
+    friction_error: Annotated[Force, Positive] | None = None
+    """by which straight lines depart from that curve at most; left out, 0.1 % of the difference of both forces"""
+    friction_curve: ForceCurve | None = None
+    """dry friction over speed, in place of friction_force and stribeck_speed"""
+    inclination: Annotated[Angle, Limit(ge=-0.5 * math.pi, le=0.5 * math.pi)] = 0.0
+    """of the positive direction above the horizontal; 90 deg: vertical, positive upwards. The weight's share along the slide acts
+    against it"""
+    end_stops: EndStops | None = None
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.mass:.4g} kg)"
+
+    @model_validator(mode="after")
+    def _friction_is_clear(self) -> Self:
+        slipping = self.friction_force
+        if self.friction_curve is not None:
+            for key in ("friction_force", "stribeck_speed"):
+                if getattr(self, key):
+                    raise ValueError(f"has {key} and friction_curve, which say the same; give one")
+            slipping = self.friction_curve.forces[0]
+        if self.breakaway_force is not None and self.breakaway_force < slipping:
+            raise ValueError(
+                f"has breakaway_force = {self.breakaway_force} N, less than its friction in motion, {slipping} N; "
+                "give at least that, or leave it out"
+            )
+        if self.stribeck_speed is not None and not (self.breakaway_force or 0.0) > slipping:
+            raise ValueError("has a stribeck_speed, which needs a breakaway_force above friction_force; give it")
+        if self.friction_error is not None and self.stribeck_speed is None:
+            raise ValueError("has a friction_error, which belongs to stribeck_speed; leave it out")
+        return self
+
+    def weight(self, mass: float | None = None) -> float:
+        """Force of gravity against the positive direction [N], of its own mass or of another one [kg]."""
+        return (self.mass if mass is None else mass) * STANDARD_GRAVITY * sin(self.inclination)
+
+    def shaft(self) -> Shaft:
+        """The same as a shaft of the equations, in units of translation."""
+        curve = self.friction_curve
+        return Shaft(
+            domain="translation",
+            inertia=self.mass,
+            viscous_friction=self.viscous_friction,
+            friction_torque=self.friction_force,
+            breakaway_torque=self.breakaway_force,
+            stribeck_speed=self.stribeck_speed,
+            friction_error=self.friction_error,
+            friction_curve=None if curve is None else FrictionCurve(speeds=curve.speeds, torques=curve.forces),
+        )
+
+
+class StiffnessCurve(Part):
+    """Force over deflection: odd, continuous, piecewise linear, as the nut, the screw and its bearings give way together."""
+
+    slopes: tuple[Annotated[AxialStiffness, NotNegative], ...] = Field(min_length=1, max_length=MAX_PIECES)
+    """of the segments, from deflection 0 outwards"""
+    breaks: tuple[Annotated[Length, Positive], ...] = ()
+    """deflections at which the slope changes; one fewer than slopes"""
+
+    @model_validator(mode="after")
+    def _is_a_curve(self) -> Self:
+        check_segments(self.slopes, self.breaks, "force")
+        return self
+
+
+class PitchHarmonic(Harmonic):
+    """A pitch error ``amplitude * sin(order * phi + phase)`` over the angle of the input shaft, by straight lines."""
+
+    amplitude: Annotated[Length, Positive]
+    """at the slide"""
+    error: Annotated[Length, Positive] | None = None
+    """by which the straight lines depart from the sine at most; left out, 0.1 % of the amplitude"""
+
+    def gear_error(self) -> ErrorHarmonic:
+        """The same as the transmission error of a gear."""
+        return ErrorHarmonic(order=self.order, phase=self.phase, amplitude=self.amplitude, error=self.error)
+
+
+class PitchCurve(AngleCurve):
+    """A pitch error over the angle of the input shaft: straight lines through points over one period."""
+
+    errors: tuple[Length, ...]
+    """at the slide"""
+
+    @model_validator(mode="after")
+    def _is_a_curve(self) -> Self:
+        self._check_points(self.errors)
+        return self
+
+    def gear_error(self) -> ErrorCurve:
+        """The same as the transmission error of a gear."""
+        return ErrorCurve(period=self.period, angles=self.angles, errors=self.errors)
+
+
+PitchError = Annotated[PitchHarmonic | PitchCurve, Field(discriminator="kind")]
+
+
+class LinearDrive(Part):
+    """What screws, racks and belts have in common: losses, compliance, play, pitch error, and what is on the input shaft."""
+
+    efficiency: Annotated[Number, Limit(gt=0.0, le=1.0)] | None = None
+    """while the input drives; left out, none is lost"""
+    backdriving_efficiency: Annotated[Number, Limit(le=1.0)] | None = None
+    """while the slide drives; 0 or less: self-locking; left out, 2 - 1/efficiency, which loses the same share of the force"""
+    stiffness: Annotated[AxialStiffness, Positive] | None = None
+    """axial, at the slide, of all that is in series; left out, rigid"""
+    stiffness_curve: StiffnessCurve | None = None
+    """force over deflection, in place of stiffness"""
+    backlash: Annotated[Length, NotNegative] = 0.0
+    """whole axial play at the slide"""
+    preload: Annotated[Force, NotNegative] = 0.0
+    """removes the segments of stiffness_curve below it"""
+    damping: Annotated[LinearViscousFriction, NotNegative] = 0.0
+    """at the slide, while the flanks touch"""
+    hysteresis: Hysteresis | None = None
+    pitch_error: PitchError | None = None
+    """e over the angle of the input shaft, at the slide: deflection = input angle/ratio - position - e"""
+    inertia: Annotated[Inertia, NotNegative] = 0.0
+    """of what turns with the input shaft"""
+    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
+    """on the input shaft"""
+    drag_torque: Annotated[Torque, NotNegative] = 0.0
+    """dry friction on the input shaft, such as that of the preload"""
+    note: str = ""
+    """what a reader of the results must know"""
+
+    @model_validator(mode="after")
+    def _compliance_is_clear(self) -> Self:
+        if self.stiffness is not None and self.stiffness_curve is not None:
+            raise ValueError("has stiffness and stiffness_curve, which say the same; give one")
+        if self.backdriving_efficiency is not None and self.efficiency is None:
+            raise ValueError("has a backdriving_efficiency without efficiency; give both, or leave it out")
+        if self.preload > 0.0 and self.stiffness_curve is None:
+            raise ValueError(
+                "has a preload, which acts on the segments of a stiffness_curve; give one, or leave it out"
+            )
+        if self.preload > 0.0 and self.backlash > 0.0:
+            raise ValueError("has backlash and preload; a preload removes the backlash, so give only one")
+        if self._stiffness() is None:
+            for key in ("backlash", "damping", "pitch_error", "hysteresis"):
+                if getattr(self, key):
+                    raise ValueError(f'has {key} but is rigid; give it a stiffness, such as "200 N/um"')
+        return self
+
+    def travel(self) -> float:
+        """Travel of the slide to one turn of the input shaft [m]."""
+        raise NotImplementedError
+
+    def ratio(self) -> float:
+        """Angle of the input shaft to the travel of the slide [rad/m], 2 pi/travel."""
+        return 2.0 * math.pi / self.travel()
+
+    def _stiffness(self) -> float | None:
+        """One stiffness [N/m], or None."""
+        if self.stiffness_curve is not None:
+            return self.stiffness_curve.slopes[-1]
+        return self.stiffness
+
+    def _turning_inertia(self) -> float:
+        return self.inertia
+
+    def efficiencies(self) -> tuple[float, float] | None:
+        """(driving, back-driving), or None without losses."""
+        if self.efficiency is None:
+            return None
+        back = self.backdriving_efficiency
+        return self.efficiency, 2.0 - 1.0 / self.efficiency if back is None else back
+
+    def gear(self, input: str, output: str) -> Gear:
+        """The gear between a shaft and a slide that has the same equations."""
+        k, both = self._stiffness(), self.efficiencies()
+        stiffness: TorsionCurve | LinearStiffness | Rigid = Rigid()
+        if self.stiffness_curve is not None:
+            slopes, breaks = self.stiffness_curve.slopes, self.stiffness_curve.breaks
+            stiffness = TorsionCurve(slopes=slopes, breaks=breaks, backlash=self.backlash, preload=self.preload)
+        elif k is not None and self.backlash > 0.0:
+            stiffness = TorsionCurve(slopes=(k,), backlash=self.backlash)
+        elif k is not None:
+            stiffness = LinearStiffness(stiffness=k)
+        return Gear(
+            input=input,
+            output=output,
+            ratio=self.ratio(),
+            inertia=self._turning_inertia(),
+            viscous_friction=self.viscous_friction,
+            stiffness=stiffness,
+            losses=ConstantEfficiency(efficiency=1.0)
+            if both is None
+            else MeshEfficiency(drive_efficiency=both[0], backdrive_efficiency=both[1]),
+            mesh_damping=self.damping,
+            hysteresis=self.hysteresis,
+            transmission_error=None if self.pitch_error is None else self.pitch_error.gear_error(),
+            note=self.note,
+        )
+
+
+def _one_way(part: Part, ways: dict[str, tuple[str, ...]], optional: tuple[str, ...] = ()) -> str:
+    """Which of several sets of keys is given, each saying the same."""
+    given = {way: [key for key in keys if getattr(part, key) is not None] for way, keys in ways.items()}
+    used = [way for way, keys in given.items() if keys]
+    text = ", or ".join(" and ".join(keys) for keys in ways.values())
+    if not used:
+        raise ValueError(f"lacks {text}; add it")
+    if len(used) > 1:
+        raise ValueError(f"has {given[used[0]][0]} and {given[used[1]][0]}, which say the same; give one")
+    lacking = [key for key in ways[used[0]] if getattr(part, key) is None and key not in optional]
+    if lacking:
+        raise ValueError(f"lacks {' and '.join(lacking)}; add it, or give {text}")
+    return used[0]
+
+
+class ScrewData(LinearDrive):
+    """A ball screw or a lead screw alone, as a data sheet has it.
+
+    Examples
+    --------
+    >>> ScrewData(lead="10 mm", mean_diameter="25 mm", friction_coefficient=0.003).efficiencies()
+    (0.9757..., 0.9752...)
+    """
+
+    lead: Annotated[Length, Positive] | None = None
+    """travel to one turn"""
+    pitch: Annotated[Length, Positive] | None = None
+    """distance of neighbouring threads, which with the number of starts says the lead"""
+    starts: Annotated[Whole, Field(ge=1, le=20)] | None = None
+    mean_diameter: Annotated[Length, Positive] | None = None
+    """d, of the pitch circle; tan(lead angle) = lead/(pi d)"""
+    friction_coefficient: Annotated[Number, NotNegative] | None = None
+    """in the thread: with mean_diameter, in place of efficiency"""
+    friction_angle: Annotated[Angle, NotNegative] | None = None
+    """in place of friction_coefficient"""
+    nut_stiffness: Annotated[AxialStiffness, Positive] | None = None
+    """in series with the next ones, in place of stiffness"""
+    bearing_stiffness: Annotated[AxialStiffness, Positive] | None = None
+    supported_length: Annotated[Length, Positive] | None = None
+    """of the screw between bearing and nut; between both bearings where both ends are fixed, the nut in the middle"""
+    core_diameter: Annotated[Length, Positive] | None = None
+    """of the screw's thread root"""
+    elastic_modulus: Annotated[Pressure, Positive] | None = None
+    """left out, that of steel, 206 GPa"""
+    support: Literal["one end", "both ends"] | None = None
+    """at which the screw is fixed axially: stiffness E A/L (left out, this), or 4 E A/L"""
+    diameter: Annotated[Length, Positive] | None = None
+    """of the screw: with length, in place of inertia"""
+    length: Annotated[Length, Positive] | None = None
+    density: Annotated[Density, Positive] | None = None
+    """left out, that of steel, 7850 kg/m^3"""
+
+    @model_validator(mode="after")
+    def _is_a_screw(self) -> Self:
+        _one_way(self, {"lead": ("lead",), "pitch": ("pitch", "starts")})
+        friction = [key for key in ("friction_coefficient", "friction_angle") if getattr(self, key) is not None]
+        if len(friction) == 2:
+            raise ValueError("has friction_coefficient and friction_angle, which say the same; give one")
+        if friction and self.mean_diameter is None:
+            raise ValueError(f"has {friction[0]} without mean_diameter, which the lead angle needs; add it")
+        if friction and self.efficiency is not None:
+            raise ValueError(f"has efficiency and {friction[0]}, which say the same; give one")
+        if self.mean_diameter is not None and not friction:
+            raise ValueError(
+                "has a mean_diameter without friction_coefficient or friction_angle; add one, or leave it out"
+            )
+        if friction:
+            g, r = self.angles()
+            if not g + r < 0.5 * math.pi:
+                raise ValueError(
+                    f"has a lead angle of {math.degrees(g):.4g} deg and a friction angle of {math.degrees(r):.4g} deg; their sum must be below 90 deg"
+                )
+        if (self.supported_length is None) != (self.core_diameter is None):
+            raise ValueError("has one of supported_length and core_diameter; the stiffness of the screw needs both")
+        series = [k for k in ("nut_stiffness", "bearing_stiffness", "supported_length") if getattr(self, k) is not None]
+        for key in ("stiffness", "stiffness_curve"):
+            if series and getattr(self, key) is not None:
+                raise ValueError(f"has {key} and {series[0]}, which say the same; give one")
+        if self.supported_length is None:
+            for key in ("support", "elastic_modulus"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f"has {key}, which belongs to supported_length and core_diameter; add them")
+        if (self.diameter is None) != (self.length is None):
+            raise ValueError("has one of diameter and length; the inertia of the screw needs both")
+        if self.diameter is not None and self.inertia > 0.0:
+            raise ValueError("has inertia and diameter, which say the same; give one")
+        if self.diameter is None and self.density is not None:
+            raise ValueError("has a density, which belongs to diameter and length; add them")
+        return self
+
+    def travel(self) -> float:
+        if self.lead is not None:
+            return self.lead
+        assert self.pitch is not None and self.starts is not None  # noqa: PT018
+        return self.pitch * self.starts
+
+    def angles(self) -> tuple[float, float]:
+        """(lead angle, friction angle) [rad]."""
+        assert self.mean_diameter is not None
+        g = arctan(self.travel() / (math.pi * self.mean_diameter))
+        r = self.friction_angle
+        return g, arctan(self.friction_coefficient) if r is None else r  # type: ignore[arg-type]
+
+    def efficiencies(self) -> tuple[float, float] | None:
+        if self.mean_diameter is None:
+            return super().efficiencies()
+        eta_f, eta_b = _core.worm_efficiencies(*self.angles())
+        return eta_f, eta_b if self.backdriving_efficiency is None else self.backdriving_efficiency
+
+    def _stiffness(self) -> float | None:
+        parts = [k for k in (self.nut_stiffness, self.bearing_stiffness) if k is not None]
+        if self.supported_length is not None and self.core_diameter is not None:
+            area = 0.25 * math.pi * self.core_diameter * self.core_diameter
+            fixed = 4.0 if self.support == "both ends" else 1.0
+            parts.append(fixed * (self.elastic_modulus or ELASTIC_MODULUS) * area / self.supported_length)
+        if not parts:
+            return super()._stiffness()
+        compliance = 0.0
+        for k in parts:
+            compliance += 1.0 / k
+        return 1.0 / compliance
+
+    def _turning_inertia(self) -> float:
+        if self.diameter is None or self.length is None:
+            return self.inertia
+        d2 = self.diameter * self.diameter
+        return math.pi / 32.0 * (self.density or STEEL) * self.length * d2 * d2
+
+
+class RackData(LinearDrive):
+    """A rack and its pinion alone, as a data sheet has them.
+
+    Examples
+    --------
+    >>> RackData(module="2 mm", teeth=20).travel()
+    0.12566370614359174
+    """
+
+    module: Annotated[Length, Positive] | None = None
+    """normal module"""
+    teeth: Annotated[Whole, Field(ge=4, le=1000)] | None = None
+    """of the pinion"""
+    helix_angle: Annotated[Angle, Limit(ge=0.0, le=0.25 * math.pi)] | None = None
+    """left out, 0: straight teeth"""
+    travel_per_turn: Annotated[Length, Positive] | None = None
+    """in place of module and teeth"""
+
+    @model_validator(mode="after")
+    def _is_a_rack(self) -> Self:
+        ways = {"teeth": ("module", "teeth", "helix_angle"), "travel": ("travel_per_turn",)}
+        _one_way(self, ways, ("helix_angle",))
+        return self
+
+    def travel(self) -> float:
+        if self.travel_per_turn is not None:
+            return self.travel_per_turn
+        assert self.module is not None and self.teeth is not None  # noqa: PT018
+        return math.pi * self.module * self.teeth / cos(self.helix_angle or 0.0)
+
+
+class BeltData(LinearDrive):
+    """A toothed belt and its pulley alone, as a data sheet has them.
+
+    Examples
+    --------
+    >>> BeltData(teeth=20, pitch="5 mm", specific_stiffness="1e6 N", free_lengths=["0.5 m", "1.5 m"]).gear("m", "s").stiffness.stiffness
+    2666666.6666666665
+    """
+
+    pulley_diameter: Annotated[Length, Positive] | None = None
+    """at the belt's pitch line"""
+    teeth: Annotated[Whole, Field(ge=4, le=1000)] | None = None
+    """of the pulley"""
+    pitch: Annotated[Length, Positive] | None = None
+    """of the belt"""
+    travel_per_turn: Annotated[Length, Positive] | None = None
+    """in place of both"""
+    specific_stiffness: Annotated[Force, Positive] | None = None
+    """c_sp, force to unit strain: with free_lengths, in place of stiffness"""
+    free_lengths: tuple[Annotated[Length, Positive], ...] | None = Field(None, min_length=1, max_length=10)
+    """of the strands between pulley and slide that carry together: stiffness = c_sp (1/L_1 + 1/L_2 ...)"""
+
+    @model_validator(mode="after")
+    def _is_a_belt(self) -> Self:
+        ways = {
+            "diameter": ("pulley_diameter",),
+            "teeth": ("teeth", "pitch"),
+            "travel": ("travel_per_turn",),
+        }
+        _one_way(self, ways)
+        if (self.specific_stiffness is None) != (self.free_lengths is None):
+            raise ValueError("has one of specific_stiffness and free_lengths; the stiffness of the belt needs both")
+        for key in ("stiffness", "stiffness_curve"):
+            if self.free_lengths is not None and getattr(self, key) is not None:
+                raise ValueError(f"has {key} and specific_stiffness, which say the same; give one")
+        return self
+
+    def travel(self) -> float:
+        if self.travel_per_turn is not None:
+            return self.travel_per_turn
+        if self.pulley_diameter is not None:
+            return math.pi * self.pulley_diameter
+        assert self.teeth is not None and self.pitch is not None  # noqa: PT018
+        return self.teeth * self.pitch
+
+    def _stiffness(self) -> float | None:
+        if self.specific_stiffness is None or self.free_lengths is None:
+            return super()._stiffness()
+        stiffness = 0.0
+        for length in self.free_lengths:
+            stiffness += self.specific_stiffness / length
+        return stiffness
+
+
+class _Placed(Part):
+    input: str
+    """shaft"""
+    output: str
+    """slide"""
+
+
+class Screw(ScrewData, _Placed):
+    """A ball screw or a lead screw between a shaft and a slide.
+
+    Examples
+    --------
+    >>> screw = Screw(input="motor", output="table", lead="10 mm", stiffness="200 N/um", backlash="2 um")
+    >>> screw.ratio() == 2 * 3.141592653589793 / 0.01
+    True
+    """
+
+
+class Rack(RackData, _Placed):
+    """A pinion on a shaft and its rack on a slide, or the other way round.
+
+    Examples
+    --------
+    >>> Rack(input="pinion", output="carriage", module="2 mm", teeth=20).ratio()
+    50.0
+    """
+
+
+class Belt(BeltData, _Placed):
+    """A toothed belt from a pulley on a shaft to a slide.
+
+    Examples
+    --------
+    >>> Belt(input="motor", output="carriage", teeth=20, pitch="5 mm").travel()
+    0.1
+    """
+
+
+class LinearMotorData(Part):
+    """A linear motor alone, as a data sheet has it: a source of force.
+
+    Examples
+    --------
+    >>> LinearMotorData(force_constant="50 N/A", rated_current="4 A", peak_current="12 A").forces()
+    (200.0, 600.0)
+    """
+
+    mass: Annotated[Mass, NotNegative] = 0.0
+    """of the part that moves"""
+    rated_force: Annotated[Force, Positive] | None = None
+    """that of command 1"""
+    peak_force: Annotated[Force, Positive] | None = None
+    """at which the force ends; left out, without limit"""
+    force_constant: Annotated[ForceConstant, Positive] | None = None
+    """force to the current in the unit of the currents"""
+    rated_current: Annotated[Current, Positive] | None = None
+    """with force_constant, in place of rated_force"""
+    peak_current: Annotated[Current, Positive] | None = None
+    """with force_constant, in place of peak_force"""
+    friction_force: Annotated[Force, NotNegative] = 0.0
+    """dry friction"""
+    cogging_force: Annotated[Force, Positive] | None = None
+    """amplitude, over the position with the period pole_pitch"""
+    pole_pitch: Annotated[Length, Positive] | None = None
+    """tau, from a north pole to the next south pole: half a magnetic period"""
+    note: str = ""
+    """what a reader of the results must know"""
+
+    @model_validator(mode="after")
+    def _is_a_motor(self) -> Self:
+        for name in ("rated", "peak"):
+            force, current = f"{name}_force", f"{name}_current"
+            if getattr(self, current) is not None and self.force_constant is None:
+                raise ValueError(f"has {current} without force_constant; add it, or give {force}")
+            if getattr(self, force) is not None and getattr(self, current) is not None:
+                raise ValueError(f"has {force} and {current}, which with force_constant say the same; give one")
+        rated, peak = self.forces()
+        if peak < rated:
+            raise ValueError(
+                f"has a peak force of {peak:g} N, less than the rated one, {rated:g} N; give at least that"
+            )
+        if (self.cogging_force is None) != (self.pole_pitch is None):
+            raise ValueError("has one of cogging_force and pole_pitch; the cogging needs both")
+        return self
+
+    def forces(self) -> tuple[float, float]:
+        """(rated, peak) [N]; infinite without a limit."""
+        rated, peak = self.rated_force, self.peak_force
+        if rated is None:
+            if self.rated_current is None or self.force_constant is None:
+                raise ValueError("lacks rated_force, or force_constant and rated_current; add it")
+            rated = self.force_constant * self.rated_current
+        if peak is None and self.peak_current is not None and self.force_constant is not None:
+            peak = self.force_constant * self.peak_current
+        return rated, math.inf if peak is None else peak
+
+
+class LinearMotor(LinearMotorData):
+    """A linear motor that moves a slide: its command times the rated force acts without delay.
+
+    Examples
+    --------
+    >>> motor = LinearMotor(slide="table", rated_force="200 N", peak_force="600 N", mass="2.5 kg")
+    >>> motor.motor().torque_limit
+    600.0
+    """
+
+    slide: str
+
+    def motor(self) -> ShaftMotor:
+        """The source of torque with the same equations."""
+        rated, peak = self.forces()
+        return ShaftMotor(
+            kind="torque_source",
+            shaft=self.slide,
+            rotor_inertia=self.mass,
+            friction_torque=self.friction_force,
+            rated_torque=rated,
+            torque_limit=None if math.isinf(peak) else peak,
+        )
+
+    def cogging(self) -> TorqueCurve | None:
+        """Its cogging as a force over the position; None without."""
+        if self.cogging_force is None or self.pole_pitch is None:
+            return None
+        share = [k / COGGING_POINTS for k in range(COGGING_POINTS)]
+        return TorqueCurve(
+            shaft=self.slide,
+            period=self.pole_pitch,
+            angles=tuple(self.pole_pitch * x for x in share),
+            torques=tuple(self.cogging_force * sin(2.0 * math.pi * x) for x in share),
+        )

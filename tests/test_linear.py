@@ -1,0 +1,272 @@
+"""Linear motion: slides, and the screws, racks and belts that move them, against the same drive in units of rotation."""
+
+import math
+import tomllib
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from lostmotion.simulation.train_scenario import train_from_tables
+from lostmotion.units.conversion import to_si
+
+SCREW = """
+title = "Ball-screw axis"
+[shafts.motor]
+inertia = "2e-4 kg m^2"
+friction_torque = "0.05 N m"
+[slides.table]
+mass = "20 kg"
+friction_force = "30 N"
+breakaway_force = "45 N"
+viscous_friction = "50 N s/m"
+force = { mean = "100 N" }
+[motors.drive]
+shaft = "motor"
+kind = "torque_source"
+rated_torque = "1 N m"
+rotor_inertia = "1e-4 kg m^2"
+[screws.screw]
+input = "motor"
+output = "table"
+lead = "10 mm"
+efficiency = 0.9
+backdriving_efficiency = 0.8
+stiffness_curve = { slopes = ["100 N/um", "200 N/um"], breaks = ["1 um"] }
+backlash = "2 um"
+hysteresis = { efficiency = 0.9 }
+inertia = "1e-5 kg m^2"
+drag_torque = "0.02 N m"
+[command.drive]
+amplitude = 0.8
+frequency = "5 Hz"
+[simulation]
+duration = "1 s"
+sample_interval = "1 ms"
+"""
+
+ROTARY = """
+[shafts.motor]
+inertia = 2e-4
+friction_torque = 0.07
+[shafts.table]
+inertia = 20.0
+friction_torque = 30.0
+breakaway_torque = 45.0
+viscous_friction = 50.0
+torque = 100.0
+[motors.drive]
+shaft = "motor"
+kind = "torque_source"
+rated_torque = 1.0
+rotor_inertia = 1e-4
+[gears.screw]
+input = "motor"
+output = "table"
+ratio = 1.0
+inertia = 1e-5
+stiffness = { kind = "curve", slopes = [1e8, 2e8], breaks = [1e-6], backlash = 2e-6 }
+hysteresis = { efficiency = 0.9 }
+losses = { kind = "mesh_efficiency", drive_efficiency = 0.9, backdrive_efficiency = 0.8 }
+[command.drive]
+amplitude = 0.8
+frequency = 5.0
+[simulation]
+duration = 1.0
+sample_interval = 1e-3
+"""
+
+# Of the slide and its screw: the names that the same variables have in units of rotation.
+NAMES = {
+    "table_position": "table_angle",
+    "table_load_force": "table_load_torque",
+    "table_contact_force": "table_contact_torque",
+    "screw_deflection": "screw_twist",
+    "screw_output_force": "screw_output_torque",
+    "screw_deflection_contact": "screw_twist_contact",
+    "screw_deflection_contact_force": "screw_twist_contact_torque",
+}
+
+
+def screw(**changes):
+    scenario = train_from_tables(tomllib.loads(SCREW))
+    return scenario.replace(**changes) if changes else scenario
+
+
+def test_screw_axis_equals_the_rotary_train_bit_for_bit():
+    """Of all variables, switching instants and energies: only names and units differ."""
+    linear = lm.simulate(screw())
+    rotary = lm.simulate(
+        train_from_tables(tomllib.loads(ROTARY)).replace(**{"gears.screw.ratio": 2.0 * math.pi / 0.01})
+    )
+    assert {NAMES.get(name, name) for name in linear} == set(rotary)
+    for name in linear:
+        assert linear[name].values.tobytes() == rotary[NAMES.get(name, name)].values.tobytes(), name
+    assert lm.energy_of(linear) == lm.energy_of(rotary)
+    one, other = lm.switchings_of(linear), lm.switchings_of(rotary)
+    assert one["instant"].values.tobytes() == other["instant"].values.tobytes()
+    assert len(one["instant"]) > 10
+    assert linear.attrs["steps"] == rotary.attrs["steps"]
+
+
+def test_units_of_a_slide_are_those_of_translation():
+    result = lm.simulate(screw())
+    assert {name: v.attrs["units"] for name, v in result.items() if "table" in name or "screw" in name} == {
+        "table_load_force": "N",
+        "table_speed": "m/s",
+        "table_position": "m",
+        "screw_deflection": "m",
+        "screw_output_force": "N",
+        "screw_input_torque": "N*m",
+        "screw_deflection_contact_force": "N",
+        "screw_deflection_contact": "1",
+        "table_contact_force": "N",
+        "table_contact": "1",
+    }
+
+
+def test_weight_of_an_inclined_slide_is_a_load():
+    """m g sin(inclination), beside the force that is given, also of what a linear motor adds to the mass."""
+    g = 9.80665
+    vertical = screw(**{"slides.table.inclination": "90 deg"})
+    assert vertical.loads()["table"].mean == 100.0 + 20.0 * g
+    sloping = screw(**{"slides.table.inclination": "30 deg"})
+    assert sloping.loads()["table"].mean == pytest.approx(100.0 + 10.0 * g, rel=1e-15)
+    falling = lm.simulate(
+        train_from_tables(
+            tomllib.loads("""
+        [slides.ram]
+        mass = "3 kg"
+        inclination = "90 deg"
+        [linear_motors.lifter]
+        slide = "ram"
+        rated_force = "10 N"
+        mass = "1 kg"
+        [command]
+        lifter = 0.0
+        [simulation]
+        duration = "1 s"
+        sample_interval = "0.1 s"
+    """)
+        )
+    )
+    t = falling["time"].values
+    np.testing.assert_allclose(falling["ram_position"], -0.5 * g * t**2, rtol=1e-13, atol=0.0)
+    assert falling["lifter_force"].attrs["units"] == "N"
+
+
+@pytest.mark.parametrize(
+    ("drive", "travel"),
+    [
+        (lm.Screw(input="a", output="b", lead="10 mm"), 0.01),
+        (lm.Screw(input="a", output="b", pitch="5 mm", starts=4), 0.02),
+        (lm.Rack(input="a", output="b", module="2 mm", teeth=20), math.pi * 0.04),
+        (lm.Rack(input="a", output="b", module="2 mm", teeth=20, helix_angle="19.5283 deg"), math.pi * 0.04 / 0.94247),
+        (lm.Belt(input="a", output="b", teeth=20, pitch="5 mm"), 0.1),
+        (lm.Belt(input="a", output="b", pulley_diameter="31.83098862 mm"), 0.1),
+    ],
+)
+def test_travel_to_one_turn(drive, travel):
+    """Of catalogues: a rack of module 2 with a helix angle of 19.5283 degrees has 133.33 mm to 20 teeth."""
+    assert drive.travel() == pytest.approx(travel, rel=1e-5)
+    assert drive.gear("a", "b").ratio == 2.0 * math.pi / drive.travel()
+
+
+def test_efficiency_of_a_screw_follows_from_its_lead_angle_and_friction():
+    """tan(g)/tan(g + r) and tan(g - r)/tan(g) of the friction angle r, as textbooks have it."""
+    part = lm.Screw(input="a", output="b", lead="10 mm", mean_diameter="25 mm", friction_coefficient=0.1)
+    g, r = math.atan(10.0 / (25.0 * math.pi)), math.atan(0.1)
+    assert part.efficiencies() == pytest.approx(
+        (math.tan(g) / math.tan(g + r), math.tan(g - r) / math.tan(g)), rel=1e-14
+    )
+    assert lm.Screw(input="a", output="b", lead="10 mm", efficiency=0.8).efficiencies() == (0.8, 2.0 - 1.0 / 0.8)
+
+
+def test_stiffness_of_screw_nut_and_bearings_in_series():
+    part = lm.Screw(
+        input="a",
+        output="b",
+        lead="10 mm",
+        nut_stiffness="400 N/um",
+        bearing_stiffness="600 N/um",
+        supported_length="800 mm",
+        core_diameter="22 mm",
+        support="both ends",
+    )
+    shank = 4.0 * 206e9 * math.pi / 4.0 * 0.022**2 / 0.8
+    assert part.gear("a", "b").stiffness.stiffness == pytest.approx(1.0 / (1 / 4e8 + 1 / 6e8 + 1 / shank), rel=1e-14)
+
+
+def test_inertia_of_a_screw_follows_from_its_size():
+    part = lm.Screw(input="a", output="b", lead="10 mm", diameter="25 mm", length="1 m")
+    mass = 7850.0 * math.pi / 4.0 * 0.025**2
+    assert part.gear("a", "b").inertia == pytest.approx(mass * 0.025**2 / 8.0, rel=1e-14)
+
+
+def test_end_stops_hold_the_slide_within_its_travel():
+    """Pressed against a stop, the slide comes to rest where the spring carries the force: F/k beyond the stop."""
+    scenario = train_from_tables(
+        tomllib.loads("""
+        [slides.ram]
+        mass = "3 kg"
+        viscous_friction = "2000 N s/m"
+        end_stops = { lower = "-10 mm", upper = "20 mm", stiffness = "100 N/um" }
+        [linear_motors.m]
+        slide = "ram"
+        force_constant = "50 N/A"
+        rated_current = "4 A"
+        [command]
+        m = 0.5
+        [simulation]
+        duration = "3 s"
+        sample_interval = "10 ms"
+    """)
+    )
+    result = lm.simulate(scenario)
+    assert float(result["ram_position"][-1]) == pytest.approx(0.02 + 100.0 / 1e8, rel=1e-12)
+
+
+def test_cogging_of_a_linear_motor_has_its_pole_pitch():
+    """A slide that is moved slowly against much viscous friction meets F_c sin(2 pi x/tau)."""
+    motor = lm.LinearMotor(slide="ram", rated_force="200 N", cogging_force="8 N", pole_pitch="24 mm")
+    curve = motor.cogging().core()
+    for x in np.linspace(-0.05, 0.05, 101):
+        assert curve(x) == pytest.approx(8.0 * math.sin(2.0 * math.pi * x / 0.024), abs=8e-3)
+
+
+def test_position_gain_in_metres_a_minute_to_a_millimetre():
+    assert to_si("1 (m/min)/mm", "1/s") == pytest.approx(1000.0 / 60.0, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"slides.table.mass": "20 kg m^2"}, "slides.table.mass"),
+        ({"slides.table.friction_force": "3 N m"}, "slides.table.friction_force"),
+        ({"screws.screw.backlash": "3 arcmin"}, "screws.screw.backlash"),
+        ({"screws.screw.output": "motor"}, "is a shaft; give the name of a slide"),
+        ({"screws.screw.input": "table"}, "is a slide; give the name of a shaft"),
+        ({"screws.screw.output": "tabel"}, "did you mean table"),
+        ({"motors.drive.shaft": "table"}, "write it in [linear_motors]"),
+        ({"gears.g": {"input": "motor", "output": "table", "ratio": 2}}, "[screws], [racks] and [belts]"),
+        ({"initial.angles": {"table": 1.0}}, "give initial.positions.table"),
+        ({"initial.positions": {"motor": 1.0}}, "give initial.angles.motor"),
+        ({"screws.screw.pitch": "5 mm"}, "lead and pitch, which say the same"),
+        ({"shafts.table": {"inertia": 1.0}}, "have the same name"),
+        ({"shafts.motor.domain": "translation"}, "write the slide as [slides.motor]"),
+        ({"screws.screw.stiffness": "200 N/um"}, "stiffness and stiffness_curve"),
+        ({"slides.table.inclination": "100 deg"}, "slides.table.inclination"),
+    ],
+)
+def test_bad_input_is_refused(changes, message):
+    with pytest.raises(lm.InputError) as refused:
+        screw(**changes)
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_start_of_a_slide_is_given_in_units_of_translation():
+    scenario = screw(**{"initial.positions": {"table": "20 mm"}, "initial.slide_speeds": {"table": "5 mm/s"}})
+    result = lm.simulate(scenario)
+    assert float(result["table_position"][0]) == 0.02
+    assert float(result["table_speed"][0]) == 0.005
