@@ -58,7 +58,7 @@ def section(report: Report, scenario: lm.Scenario, programs: dict[str, list[list
 
     rows = compiled("table")
     rows.append(("Python to dataset, no ledger", best(100, lambda: lm.simulate(scenario, energy=False)), "0"))
-    rows.append(("Python to dataset, with ledger", best(100, lambda: lm.simulate(scenario)), "0"))
+    rows.append(("Python to dataset, with ledger", best(100, lambda: lm.simulate(scenario, energy=True)), "0"))
     for is_compiled, what in ((False, "in Python"), (True, "compiled by numba")):
         drive = ContactDrive(scenario, compiled=is_compiled)
         peer_scipy.run(drive, 0.1, times[:101], "LSODA", 1e-6)  # numba compiles now

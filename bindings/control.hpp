@@ -233,6 +233,7 @@ inline void bind_control(nb::module_& m) {
         .def("output_torque", &GearLosses::output_torque, "input_torque"_a, "direction"_a, "speed"_a, "factor"_a);
     nb::class_<BoundAxis> axis(m, "Axis");
     axis.def(nb::init<>())
+        .def(nb::init<const BoundAxis&>(), "other"_a, "A copy, which may be changed.")
         .def("set", &BoundAxis::set, "fields"_a, nb::sig("def set(self, fields: dict[str, typing.Any]) -> None"),
              "Parameters by the keys of scenario files, tables as dicts; what is left out stays as it is.")
         .def(

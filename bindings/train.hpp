@@ -368,7 +368,7 @@ inline void bind_train(nb::module_& m) {
         },
         "friction_torque"_a, "breakaway_torque"_a, "stribeck_speed"_a, "error"_a);
 
-    nb::class_<TrainDescription>(m, "Train")
+    nb::class_<TrainDescription>(m, "Train", nb::is_weak_referenceable())
         .def(nb::init<>())
         .def("add_shaft", &TrainDescription::add_shaft, "name"_a, "inertia"_a, "viscous_friction"_a, "friction"_a,
              "drag"_a.none(), "loaded"_a)

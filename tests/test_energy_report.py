@@ -33,12 +33,12 @@ def test_breakpoints_that_the_solver_cannot_tell_apart_are_refused(
 
 
 def test_a_ledger_that_does_not_close_is_reported() -> None:
-    run = lm.simulate(lm.load(NAMED["backlash-reversing-load"], {"gearbox.ratio": 1e-5}))
+    run = lm.simulate(lm.load(NAMED["backlash-reversing-load"], {"gearbox.ratio": 1e-5}), energy=True)
     energy = json.loads(run.attrs["energy"])
     share = abs(energy["residual"]) / energy["turned_over"]
     assert run.attrs["energy_residual"] == share
     assert (share > 1e-6) == ("energy balance" in run.attrs.get("warning", ""))
-    good = lm.simulate(lm.load(NAMED["backlash-reversing-load"]))
+    good = lm.simulate(lm.load(NAMED["backlash-reversing-load"]), energy=True)
     assert good.attrs["energy_residual"] < 1e-9
     assert "warning" not in good.attrs
 
@@ -46,7 +46,9 @@ def test_a_ledger_that_does_not_close_is_reported() -> None:
 @pytest.mark.parametrize("ratio", [1e-3, 1e-4, 1e-5])
 def test_the_motion_tends_to_a_limit_as_its_ratio_goes_to_zero(ratio: float) -> None:
     """The rotor reflects ratio^2 of its inertia and ratio of its friction: the motion differs from the limit by that."""
-    run, limit = (lm.simulate(lm.load(NAMED["backlash-reversing-load"], {"gearbox.ratio": r})) for r in (ratio, 1e-7))
+    run, limit = (
+        lm.simulate(lm.load(NAMED["backlash-reversing-load"], {"gearbox.ratio": r}), energy=True) for r in (ratio, 1e-7)
+    )
     assert run.attrs["energy_residual"] < 1e-12
     assert "warning" not in run.attrs
     apart = float(abs(run["load_speed"] - limit["load_speed"]).max())
@@ -56,7 +58,7 @@ def test_the_motion_tends_to_a_limit_as_its_ratio_goes_to_zero(ratio: float) -> 
 @pytest.mark.parametrize("ratio", [1e-2, 1e-4, 1e-6])
 def test_the_ledger_of_a_locked_worm_keeps_changes_far_below_what_it_stores(ratio: float) -> None:
     """The load stores 0.02 J in the mesh. The motor winds the coupling to T i/k and lets it go down to its friction."""
-    run = lm.simulate(lm.load(NAMED["worm-lowering"], {"gears.coupling.ratio": ratio}))
+    run = lm.simulate(lm.load(NAMED["worm-lowering"], {"gears.coupling.ratio": ratio}), energy=True)
     energy = lm.energy_of(run)
     torque, friction, k = 0.15, 0.01, 500.0
     wound, left = (torque - friction) / k, friction / k

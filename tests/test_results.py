@@ -13,7 +13,7 @@ from lostmotion.simulation.variables import VARIABLES
 
 @pytest.fixture(scope="module")
 def result(request: pytest.FixtureRequest) -> xr.Dataset:
-    return lm.simulate(lm.load(request.config.rootpath / "scenarios" / "paper-2dof-nl-small.toml"))
+    return lm.simulate(lm.load(request.config.rootpath / "scenarios" / "paper-2dof-nl-small.toml"), energy=True)
 
 
 def test_every_variable_is_there_with_unit_and_meaning(result: xr.Dataset) -> None:
@@ -41,7 +41,7 @@ def test_a_result_file_reads_back_unchanged(result: xr.Dataset, tmp_path: Path, 
 @pytest.mark.parametrize("ending", [".nc", ".csv", ".parquet"])
 def test_a_result_file_alone_can_be_run_again(result: xr.Dataset, tmp_path: Path, ending: str) -> None:
     lm.save(result, tmp_path / f"r{ending}")
-    again = lm.simulate(lm.scenario_of(lm.open_result(tmp_path / f"r{ending}")))
+    again = lm.simulate(lm.scenario_of(lm.open_result(tmp_path / f"r{ending}")), energy=True)
     xr.testing.assert_identical(again, result)
 
 
@@ -66,7 +66,7 @@ def test_a_data_frame_has_one_row_for_each_sample_and_one_for_each_switching(res
 @pytest.mark.parametrize("ending", [".nc", ".csv", ".parquet"])
 def test_a_run_without_any_switching_is_saved_as_one_with(tmp_path: Path, ending: str, small: Path) -> None:
     short = lm.load(small, {"simulation.duration": 1e-5, "simulation.sample_interval": 1e-5})
-    quiet = lm.simulate(short.replace(**{"command.amplitude": 0.0}))
+    quiet = lm.simulate(short.replace(**{"command.amplitude": 0.0}), energy=True)
     assert lm.switchings_of(quiet).sizes["switching"] == 0
     lm.save(quiet, tmp_path / f"r{ending}")
     xr.testing.assert_identical(lm.open_result(tmp_path / f"r{ending}"), quiet)

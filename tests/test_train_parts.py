@@ -50,7 +50,7 @@ def finder() -> lm.TrainScenario:
 
 @pytest.mark.parametrize("make", [finder, lambda: lm.TrainScenario(**MASSES)], ids=["finder", "masses"])
 def test_parts_give_the_dataset_of_the_whole(make: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    parts, whole = both_ways(make(), monkeypatch)
+    parts, whole = both_ways(make(), monkeypatch, energy=True)
     assert list(parts) == list(whole)
     for name in whole:
         x, y = parts[name].values, whole[name].values

@@ -97,7 +97,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "save": (lm.save, {"dataset": RESULT, "path": "out.csv"}),
     "scenario_of": (lm.scenario_of, {"dataset": RESULT}),
     "shipped_scenarios": (lm.shipped_scenarios, {}),
-    "simulate": (lm.simulate, {"scenario_or_drive": SCENARIO, "command": 0.0, "load_torque": 0.0, "duration": 0.01, "sample_interval": 0.001, "initial": None, "solver": "exact", "relative_tolerance": None, "energy": True, "law": None, "sensitivities": None}),
+    "simulate": (lm.simulate, {"scenario_or_drive": SCENARIO, "command": 0.0, "load_torque": 0.0, "duration": 0.01, "sample_interval": 0.001, "initial": None, "solver": "exact", "relative_tolerance": None, "energy": True, "law": None, "sensitivities": None, "output": "dataset"}),
     "study": (lm.study, {"what": STUDY, "directory": "study", "threads": 1, "executor": None, "repair": False, "progress": None}),
     "switchings_of": (lm.switchings_of, {"result": RESULT}),
     "as_filter": (lm.as_filter, {"system": scipy.signal.dlti([1.0], [1.0, -0.5], dt=1e-3)}),

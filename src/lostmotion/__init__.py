@@ -148,6 +148,7 @@ if TYPE_CHECKING:
     from .simulation.explanation import explain as explain
     from .simulation.result_files import open_result as open_result
     from .simulation.result_files import save as save
+    from .simulation.results import RunArrays as RunArrays
     from .simulation.results import energy_of as energy_of
     from .simulation.results import scenario_of as scenario_of
     from .simulation.run import simulate as simulate
@@ -256,7 +257,7 @@ _HOMES = {
     "response.shooting": ("periodic_motion", "periodic_motions"),
     "simulation.explanation": ("ContactState", "Explanation", "MotorState", "explain"),
     "simulation.result_files": ("open_result", "save"),
-    "simulation.results": ("energy_of", "scenario_of"),
+    "simulation.results": ("RunArrays", "energy_of", "scenario_of"),
     "simulation.run": ("simulate",),
     "simulation.scenario": ("Initial", "Scenario"),
     "simulation.shipped": ("shipped_scenarios",),

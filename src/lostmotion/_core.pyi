@@ -1,6 +1,6 @@
 from collections.abc import Callable, Mapping, Sequence
 import enum
-from typing import Any
+from typing import Any, overload
 
 import numpy
 import numpy.typing
@@ -87,7 +87,12 @@ class GearLosses:
     def output_torque(self, input_torque: float, direction: float, speed: float, factor: float) -> float: ...
 
 class Axis:
+    @overload
     def __init__(self) -> None: ...
+
+    @overload
+    def __init__(self, other: Axis) -> None:
+        """A copy, which may be changed."""
 
     def set(self, fields: dict[str, Any]) -> None:
         """

@@ -51,7 +51,7 @@ def case(random: Random, folder: Path) -> None:
     scenario = refused(lambda: lm.load("drive.toml"), ["drive.toml"])
     if scenario is None:
         return
-    result = ends(lambda: refused(lambda: lm.simulate(scenario), (), lm.SolverError), SECONDS)
+    result = ends(lambda: refused(lambda: lm.simulate(scenario, energy=True), (), lm.SolverError), SECONDS)
     if result is None:
         return
     check_result(result)

@@ -243,6 +243,12 @@ def core_control(
     return base, axes
 
 
+def own(control: Bound) -> Bound:
+    """Copies of the controllers, which may be changed."""
+    base, axes = control
+    return base, [(_core.Axis(axis), motor, position, speed, aim) for axis, motor, position, speed, aim in axes]
+
+
 def driven(controller: Controller | ContinuousController) -> MotorLaw | None:
     """What a current loop makes of its motor; None where the motor stays what it is.
 

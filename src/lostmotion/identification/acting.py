@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..control.axis import OPEN_LOOP, Bound
+from ..control.axis import OPEN_LOOP, Bound, own
 from ..errors import InputError
 from .formulas import number
 from .goal_shaping import shaped
@@ -75,7 +75,7 @@ class Acting:
         axes = built.scenario.axes()
         if not axes:
             return OPEN_LOOP
-        control = built.scenario.control()
+        control = own(built.scenario.control())
         for (axis, *_), name in zip(control[1], axes, strict=True):
             signal = f"{name}_reference"
             if signal in self._task.inputs:

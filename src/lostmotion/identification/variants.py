@@ -9,6 +9,7 @@ from typing import Any, get_args, get_origin
 from pydantic import TypeAdapter, ValidationError
 
 from ..errors import InputError
+from ..inputs.kept import keep
 from ..inputs.named import Named
 from ..model.shaft import Shaft
 from ..model.train import DriveTrain
@@ -70,7 +71,7 @@ class Variants:
             else Shaft.model_construct(None, **{key: getattr(shaft, key) for key in Shaft.model_fields})
             for name, shaft in found.shafts.items()
         }
-        found._train = DriveTrain.model_construct(None, shafts=Named(shafts), **found.elements())
+        keep(found, TrainScenario.train, DriveTrain.model_construct(None, shafts=Named(shafts), **found.elements()))
         return found
 
 

@@ -31,6 +31,7 @@ WANTED = {
     "int": "a whole number",
     "float": "a number, or text with a number and its unit",
     "SolverName": 'the name of a solver, "exact" or "dormand-prince"',
+    "OutputName": 'the form of a result, "dataset" or "arrays"',
     "RecordName": "the name of a record, or of a file with one",
     "ScenarioName": "the name of a scenario, or of a file with a scenario or a result",
     "Callable": "a function",
@@ -49,7 +50,7 @@ WANTED = {
     "TrainScenario": "a TrainScenario, such as load(path) returns",
     "Study": "a Study, such as load_study(path) returns",
 }
-SILENT = ("None", "RawResult")  # accepted, and not asked for
+SILENT = ("None", "RunArrays")  # accepted, and not asked for
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
@@ -166,7 +167,7 @@ def _fits(value: Any, option: str, known: Mapping[str, Any]) -> bool:
             return isinstance(value, Integral) and is_number(value) and 0 < int(value) < 2**31
         case "int":
             return isinstance(value, Integral) and is_number(value)
-        case "str" | "SolverName" | "RecordName" | "ScenarioName":
+        case "str" | "SolverName" | "OutputName" | "RecordName" | "ScenarioName":
             return isinstance(value, str)
         case "bool":
             return isinstance(value, bool)

@@ -23,6 +23,9 @@ class Part(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+    # Neither a field nor a private attribute: pydantic copies, compares and pickles both, and what is kept belongs to one object.
+    __slots__ = ("_made",)
+
     # Pydantic would read them from the source of every class on import, which took half of the time of a command.
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -76,6 +79,15 @@ class Part(BaseModel):
         """As the constructor, from JSON."""
         with cls._one_error():
             return super().model_validate_json(json_data, **options)
+
+    def kept_values(self) -> dict[Any, Any]:
+        """What `inputs.kept.kept` keeps with this object."""
+        try:
+            values: dict[Any, Any] = object.__getattribute__(self, "_made")
+        except AttributeError:
+            values = {}
+            object.__setattr__(self, "_made", values)
+        return values
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name.startswith("_"):  # of the object alone, such as what it keeps for later

@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.validation import shown
 from ..response.harmonic import of_output
-from ..simulation.results import energy_of, scenario_of
+from ..simulation.results import energy_of, scenario_of, whole
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from .run import summary
@@ -78,13 +78,13 @@ class ResultAccessor:
         from .run import run_report
 
         try:
-            return run_report("run", self._dataset)._repr_html_()
+            return run_report("run", whole(self._dataset))._repr_html_()
         except InputError:  # not a run
             return f"<code>{self!r}</code>"
 
     def summary(self) -> str:
         """A run in a few lines, as `lostmotion run` prints it."""
-        return summary(self._dataset)
+        return summary(whole(self._dataset))
 
     @property
     def scenario(self) -> Scenario | TrainScenario:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import visible
-from ..simulation.results import RawResult, energy_of, is_train_result
+from ..simulation.results import RunArrays, energy_of, is_train_result
 from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.switchings import names_in, unpacked
 from ..simulation.train_scenario import TrainScenario
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .page import Report, Table
 
 
-def summary(result: xarray.Dataset | RawResult) -> str:
+def summary(result: xarray.Dataset | RunArrays) -> str:
     """A run in a few lines: the end, the extremes, the contacts, the energy."""
     if is_train_result(result):
         return train_summary(result)
@@ -64,7 +64,7 @@ def summary(result: xarray.Dataset | RawResult) -> str:
     return "\n".join(lines)
 
 
-def contact_lines(result: xarray.Dataset | RawResult) -> list[str]:
+def contact_lines(result: xarray.Dataset | RunArrays) -> list[str]:
     """How often each contact has come to stick, slipped again and turned around, of the switchings that the result keeps."""
     if not result.attrs.get(SWITCHINGS):
         return []
@@ -84,7 +84,7 @@ def contact_lines(result: xarray.Dataset | RawResult) -> list[str]:
     return [f"  contacts [times]: {'; '.join(found)}"] if found else []
 
 
-def error_lines(result: xarray.Dataset | RawResult) -> list[str]:
+def error_lines(result: xarray.Dataset | RunArrays) -> list[str]:
     """By how much currents, torques and speeds of motors under field-oriented control may be wrong, and their largest values."""
     bounds = errors_of(result)
     if not bounds:
@@ -96,7 +96,7 @@ def error_lines(result: xarray.Dataset | RawResult) -> list[str]:
     return [f"  error of the field-oriented control at most: {', '.join(shown)}"]
 
 
-def train_summary(result: xarray.Dataset | RawResult) -> str:
+def train_summary(result: xarray.Dataset | RunArrays) -> str:
     """A run of a drive train in a few lines: each element at the end and at its peak, and the energy."""
     scenario = TrainScenario.from_json(result.attrs["scenario"])
     train = scenario.train()

@@ -7,6 +7,7 @@ from typing import Any
 
 from .. import _core
 from ..control.axis import OPEN_LOOP, Bound
+from ..inputs.kept import kept
 from ..worker_threads import thread_pool
 from .scenario import Scenario
 from .train_parts import SIDE_BY_SIDE, control_of_part, joined_results, parts_of
@@ -18,10 +19,14 @@ Case = tuple[_core.Train, Sequence[_core.Signal], Mapping[str, float], Mapping[s
 
 def core_case(scenario: Scenario | TrainScenario) -> Case:
     """What every run of the core begins with."""
-    core = scenario.core()
+    return scenario.core(), *_around(scenario)
+
+
+@kept
+def _around(scenario: Scenario | TrainScenario) -> tuple[list[_core.Signal], dict[str, float], dict[str, float]]:
     signals = scenario.signals()
-    inputs = [signals[name].core() for name in core.input_names()]
-    return core, inputs, scenario.start(), scenario.capacities()
+    inputs = [signals[name].core() for name in scenario.core().input_names()]
+    return inputs, scenario.start(), scenario.capacities()
 
 
 def core_run(case: Case, options: tuple[Any, ...], control: Bound = OPEN_LOOP) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .results import RawResult
+from .results import RunArrays
 from .scenario import Scenario
 from .train_scenario import TrainScenario
 
@@ -20,7 +20,7 @@ def pointing_names(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, st
             yield motor, f"{scenario.prefix(motor)}{NAME}"
 
 
-def pointing_errors(scenario: Scenario | TrainScenario, result: RawResult) -> dict[str, np.ndarray]:
+def pointing_errors(scenario: Scenario | TrainScenario, result: RunArrays) -> dict[str, np.ndarray]:
     """The reference less the true angle of its shaft [rad] over time, by name; with a camera the reference is where the target is."""
     found = {}
     for motor, name in pointing_names(scenario):
@@ -29,7 +29,7 @@ def pointing_errors(scenario: Scenario | TrainScenario, result: RawResult) -> di
     return found
 
 
-def _angle(scenario: Scenario | TrainScenario, result: RawResult, shaft: str | None) -> np.ndarray:
+def _angle(scenario: Scenario | TrainScenario, result: RunArrays, shaft: str | None) -> np.ndarray:
     if isinstance(scenario, TrainScenario):
         train = scenario.train()
         return result[train.angle_of(shaft or list(train.shafts)[-1])]

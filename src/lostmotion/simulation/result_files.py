@@ -17,7 +17,7 @@ from ..inputs.arguments import checked
 from ..inputs.hdf5_files import datasets
 from ..inputs.limits import RESULT, check_memory, read_text
 from ..inputs.toml_files import in_short
-from .results import labelled, recorded_variables
+from .results import labelled, recorded_variables, whole
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import packed_again, switchings_of
 
@@ -57,7 +57,7 @@ def _need_library(path: Path) -> None:
 
 @checked
 def save(dataset: xarray.Dataset, path: str | Path) -> None:
-    """Write a result as ``.nc``, ``.csv`` or ``.parquet``; `open_result` reads each back unchanged.
+    """Write a result with its energy ledger as ``.nc``, ``.csv`` or ``.parquet``; `open_result` reads each back unchanged.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def save(dataset: xarray.Dataset, path: str | Path) -> None:
     """
     if "time" not in dataset.coords or not any(v.name in dataset for v in recorded_variables(dataset.attrs)):
         raise InputError("this dataset is no result over time; give one of simulate, periodic_motion or open_result")
-    path = check_output(path)
+    path, dataset = check_output(path), whole(dataset)
     writers = {".nc": _write_netcdf, ".csv": _write_csv, ".parquet": _write_parquet}
     write_whole(path, lambda target: writers[path.suffix](dataset, target))
 

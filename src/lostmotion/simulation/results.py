@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,12 +14,14 @@ from .. import _core
 from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.kept import kept
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from ..version import __version__
+from .ledger import ledger_of, with_energy
 from .scenario import Scenario
 from .switchings import ATTRIBUTE as SWITCHINGS
-from .switchings import CONTACTS_OF_TRAIN, packed
+from .switchings import CONTACTS_OF_TRAIN, columns_of, packed
 from .train_scenario import TrainScenario, is_train
 from .train_variables import angle_through, angles_through_gears, axis_variables, named_signals, train_variables
 from .variables import VARIABLES, Variable
@@ -29,7 +32,7 @@ if TYPE_CHECKING:
 
 
 ENERGY = tuple(_core.energy_entries())
-MOST_RESIDUAL = 1e-6  # of the energy turned over, by which the balance of an accurate run fails at most
+FRAME_SAMPLES = 100_000  # of a run whose dataset is made quickly; what is kept for that holds its time axis
 """entries of the energy ledger"""
 
 
@@ -38,34 +41,101 @@ def installed_version() -> str:
     return __version__
 
 
-@dataclass(frozen=True)
-class RawResult:
-    """A result as plain arrays. A dataset is made only where one is wanted: importing its library takes half a second."""
+@dataclass(frozen=True, repr=False)
+class RunArrays:
+    """A run as plain arrays by name, as ``simulate(..., output="arrays")`` returns it.
+
+    It is made in a small part of the time of a dataset, and does without the library that datasets need.
+
+    Attributes
+    ----------
+    time
+        Instants of the samples [s].
+    values
+        Arrays over time by the name of their variable; ``result["twist"]`` is short for ``result.values["twist"]``.
+    attrs
+        As of the dataset: the scenario, the end state, how many switchings there were.
+    scenario
+        The scenario that was run.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> result = lm.simulate(lm.load("paper-2dof-nl-small"), output="arrays")
+    >>> result.names[:3]
+    ('command', 'motor_torque', 'motor_speed')
+    >>> result.units["motor_torque"], result["motor_torque"].shape == result.time.shape
+    ('N*m', True)
+    >>> result.switchings["instant"].shape == (result.attrs["switching_count"],)
+    True
+    """
 
     time: np.ndarray
-    values: dict[str, np.ndarray]
-    """of the result variables"""
-    attrs: dict[str, Any]
-    variables: tuple[Variable, ...]
-    """those that the scenario may have, for units and meanings"""
+    values: Mapping[str, np.ndarray]
+    attrs: Mapping[str, Any]
+    scenario: Scenario | TrainScenario
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.time if name == "time" else self.values[name]
 
-    def __contains__(self, name: str) -> bool:
+    def __contains__(self, name: object) -> bool:
         return name == "time" or name in self.values
 
+    def __repr__(self) -> str:
+        return f"RunArrays({len(self.time)} samples of {', '.join(self.names)})"
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """The variables, each with its unit and meaning."""
+        return tuple(v for v in variables_of(self.scenario) if v.name in self.values)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the variables."""
+        return tuple(v.name for v in self.variables)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """SI units of the variables, by name; ``1`` of pure numbers."""
+        return {v.name: v.unit for v in self.variables}
+
+    @property
+    def switchings(self) -> dict[str, np.ndarray]:
+        """The switchings as columns by name, as of `switchings_of`."""
+        return columns_of(self.attrs)
+
+    def frozen(self) -> RunArrays:
+        """The same, its arrays read-only."""
+        for array in (self.time, *self.values.values()):
+            array.flags.writeable = False
+        return replace(self, values=MappingProxyType(self.values), attrs=MappingProxyType(self.attrs))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _made_again, (self.time, dict(self.values), dict(self.attrs), self.scenario)
+
+    def energy(self) -> dict[str, float]:
+        """The energy ledger [J], as `energy_of` returns it."""
+        return energy_of(self)
+
     def dataset(self) -> xarray.Dataset:
-        """The labelled dataset."""
-        return labelled(self.time, self.values, self.attrs, self.variables)
+        """The labelled dataset, which shares the arrays."""
+        if len(self.time) > FRAME_SAMPLES:
+            return labelled(self.time, self.values, self.attrs, self.variables)
+        found = _frame(self.scenario).copy(data=self.values)
+        found.attrs = dict(self.attrs)
+        return found
+
+
+def _made_again(*fields: Any) -> RunArrays:
+    return RunArrays(*fields).frozen()
 
 
 def raw_result(
     scenario: Scenario | TrainScenario, core: _core.Train, result: dict[str, Any], solver: str, *, ledger: bool
-) -> RawResult:
+) -> RunArrays:
     """What the solver returned, with all that belongs to it."""
-    time = np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
-    data = dict(zip((name for name, *_ in core.channels()), result["values"], strict=True))
+    time = _time(scenario)
+    data = dict(zip(_channels(scenario), result["values"], strict=True))
     data |= named_signals(scenario.by_prefix(), result["control"])
     set_torques(scenario, data)
     add_derived(scenario, data, time)
@@ -83,36 +153,40 @@ def raw_result(
     }
     if not core.short_form:
         attributes[CONTACTS_OF_TRAIN] = " ".join(core.contact_names())
-    warnings = []
     if np.isfinite(result["left_data_at"]):
         losses = "gearbox.losses" if core.short_form else "the losses of the gear"
-        warnings.append(
+        attributes["warning"] = (
             f"from t = {result['left_data_at']:.6g} s on a loss map is used outside its data; there it continues with the slope "
             f"of its edge. Extend {losses}."
         )
     if ledger:
-        add_ledger(attributes, result["energy"], warnings)
-    if warnings:
-        attributes["warning"] = " ".join(warnings)
+        attributes = with_energy(attributes, result["energy"])
     if note := scenario.note():
         attributes["note"] = note
-    return RawResult(time, data, attributes, variables_of(scenario))
+    order = (v.name for v in variables_of(scenario) if v.name in data)
+    return RunArrays(time, {name: data[name] for name in order}, attributes, scenario)
 
 
-def add_ledger(attributes: dict[str, Any], energy: dict[str, float], warnings: list[str]) -> None:
-    """Add the energy ledger of a run to its attributes, and a warning if the ledger does not close."""
-    attributes["energy"] = json.dumps(energy)
-    share = abs(energy["residual"]) / energy["turned_over"] if energy["turned_over"] > 0.0 else 0.0
-    attributes["energy_residual"] = share
-    if not share <= MOST_RESIDUAL:
-        warnings.append(
-            f"the energy balance closes to no more than {share:.1e} of the energy turned over, so this run is inaccurate. "
-            "Look for ratios, inertias or stiffnesses many orders of magnitude apart."
-        )
+@kept
+def _frame(scenario: Scenario | TrainScenario) -> xarray.Dataset:
+    """The dataset of its runs without their samples and attributes: to put these in takes a tenth of the time of making one."""
+    nothing = np.broadcast_to(np.nan, scenario.simulation.samples)
+    variables = variables_of(scenario)
+    return labelled(_time(scenario), dict.fromkeys((v.name for v in variables), nothing), {}, variables)
+
+
+def _time(scenario: Scenario | TrainScenario) -> np.ndarray:
+    return np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
+
+
+@kept
+def _channels(scenario: Scenario | TrainScenario) -> tuple[str, ...]:
+    """Names of what the solver samples."""
+    return tuple(name for name, *_ in scenario.core().channels())
 
 
 def labelled(
-    time: Any, data: dict[str, Any], attributes: dict[str, Any], variables: Iterable[Variable]
+    time: Any, data: Mapping[str, Any], attributes: Mapping[str, Any], variables: tuple[Variable, ...]
 ) -> xarray.Dataset:
     """Samples of the result variables as a dataset, with units and meanings."""
     import xarray as xr
@@ -129,11 +203,12 @@ def labelled(
     return xr.Dataset(shown, coords=coordinates, attrs=attributes)
 
 
-def is_train_result(result: xarray.Dataset | RawResult) -> bool:
+def is_train_result(result: xarray.Dataset | RunArrays) -> bool:
     """Whether it is the run of a drive train."""
     return is_train(json.loads(result.attrs.get("scenario", "{}")))
 
 
+@kept
 def variables_of(scenario: Scenario | TrainScenario) -> tuple[Variable, ...]:
     """The variables that a result of this scenario may have."""
     own = VARIABLES if isinstance(scenario, Scenario) else train_variables(scenario.train(), scenario.core())
@@ -205,20 +280,48 @@ def scenario_of(dataset: xarray.Dataset) -> Scenario | TrainScenario:
 
 
 @checked
-def energy_of(dataset: xarray.Dataset | RawResult) -> dict[str, float]:
+def energy_of(dataset: xarray.Dataset | RunArrays) -> dict[str, float]:
     """Energy ledger of a run [J].
 
-    `source` is what the motor gave to the shaft; `input_damper`, `motor_friction`, `gear_losses`, `hysteresis`,
-    `load_damper` and `load_friction` is what became heat; `load_work` what went into the disturbance torque;
-    `kinetic_change` and `elastic_change` what is stored; `residual` what the balance fails by, `turned_over` the sum
-    of the magnitudes of all flows.
+    A result that carries none, since it was simulated without ``energy=True``, is simulated a second time for it.
+
+    Parameters
+    ----------
+    dataset
+        From `simulate` or `open_result`.
+
+    Returns
+    -------
+    dict
+        `source` is what the motor gave to the shaft; `input_damper`, `motor_friction`, `gear_losses`, `hysteresis`,
+        `load_damper` and `load_friction` is what became heat; `load_work` what went into the disturbance torque;
+        `kinetic_change` and `elastic_change` what is stored; `residual` what the balance fails by, `turned_over` the sum
+        of the magnitudes of all flows.
 
     Raises
     ------
     InputError
         The result has no energy ledger.
     """
-    if "energy" not in dataset.attrs:
+    attributes = attributes_with_energy(dataset)
+    if "energy" not in attributes:
         raise InputError("this result has no energy ledger; simulate with the exact solver and energy=True")
-    ledger: dict[str, float] = json.loads(dataset.attrs["energy"])
+    ledger: dict[str, float] = json.loads(attributes["energy"])
     return ledger
+
+
+def attributes_with_energy(result: xarray.Dataset | RunArrays) -> Mapping[str, Any]:
+    """The attributes of a result with its energy ledger: of another solver, and of a law that only its caller knows, without."""
+    attributes = result.attrs
+    if "energy" in attributes or attributes.get("solver") != "exact" or "steps" not in attributes:
+        return attributes
+    scenario = result.scenario if isinstance(result, RunArrays) else scenario_of(result)
+    if any(controller.law for controller in scenario.axes().values()):
+        return attributes
+    return with_energy(attributes, ledger_of(scenario))
+
+
+def whole(result: xarray.Dataset) -> xarray.Dataset:
+    """A result with its energy ledger, for files and reports."""
+    attributes = attributes_with_energy(result)
+    return result if attributes is result.attrs else result.assign_attrs(attributes)

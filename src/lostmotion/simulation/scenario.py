@@ -14,6 +14,7 @@ from ..control.controller import Controller
 from ..control.law import Law
 from ..data_sheets.components import Conditions, use_records
 from ..errors import InputError
+from ..inputs.kept import kept, kept_while_used
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Positive, Speed, Switch, Time, Torque
 from ..model.drive import Drive
@@ -193,6 +194,7 @@ class Scenario(Part):
         """All that acts on the drive, by the name of its result variable."""
         return {"command": self.command, "load_torque": self.load.torque}
 
+    @kept
     def begin(self) -> Initial:
         """State at t = 0, with what the reference says of it."""
         if not self.initial.on_reference or self.controller is None:
@@ -204,8 +206,12 @@ class Scenario(Part):
         return self.initial.model_copy(update=found)
 
     def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
-        """The solver's controllers."""
-        return core_control(self.train(), self.axes(), "controller.", laws)
+        """The solver's controllers, kept if there are no laws: change copies of them alone (`control.axis.own`)."""
+        return core_control(self.train(), self.axes(), "controller.", laws) if laws else self._control()
+
+    @kept
+    def _control(self) -> Bound:
+        return core_control(self.train(), self.axes(), "controller.")
 
     def core(self, *, sampled: bool = True) -> _core.Train:
         """The solver's train, its motor as the current loop makes it.
@@ -215,12 +221,18 @@ class Scenario(Part):
         sampled
             Whether with that of a sampled controller.
         """
-        return self.drive().core(None if self.controller is None or not sampled else driven(self.controller))
+        return self._own_core() if sampled else self.drive().core()
 
+    @kept_while_used
+    def _own_core(self) -> _core.Train:
+        return self.drive().core(None if self.controller is None else driven(self.controller))
+
+    @kept
     def train(self) -> DriveTrain:
         """The drive as a train: shafts `motor` and `load`, joined by the gear `gearbox`, and on the first the motor `motor`."""
         return self.drive().train()
 
+    @kept
     def drive(self) -> Drive:
         """The drive without its surroundings."""
         load = Load(**{name: getattr(self.load, name) for name in Load.model_fields})
@@ -237,6 +249,7 @@ class Scenario(Part):
         use_records(data)
         return Scenario(**data)
 
+    @kept
     def to_json(self) -> str:
         """All values in SI, as JSON that `from_json` reads."""
         return self.model_dump_json(exclude_none=True)

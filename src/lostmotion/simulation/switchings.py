@@ -45,6 +45,15 @@ def unpacked(attributes: Mapping[str, Any]) -> np.ndarray:
     return table.reshape(-1, len(names_in(attributes)))
 
 
+def columns_of(attributes: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Its columns by name: instants and torques, and of contacts and causes whole numbers."""
+    numbers = ("instant", *TORQUES)
+    return {
+        name: values.copy() if name in numbers else values.astype(np.int8)
+        for name, values in zip(names_in(attributes), unpacked(attributes).T, strict=True)
+    }
+
+
 def packed_again(columns: Mapping[str, Any], attributes: Mapping[str, Any]) -> str:
     """The same from the columns of `switchings_of`."""
     return packed(np.stack([np.asarray(columns[name], dtype="<f8") for name in names_in(attributes)], axis=1))
@@ -77,14 +86,9 @@ def switchings_of(result: xarray.Dataset) -> xarray.Dataset:
         raise InputError(
             "this dataset has no switchings; give a result of simulate or open_result, attributes included"
         )
-    names = names_in(result.attrs)
     causes = TRAIN_CAUSES if CONTACTS_OF_TRAIN in result.attrs else CAUSES
-    rows = unpacked(result.attrs)
-    variables = {}
-    for name, values in zip(names, rows.T, strict=True):
-        own = values.copy() if name == "instant" or name in TORQUES else values.astype(np.int8)
-        variables[name] = ("switching", own, _about(name, causes))
-    return xr.Dataset(variables)
+    columns = columns_of(result.attrs).items()
+    return xr.Dataset({name: ("switching", values, _about(name, causes)) for name, values in columns})
 
 
 def _about(name: str, causes: Mapping[int, str]) -> dict[str, Any]:

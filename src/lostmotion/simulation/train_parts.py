@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..control.axis import Bound
+from ..inputs.kept import kept
 from ..inputs.named import Named
 from ..model.linear_train import LinearElements
 from ..model.train import COUPLINGS
@@ -19,6 +20,7 @@ SIDE_BY_SIDE = 1_000_000  # ticks: the longest run that another one may have bes
 SUMS = ("residual", "stored_change", "turned_over")  # of the ledger, over all elements
 
 
+@kept
 def parts_of(scenario: TrainScenario) -> list[TrainScenario]:
     """The trains that a scenario consists of, in the order of their first shafts; most often itself alone.
 

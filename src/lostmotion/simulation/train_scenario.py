@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping, Sequence
+from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, model_validator
 
 from .. import _core
 from ..control.axis import NO_LAWS, Bound, check_torques, core_control, motor_laws, turns
@@ -16,12 +17,14 @@ from ..control.law import Law
 from ..data_sheets.components import Conditions
 from ..data_sheets.train_components import RECORDS, use_train_records
 from ..errors import InputError
+from ..inputs.kept import kept, kept_while_used
 from ..inputs.named import Named, nothing
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Force, Length, LinearSpeed, NotNegative, Number, Speed, Switch, Torque
 from ..inputs.validation import did_you_mean, shown
 from ..model.linear import Slide
 from ..model.linear_train import LinearElements
+from ..model.parameters import MotorLaw
 from ..model.shaft import Shaft
 from ..model.signals import CommandSignal, ForceSignal, Signal, TorqueSignal
 from ..model.train import DriveTrain, Elements
@@ -106,7 +109,6 @@ class TrainScenario(LinearElements):
     """of motors, which then have no command"""
     initial: TrainInitial = TrainInitial()
     simulation: SimulationTable
-    _train: DriveTrain | None = PrivateAttr(None)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -217,8 +219,12 @@ class TrainScenario(LinearElements):
         return {name: h for name, h in given.items() if h}
 
     def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
-        """The solver's controllers."""
-        return core_control(self.train(), self.axes(), laws=laws)
+        """The solver's controllers, kept if there are no laws: change copies of them alone (`control.axis.own`)."""
+        return core_control(self.train(), self.axes(), laws=laws) if laws else self._control()
+
+    @kept
+    def _control(self) -> Bound:
+        return core_control(self.train(), self.axes())
 
     def core(self, *, sampled: bool = True, loaded: Collection[str] | None = None) -> _core.Train:
         """The solver's train with its continuous controllers, its motors as the current loops make them.
@@ -230,16 +236,17 @@ class TrainScenario(LinearElements):
         loaded
             Names of the shafts that a load torque acts on, if others than those of the scenario.
         """
-        train, continuous = self.train(), self.continuous()
-        core = train.core(
-            self.loaded() if loaded is None else loaded, motor_laws(self.controllers if sampled else continuous)
-        )
-        for name, controller in continuous.items():
-            try:
-                controller.add_to(core, train, name)
-            except InputError as problem:
-                raise InputError(f"key controllers.{name}.{problem}") from None
-        return core
+        return self._own_core() if sampled and loaded is None else self._core_with(sampled=sampled, loaded=loaded)
+
+    @kept_while_used
+    def _own_core(self) -> _core.Train:
+        return self._core_with()
+
+    def _core_with(self, *, sampled: bool = True, loaded: Collection[str] | None = None) -> _core.Train:
+        continuous = self.continuous()
+        laws = motor_laws(self.controllers if sampled else continuous)
+        shafts = self.loaded() if loaded is None else loaded
+        return _core_train(self.train(), tuple(shafts), tuple(laws.items()), tuple(continuous.items()))
 
     def start(self, initial: TrainInitial | None = None) -> dict[str, float]:
         """State at t = 0 by the names of its variables; what is left out is 0.
@@ -269,6 +276,7 @@ class TrainScenario(LinearElements):
                 )
         return values | initial.controller_states
 
+    @kept
     def begin(self) -> TrainInitial:
         """State at t = 0, with what the references say of it."""
         if not self.initial.on_reference:
@@ -288,11 +296,10 @@ class TrainScenario(LinearElements):
             found[LINEAR_INITIAL[key]] = Named({name: v for name, v in values.items() if train.is_slide(name)})
         return self.initial.model_copy(update=found)
 
+    @kept
     def train(self) -> DriveTrain:
         """The drive train without its surroundings."""
-        if self._train is None:
-            self._train = DriveTrain(shafts=self.plain_shafts(), **self.elements())
-        return self._train
+        return DriveTrain(shafts=self.plain_shafts(), **self.elements())
 
     def plain_shafts(self) -> dict[str, Shaft]:
         """The shafts without the torques on them."""
@@ -345,6 +352,7 @@ class TrainScenario(LinearElements):
         use_train_records(data)
         return TrainScenario(**data)
 
+    @kept
     def to_json(self) -> str:
         """All values in SI, as JSON that `from_json` reads."""
         return self.model_dump_json(exclude_none=True)
@@ -356,6 +364,22 @@ class TrainScenario(LinearElements):
     @classmethod
     def _described_by(cls) -> dict[str, Any]:
         return train_schema()
+
+
+@lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes
+def _core_train(
+    train: DriveTrain,
+    loaded: tuple[str, ...],
+    laws: tuple[tuple[str, MotorLaw | None], ...],
+    continuous: tuple[tuple[str, ContinuousController], ...],
+) -> _core.Train:
+    core = train.core(loaded, dict(laws))
+    for name, controller in continuous:
+        try:
+            controller.add_to(core, train, name)
+        except InputError as problem:
+            raise InputError(f"key controllers.{name}.{problem}") from None
+    return core
 
 
 def loaded_train(what: DriveTrain | TrainScenario, loaded: Sequence[str] | None = None) -> tuple[DriveTrain, list[str]]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..control.axis import Bound
+from ..control.axis import Bound, own
 from ..model.synchronous_motor import PhaseValues
 from .scenario import Scenario
 from .train_scenario import TrainScenario
@@ -40,8 +40,8 @@ def set_torques(scenario: Scenario | TrainScenario, data: dict[str, np.ndarray])
 
 
 def coarser(control: Bound) -> Bound:
-    """The same controllers, with one exchange of torque and speed in each tick in the place of two."""
-    tick, axes = control
+    """Copies of the controllers, with one exchange of torque and speed in each tick in the place of two."""
+    tick, axes = own(control)
     for axis, *_ in axes:
         if axis.is_oriented:
             axis.set({"field_orientation": {"parts": 1}})

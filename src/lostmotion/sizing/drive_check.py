@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..inputs.arguments import checked
-from ..simulation.results import RawResult
+from ..simulation.results import RunArrays
 from ..simulation.run import as_scenario, run
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
@@ -68,7 +68,7 @@ def check_drive(scenario: Scenario | TrainScenario) -> Findings:
     return Findings(_with_sinking(f, result, cycle) if f.rule in MEANS else f for f in findings)
 
 
-def _with_sinking(finding: Finding, result: RawResult, cycle: DutyCycle) -> Finding:
+def _with_sinking(finding: Finding, result: RunArrays, cycle: DutyCycle) -> Finding:
     """A mean, with what the load does to it where it drives the motor with command 0.
 
     Such a motion that goes on at the end of the run has no end of its own: the mean depends on the duration, and is not judged
@@ -86,7 +86,7 @@ def _with_sinking(finding: Finding, result: RawResult, cycle: DutyCycle) -> Find
     return replace(finding, remark="; ".join(filter(None, [finding.remark, told])))
 
 
-def _sinking(result: RawResult) -> tuple[float, float]:
+def _sinking(result: RunArrays) -> tuple[float, float]:
     """Time [s] in which the load torque drives the turning motor with command 0: of the whole run, and after the last command."""
     time, command = result["time"], result["command"]
     speed = result["motor_speed"]
@@ -98,7 +98,7 @@ def _sinking(result: RawResult) -> tuple[float, float]:
     return float(lasting.sum()), float(lasting[last:].sum())
 
 
-def _finely_sampled(scenario: Scenario) -> RawResult:
+def _finely_sampled(scenario: Scenario) -> RunArrays:
     """The run with samples so close that no peak is missed; of a very long one only the beginning, since long ones end in rest."""
     table = scenario.simulation
     fastest = max((f for _, f, _ in resonances(scenario)), default=0.0)

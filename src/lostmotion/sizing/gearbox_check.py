@@ -16,7 +16,7 @@ from .duty_cycle import DutyCycle
 from .finding import Finding, within
 
 if TYPE_CHECKING:
-    from ..simulation.results import RawResult
+    from ..simulation.results import RunArrays
 
 
 def loads(g: Transmission, peak: float, cycle: DutyCycle, where: str = "gearbox") -> list[Finding]:
@@ -115,7 +115,7 @@ def lost_motion(g: Gearbox, limit: float | None) -> Finding:
     )
 
 
-def loss_map(result: RawResult) -> Finding:
+def loss_map(result: RunArrays) -> Finding:
     """Whether the run left the data of a loss map."""
     if "warning" in result.attrs:
         return Finding("loss_map", "loss map", "used outside its data", "warning", result.attrs["warning"])

@@ -9,7 +9,7 @@ from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..model.torsion import Rigid
 from ..simulation.explanation import smallest_commands
-from ..simulation.results import RawResult
+from ..simulation.results import RunArrays
 from ..simulation.scenario import Scenario
 from ..test_rig.rig import TestRig
 from .finding import Finding, Verdict
@@ -19,7 +19,7 @@ INERTIA_RATIO = 10.0  # beyond it a load is usually called hard to control
 NEAR_RESONANCE = 1.5  # a command within this factor of a resonance excites it
 
 
-def load_torques(result: RawResult) -> list[float]:
+def load_torques(result: RunArrays) -> list[float]:
     """The largest and the least load torque of a run, but not 0 [N·m]."""
     torque = result["load_torque"]
     return sorted({float(torque.max()), float(torque.min())} - {0.0})
@@ -77,7 +77,7 @@ def resonance(scenario: Scenario) -> list[Finding]:
     return out
 
 
-def dead_zone(scenario: Scenario, result: RawResult) -> Finding:
+def dead_zone(scenario: Scenario, result: RunArrays) -> Finding:
     """The commands that move the load from rest."""
     against = float(result["load_torque"][0])
     forward, backward = smallest_commands(scenario.drive(), against)
@@ -94,7 +94,7 @@ def dead_zone(scenario: Scenario, result: RawResult) -> Finding:
     return Finding("dead_zone", "dead zone", value, "warning" if small else "ok", remark)
 
 
-def holdings(scenario: Scenario, result: RawResult) -> list[Finding]:
+def holdings(scenario: Scenario, result: RunArrays) -> list[Finding]:
     """Whether the drive bears the load torques of the run with command 0."""
     loads = load_torques(result)
     if not loads:

@@ -15,7 +15,7 @@ from ..inputs.quantities import Temperature
 from ..inputs.validation import did_you_mean
 from ..model.motor import Motor
 from ..model.task import Task
-from ..simulation.results import RawResult, scenario_of
+from ..simulation.results import RunArrays, scenario_of
 from ..simulation.train_scenario import TrainScenario
 from .motor_check import command_of_run
 from .thermal import COPPER, mean_square, need_two_bodies, rms
@@ -69,7 +69,7 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
     return _dataset(result, found, attributes)
 
 
-def oriented_amplitudes(result: xarray.Dataset | RawResult, where: str) -> tuple[np.ndarray, np.ndarray] | None:
+def oriented_amplitudes(result: xarray.Dataset | RunArrays, where: str) -> tuple[np.ndarray, np.ndarray] | None:
     """Current [A], with the sign of the torque, and voltage [V] under field-oriented control; None without."""
     prefix = "" if where == "motor" else f"{where.removeprefix('motors.')}_"
     names = [f"{prefix}{axis}_{what}" for what in ("current", "voltage") for axis in ("direct", "quadrature")]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from ..model.losses import ConstantEfficiency, LossMap
 from ..model.task import Task
-from ..simulation.results import RawResult
+from ..simulation.results import RunArrays
 from ..simulation.run import run
 from ..simulation.train_scenario import TrainScenario
 from .duty_cycle import duty_cycle
@@ -46,7 +46,7 @@ def _named(name: str, findings: list[Finding]) -> list[Finding]:
     return [replace(f, what=f"{name}: {f.what}") for f in findings]
 
 
-def _gear(scenario: TrainScenario, name: str, result: RawResult) -> list[Finding]:
+def _gear(scenario: TrainScenario, name: str, result: RunArrays) -> list[Finding]:
     gear, where = scenario.gears[name], f"gears.{name}"
     torque = f"{name}_output_torque"
     cycle = duty_cycle(
@@ -63,7 +63,7 @@ def _gear(scenario: TrainScenario, name: str, result: RawResult) -> list[Finding
     return findings
 
 
-def _load_torques(scenario: TrainScenario, name: str, result: RawResult) -> list[float]:
+def _load_torques(scenario: TrainScenario, name: str, result: RunArrays) -> list[float]:
     """The largest and the least load torque at the output of a gear, from the shafts behind it through their ratios [N·m]; its
     rated torque where there are none."""
     gear, share = scenario.gears[name], 1.0
@@ -81,7 +81,7 @@ def _load_torques(scenario: TrainScenario, name: str, result: RawResult) -> list
     return [gear.rated_output_torque]
 
 
-def _motor(scenario: TrainScenario, name: str, result: RawResult) -> list[Finding]:
+def _motor(scenario: TrainScenario, name: str, result: RunArrays) -> list[Finding]:
     motor, where = scenario.motors[name], f"motors.{name}"
     torque, speed = f"{name}_torque", f"{motor.shaft}_speed"
     cycle = duty_cycle(result, None, speed=speed, motor_torque=torque, output_torque=torque)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..model.motor import Motor
-from ..simulation.results import RawResult
+from ..simulation.results import RunArrays
 from ..simulation.scenario import Scenario
 from ..sizing.duty_cycle import DutyCycle
 from ..sizing.motor_check import rms_rise
@@ -51,13 +51,13 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values[:-1] ** 2)))
 
 
-def last_cycle(result: RawResult, count: int, back: int = 1) -> slice:
+def last_cycle(result: RunArrays, count: int, back: int = 1) -> slice:
     """The samples of the last of so many cycles, both ends included; `back` = 2 for the one before."""
     each = (len(result.time) - 1) // count
     return slice((count - back) * each, (count - back + 1) * each + 1)
 
 
-def change(result: RawResult, count: int) -> float:
+def change(result: RunArrays, count: int) -> float:
     """By how much the last two cycles differ in rms torque and rms twist, and in the mean distance from the reference."""
     last, before = last_cycle(result, count), last_cycle(result, count, 2)
     found = 0.0
@@ -67,7 +67,7 @@ def change(result: RawResult, count: int) -> float:
     return found
 
 
-def duty_cycle_of(result: RawResult, cycle: slice, period: float) -> DutyCycle:
+def duty_cycle_of(result: RunArrays, cycle: slice, period: float) -> DutyCycle:
     """The duty cycle that the rules of the drive check are for."""
     values = (result[name][cycle] for name in ("motor_speed", "output_torque", "motor_torque"))
     speed, output, torque = values
@@ -95,7 +95,7 @@ def temperatures_of(motor: Motor, time: np.ndarray, square: np.ndarray, ambient:
     return math.nan if rise is None else ambient + rise, math.nan
 
 
-def row_of(scenario: Scenario, task: AxisTask, result: RawResult, count: int) -> dict[str, float]:
+def row_of(scenario: Scenario, task: AxisTask, result: RunArrays, count: int) -> dict[str, float]:
     """The columns of one run."""
     here = last_cycle(result, count)
     time = result.time[here]

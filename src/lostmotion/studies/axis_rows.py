@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
-from ..simulation.results import RawResult
+from ..simulation.results import RunArrays
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
 from ..sizing.finding import Finding
@@ -122,7 +122,7 @@ class Axes:
         found = self._after_run(scenario, result, count, columns["winding_temperature"])
         return columns_of(found) | columns, int(result.attrs["switching_count"])
 
-    def until_it_repeats(self, row: np.ndarray) -> tuple[Scenario, RawResult, int]:
+    def until_it_repeats(self, row: np.ndarray) -> tuple[Scenario, RunArrays, int]:
         """Runs twice as many cycles again and again, until the last two agree, or there are as many as the task permits."""
         count = FEWEST
         while True:
@@ -132,7 +132,7 @@ class Axes:
                 return scenario, result, count
             count = min(2 * count, self.task.max_cycles)
 
-    def _after_run(self, scenario: Scenario, result: RawResult, count: int, winding: float) -> list[Finding]:
+    def _after_run(self, scenario: Scenario, result: RunArrays, count: int, winding: float) -> list[Finding]:
         """The same rules, of the cycle that was run, and the temperature of its winding [°C]."""
         here, task = last_cycle(result, count), self.task
         duty, g, m = duty_cycle_of(result, here, task.cycle), scenario.gearbox, scenario.motor

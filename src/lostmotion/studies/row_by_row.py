@@ -50,7 +50,8 @@ def run_each(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         except (RuntimeError, ValueError) as error:
             runs.errors[k] = str(error)
             return
-        values = result.values | pointing_errors(scenario, result) | bound_values(scenario, result.attrs, samples)
+        bounds = bound_values(scenario, result.attrs, samples)
+        values = {**result.values, **pointing_errors(scenario, result), **bounds}
         for c in sampled:
             runs.samples[c][k] = values[c]
         if energy:

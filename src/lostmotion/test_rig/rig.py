@@ -23,7 +23,7 @@ from ..model.load import Load
 from ..model.motor import Motor
 from ..model.signals import CommandSignal, Samples, TorqueSignal
 from ..model.torsion import Rigid
-from ..simulation.results import RawResult
+from ..simulation.results import RunArrays
 from ..simulation.run import as_scenario, run
 from ..simulation.scenario import Initial
 from ..simulation.switchings import names_in, unpacked
@@ -96,7 +96,7 @@ class TestRig:
         raise AssertionError("the last piece has no end")
 
     @staticmethod
-    def _run(drive: Drive, **surroundings: Any) -> RawResult:
+    def _run(drive: Drive, **surroundings: Any) -> RunArrays:
         return run(as_scenario(drive, **surroundings), energy=False)
 
     def _flywheel(self) -> Drive:
@@ -176,7 +176,7 @@ class TestRig:
         """
         return self._torsion(turning_points, samples).dataset()
 
-    def _torsion(self, turning_points: Iterable[float], samples: int = 2000) -> RawResult:
+    def _torsion(self, turning_points: Iterable[float], samples: int = 2000) -> RunArrays:
         """The same without a dataset."""
         if self.rigid:
             raise InputError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
@@ -274,7 +274,7 @@ class TestRig:
         return Drive(motor=motor, gearbox=g.model_copy(update={"viscous_friction": damper}), load=self.load)
 
     @staticmethod
-    def _break_away(result: RawResult) -> tuple[float, float]:
+    def _break_away(result: RunArrays) -> tuple[float, float]:
         """(instant [s], output torque [N·m]) at which the input shaft first starts to turn: at once where nothing holds it."""
         if result["input_contact"][0] != 0:
             return 0.0, float(result["output_torque"][0])

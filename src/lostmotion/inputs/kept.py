@@ -1,0 +1,51 @@
+"""What follows from an immutable part is made once and kept with the part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar
+from weakref import ref
+
+from .part import Part
+
+P = TypeVar("P", bound=Part)
+R = TypeVar("R")
+
+
+def kept(function: Callable[[P], R]) -> Callable[[P], R]:
+    """The function of a part alone, or method of a part, whose value is made once for each part and kept with it.
+
+    The value belongs to the object: copies, pickles, comparisons and files are without it. It must not be changed.
+    """
+
+    @wraps(function)
+    def call(part: P) -> R:
+        values = part.kept_values()
+        try:
+            value: R = values[function]
+        except KeyError:
+            value = values[function] = function(part)
+        return value
+
+    return call
+
+
+def kept_while_used(method: Callable[[P], R]) -> Callable[[P], R]:
+    """As `kept`, of a value that is large: kept with the part only while something else holds it."""
+
+    @wraps(method)
+    def call(part: P) -> R:
+        values = part.kept_values()
+        value: R | None = values[method]() if method in values else None
+        if value is None:
+            value = method(part)
+            values[method] = ref(value)
+        return value
+
+    return call
+
+
+def keep(part: Part, function: Any, value: Any) -> None:
+    """Keeps with a part what a `kept` function of it would make."""
+    part.kept_values()[function.__wrapped__] = value
