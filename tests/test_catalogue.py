@@ -10,7 +10,7 @@ from conftest import ROOT
 from lostmotion.cli import app
 from lostmotion.data_sheets import records
 from lostmotion.data_sheets.loss_map_builder import build_loss_map
-from lostmotion.data_sheets.records import catalogue, find, parse_sheets
+from lostmotion.data_sheets.records import KINDS, catalogue, find, parse_sheets
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
 from lostmotion.test_rig.comparison import Comparison
@@ -33,7 +33,7 @@ def test_names_are_unique_and_enough_records_can_run():
 
 
 def test_a_record_found_by_name_is_that_of_the_catalogue_and_other_files_are_not_parsed(monkeypatch):
-    for table, kind in (("gearbox", lm.GearboxSheet), ("motor", lm.MotorSheet)):
+    for table, kind in KINDS.items():
         assert all(find(r.name, table) == r for r in catalogue() if isinstance(r, kind))
     parsed = []
     monkeypatch.setattr(records, "_entries_of", lambda file: parsed.append(file) or ())

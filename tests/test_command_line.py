@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, ROOT, SCENARIOS
 from lostmotion.cli import app, terminal
+from lostmotion.data_sheets.records import table_of
 from lostmotion.reports import plots, thinning
 from lostmotion.reports.listing import list_records
 from lostmotion.simulation.forecast import forecast
@@ -121,8 +122,7 @@ def test_the_catalogue_says_what_is_a_gearbox_a_motor_complete_or_not() -> None:
     assert lines[0].split()[:3] == ["name", "type", "kind"]
     of = {line.split()[0]: line.split()[1:] for line in lines[1:-2]}
     for record in lm.catalogue():
-        table = "motor" if isinstance(record, lm.MotorSheet) else "gearbox"
-        assert of[record.name][:2] == [table, record.kind]
+        assert of[record.name][:2] == [table_of(record), record.kind]
         assert ("yes" in of[record.name]) is (not record.missing())
     gearboxes = [r for r in lm.catalogue() if isinstance(r, lm.GearboxSheet)]
     complete = [r for r in gearboxes if not r.missing()]

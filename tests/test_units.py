@@ -383,6 +383,10 @@ def test_every_unit_of_the_schema_can_be_written():
         | units(train)
         | units(lm.GearboxSheet.model_json_schema())
         | units(lm.MotorSheet.model_json_schema())
+        | units(lm.ScrewSheet.model_json_schema())
+        | units(lm.RackSheet.model_json_schema())
+        | units(lm.BeltSheet.model_json_schema())
+        | units(lm.LinearMotorSheet.model_json_schema())
         | units(lm.PositionReference.model_json_schema())
     )
     assert {"rad/s^2", "rad/s^3"} <= found

@@ -35,6 +35,10 @@ if TYPE_CHECKING:
     from .data_sheets.components import gearbox as gearbox
     from .data_sheets.components import motor as motor
     from .data_sheets.gearbox_sheet import GearboxSheet as GearboxSheet
+    from .data_sheets.linear_sheets import BeltSheet as BeltSheet
+    from .data_sheets.linear_sheets import LinearMotorSheet as LinearMotorSheet
+    from .data_sheets.linear_sheets import RackSheet as RackSheet
+    from .data_sheets.linear_sheets import ScrewSheet as ScrewSheet
     from .data_sheets.loss_map_builder import BuiltMap as BuiltMap
     from .data_sheets.loss_map_builder import build_loss_map as build_loss_map
     from .data_sheets.motor_sheet import MotorSheet as MotorSheet
@@ -203,6 +207,7 @@ _HOMES = {
     "control.references": ("Move", "PositionReference", "SpeedReference", "TorqueReference"),
     "data_sheets.components": ("gearbox", "motor"),
     "data_sheets.gearbox_sheet": ("GearboxSheet",),
+    "data_sheets.linear_sheets": ("BeltSheet", "LinearMotorSheet", "RackSheet", "ScrewSheet"),
     "data_sheets.loss_map_builder": ("BuiltMap", "build_loss_map"),
     "data_sheets.motor_sheet": ("MotorSheet",),
     "data_sheets.records": ("catalogue",),

@@ -15,23 +15,33 @@ def catalogue(
     kind: Annotated[
         str | None,
         typer.Option(
-            "--kind", metavar="KIND", help="gearbox, motor, or a kind of gearbox: strain_wave, planetary, worm, ..."
+            "--kind",
+            metavar="KIND",
+            help="gearbox, motor, screw, rack, belt, linear_motor, or a kind of one: strain_wave, planetary, worm, ironless, ...",
         ),
     ] = None,
     ratio: Annotated[str | None, typer.Option("--ratio", metavar="MIN..MAX", help="Gear ratio.")] = None,
     torque: Annotated[str | None, typer.Option("--torque", metavar="MIN..MAX", help="Rated torque [N·m].")] = None,
+    force: Annotated[
+        str | None,
+        typer.Option("--force", metavar="MIN..MAX", help="Rated force [N]; of screws the dynamic capacity."),
+    ] = None,
+    lead: Annotated[
+        str | None, typer.Option("--lead", metavar="MIN..MAX", help='Lead of a screw [m], e.g. "5 mm..10 mm".')
+    ] = None,
     complete: Annotated[bool, typer.Option("--complete", help="Only records that can be simulated.")] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="With `new`: the file.")] = None,
 ) -> None:
     """List the components, show one with its sources and gaps, or start your own data sheet.
 
-    The list says of each record whether it is a gearbox or a motor, and what it lacks for a simulation.
+    The list says of each record what it is, and what it lacks for a simulation.
 
     \b
     lostmotion catalogue --kind strain_wave --ratio 50..120 --torque 20..100
     lostmotion catalogue schaeffler-rt1-h-20-100
     lostmotion catalogue new -o my-gearbox.toml
-    lostmotion catalogue new --kind motor -o my-motor.toml
+    lostmotion catalogue --kind screw --lead "5 mm..10 mm" --force 10000..20000
+    lostmotion catalogue new --kind screw -o my-screw.toml
     """
     from ..reports.listing import list_records, record_text, template
 
@@ -50,4 +60,4 @@ def catalogue(
     elif name is not None:
         print(record_text(name))
     else:
-        print(list_records(kind, ratio, torque, complete))
+        print(list_records(kind, ratio, torque, complete, force, lead))

@@ -13,27 +13,48 @@ from ..errors import InputError
 from ..inputs.toml_files import read_toml
 from ..inputs.validation import names_like, shown, unknown_key
 from .gearbox_sheet import GearboxSheet
+from .linear_sheets import BeltSheet, LinearMotorSheet, RackSheet, ScrewSheet
 from .motor_sheet import MotorSheet
 from .sheet import in_current_words
 
-Kind: TypeAlias = type[GearboxSheet] | type[MotorSheet]
+Sheet: TypeAlias = GearboxSheet | MotorSheet | ScrewSheet | RackSheet | BeltSheet | LinearMotorSheet
+Kind: TypeAlias = type[Sheet]
 Entry: TypeAlias = tuple[Kind, dict[str, Any], str]
-KINDS: dict[str, Kind] = {"gearbox": GearboxSheet, "motor": MotorSheet}
+# The table of a record in a sheet file.
+KINDS: dict[str, Kind] = {
+    "gearbox": GearboxSheet,
+    "motor": MotorSheet,
+    "screw": ScrewSheet,
+    "rack": RackSheet,
+    "belt": BeltSheet,
+    "linear_motor": LinearMotorSheet,
+}
 
 
 # Keys of a sheet file that hold for all of its records.
 COMMON = ("kind", "manufacturer", "note")
 
 
-def catalogue() -> tuple[GearboxSheet | MotorSheet, ...]:
-    """All records that are shipped, gearboxes first."""
+def catalogue() -> tuple[Sheet, ...]:
+    """All records that are shipped: gearboxes, motors, screws, racks, belts, linear motors."""
     return _shipped()
 
 
 @cache
-def _shipped() -> tuple[GearboxSheet | MotorSheet, ...]:
+def _shipped() -> tuple[Sheet, ...]:
     found = [_made(*entry) for file in _texts() for entry in _entries_of(file)]
-    return tuple(sorted(found, key=lambda r: isinstance(r, MotorSheet)))
+    order = list(KINDS)
+    return tuple(sorted(found, key=lambda record: order.index(table_of(record))))
+
+
+def table_of(record: Sheet) -> str:
+    """The table that a record has in a sheet file, such as ``"gearbox"``."""
+    return next(table for table, kind in KINDS.items() if isinstance(record, kind))
+
+
+def called(table: str) -> str:
+    """A kind of record in a sentence, such as ``"a linear motor"``."""
+    return f"a {table.replace('_', ' ')}"
 
 
 @cache
@@ -51,13 +72,13 @@ def _entries_of(file: str) -> tuple[Entry, ...]:
 
 
 @cache
-def _named(name: str) -> GearboxSheet | MotorSheet | None:
+def _named(name: str) -> Sheet | None:
     """The shipped record of a name. Only files whose text has the name are parsed, and no other record is made."""
     near = (entry for file, text in _texts().items() if f'"{name}"' in text for entry in _entries_of(file))
     return next((_made(*entry) for entry in near if entry[1].get("name") == name), None)
 
 
-def read_sheets(path: Path) -> list[GearboxSheet | MotorSheet]:
+def read_sheets(path: Path) -> list[Sheet]:
     """The records of a sheet file.
 
     Raises
@@ -68,11 +89,11 @@ def read_sheets(path: Path) -> list[GearboxSheet | MotorSheet]:
     return parse_sheets(read_toml(path, "a data sheet"), str(path))
 
 
-def parse_sheets(data: dict[str, Any], where: str) -> list[GearboxSheet | MotorSheet]:
+def parse_sheets(data: dict[str, Any], where: str) -> list[Sheet]:
     """Records from the contents of a sheet file."""
     records = [_made(*entry) for entry in _entries(data, where)]
     if not records:
-        raise InputError(f"{where}: holds no record; add a table [[gearbox]] or [[motor]]")
+        raise InputError(f"{where}: holds no record; add a table such as [[gearbox]] or [[screw]]")
     return records
 
 
@@ -95,7 +116,7 @@ def _entries(data: dict[str, Any], where: str) -> Iterator[Entry]:
             yield kind, fields, which
 
 
-def _made(kind: Kind, fields: Mapping[str, Any], which: str) -> GearboxSheet | MotorSheet:
+def _made(kind: Kind, fields: Mapping[str, Any], which: str) -> Sheet:
     try:
         return kind(**fields)
     except InputError as error:
@@ -110,13 +131,13 @@ def _tables(data: Mapping[str, Any], key: str, where: str) -> list[Mapping[str, 
     return entries
 
 
-def find(reference: str, table: str) -> GearboxSheet | MotorSheet:
+def find(reference: str, table: str) -> Sheet:
     """The record of a name, or the only one of that kind in a file (``.toml``).
 
     Parameters
     ----------
     table
-        ``"gearbox"`` or ``"motor"``.
+        A key of `KINDS`, such as ``"gearbox"``.
 
     Raises
     ------
@@ -131,7 +152,9 @@ def find(reference: str, table: str) -> GearboxSheet | MotorSheet:
         own = [r for r in records if isinstance(r, kind)]
         if len(own) != 1:
             found = f"{len(own)} of them: {', '.join(r.name for r in own)}" if own else "none"
-            raise InputError(f"{reference}: a {table} is wanted here, and this file has {found}; name a file with one")
+            raise InputError(
+                f"{reference}: {called(table)} is wanted here, and this file has {found}; name a file with one"
+            )
         return own[0]
     record = _named(reference)
     if isinstance(record, kind):
@@ -139,6 +162,7 @@ def find(reference: str, table: str) -> GearboxSheet | MotorSheet:
     same = [r.name for r in catalogue() if isinstance(r, kind)]
     hint = names_like(reference, same, "`lostmotion catalogue` lists them")
     if record is not None:
-        other = next(name for name, k in KINDS.items() if isinstance(record, k))
-        raise InputError(f"{reference} is a {other}; a {table} is wanted here; `lostmotion catalogue` lists them")
-    raise InputError(f"{table} {shown(reference)} is not in the catalogue; {hint}")
+        raise InputError(
+            f"{reference} is {called(table_of(record))}; {called(table)} is wanted here; `lostmotion catalogue` lists them"
+        )
+    raise InputError(f"{table.replace('_', ' ')} {shown(reference)} is not in the catalogue; {hint}")

@@ -6,21 +6,31 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import InputError
+from ..inputs.part import Part
 from ..inputs.validation import shown
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor, ShaftMotor
 from .components import Conditions, gearbox_table, motor_table
+from .linear_components import ScrewConditions, linear_table
 
 # For each table of elements: the key that names a record, and the keys that a record does not give.
 RECORDS = {
     "gears": ("gearbox", tuple(key for key in Gear.model_fields if key not in Gearbox.model_fields)),
     "motors": ("from", tuple(key for key in ShaftMotor.model_fields if key not in Motor.model_fields)),
+    "screws": ("from", ("input", "output")),
+    "racks": ("from", ("input", "output")),
+    "belts": ("from", ("input", "output")),
+    "linear_motors": ("from", ("slide",)),
 }
+# For each of them the kind of its records.
+RECORD_KINDS = {table: "gearbox" if table == "gears" else table.removesuffix("s") for table in RECORDS}
+# For some of them the conditions of use: keys that act on a record.
+CONDITIONS: dict[str, type[Part]] = {"gears": Conditions, "screws": ScrewConditions}
 
 
 def use_train_records(data: dict[str, Any]) -> None:
-    """Puts the values of a record in the place of `gears.NAME.gearbox` and `motors.NAME.from`.
+    """Puts the values of a record in the place of the key that names it, such as `gears.NAME.gearbox` and `screws.NAME.from`.
 
     Raises
     ------
@@ -33,29 +43,39 @@ def use_train_records(data: dict[str, Any]) -> None:
 
 
 def without_record(table: str, element: Mapping[str, Any]) -> dict[str, Any]:
-    """What of an element is no value of its gearbox or motor, so that another record can take the place."""
+    """What of an element is no value of its record, so that another record can take the place."""
     return {key: value for key, value in element.items() if key in RECORDS[table][1]}
 
 
 def _with_record(table: str, name: str, element: Any) -> Any:
     if not isinstance(element, dict):
         return element
-    key, _ = RECORDS[table]
+    key = RECORDS[table][0]
     where = f"{table}.{name}"
     if key not in element:
-        for condition in Conditions.model_fields if table == "gears" else ():
+        for condition in CONDITIONS[table].model_fields if table in CONDITIONS else ():
             if condition in element:
-                raise InputError(f"key {where}.{condition}: acts on a record; give {where}.gearbox, or leave it out")
+                raise InputError(f"key {where}.{condition}: acts on a record; give {where}.{key}, or leave it out")
         return element
     record = element[key]
     if not isinstance(record, str):
         raise InputError(f"key {where}.{key}: {shown(record)} must be the name of a record, or of a file with one")
-    part = {*Gearbox.model_fields, *Conditions.model_fields} if table == "gears" else {*Motor.model_fields}
-    changes = {k: v for k, v in element.items() if k in part}
-    kept = {k: v for k, v in element.items() if k not in (key, *part)}
     try:
-        values = gearbox_table(record, changes, where)[0] if table == "gears" else motor_table(record, changes, where)
+        values, kept = _values(table, record, element, where)
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith("key ") else f"key {where}.{key}: {text}") from None
     return values | kept
+
+
+def _values(table: str, record: str, element: dict[str, Any], where: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The values of a record with the changes beside it, and what of the element is neither."""
+    key, own = RECORDS[table]
+    if table not in ("gears", "motors"):
+        changes = {k: v for k, v in element.items() if k not in (key, *own)}
+        return linear_table(RECORD_KINDS[table], record, changes, where), without_record(table, element)
+    part = {*Gearbox.model_fields, *Conditions.model_fields} if table == "gears" else {*Motor.model_fields}
+    changes = {k: v for k, v in element.items() if k in part}
+    kept = {k: v for k, v in element.items() if k not in (key, *part)}
+    values = gearbox_table(record, changes, where)[0] if table == "gears" else motor_table(record, changes, where)
+    return values, kept

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib.resources import files
 from pathlib import Path
 from typing import get_args
@@ -9,8 +10,9 @@ from typing import get_args
 import numpy as np
 
 from ..data_sheets.gearbox_sheet import GearboxSheet
+from ..data_sheets.linear_sheets import BeltSheet, LinearMotorSheet, LinearSheet, RackSheet, ScrewSheet
 from ..data_sheets.motor_sheet import MotorSheet
-from ..data_sheets.records import catalogue, find, read_sheets
+from ..data_sheets.records import KINDS, Sheet, catalogue, find, read_sheets, table_of
 from ..errors import InputError
 from ..inputs.validation import names_like
 from ..units.conversion import si_value
@@ -38,16 +40,21 @@ def _range(text: str | None, option: str, unit: str = "") -> tuple[float, float]
 
 
 def list_records(
-    kind: str | None = None, ratio: str | None = None, torque: str | None = None, complete: bool = False
+    kind: str | None = None,
+    ratio: str | None = None,
+    torque: str | None = None,
+    complete: bool = False,
+    force: str | None = None,
+    lead: str | None = None,
 ) -> str:
     """The records that fit, a line each, with what they lack for a simulation.
 
     Parameters
     ----------
     kind
-        ``"gearbox"``, ``"motor"``, or a kind of either, such as ``"worm"``.
-    ratio, torque
-        ``MIN..MAX``; torque is the rated one [N·m].
+        A table of records, such as ``"gearbox"`` or ``"screw"``, or a kind within one, such as ``"worm"``.
+    ratio, torque, force, lead
+        ``MIN..MAX``; torque and force are the rated ones [N·m, N], of a screw the dynamic capacity.
     complete
         Only records that lack nothing.
 
@@ -57,50 +64,81 @@ def list_records(
         Unknown kind, or a range that is none.
     """
     records = catalogue()
-    kinds = sorted({_table(r) for r in records}) + sorted({r.kind for r in records})
+    kinds = [*KINDS, *sorted({r.kind for r in records})]
     if kind is not None and kind not in kinds:
         raise InputError(f"--kind {kind}: must be one of {', '.join(kinds)}")
-    ratios, torques = _range(ratio, "ratio"), _range(torque, "torque", "N*m")
-    found: list[GearboxSheet | MotorSheet] = []
-    for r in records:
-        own_ratio = r.ratio if isinstance(r, GearboxSheet) else None
-        own_torque = _rated_torque(r)
-        fits = kind in (None, _table(r), r.kind) and not (complete and r.missing())
-        fits = fits and (ratio is None or (own_ratio is not None and ratios[0] <= own_ratio <= ratios[1]))
-        if fits and (torque is None or (own_torque is not None and torques[0] <= own_torque <= torques[1])):
-            found.append(r)
+    bounds = [
+        (data_of, _range(text, option, unit))
+        for option, text, unit, data_of in (
+            ("ratio", ratio, "", _ratio),
+            ("torque", torque, "N*m", _rated_torque),
+            ("force", force, "N", _rated_force),
+            ("lead", lead, "m", _lead),
+        )
+        if text is not None
+    ]
+    found = [
+        r
+        for r in records
+        if kind in (None, table_of(r), r.kind)
+        and not (complete and r.missing())
+        and all((x := data_of(r)) is not None and low <= x <= high for data_of, (low, high) in bounds)
+    ]
     if not found:
         return "No record fits."
-    head = f"{'name':<34} {'type':<8} {'kind':<12} {'ratio':>8} {'rated N·m':>9} {'rpm':>6}  complete"
+    head = f"{'name':<34} {'type':<12} {'kind':<12} {'ratio, lead':>11} {'rated':>10} {'rpm':>6}  complete"
     return "\n".join([head, *map(_line, found), _counts(found), "`lostmotion catalogue NAME` shows one."])
 
 
-def _table(record: GearboxSheet | MotorSheet) -> str:
-    return "gearbox" if isinstance(record, GearboxSheet) else "motor"
+def _ratio(record: Sheet) -> float | None:
+    return record.ratio if isinstance(record, GearboxSheet) else None
 
 
-def _rated_torque(record: GearboxSheet | MotorSheet) -> float | None:
-    return record.rated_output_torque if isinstance(record, GearboxSheet) else record.rated_torque
+def _rated_torque(record: Sheet) -> float | None:
+    if isinstance(record, GearboxSheet):
+        return record.rated_output_torque
+    return record.rated_torque if isinstance(record, MotorSheet) else None
 
 
-def _line(record: GearboxSheet | MotorSheet) -> str:
-    ratio = f"{record.ratio:8.4g}" if isinstance(record, GearboxSheet) else " " * 8
-    torque = _rated_torque(record)
-    speed = record.rated_input_speed if isinstance(record, GearboxSheet) else record.rated_speed
-    rated = f"{torque:9.4g}" if torque else "        ?"
-    rpm = f"{RPM * speed:6.0f}" if speed else "     ?"
+def _rated_force(record: Sheet) -> float | None:
+    """[N]."""
+    if isinstance(record, ScrewSheet):
+        return record.dynamic_capacity
+    return record.rated_force if isinstance(record, RackSheet | BeltSheet | LinearMotorSheet) else None
+
+
+def _lead(record: Sheet) -> float | None:
+    """[m]."""
+    if not isinstance(record, ScrewSheet):
+        return None
+    return record.lead if record.lead is not None else (record.pitch or 0.0) * (record.starts or 0) or None
+
+
+def _line(record: Sheet) -> str:
+    ratio, lead, torque, force = _ratio(record), _lead(record), _rated_torque(record), _rated_force(record)
+    speed = None
+    if isinstance(record, GearboxSheet):
+        speed = record.rated_input_speed
+    elif isinstance(record, MotorSheet):
+        speed = record.rated_speed
+    first = f"{ratio:.4g}" if ratio else f"{1e3 * lead:.4g} mm" if lead else ""
+    rated = f"{torque:.4g} N·m" if torque else f"{force:.4g} N" if force else "?"
+    turns = isinstance(record, GearboxSheet | MotorSheet)
+    rpm = f"{RPM * speed:.0f}" if speed else "?" if turns else ""
     missing = ", ".join(record.missing())
     state = "yes" if not missing else f"no, lacks {missing}"
-    return f"{record.name:<34} {_table(record):<8} {record.kind:<12} {ratio} {rated} {rpm}  {state}"
+    return f"{record.name:<34} {table_of(record):<12} {record.kind:<12} {first:>11} {rated:>10} {rpm:>6}  {state}"
 
 
-def _counts(records: list[GearboxSheet | MotorSheet]) -> str:
+def _counts(records: list[Sheet]) -> str:
     parts = []
-    for table, plural in (("gearbox", "gearboxes"), ("motor", "motors")):
-        of_it = [r for r in records if _table(r) == table]
+    for table in KINDS:
+        of_it = [r for r in records if table_of(r) == table]
         if of_it:
             whole = sum(not r.missing() for r in of_it)
-            parts.append(f"{len(of_it)} {plural if len(of_it) > 1 else table}, {whole} of them complete")
+            one = table.replace("_", " ")
+            many = "gearboxes" if table == "gearbox" else f"{one}s"
+            parts.append(f"{len(of_it)} {many if len(of_it) > 1 else one}, {whole} of them complete")
     return f"{len(records)} record{'s' if len(records) > 1 else ''}: {'; '.join(parts)}."
 
 
@@ -112,14 +150,14 @@ def record_text(name: str) -> str:
     InputError
         There is no such record.
     """
-    kinds = {r.name: _table(r) for r in catalogue()}
+    kinds = {r.name: table_of(r) for r in catalogue()}
     if not name.endswith(".toml") and name not in kinds:
         hint = names_like(name, kinds, "`lostmotion catalogue` lists them")
         raise InputError(f"{name!r} is not in the catalogue; {hint}")
-    table = kinds.get(name) or _table(read_sheets(Path(name))[0])
+    table = kinds.get(name) or table_of(read_sheets(Path(name))[0])
     record = find(name, table)
     rows = rows_of(record)
-    lines = [f"{record.name}: {table}, {record.manufacturer} {record.title}".strip(), ""]
+    lines = [f"{record.name}: {table.replace('_', ' ')}, {record.manufacturer} {record.title}".strip(), ""]
     lines += [f"  {what:<52} {value:<26} {status}" for what, value, status in rows]
     if isinstance(record, MotorSheet) and not record.missing() and record.no_load_speed is not None:
         lines += [
@@ -139,29 +177,40 @@ def record_text(name: str) -> str:
         if not missing
         else f"Not complete: a simulation also needs {', '.join(missing)}.",
     ]
+    if isinstance(record, LinearSheet) and (choices := record.open_choices(record.values())):
+        beside = " and ".join(f"{key} ({text})" for key, text in choices.items())
+        lines.append(f"Beside `from` a scenario gives {beside}.")
     lines += [f"Note: {record.note}"] if record.note else []
     return "\n".join(lines)
 
 
 def template(kind: str | None = None) -> str:
-    """A commented sheet file for a gearbox, or with the kind ``"motor"`` for a motor.
+    """A commented sheet file to fill in, for a gearbox if nothing else is said.
+
+    Parameters
+    ----------
+    kind
+        A table of records, such as ``"motor"`` or ``"screw"``, or a kind within one, such as ``"worm"``.
 
     Raises
     ------
     InputError
         Unknown kind.
     """
-    gearboxes, motors = (_kinds(sheet) for sheet in (GearboxSheet, MotorSheet))
-    if kind is not None and kind not in ("gearbox", "motor", *gearboxes, *motors):
-        raise InputError(f"--kind {kind}: must be one of gearbox, motor, {', '.join((*gearboxes, *motors))}")
-    table = "motor" if kind == "motor" or kind in motors else "gearbox"
-    name = "synchronous-motor" if kind == "synchronous" else table
-    text = files("lostmotion").joinpath(f"data_sheets/{name}-template.toml").read_text(encoding="utf-8")
-    if kind in (None, "gearbox", "motor", "synchronous"):
+    of_kind = {inner: table for table, sheet in KINDS.items() for inner in _kinds(sheet)}
+    if kind is not None and kind not in (*KINDS, *of_kind):
+        raise InputError(f"--kind {kind}: must be one of {', '.join((*KINDS, *of_kind))}")
+    table = "gearbox" if kind is None else of_kind.get(kind, kind)
+    name = "synchronous" if kind == "synchronous" else table
+    text = files("lostmotion").joinpath(f"data_sheets/{TEMPLATES[name]}-template.toml").read_text(encoding="utf-8")
+    if kind not in of_kind:
         return text
-    default = "planetary" if table == "gearbox" else "brushless"
-    return text.replace(f'kind = "{default}"', f'kind = "{kind}"')
+    return re.sub(r'^kind = "\w+"', f'kind = "{kind}"', text, count=1, flags=re.MULTILINE)
 
 
-def _kinds(sheet: type[GearboxSheet] | type[MotorSheet]) -> tuple[str, ...]:
+# The files with the templates, by tables of records and kinds with one of their own.
+TEMPLATES = {table: table.replace("_", "-") for table in KINDS} | {"synchronous": "synchronous-motor"}
+
+
+def _kinds(sheet: type[Sheet]) -> tuple[str, ...]:
     return get_args(sheet.model_fields["kind"].annotation)

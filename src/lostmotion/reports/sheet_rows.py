@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..data_sheets.gearbox_sheet import StiffnessData
 from ..data_sheets.sheet import Record
+from ..inputs.part import Part
 from ..inputs.schema import unit_in_schema
 from ..model.gearbox import Gearbox
-from ..model.synchronous_motor import Winding
 from ..units.practical import practical
 
 
@@ -30,7 +31,7 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
         ):
             continue
         label = name.replace("_", " ")
-        if name == "stiffness":
+        if isinstance(value, StiffnessData):
             for k, slope in enumerate(value.slopes):
                 upto = f" up to {value.torques[k]:g} N·m" if k < len(value.torques) else ""
                 add(name, f"torsional stiffness K{k + 1}{upto}", f"{slope:.5g} N·m/rad")
@@ -40,9 +41,9 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
             add(name, "torsional stiffness", "rigid: no twist")
         elif name == "losses":
             _add_losses(value, add)
-        elif isinstance(value, Winding):
-            units = Winding.model_json_schema()["properties"]
-            for key in Winding.model_fields:
+        elif isinstance(value, Part):
+            units = type(value).model_json_schema()["properties"]
+            for key in type(value).model_fields:
                 if (datum := getattr(value, key)) is not None and key in value.model_fields_set:
                     add(f"{name}.{key}", key.replace("_", " "), practical(datum, unit_in_schema(units[key]) or ""))
         else:

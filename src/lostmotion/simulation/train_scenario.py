@@ -14,8 +14,7 @@ from ..control.axis import NO_LAWS, Bound, check_torques, core_control, motor_la
 from ..control.continuous import ContinuousController
 from ..control.controller import AnyController, Controller
 from ..control.law import Law
-from ..data_sheets.components import Conditions
-from ..data_sheets.train_components import RECORDS, use_train_records
+from ..data_sheets.train_components import CONDITIONS, RECORDS, use_train_records
 from ..errors import InputError
 from ..inputs.kept import kept, kept_while_used
 from ..inputs.named import Named, nothing
@@ -454,7 +453,7 @@ def train_schema() -> dict[str, Any]:
     for table, (key, own) in RECORDS.items():
         elements = schema["properties"][table]
         whole = elements["additionalProperties"]
-        conditions = Conditions.model_json_schema()["properties"] if table == "gears" else {}
+        conditions = CONDITIONS[table].model_json_schema()["properties"] if table in CONDITIONS else {}
         part = schema["$defs"][whole["$ref"].rsplit("/", 1)[1]]
         from_record = {
             "type": "object",

@@ -8,9 +8,9 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from ..data_sheets.components import Conditions
-from ..data_sheets.records import KINDS, catalogue, find
+from ..data_sheets.records import KINDS, called, catalogue, find
 from ..data_sheets.sheet import in_current_words
-from ..data_sheets.train_components import RECORDS, without_record
+from ..data_sheets.train_components import CONDITIONS, RECORD_KINDS, RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import unit_in_schema
 from ..inputs.validation import listed, shown
@@ -23,12 +23,20 @@ from .units import in_si
 _RECORD_KEYS = {
     "gearbox": re.compile(r"(gearbox)(\.from)?|(gears\.[^.]+)\.gearbox"),
     "motor": re.compile(r"(motor)(\.from)?|(motors\.[^.]+)\.from"),
+} | {
+    RECORD_KINDS[table]: re.compile(rf"({table}\.[^.]+)\.from") for table in RECORDS if table not in ("gears", "motors")
 }
-_CONDITION = re.compile(rf"(gearbox|gears\.[^.]+)\.({'|'.join(Conditions.model_fields)})")
+# Of keys that hold beside the name of a record: the part.
+_CONDITION = re.compile(
+    "|".join(
+        rf"({'gearbox|' if table == 'gears' else ''}{table}\.[^.]+)\.(?:{'|'.join(part.model_fields)})"
+        for table, part in CONDITIONS.items()
+    )
+)
 
 
 def kind_of_record(key: str) -> str | None:
-    """``"gearbox"`` or ``"motor"`` for a key that takes the name of such a record, else None."""
+    """The kind of a record, such as ``"gearbox"``, for a key that takes the name of one, else None."""
     return next((kind for kind, pattern in _RECORD_KEYS.items() if pattern.fullmatch(key)), None)
 
 
@@ -41,17 +49,18 @@ def owner_of(key: str) -> str:
     """The part that such a key belongs to, such as ``gearbox`` or ``gears.worm``."""
     found = next((m for p in (*_RECORD_KEYS.values(), _CONDITION) if (m := p.fullmatch(key))), None)
     assert found is not None, key
-    return found[1] or found[3]
+    return str(next(group for group in found.groups() if group not in (None, ".from")))
 
 
 def record_keys(scenario: Scenario | TrainScenario) -> Iterator[str]:
     """The keys of a scenario that take names of records, and the conditions of their use."""
     if isinstance(scenario, Scenario):
-        yield from (*KINDS, *(f"gearbox.{name}" for name in Conditions.model_fields))
+        yield from ("gearbox", "motor", *(f"gearbox.{name}" for name in Conditions.model_fields))
         return
-    for name in scenario.gears:
-        yield from (f"gears.{name}.{key}" for key in (RECORDS["gears"][0], *Conditions.model_fields))
-    yield from (f"motors.{name}.{RECORDS['motors'][0]}" for name in scenario.motors)
+    for table, (key, _) in RECORDS.items():
+        beside = CONDITIONS[table].model_fields if table in CONDITIONS else ()
+        for name in getattr(scenario, table):
+            yield from (f"{table}.{name}.{key}" for key in (key, *beside))
 
 
 def name_key(part: str) -> str:
@@ -74,7 +83,7 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
     Parameters
     ----------
     table
-        ``"gearbox"`` or ``"motor"``.
+        The kind of records, such as ``"gearbox"``.
     wanted
         For each datum of a record a text with ``*`` for anything (``kind``, ``manufacturer``, ``name``), or minimum and maximum. A
         record that lacks the datum does not fit.
@@ -90,7 +99,9 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
     wanted = in_current_words(wanted)
     for key, value in wanted.items():
         if key not in known:
-            raise ValueError(f"has catalogue.{key}, which is no datum of a {table}; they are {listed(sorted(known))}")
+            raise ValueError(
+                f"has catalogue.{key}, which is no datum of {called(table)}; they are {listed(sorted(known))}"
+            )
         if _is_text(key):
             if not isinstance(value, str):
                 raise ValueError(
@@ -114,12 +125,14 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
         if texts and all(x is not None and bounds[k][0] <= x <= bounds[k][1] for k, x in numbers.items()):
             found.append(record.name)
     if not found:
-        raise ValueError(f"has a catalogue filter that no {table} fits; `lostmotion catalogue` lists them")
+        raise ValueError(
+            f"has a catalogue filter that no {table.replace('_', ' ')} fits; `lostmotion catalogue` lists them"
+        )
     return found
 
 
 def _is_text(key: str) -> bool:
-    return key in ("name", "kind", "manufacturer")
+    return key in ("name", "kind", "manufacturer", "profile")
 
 
 def check_names(table: str, names: Any) -> None:
@@ -134,7 +147,7 @@ def check_names(table: str, names: Any) -> None:
         raise ValueError(f"has values = {shown(names)}; it must be a list of names")
     for name in names:
         if not isinstance(name, str):
-            raise ValueError(f"has the value {shown(name)}, which is no name of a {table}")
+            raise ValueError(f"has the value {shown(name)}, which is no name of {called(table)}")
         find(name, table)
 
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
+from ..data_sheets.train_components import RECORDS
 from ..errors import InputError
 from ..inputs.named import Named
 from ..inputs.part import Part
@@ -25,7 +26,7 @@ from .records import check_names, is_condition, kind_of_record, names_that_fit, 
 from .units import in_si, unit_in, unit_of_key
 
 MAX_LEVELS = 1_000_000  # of one parameter
-TAKING_NAMES = ("gearbox", "gearbox.from", "motor", "motor.from", "gears.NAME.gearbox", "motors.NAME.from")
+TAKING_NAMES = ("gearbox", "motor", *(f"{table}.NAME.{key}" for table, (key, _) in RECORDS.items()))
 WAYS = ("values", "grid", "uniform", "log_uniform", "normal", "triangular")
 
 

@@ -14,6 +14,7 @@ PRACTICAL = {
     "rad": ("arcmin", ARCMIN),
     "m": ("mm", 1e3),
     "m/s": ("mm/s", 1e3),
+    "N/m": ("N/µm", 1e-6),
     "kg*m^2": ("kg·cm²", 1e4),
     "s": ("ms", 1e3),
     "H": ("mH", 1e3),

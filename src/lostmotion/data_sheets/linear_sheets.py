@@ -1,0 +1,243 @@
+"""Data sheets of ball screws, racks, toothed belts and linear motors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import model_validator
+
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Angle,
+    Force,
+    Inductance,
+    Length,
+    LinearSpeed,
+    LinearVoltageConstant,
+    Mass,
+    MassPerLength,
+    Positive,
+    Power,
+    Resistance,
+    Speed,
+    Voltage,
+    Whole,
+)
+from ..model.linear import BeltData, LinearMotorData, RackData, ScrewData
+from .sheet import Record
+
+Alternatives = tuple[tuple[tuple[str, ...], ...], ...]
+STIFFNESSES = (("stiffness",), ("stiffness_curve",))
+
+
+class LinearSheet(Record):
+    """What data sheets of linear parts have in common: a table of scenarios has their data under the same keys.
+
+    A sheet is checked for units and ranges when it is read, and for what belongs together where it is used, with the
+    keys beside `from`.
+    """
+
+    PART: ClassVar[type[Part]]
+    """the values of the table of a scenario"""
+    ALTERNATIVES: ClassVar[Alternatives] = ()
+    """sets of keys, each of which says the same: one that is given beside `from` takes the place of the others"""
+    PARTNERS: ClassVar[dict[str, tuple[str, ...]]] = {}
+    """for some keys those of which one must be given too; without them they are data for nothing but the list"""
+    CHOICES: ClassVar[dict[str, str]] = {}
+    """what no record can say, since the axis decides it"""
+    NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {}
+    """what a run needs, and the keys each of which says it"""
+
+    def values(self) -> dict[str, Any]:
+        """Those data that the table of a scenario has too."""
+        names = (name for name in type(self).PART.model_fields if name in self.model_fields_set)
+        return {name: value for name in names if (value := getattr(self, name)) is not None}
+
+    def missing(self) -> dict[str, str]:
+        """What a run needs and the record lacks: the key, and where to look for it."""
+        return {key: f"see {self.where(key)}" for key in self._lacking()}
+
+    def open_choices(self, values: Mapping[str, Any]) -> dict[str, str]:
+        """Those choices that some values leave open: none of the keys that say the same is complete."""
+        return {
+            key: text
+            for key, text in type(self).CHOICES.items()
+            if key not in values and not any(other in values for other in self._replacing(key))
+        }
+
+    def _replacing(self, key: str) -> set[str]:
+        """The keys that take the place of one."""
+        ways = [ways for ways in type(self).ALTERNATIVES if any(key in way for way in ways)]
+        return {other for each in ways for way in each if key not in way for other in way}
+
+    def _lacking(self) -> list[str]:
+        given = self.values()
+        return [need for need, keys in type(self).NEEDS.items() if not any(key in given for key in keys)]
+
+
+class ScrewSheet(LinearSheet, ScrewData):
+    """Data sheet of a ball screw, a roller screw or a lead screw.
+
+    Examples
+    --------
+    >>> sheet = ScrewSheet(name="my-screw", lead="10 mm", nut_stiffness="320 N/um", efficiency=0.9)
+    >>> sheet.missing()
+    {}
+    """
+
+    kind: Literal["ball_screw", "roller_screw", "lead_screw"] = "ball_screw"
+    dynamic_capacity: Annotated[Force, Positive] | None = None
+    """C: axial load for a million turns of nominal life"""
+    static_capacity: Annotated[Force, Positive] | None = None
+    """C_0"""
+    ball_diameter: Annotated[Length, Positive] | None = None
+    nut_preload: Annotated[Force, Positive] | None = None
+    """of the nut, at which nut_stiffness and drag_torque hold"""
+    nut_mass: Annotated[Mass, Positive] | None = None
+    max_input_speed: Annotated[Speed, Positive] | None = None
+
+    PART: ClassVar[type[Part]] = ScrewData
+    ALTERNATIVES: ClassVar[Alternatives] = (
+        (("lead",), ("pitch", "starts")),
+        (("efficiency", "backdriving_efficiency"), ("friction_coefficient",), ("friction_angle",)),
+        (*STIFFNESSES, ("nut_stiffness", "bearing_stiffness", "supported_length", "core_diameter")),
+        (("inertia",), ("diameter", "length", "density")),
+    )
+    PARTNERS: ClassVar[dict[str, tuple[str, ...]]] = {
+        "core_diameter": ("supported_length",),
+        "diameter": ("length",),
+        "mean_diameter": ("friction_coefficient", "friction_angle"),
+    }
+    NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {
+        "lead": ("lead", "pitch"),
+        "efficiency": ("efficiency", "friction_coefficient", "friction_angle"),
+        "nut_stiffness": ("nut_stiffness", "stiffness", "stiffness_curve"),
+    }
+
+    @model_validator(mode="after")
+    def _compliance_is_clear(self) -> Self:
+        return self
+
+    @model_validator(mode="after")
+    def _is_a_screw(self) -> Self:
+        return self
+
+
+class RackSheet(LinearSheet, RackData):
+    """Data sheet of a rack, or of a rack with its pinion.
+
+    Examples
+    --------
+    >>> RackSheet(name="my-rack", module="2 mm", rated_force="8 kN").missing()
+    {}
+    """
+
+    kind: Literal["straight", "helical"] = "straight"
+    pressure_angle: Annotated[Angle, Positive] | None = None
+    width: Annotated[Length, Positive] | None = None
+    """of the bar, across the teeth"""
+    height: Annotated[Length, Positive] | None = None
+    """of the bar, from its back to the tips of the teeth"""
+    pitch_line_height: Annotated[Length, Positive] | None = None
+    """from the back of the bar to the pitch line"""
+    bar_length: Annotated[Length, Positive] | None = None
+    bar_teeth: Annotated[Whole, Positive] | None = None
+    bar_mass: Annotated[Mass, Positive] | None = None
+    rated_force: Annotated[Force, Positive] | None = None
+    """along the rack, continuous"""
+    peak_force: Annotated[Force, Positive] | None = None
+
+    PART: ClassVar[type[Part]] = RackData
+    ALTERNATIVES: ClassVar[Alternatives] = ((("module", "teeth", "helix_angle"), ("travel_per_turn",)), STIFFNESSES)
+    CHOICES: ClassVar[dict[str, str]] = {"teeth": "of the pinion"}
+    NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {"module": ("module", "travel_per_turn")}
+
+    @model_validator(mode="after")
+    def _compliance_is_clear(self) -> Self:
+        return self
+
+    @model_validator(mode="after")
+    def _is_a_rack(self) -> Self:
+        return self
+
+
+class BeltSheet(LinearSheet, BeltData):
+    """Data sheet of a toothed belt.
+
+    Examples
+    --------
+    >>> sheet = BeltSheet(name="my-belt", pitch="5 mm", width="25 mm", rated_force="1750 N")
+    >>> sheet.missing()
+    {'specific_stiffness': "see the manufacturer's data sheet"}
+    """
+
+    kind: Literal["open", "endless"] = "open"
+    profile: str = ""
+    """such as AT5"""
+    width: Annotated[Length, Positive] | None = None
+    rated_force: Annotated[Force, Positive] | None = None
+    """largest one of the tension members in operation"""
+    breaking_force: Annotated[Force, Positive] | None = None
+    tooth_force: Annotated[Force, Positive] | None = None
+    """of one tooth in mesh, at standstill"""
+    mass_per_length: Annotated[MassPerLength, Positive] | None = None
+
+    PART: ClassVar[type[Part]] = BeltData
+    ALTERNATIVES: ClassVar[Alternatives] = (
+        (("pulley_diameter",), ("teeth", "pitch"), ("travel_per_turn",)),
+        (*STIFFNESSES, ("specific_stiffness", "free_lengths")),
+    )
+    CHOICES: ClassVar[dict[str, str]] = {
+        "teeth": "of the pulley",
+        "free_lengths": "of the strands between pulley and slide",
+    }
+    NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {
+        "pitch": ("pitch", "pulley_diameter", "travel_per_turn"),
+        "specific_stiffness": ("specific_stiffness", "stiffness", "stiffness_curve"),
+    }
+
+    @model_validator(mode="after")
+    def _compliance_is_clear(self) -> Self:
+        return self
+
+    @model_validator(mode="after")
+    def _is_a_belt(self) -> Self:
+        return self
+
+
+class LinearMotorSheet(LinearSheet, LinearMotorData):
+    """Data sheet of a linear motor or a voice coil. Currents are effective values where the motor has three phases.
+
+    Examples
+    --------
+    >>> sheet = LinearMotorSheet(name="my-motor", kind="ironless", rated_force="100 N", mass="0.3 kg")
+    >>> sheet.values()
+    {'mass': 0.3, 'rated_force': 100.0}
+    """
+
+    kind: Literal["iron_core", "ironless", "tubular", "voice_coil"] = "iron_core"
+    resistance: Annotated[Resistance, Positive] | None = None
+    """between two terminals, at 25 °C"""
+    inductance: Annotated[Inductance, Positive] | None = None
+    """between two terminals"""
+    voltage_constant: Annotated[LinearVoltageConstant, Positive] | None = None
+    """amplitude of the voltage between two terminals to the speed"""
+    attraction_force: Annotated[Force, Positive] | None = None
+    """between coils and magnets"""
+    max_dissipation: Annotated[Power, Positive] | None = None
+    dc_voltage: Annotated[Voltage, Positive] | None = None
+    max_speed: Annotated[LinearSpeed, Positive] | None = None
+    track_mass_per_length: Annotated[MassPerLength, Positive] | None = None
+
+    PART: ClassVar[type[Part]] = LinearMotorData
+    ALTERNATIVES: ClassVar[Alternatives] = (
+        (("rated_force",), ("rated_current",)),
+        (("peak_force",), ("peak_current",)),
+    )
+    PARTNERS: ClassVar[dict[str, tuple[str, ...]]] = {"pole_pitch": ("cogging_force",)}
+    NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {"rated_force": ("rated_force", "rated_current"), "mass": ("mass",)}
+
+    @model_validator(mode="after")
+    def _is_a_motor(self) -> Self:
+        return self
