@@ -47,7 +47,9 @@ class Variants:
         return scenario
 
     def _quickly(self, data: Mapping[str, Any]) -> TrainScenario | None:
-        """Nothing where the constructor has to say what is wrong."""
+        """Nothing where the constructor has to say what is wrong, or where slides make shafts of several tables."""
+        if self._like.slides:
+            return None
         fields = {name: getattr(self._like, name) for name in TrainScenario.model_fields}
         for table, elements in data.items():
             before = self._data[table]
@@ -71,7 +73,8 @@ class Variants:
             else Shaft.model_construct(None, **{key: getattr(shaft, key) for key in Shaft.model_fields})
             for name, shaft in found.shafts.items()
         }
-        keep(found, TrainScenario.train, DriveTrain.model_construct(None, shafts=Named(shafts), **found.elements()))
+        tables = {table: Named(elements) for table, elements in {"shafts": shafts, **found.elements()}.items()}
+        keep(found, TrainScenario.train, DriveTrain.model_construct(None, **tables))
         return found
 
 
