@@ -20,6 +20,7 @@ from lostmotion.control.tuning import (
     identical_real_part,
     symmetrical_optimum,
 )
+from lostmotion.reports.servo import servo_report
 from lostmotion.servo.data import lag_sum, two_inertias
 from lostmotion.servo.margins import bandwidth_of, frequencies, margins
 from lostmotion.servo.regimes import Axis, axis_of, regimes
@@ -411,7 +412,13 @@ def test_the_command_writes_one_page_that_needs_nothing_else(tmp_path: Any) -> N
         "servo", str(ROOT / "scenarios" / "position-axis.toml"), "--window", "5 arcmin", "-o", "sheet", cwd=tmp_path
     )
     assert done.returncode == 0, done.stderr
-    assert "at rest: no limit cycle" in done.stdout
+    title, *rows = done.stdout.splitlines()
+    assert title == "Position axis: the paper's drive under a servo cascade, there and back"
+    kinds = ("verdict", "worst margins", "following error", "settling", "stiffness", "at rest")
+    for kind, row in zip(kinds, rows, strict=False):
+        assert row.strip().startswith(kind)
+    assert "stable in all 3 regimes" in rows[0]
+    assert "no limit cycle" in rows[5]
     page = (tmp_path / "sheet" / "servo.html").read_text()
     assert (
         len(charts(page)) == 18
@@ -428,14 +435,165 @@ def test_the_command_says_what_is_unstable_and_fails(tmp_path: Any) -> None:
     scenario = str(ROOT / "scenarios" / "position-axis.toml")
     done = lostmotion("servo", scenario, "--set", "controller.position.gain=2000 1/s", cwd=tmp_path)
     assert done.returncode == 1
-    assert done.stderr.startswith("lostmotion: unstable: position (first stiffness)")
-    assert (tmp_path / "servo" / "servo.html").exists()
+    assert done.stderr.splitlines()[-1].startswith("lostmotion: unstable: position (first stiffness)")
+    assert "UNSTABLE: position (first stiffness)" in done.stdout
+    assert list(tmp_path.iterdir()) == []  # no directory was asked for
     done = lostmotion("servo", scenario, "--tune", "identical_radius", cwd=tmp_path)
     assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
     assert "at most 4, and it is 16.8" in done.stderr
     done = lostmotion("servo", "paper-2dof-nl-large", cwd=tmp_path)
     assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
     assert "has no controller" in done.stderr
+
+
+# --- gains that are kept ---
+
+AXIS = (ROOT / "scenarios" / "position-axis.toml").read_text()
+LONG = """
+title = "A motor on a load"  # by hand
+controllers.m.speed = { gain = "0.05 N*m*s/rad", integral_time = "20 ms" }  # from the first day
+controllers.m.sample_time = "125 us"
+controllers.m.encoder.lines = 2048
+shafts.motor.inertia = "1 kg*cm^2"
+[controllers.m.reference]
+kind = "speed"
+mean = "100 rpm"
+[motors.m]
+shaft = "motor"
+kind = "torque_source"
+rotor_inertia = "2 kg*cm^2"
+rated_torque = "1 N*m"
+[simulation]
+duration = "0.1 s"
+sample_interval = "1 ms"
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        (AXIS, "# of current and speed loop"),
+        (f"{AXIS}\n[controller.feedforward]\ninertia = '1 kg*cm^2'  # measured\n", "# measured"),
+        ('base = "position-axis"  # as shipped\n', "# as shipped"),
+        (LONG, "# by hand"),
+    ],
+)
+def test_a_tuned_file_keeps_comments_and_loads_to_the_tuned_scenario(tmp_path: Any, text: str, kept: str) -> None:
+    source, target = tmp_path / "here" / "axis.toml", tmp_path / "there" / "tuned.toml"
+    source.parent.mkdir()
+    target.parent.mkdir()
+    source.write_text(text.replace("paper-2dof-nl-large.toml", "paper-2dof-nl-large"))
+    tuned = lm.tune(lm.load(source), rule="suited", feedforward=True)
+    for _ in range(2):  # the second time over the file itself
+        tuned.write(target, source)
+        assert kept in target.read_text()
+        assert lm.load(target) == tuned.scenario
+        source = target
+    assert len([line for line in target.read_text().splitlines() if "by the rule" in line]) == 1
+    assert [p.name for p in target.parent.iterdir()] == ["tuned.toml"]
+
+
+def test_a_tuned_file_finds_the_files_that_its_source_names(tmp_path: Any) -> None:
+    (tmp_path / "drive.toml").write_text('base = "position-axis"\n')
+    source, target = tmp_path / "axis.toml", tmp_path / "kept" / "tuned.toml"
+    source.write_text('base = "drive.toml"\n')
+    target.parent.mkdir()
+    tuned = lm.tune(lm.load(source), rule="suited")
+    tuned.write(target, source)
+    assert 'base = "../drive.toml"' in target.read_text()
+    assert lm.load(target) == tuned.scenario
+
+
+def test_a_saved_result_and_changed_values_give_a_file_of_the_whole_scenario(tmp_path: Any) -> None:
+    lm.save(lm.simulate(lm.load("speed-axis"), duration=0.01), tmp_path / "run.csv")
+    tuned = lm.tune(lm.load(tmp_path / "run.csv"), rule="symmetrical_optimum")
+    tuned.write(tmp_path / "tuned.toml", tmp_path / "run.csv")
+    assert lm.load(tmp_path / "tuned.toml") == tuned.scenario
+    changes = ["controller.position.gain=7", 'motor.voltage_limit="30 V"', "controller.reference.moves.0.to=0.5"]
+    tuned = lm.tune(lm.load("position-axis", changes), rule="suited")
+    tuned.write(tmp_path / "tuned.toml", "position-axis", changes)
+    assert lm.load(tmp_path / "tuned.toml") == tuned.scenario
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing_behind(position_axis: Any, tmp_path: Any) -> None:
+    tuned = lm.tune(position_axis, rule="suited")
+    with pytest.raises(lm.InputError, match=r"must end in \.toml"):
+        tuned.write(tmp_path / "tuned.txt", "position-axis")
+    with pytest.raises(lm.InputError, match="its directory does not exist"):
+        tuned.write(tmp_path / "none" / "tuned.toml", "position-axis")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_keeps_gains_and_the_file_gives_the_same_verdict(tmp_path: Any) -> None:
+    call = ("servo", "position-axis", "--tune", "margins", "--feedforward", "--drive-units", "-o", "tuned.toml")
+    done = lostmotion(*call, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"controller\.position\.gain +10 1/s -> 7\.071 1/s", done.stdout)
+    assert "71.139 ms" in done.stdout
+    assert "Next: lostmotion run tuned.toml" in done.stdout
+    again = lostmotion("servo", "tuned.toml", cwd=tmp_path)
+    count = 7 + 9 + 1 + 3  # title and summary, loops with their header, steps
+    assert again.stdout.splitlines()[:count] == done.stdout.splitlines()[:count]
+    assert lostmotion("run", "tuned.toml", cwd=tmp_path).returncode == 0
+    assert [p.name for p in tmp_path.iterdir()] == ["tuned.toml"]
+    for words, problem in (
+        (("-o", "x.toml"), "needs a rule"),
+        (("--feedforward",), "goes with"),
+        (("--figures", "png"), "-o DIR"),
+    ):
+        refused = lostmotion("servo", "position-axis", *words, cwd=tmp_path)
+        assert (refused.returncode, len(refused.stderr.splitlines())) == (1, 1)
+        assert problem in refused.stderr
+
+
+def test_what_is_fed_forward_is_inertia_and_friction_at_the_motor(position_axis: Any) -> None:
+    """Sums by hand: load over ratio squared; the dry friction of the motor alone, as the load has none."""
+    p = position_axis
+    i = p.gearbox.ratio
+    found = lm.tune(p, rule="suited", feedforward=True).scenario.controller.feedforward
+    J = p.motor.rotor_inertia + p.gearbox.inertia + p.load.inertia / i**2
+    assert found.inertia == pytest.approx(J, rel=1e-5)
+    viscous = p.gearbox.viscous_friction + p.load.viscous_friction / i**2
+    assert found.viscous_friction == pytest.approx(viscous, rel=1e-5)
+    assert found.friction_torque == pytest.approx(p.motor.friction_torque, rel=1e-5)
+
+
+def test_a_move_that_does_not_settle_is_explained_by_the_static_twist() -> None:
+    """A spring of k under a load torque M twists by M/k, which an encoder on the motor does not see."""
+    torque, wanted = 0.004 * k, 0.004
+    scenario = two_mass(
+        {"gain": 1.1, "integral_gain": 45.0, "estimate": {"kind": "exact"}},
+        reference={"kind": "position", "moves": [{"to": 0.1}], "speed": 1.0, "acceleration": 20.0, "jerk": 2000.0},
+        position={"gain": 30.0, "feedforward": 1.0},
+    ).replace(**{"shafts.load.torque": torque, "shafts.load.viscous_friction": 0.5, "simulation.duration": 3.0})
+    report = lm.commission(scenario, window="1 arcmin")
+    (move,) = report.settling
+    assert math.isnan(move.time)
+    assert move.unseen == pytest.approx(wanted, rel=1e-3)
+    text = dict(report.summary())["settling"]
+    assert text.startswith("not within 1 arcmin: the error is still 13.")
+    assert text.endswith("as an encoder on the motor does not see 13.8 arcmin of static twist under load")
+
+
+def test_margins_are_marked_where_the_curves_are() -> None:
+    report = lm.commission(lm.load("position-axis"))
+    page = servo_report("axis", report)
+    panels = {p.title: p for g in page.groups() for p in g.charts}
+    for loop in ("current", "speed", "position"):
+        gain, phase = panels[f"{loop} loop, open: gain"], panels[f"{loop} loop, open: phase"]
+        assert phase.y_range == (-360.0, 0.0)
+        for row, curve in zip((r for r in report.loops if r.loop == loop), phase.curves, strict=True):
+            seen = np.isfinite(curve.y)
+            assert ((curve.y[seen] >= -360.0) & (curve.y[seen] <= 0.0)).all()
+            # The same phase up to whole turns, and no line across the figure where it wraps.
+            turns = (curve.y[seen] - np.degrees(np.angle(row.open_loop[seen]))) / 360.0
+            assert np.abs(turns - np.round(turns)).max() < 3.0 / 360.0
+        for panel, level in ((gain, 0.0), (phase, -180.0)):
+            for mark in panel.marks:
+                # A mark lies on one of the curves; its line ends at the level.
+                at = [np.interp(mark.x, c.x, c.y) for c in panel.curves]
+                assert min(abs(y - mark.y) for y in at if np.isfinite(y)) < 0.5
+                assert mark.to in (None, level)
 
 
 # --- the search ---

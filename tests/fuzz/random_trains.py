@@ -9,7 +9,7 @@ from typing import Any
 import lostmotion as lm
 from fuzz.scenario_files import check_result
 from fuzz.verdict import ends, refused
-from lostmotion.identification.record import toml_text
+from lostmotion.inputs.toml_text import toml_text
 
 SECONDS = 3.0  # of a run until it is interrupted
 

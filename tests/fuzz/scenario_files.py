@@ -14,7 +14,7 @@ import numpy as np
 import lostmotion as lm
 from fuzz import mutation
 from fuzz.verdict import Failure, check_message, ends, refused
-from lostmotion.identification.record import toml_text
+from lostmotion.inputs.toml_text import toml_text
 
 ROOT = Path(__file__).parents[2]
 SECONDS = 1.5  # of a run until it is interrupted

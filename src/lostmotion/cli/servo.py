@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .arguments import FiguresOption, Overrides, SourceArgument, number
-from .targets import try_directory, writing
+from .targets import try_directory, try_file, writing
 from .terminal import busy, console, fail, progress
 
 if TYPE_CHECKING:
@@ -18,9 +18,15 @@ if TYPE_CHECKING:
 
 def servo(
     scenario: SourceArgument,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
-        "servo"
-    ),
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE.toml|DIR",
+            help="Tuned scenario (.toml), or directory of the report, made if missing; both by giving it twice.",
+        ),
+    ] = None,
     motor: Annotated[
         str | None,
         typer.Option("--motor", metavar="NAME", help="Whose controller; may be left out where there is one."),
@@ -43,44 +49,96 @@ def servo(
             help="Tune first: suited, symmetrical_optimum, identical_damping, identical_radius, identical_real_part, margins or search.",
         ),
     ] = None,
+    feedforward: Annotated[
+        bool,
+        typer.Option("--feedforward", help="With --tune: feed forward inertia and friction of the drive too."),
+    ] = False,
+    drive_units: Annotated[
+        bool,
+        typer.Option("--drive-units", help="Print the gains in the units of common drives, to be entered there."),
+    ] = False,
     overrides: Overrides = None,
     figures: FiguresOption = None,
 ) -> None:
     """Commission a servo axis: margins, bandwidths, steps, following, settling, stiffness, limit cycle.
 
-    Writes servo.html (one page), the data of its charts and the margins as CSV. Exit code 1 if the complete loop is unstable
-    in one of its regimes; the page is written all the same.
+    The report is servo.html (one page) with the data of its charts and the margins as CSV. Exit code 1 if the complete loop
+    is unstable in one of its regimes; what was asked for is written all the same.
 
     \b
-    lostmotion servo position-axis
-    lostmotion servo axis.toml --tune margins --window "1 arcmin" -o sheet
+    lostmotion servo position-axis -o sheet
+    lostmotion servo position-axis --tune margins --feedforward -o tuned.toml
     """
+    from ..errors import InputError
     from ..reports.pictures import endings
     from ..simulation.sources import load
 
     pictures = endings(figures)
+    files, directories = _targets(output or [], rule)
+    if pictures and not directories:
+        raise InputError(f"--figures {figures}: needs the directory of the report; add -o DIR")
+    if feedforward and rule is None:
+        raise InputError("--feedforward: goes with --tune RULE; add a rule")
     loaded = load(scenario, overrides or ())
-    try_directory(output)
+    for path in files:
+        try_file(path)
+    for path in directories:
+        try_directory(path)
     from ..servo.commission import commission, work
 
     total = work(loaded, motor)
+    tuned = None
     if rule is not None:
         from ..servo.tuning import tune
 
         with busy("Tuning"):
-            tuned = tune(loaded, rule=rule, motor=motor)
+            tuned = tune(loaded, rule=rule, feedforward=feedforward, motor=motor)
         loaded = tuned.scenario
-        print(tuned)
     with progress(total, "Commissioning") as step:
         report = commission(loaded, motor=motor, window=window, progress=step)
-    with writing(output), busy("Writing"):
-        from ..reports.servo import write_servo
+    written = []
+    for path in files:
+        assert tuned is not None
+        tuned.write(path, scenario, overrides or ())
+        written.append(f"Tuned scenario: {path}")
+    for path in directories:
+        with writing(path), busy("Writing"):
+            from ..reports.servo import write_servo
 
-        page = write_servo(output, Path(scenario).stem, report, pictures)
+            written.append(f"Report: {write_servo(path, Path(scenario).stem, report, pictures)}")
     _print_summary(loaded.title or Path(scenario).stem, report)
-    print(f"The sheet is at {page}")
+    if tuned is not None:
+        print(f"Tuned by the rule {tuned.rule}: {tuned.why}")
+        _print_columns([(key, f"{old} -> {new}") for key, old, new in tuned.changes()])
+    if drive_units:
+        from ..servo.tuning import drive_units as in_drive_units
+
+        print("In the units of drives:")
+        print("\n".join(f"  {line}" for line in in_drive_units(loaded, motor)))
+    print("\n".join([*written, _next(scenario, files, directories, rule)]))
     if not report.stable:
         fail(f"unstable: {'; '.join(map(str, report.instabilities()))}")
+
+
+def _targets(output: list[Path], rule: str | None) -> tuple[list[Path], list[Path]]:
+    """Files of scenarios, and directories, among what is to be written."""
+    from ..errors import InputError
+
+    files = [path for path in output if path.suffix == ".toml"]
+    if files and rule is None:
+        raise InputError(f"-o {files[0]}: a tuned scenario needs a rule; add --tune RULE, such as --tune margins")
+    return files, [path for path in output if path.suffix != ".toml"]
+
+
+def _next(scenario: str, files: list[Path], directories: list[Path], rule: str | None) -> str:
+    """The next useful command."""
+    if files:
+        return f"Next: lostmotion run {files[0]} --plot run.png"
+    if rule is not None:
+        return f"Keep these gains: lostmotion servo {scenario} --tune {rule} -o tuned.toml"
+    if directories:
+        return f"Next: lostmotion servo {scenario} --tune margins -o tuned.toml"
+    return f"All charts on a page: lostmotion servo {scenario} -o sheet"
 
 
 def _print_summary(title: str, report: ServoReport) -> None:
@@ -89,6 +147,7 @@ def _print_summary(title: str, report: ServoReport) -> None:
     from ..reports.servo import loop_rows, step_rows
 
     print(title)
+    _print_columns(report.summary())
     table = Table(box=None, pad_edge=False)
     for name in ("loop", "regime", "stable"):
         table.add_column(name)
@@ -98,5 +157,10 @@ def _print_summary(title: str, report: ServoReport) -> None:
         units = zip((3, 4, 6, 8, 9, 10), (" Hz", " Hz", " dB", "°", " Hz", ""), strict=True)
         table.add_row(*row[:3], *(f"{row[k]}{unit}" if row[k] else "-" for k, unit in units))
     console(sys.stdout, 120).print(table)
-    for what, value in [*step_rows(report), *report.motion_rows()]:
-        print(f"  {what}: {value}")
+    _print_columns(step_rows(report))
+
+
+def _print_columns(rows: list[tuple[str, str]]) -> None:
+    width = max((len(what) for what, _ in rows), default=0)
+    for what, value in rows:
+        print(f"  {what:<{width}}  {value}")

@@ -13,14 +13,15 @@ from ..atomic_writer import write_whole
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
+from ..inputs.toml_text import toml_text
 from ..model.angle_torques import TorqueHarmonic
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.losses import LossMap
 from ..model.torsion import TorsionCurve
+from ..simulation.scenario_files import scenario_text
 from ..simulation.train_scenario import TrainScenario
 from .logs import Channel, Log
-from .record import scenario_text, toml_text
 from .rig import Rig
 from .task import Identification
 from .virtual import virtual_log

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
+from ..simulation.scenario_files import scenario_text
 from ..simulation.train_scenario import TrainScenario
 from .engine import Engine, Point
 from .errors_of_logs import LogError, total
@@ -24,7 +25,7 @@ from .misfit import Misfit, hidden, misfits
 from .odd_logs import OddLog, odd_logs
 from .pauses import split_at_pauses
 from .prepare import DEFAULT, Prepared
-from .record import gear_sheet, scenario_text, sheet_text
+from .record import gear_sheet, sheet_text
 from .recorded import as_recorded, nearer_ways
 from .rig import Rig
 from .runs import run_log

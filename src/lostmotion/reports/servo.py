@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ..servo.commission import LoopSheet, ServoReport
+from ..servo.commission import LoopSheet, ServoReport, decibels
 from ..servo.motion import LimitCycle, StepResponse
-from ..units.practical import practical
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import FAINT, Curve, Group, Mark, Panel, look
 
 DEGREES = 180.0 / math.pi
+LEAD = 2.0  # [deg] of a phase that is drawn as 0
 HEADER = (
     "loop",
     "regime",
@@ -55,15 +55,11 @@ def _loop_row(row: LoopSheet) -> list[str]:
         b.three_decibels,
         b.ninety_degrees,
         math.nan if fed is None else fed.three_decibels,
-        _decibels(m.gain_margin),
+        decibels(m.gain_margin),
         m.gain_margin_frequency,
     )
     more = (DEGREES * m.phase_margin, m.crossover, m.sensitivity_peak, m.sensitivity_peak_frequency)
     return [row.loop, row.regime, row.verdict, *(_text(x) for x in (*numbers, *more))]
-
-
-def _decibels(factor: float) -> float:
-    return 20.0 * math.log10(factor) if factor > 0.0 else math.nan
 
 
 def _text(value: float) -> str:
@@ -98,31 +94,24 @@ def _cycle_table(cycle: LimitCycle) -> Table:
 
 
 def _verdict(report: ServoReport) -> Headline:
+    """Stability and margins; error and settling; stiffness and hunting."""
     found = report.instabilities()
-    regimes = ", ".join(report.regimes)
-    first = f"Unstable: {'; '.join(map(str, found))}." if found else f"Stable in each regime ({regimes})."
-    f = report.following
-    unit = f.unit.replace("·", "*")
-    second = f"Following error over the run: peak {practical(f.peak, unit)}, rms {practical(f.rms, unit)}."
+    rows = dict(report.summary())
     cycle = report.limit_cycle
     state = "bad" if found or (cycle is not None and cycle.whole.cycles) else "good"
     if state == "good" and cycle is not None and cycle.whole.verdict == "not decided":
         state = "open"
-    return Headline(state, (f"{first} {_least(report.loops)}", second, f"At rest: {report.rest()}."))  # type: ignore[arg-type]
+    lines = (
+        f"{_sentence(rows['verdict'])} Worst margins: {rows['worst margins']}.",
+        f"Following error over the run: {rows['following error']}."
+        + (f" Settled: {rows['settling']}." if "settling" in rows else ""),
+        (f"Stiffness: {rows['stiffness']}. " if "stiffness" in rows else "") + f"At rest: {rows['at rest']}.",
+    )
+    return Headline(state, lines)  # type: ignore[arg-type]
 
 
-def _least(loops: Sequence[LoopSheet]) -> str:
-    """The least margins of all loops."""
-    words = []
-    with_phase = [row for row in loops if math.isfinite(row.margins.phase_margin)]
-    if with_phase:
-        row = min(with_phase, key=lambda r: r.margins.phase_margin)
-        words.append(f"phase margin {DEGREES * row.margins.phase_margin:.4g}° ({row.loop} loop, {row.regime})")
-    with_gain = [row for row in loops if math.isfinite(_decibels(row.margins.gain_margin))]
-    if with_gain:
-        row = min(with_gain, key=lambda r: r.margins.gain_margin)
-        words.append(f"gain margin {_decibels(row.margins.gain_margin):.4g} dB ({row.loop} loop, {row.regime})")
-    return f"Least {', least '.join(words)}." if words else ""
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
 
 
 # --- figures ---
@@ -156,43 +145,51 @@ def _open_panels(report: ServoReport, loop: str) -> tuple[Panel, Panel]:
     for k, row in enumerate(rows):
         m = row.margins
         if math.isfinite(m.crossover):
-            at_gain.append(Mark(m.crossover, 1.0, f"{m.crossover:.3g} Hz", look(k)))
-            phase = float(np.interp(m.crossover, row.frequency, _phase(row.open_loop)))
-            margin = DEGREES * m.phase_margin
-            at_phase.append(Mark(m.crossover, phase, f"{margin:.3g}°", look(k), to=phase - margin))
+            at_gain.append(Mark(m.crossover, 0.0, f"{m.crossover:.3g} Hz", look(k)))
+            # At the crossover the loop is -exp(j margin) or its conjugate; the side is that of its neighbours.
+            side = np.interp(m.crossover, row.frequency, np.imag(-row.open_loop))
+            margin = math.copysign(DEGREES * m.phase_margin, side)
+            at_phase.append(Mark(m.crossover, margin - 180.0, f"{abs(margin):.3g}°", look(k), to=-180.0))
         if m.gain_margin > 0.0 and math.isfinite(m.gain_margin):
-            mark = Mark(
-                m.gain_margin_frequency, 1.0 / m.gain_margin, f"{_decibels(m.gain_margin):.3g} dB", look(k), to=1.0
-            )
-            at_gain.append(mark)
-    gain = _panel(
-        report,
-        loop,
-        "open: gain",
-        "|L| [-]",
-        lambda r: _seen(np.abs(r.open_loop)),
-        log_y=True,
-        marks=tuple(at_gain),
-        level=1.0,
-    )
-    phase_panel = _panel(
-        report, loop, "open: phase", "phase [deg]", lambda r: _phase(r.open_loop), marks=tuple(at_phase), level=-180.0
-    )
-    return gain, phase_panel
+            margin = decibels(m.gain_margin)
+            at_gain.append(Mark(m.gain_margin_frequency, -margin, f"{margin:.3g} dB", look(k), to=0.0))
+    gain = _panel(report, loop, "open: gain", "|L| [dB]", lambda r: _gain(r.open_loop), marks=tuple(at_gain), level=0.0)
+    return gain, _phase_panel(report, loop, "open", lambda r: r.open_loop, marks=tuple(at_phase), level=-180.0)
 
 
 def _closed_panels(report: ServoReport, loop: str) -> tuple[Panel, Panel]:
-    gain = _panel(report, loop, "closed: gain", "|T| [-]", lambda r: _seen(np.abs(r.closed_loop)), log_y=True)
-    return gain, _panel(report, loop, "closed: phase", "phase [deg]", lambda r: _phase(r.closed_loop))
+    """Gain and phase of the closed loop, with the line of its bandwidth."""
+    gain = _panel(report, loop, "closed: gain", "|T| [dB]", lambda r: _gain(r.closed_loop), level=-3.0)
+    return gain, _phase_panel(report, loop, "closed", lambda r: r.closed_loop)
 
 
-def _seen(gain: np.ndarray) -> np.ndarray:
-    """Without what rounding makes of no gain at all."""
-    return np.where(gain > 1e-9, gain, np.nan)
+def _phase_panel(
+    report: ServoReport, loop: str, which: str, response: Callable[[LoopSheet], np.ndarray], **options: Any
+) -> Panel:
+    return _panel(
+        report,
+        loop,
+        f"{which}: phase",
+        "phase [deg]",
+        lambda r: _phase(response(r)),
+        y_range=(-360.0, 0.0),
+        **options,
+    )
+
+
+def _gain(response: np.ndarray) -> np.ndarray:
+    """In dB, without what rounding makes of no gain at all."""
+    magnitude = np.abs(response)
+    return np.where(magnitude > 1e-9, 20.0 * np.log10(np.maximum(magnitude, 1e-9)), np.nan)
 
 
 def _phase(response: np.ndarray) -> np.ndarray:
-    return np.where(np.abs(response) > 1e-9, DEGREES * np.unwrap(np.angle(response)), np.nan)
+    """Phase in degrees between -360 and 0; the curve is broken where it wraps."""
+    phase = np.where(np.abs(response) > 1e-9, np.mod(DEGREES * np.angle(response), -360.0), np.nan)
+    phase = np.where(phase < -360.0 + LEAD, 0.0, phase)  # a lead too small to be seen
+    wraps = np.flatnonzero(np.abs(np.diff(phase)) > 180.0)
+    phase[wraps] = np.nan
+    return phase
 
 
 def _motion_panels(report: ServoReport) -> Iterable[Panel]:

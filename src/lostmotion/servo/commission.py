@@ -108,6 +108,63 @@ class ServoReport:
         """Poles of the complete loop outside the unit circle, one for each regime that has some."""
         return list(dict.fromkeys(row.unstable for row in self.loops if row.unstable is not None))
 
+    def summary(self) -> list[tuple[str, str]]:
+        """The verdict on the axis, as (what, value): stability, worst margins, error, settling, stiffness, hunting."""
+        found = self.instabilities()
+        f = self.following
+        rows = [
+            ("verdict", f"UNSTABLE: {'; '.join(map(str, found))}" if found else f"stable in {self._regimes()}"),
+            ("worst margins", self.least_margins() or "none: no gain crosses 1"),
+            ("following error", f"peak {_shown(f.peak, f.unit)}, rms {_shown(f.rms, f.unit)}"),
+        ]
+        if self.settling:
+            rows.append(("settling", self._worst_settling()))
+        if self.stiffness:
+            weakest = min(self.stiffness, key=lambda s: s.least[0])
+            least, at = weakest.least
+            unit = "N·m/rad" if f.unit == "rad" else "N/m"
+            rows.append(("stiffness", f"at least {least:.4g} {unit}, at {at:.3g} Hz ({weakest.regime})"))
+        return [*rows, ("at rest", self.rest())]
+
+    def _regimes(self) -> str:
+        names = ", ".join(self.regimes)
+        return f"its one regime ({names})" if len(self.regimes) == 1 else f"all {len(self.regimes)} regimes ({names})"
+
+    def least_margins(self) -> str:
+        """The least margins of all loops and regimes; empty where no loop has one."""
+        words = []
+        for what, key, scale, unit in (
+            ("phase", "phase_margin", math.degrees, "°"),
+            ("gain", "gain_margin", decibels, " dB"),
+        ):
+            known = [row for row in self.loops if math.isfinite(getattr(row.margins, key))]
+            if known:
+                row = min(known, key=lambda r: getattr(r.margins, key))
+                words.append(f"{what} {scale(getattr(row.margins, key)):.3g}{unit} ({row.loop} loop, {row.regime})")
+        return ", ".join(words)
+
+    def _worst_settling(self) -> str:
+        """The longest time of all moves; where one does not settle, why."""
+        inside = f"within {_shown(self.window, self.following.unit)}"
+        never = [s for s in self.settling if math.isnan(s.time)]
+        if not never:
+            return f"{inside} in at most {1e3 * max(s.time for s in self.settling):.4g} ms"
+        worst = max(never, key=lambda s: abs(s.remaining))
+        return f"not {inside}: {self._why(worst)}"
+
+    def _why(self, s: Settling) -> str:
+        """Why a move does not settle, in one sentence."""
+        left, twist = abs(s.remaining), abs(s.unseen)
+        if math.isnan(left):
+            return "the run ends with the move"
+        text = f"the error is still {_shown(left, self.following.unit, 3)} before the next move or the end"
+        if left <= self.window:
+            return f"it leaves the window again; {text}"
+        if twist > 0.5 * left:
+            where = "the motor" if self.following.encoder == "motor" else f"the shaft {self.following.encoder}"
+            return f"{text}, as an encoder on {where} does not see {_shown(twist, self.following.unit, 3)} of static twist under load"
+        return f"{text}, which the loop sees and has not yet removed; raise its gains, or allow more time"
+
     def motion_rows(self) -> list[tuple[str, str]]:
         """Following, settling, stiffness and rest, as (what, value)."""
         f = self.following
@@ -116,10 +173,9 @@ class ServoReport:
             ("following error over the run, rms", _shown(f.rms, f.unit)),
         ]
         for s in self.settling:
-            inside = f"{1e3 * s.time:.4g} ms" if not math.isnan(s.time) else "not before the next move or the end"
-            rows.append(
-                (f"settled within {_shown(self.window, 'rad')} after the move to {math.degrees(s.to):.5g} deg", inside)
-            )
+            inside = f"{1e3 * s.time:.4g} ms" if not math.isnan(s.time) else f"not: {self._why(s)}"
+            to = f"{math.degrees(s.to):.5g} deg" if f.unit == "rad" else f"{1e3 * s.to:.5g} mm"
+            rows.append((f"settled within {_shown(self.window, f.unit)} after the move to {to}", inside))
         for k in self.stiffness:
             least, at = k.least
             rows.append((f"least stiffness against load, {k.regime}", f"{least:.4g} N·m/rad at {at:.3g} Hz"))
@@ -245,5 +301,10 @@ def _stiffness(axis: Axis, regime: Regime) -> Stiffness:
         return Stiffness(regime.name, axis.shaft, f, 1.0 / np.abs(closed.compliance(f, axis.shaft, axis.shaft)))
 
 
-def _shown(value: float, unit: str) -> str:
-    return f"{value:.4g} N·m" if unit == "N·m" else practical(value, unit)
+def decibels(factor: float) -> float:
+    """20 log10; NaN where there is none."""
+    return 20.0 * math.log10(factor) if factor > 0.0 else math.nan
+
+
+def _shown(value: float, unit: str, digits: int = 5) -> str:
+    return f"{value:.4g} N·m" if unit == "N·m" else practical(value, unit, digits)

@@ -37,6 +37,20 @@ def inertias(axis: Axis, beyond: str | None = None) -> tuple[float, float]:
     return near, far
 
 
+def frictions(axis: Axis) -> tuple[float, float]:
+    """Viscous friction [N·m·s/rad] and dry friction [N·m] of all that turns with the motor, at the motor."""
+    train, viscous, dry = axis.train, 0.0, 0.0
+    for name, shaft in train.shafts.items():
+        i = turns(train, axis.motor_shaft, name)
+        if i is None:
+            continue
+        of_motors = sum(m.friction_torque for m in train.motors.values() if m.shaft == name)
+        viscous += shaft.viscous_friction / i**2
+        viscous += sum(g.viscous_friction for g in train.gears.values() if g.input == name) / i**2
+        dry += (shaft.friction_torque + of_motors) / abs(i)
+    return viscous, dry
+
+
 def secant(gear: Gear | Gearbox) -> float:
     """Stiffness of a gear up to its rated torque, without its gap [N·m/rad]; without a rated torque that of its last piece."""
     if isinstance(gear.stiffness, Rigid):

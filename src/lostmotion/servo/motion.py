@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..control.axis import turns
 from ..control.loops import CurrentLoop, Feedforward, FieldOriented
 from ..control.references import PositionReference
 from ..inputs.part import Part
@@ -186,6 +187,11 @@ class Following:
     error: np.ndarray
     peak: float
     rms: float
+    unseen: np.ndarray
+    """part of the error of a position that its encoder does not see: the angle of the encoder's shaft, in terms of the reference's
+    shaft, less that of the reference's shaft [rad]"""
+    encoder: str
+    """shaft of that encoder"""
 
 
 @dataclass(frozen=True)
@@ -198,6 +204,10 @@ class Settling:
     """position [rad]"""
     time: float
     """until the error stays within the window until the next move [s]; NaN if it does not"""
+    remaining: float = math.nan
+    """error before the next move, or at the end of the run [rad]"""
+    unseen: float = math.nan
+    """part of it that the encoder of the position does not see: the twist between its shaft and that of the reference [rad]"""
 
 
 def following(axis: Axis) -> Following:
@@ -210,7 +220,20 @@ def following(axis: Axis) -> Following:
         name, unit = f"{axis.shaft}_speed", axis.train.speed_unit(axis.shaft)
     error = wanted - data[name].values
     rms = math.sqrt(float(np.mean(error**2)))
-    return Following(unit, time, wanted, error, float(np.abs(error).max()), rms)
+    encoder = encoder_shaft(axis)
+    unseen = np.zeros_like(error)
+    if reference.kind == "position" and encoder != axis.shaft:
+        read = data[axis.train.angle_of(encoder)].values
+        unseen = read / (turns(axis.train, encoder, axis.shaft) or 1.0) - data[name].values
+    return Following(unit, time, wanted, error, float(np.abs(error).max()), rms, unseen, encoder)
+
+
+def encoder_shaft(axis: Axis) -> str:
+    """That the position is measured at."""
+    c = axis.controller
+    if c.position_encoder is not None:
+        return c.position_encoder.shaft or axis.shaft
+    return (c.encoder and c.encoder.shaft) or axis.motor_shaft
 
 
 def default_window(axis: Axis) -> float:
@@ -234,7 +257,9 @@ def settling(axis: Axis, followed: Following, window: float) -> list[Settling]:
         until = spans[k + 1][0] if k + 1 < len(spans) else math.inf
         during = (followed.time >= end) & (followed.time <= until)
         time = settled(followed.time[during], followed.error[during], window) if during.any() else math.nan
-        out.append(Settling(end, reference.moves[k].to, time))
+        last = np.flatnonzero(during)[-1:]
+        left = [float(x[last[0]]) if len(last) else math.nan for x in (followed.error, followed.unseen)]
+        out.append(Settling(end, reference.moves[k].to, time, *left))
     return out
 
 

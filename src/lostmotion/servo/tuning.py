@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,12 +23,14 @@ from ..control.tuning import (
     symmetrical_optimum,
 )
 from ..errors import InputError, need
-from ..inputs.arguments import checked
+from ..inputs.arguments import ScenarioName, checked
 from ..inputs.quantities import Angle, Number
+from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
+from ..simulation.keys import parse_override
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
-from .data import inertias, lag_sum, two_inertias
+from ..simulation.train_scenario import TrainScenario, file_schema
+from .data import frictions, inertias, lag_sum, two_inertias
 from .margins import STABLE, bandwidth_of, frequencies, margins
 from .motion import with_controller
 from .regimes import Axis, Regime, axis_of, regimes
@@ -68,6 +72,8 @@ class Tuning:
     """time constant of the filter of the speed reference [s]; 0: none"""
     torque_constant: float | None
     """of the motor [N·m/A], where its data say it; of a winding per ampere of amplitude of a phase"""
+    changed: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
+    """old and new value [SI] of each key of the scenario that differs; None where there is none"""
 
     @property
     def integral_time(self) -> float:
@@ -76,27 +82,101 @@ class Tuning:
 
     def conventions(self) -> list[tuple[str, str, str]]:
         """The same gains as manufacturers of drives write them: (what, value with unit, where it is written so)."""
-        rows = [("speed loop, gain", f"{self.gain:.5g} N·m/(rad/s)", "torque at the motor per speed of the motor")]
-        rows.append(("", f"{self.gain * math.pi / 30.0:.5g} N·m/rpm", "the same per revolution in a minute"))
-        if self.torque_constant is not None:
-            amps = self.gain / self.torque_constant
-            rows.append(("", f"{amps:.5g} A/(rad/s)", f"with {self.torque_constant:.4g} N·m/A"))
-            rows.append(("", f"{1e3 * amps * math.pi / 30.0:.5g} mA/rpm", "the same per revolution in a minute"))
-        if self.integral_gain:
-            rows.append(("speed loop, integral time", f"{1e3 * self.integral_time:.5g} ms", "K_p/K_i, reset time T_N"))
-            rows.append(("", f"{1.0 / self.integral_time:.5g} 1/s", "its inverse"))
-            rows.append(("", f"{self.integral_gain:.5g} N·m/rad", "parallel form, K_i"))
-        if self.filter_time:
-            rows.append(("filter of the speed reference", f"{1e3 * self.filter_time:.5g} ms", "time constant"))
-        if self.position_gain is not None:
-            rows.append(("position loop, gain", f"{self.position_gain:.5g} 1/s", "K_v"))
-            rows.append(("", f"{0.06 * self.position_gain:.5g} (m/min)/mm", "K_v of linear axes: 1/s times 0.06"))
-        return rows
+        return _conventions(self.gain, self.integral_gain, self.position_gain, self.filter_time, self.torque_constant)
+
+    def changes(self) -> list[tuple[str, str, str]]:
+        """What tuning changed: (key of the scenario, old value, new value), with units.
+
+        Examples
+        --------
+        >>> for key, old, new in lm.tune(lm.load("position-axis"), rule="suited").changes():
+        ...     print(f"{key}: {old} -> {new}")
+        controller.position.gain: 10 1/s -> 25.4241 1/s
+        controller.speed.gain: 0.00829 N·m·s/rad -> 0.00829231 N·m·s/rad
+        controller.speed.integral_gain: 0.1266 N·m/rad -> 0.126631 N·m/rad
+        """
+        return [(key, _value(key, old), _value(key, new)) for key, (old, new) in self.changed.items()]
+
+    @checked
+    def write(self, path: Path, source: ScenarioName | Path, overrides: Iterable[str] = ()) -> None:
+        """Write the tuned scenario as a file.
+
+        Comments and order of the source file are kept where it can carry the new values; else the file is a new one, of
+        the whole scenario. Either way it loads to `scenario`, which is checked before the file gets its name.
+
+        Parameters
+        ----------
+        path
+            Of the new file (.toml).
+        source
+            Scenario file or name that the tuned scenario was loaded from.
+        overrides
+            Changes with which it was loaded, as ``KEY=VALUE``.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written; nothing is left behind.
+
+        Examples
+        --------
+        >>> tuned = lm.tune(lm.load("position-axis"), rule="suited")
+        >>> tuned.write("tuned.toml", "position-axis")
+        >>> lm.load("tuned.toml") == tuned.scenario
+        True
+        """
+        need("tomlkit", "Writing a tuned scenario", "control")
+        from ..simulation.scenario_writer import write_changed
+
+        if path.suffix != ".toml":
+            raise InputError(f"{path}: a scenario is a TOML file; its name must end in .toml")
+        values = dict(map(parse_override, overrides))
+        values |= {key: _with_unit(key, new) for key, (_, new) in self.changed.items()}
+        notes = [f" by the rule {self.rule}: {self.why}"]
+        notes += [f": {key}, {old} -> {new}" for key, old, new in self.changes()]
+        write_changed(path, self.scenario, source, values, notes)
 
     def __str__(self) -> str:
         """The gains with units, in the words of a scenario and of manufacturers."""
-        rows = [f"{what or '':<30} {value:<24} {where}" for what, value, where in self.conventions()]
-        return "\n".join([f"rule {self.rule}: {self.why}", *rows])
+        return "\n".join([f"rule {self.rule}: {self.why}", *_aligned(self.conventions())])
+
+
+def _conventions(
+    gain: float, integral_gain: float, K_v: float | None, filter_time: float, torque_constant: float | None
+) -> list[tuple[str, str, str]]:
+    rows = [("speed loop, gain", f"{gain:.5g} N·m/(rad/s)", "torque at the motor per speed of the motor")]
+    rows.append(("", f"{gain * math.pi / 30.0:.5g} N·m/rpm", "the same per revolution in a minute"))
+    if torque_constant is not None:
+        amps = gain / torque_constant
+        rows.append(("", f"{amps:.5g} A/(rad/s)", f"with {torque_constant:.4g} N·m/A"))
+        rows.append(("", f"{1e3 * amps * math.pi / 30.0:.5g} mA/rpm", "the same per revolution in a minute"))
+    if integral_gain:
+        time = gain / integral_gain
+        rows.append(("speed loop, integral time", f"{1e3 * time:.5g} ms", "K_p/K_i, reset time T_N"))
+        rows.append(("", f"{1.0 / time:.5g} 1/s", "its inverse"))
+        rows.append(("", f"{integral_gain:.5g} N·m/rad", "parallel form, K_i"))
+    if filter_time:
+        rows.append(("filter of the speed reference", f"{1e3 * filter_time:.5g} ms", "time constant"))
+    if K_v is not None:
+        rows.append(("position loop, gain", f"{K_v:.5g} 1/s", "K_v"))
+        rows.append(("", f"{0.06 * K_v:.5g} (m/min)/mm", "K_v of linear axes: 1/s times 0.06"))
+    return rows
+
+
+def _aligned(rows: list[tuple[str, str, str]]) -> list[str]:
+    return [f"{what:<30} {value:<24} {where}" for what, value, where in rows]
+
+
+def drive_units(scenario: Scenario | TrainScenario, motor: str | None = None) -> list[str]:
+    """The gains of an axis as manufacturers of drives write them, as lines."""
+    axis = axis_of(scenario, motor)
+    speed, position = axis.controller.speed, axis.controller.position
+    if speed is None:
+        raise InputError("the controller has no speed loop, whose gains are asked for; add one")
+    filters = [f for f in speed.reference_filters if isinstance(f, LowPass)]
+    time = 1.0 / (2.0 * math.pi * filters[0].frequency) if len(filters) == 1 else 0.0
+    K_v = None if position is None else position.gain
+    return _aligned(_conventions(speed.gain, speed.k_i, K_v, time, _torque_constant(axis)))
 
 
 @checked
@@ -108,6 +188,7 @@ def tune(
     phase_margin: Angle = math.pi / 3.0,
     goal: str = "bandwidth",
     sensitivity_peak: Number = WORST_PEAK,
+    feedforward: bool = False,
     motor: str | None = None,
 ) -> Tuning:
     """Gains of the speed and the position loop of an axis.
@@ -132,6 +213,9 @@ def tune(
         the load torque that turns the motor by 1 rad.
     sensitivity_peak
         For search: of the speed loop in each regime, not to be exceeded; that of the position loop the same.
+    feedforward
+        Whether to feed forward what the scenario says of the drive too: the speed of the reference, and torques for the inertia, the viscous
+        and the dry friction of all that turns.
     motor
         Whose controller; may be left out where there is one.
 
@@ -153,6 +237,8 @@ def tune(
     axis = axis_of(scenario, motor)
     if axis.controller.speed is None:
         raise InputError("the controller has no speed loop to tune; add one, with any gain")
+    if feedforward and axis.controller.inverse_model is not None:
+        raise InputError("feedforward: the controller has an inverse_model, which adds the same torques; leave one out")
     by: dict[str, Callable[[], tuple[SpeedGains, str]]] = {
         "symmetrical_optimum": lambda: _by_lags(axis),
         "identical_damping": lambda: _by_poles(axis, lambda d: identical_damping(d, damping), f"damping {damping:g}"),
@@ -173,7 +259,13 @@ def tune(
             if axis.controller.position is None
             else rounded(position_gain(_lowest_bandwidth(_with(axis, gains, None), "speed")))
         )
-    return _tuning(scenario, axis, rule, why, gains, K_v)
+    kept = SpeedGains(_as_in_files(gains.gain), _as_in_files(gains.integral_gain), gains.filter_time)
+    return _tuning(scenario, axis, rule, why, kept, K_v, feedforward)
+
+
+def _as_in_files(value: float) -> float:
+    """A gain to six significant digits, which a file can carry."""
+    return float(f"{value:.6g}")
 
 
 # --- rules ---
@@ -350,7 +442,7 @@ def _fields(axis: Axis, gains: SpeedGains, K_v: float | None) -> dict[str, Any]:
     assert speed is not None
     update: dict[str, Any] = {"gain": gains.gain, "integral_gain": gains.integral_gain, "integral_time": None}
     if gains.filter_time:
-        corner = LowPass(kind="low_pass", frequency=1.0 / (2.0 * math.pi * gains.filter_time))
+        corner = LowPass(kind="low_pass", frequency=_as_in_files(1.0 / (2.0 * math.pi * gains.filter_time)))
         update["reference_filters"] = (corner,)
     fields: dict[str, Any] = {"speed": speed.model_copy(update=update)}
     if position is not None and K_v is not None:
@@ -362,18 +454,79 @@ def _with(axis: Axis, gains: SpeedGains, K_v: float | None) -> Axis:
     return with_controller(axis, **_fields(axis, gains, K_v))
 
 
+def _known(axis: Axis) -> dict[str, Any]:
+    """What the scenario says of the drive, as feedforward."""
+    viscous, dry = frictions(axis)
+    torques = {"inertia": sum(inertias(axis)), "viscous_friction": viscous, "friction_torque": dry}
+    known = axis.controller.feedforward.model_copy(update={key: _as_in_files(x) for key, x in torques.items()})
+    position = axis.controller.position
+    ahead = {} if position is None else {"position": position.model_copy(update={"feedforward": 1.0})}
+    return {"feedforward": known, **ahead}
+
+
+def _torque_constant(axis: Axis) -> float | None:
+    motor = axis.train.motors[axis.motor]
+    if motor.winding is not None:
+        return motor.winding.phase_values().torque_constant
+    return None if motor.limits is None else motor.limits.torque_constant
+
+
 def _tuning(
-    scenario: Scenario | TrainScenario, axis: Axis, rule: str, why: str, gains: SpeedGains, K_v: float | None
+    scenario: Scenario | TrainScenario,
+    axis: Axis,
+    rule: str,
+    why: str,
+    gains: SpeedGains,
+    K_v: float | None,
+    feedforward: bool,
 ) -> Tuning:
-    fields = _fields(axis, gains, K_v)
-    controller = axis.controller.model_copy(update=fields)
+    if feedforward:
+        axis = with_controller(axis, **_known(axis))
+    controller = axis.controller.model_copy(update=_fields(axis, gains, K_v))
     changed: Scenario | TrainScenario
     if isinstance(scenario, TrainScenario):
+        where, before = f"controllers.{axis.motor}", dict(scenario.axes())[axis.motor]
         changed = scenario.model_copy(update={"controllers": {**scenario.controllers, axis.motor: controller}})
     else:
+        where, before = "controller", dict(scenario.axes())[axis.motor]
         changed = scenario.model_copy(update={"controller": controller})
-    motor = axis.train.motors[axis.motor]
-    constant = None if motor.limits is None else motor.limits.torque_constant
-    if motor.winding is not None:
-        constant = motor.winding.phase_values().torque_constant
-    return Tuning(rule, why, changed, gains.gain, gains.integral_gain, K_v, gains.filter_time, constant)
+    differences = dict(_differences(before.model_dump(), controller.model_dump(), where))
+    constant = _torque_constant(axis)
+    return Tuning(rule, why, changed, gains.gain, gains.integral_gain, K_v, gains.filter_time, constant, differences)
+
+
+def _differences(old: Any, new: Any, key: str) -> Iterator[tuple[str, tuple[Any, Any]]]:
+    """Values that differ between nested tables, by dotted key; those that are removed first."""
+    if not isinstance(old, Mapping) or not isinstance(new, Mapping):
+        if old != new:
+            yield key, (old, new)
+        return
+    for name in sorted(new, key=lambda name: new[name] is not None):
+        yield from _differences(old.get(name), new[name], f"{key}.{name}")
+
+
+@cache
+def _unit(key: str) -> str | None:
+    """The SI unit of a key of a scenario."""
+    _, nodes = follow(file_schema(), tuple(key.split(".")))
+    return next((unit for node in nodes if (unit := unit_in_schema(node)) is not None), None)
+
+
+def _with_unit(key: str, value: Any) -> Any:
+    """A value as a scenario file writes it."""
+    unit = _unit(key)
+    if isinstance(value, float) and unit not in (None, "", "1"):
+        return f"{value!r} {unit}"
+    if isinstance(value, list | tuple):
+        return [{k: v for k, v in f.items() if v is not None} if isinstance(f, Mapping) else f for f in value]
+    return value
+
+
+def _value(key: str, value: Any) -> str:
+    """A value with its unit, for readers."""
+    if value is None or (isinstance(value, list | tuple) and not value):
+        return "none"
+    if isinstance(value, list | tuple):
+        return ", ".join(" ".join(f"{k} {_value('', v)}" for k, v in f.items() if v is not None) for f in value)
+    unit = (_unit(key) or "").replace("*", "·") if key else ""
+    return f"{value:.6g} {unit}".strip() if isinstance(value, float) else str(value)

@@ -13,6 +13,7 @@ from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import follow, unit_in_schema
 from ..inputs.toml_files import RESULTS, no_such_file, read_toml
+from ..inputs.toml_text import toml_text, without_empty
 from ..inputs.validation import names_like, shortened, shown
 from ..model.gearbox import Gearbox
 from .keys import parse_override, set_values
@@ -275,6 +276,11 @@ def _merge(base: dict[str, Any], changes: dict[str, Any], where: tuple[str, ...]
         else:
             merged[key] = value
     return merged
+
+
+def scenario_text(scenario: Scenario | TrainScenario, comment: str) -> str:
+    """A scenario as a TOML file that `load` reads."""
+    return toml_text(without_empty(scenario.model_dump(exclude_none=True)), comment)
 
 
 def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[Gearbox, tuple[str, ...]]:
