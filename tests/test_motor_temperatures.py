@@ -184,7 +184,7 @@ def test_a_brushless_motor_of_the_catalogue_with_field_orientation() -> None:
     assert phase.pole_pairs == 8
     assert pytest.approx(3.0 * math.sqrt(3.0) / math.pi * phase.voltage_constant, rel=1e-14) == 0.068
     assert sine.copper_loss()[0] / block.copper_loss()[0] == pytest.approx(9.0 / math.pi**2, rel=1e-14)
-    assert sine.no_load_speed == pytest.approx(3.0 / math.pi * 24.0 / 0.068, rel=1e-14)
+    assert sine.unloaded_speed == pytest.approx(3.0 / math.pi * 24.0 / 0.068, rel=1e-14)
     assert sine.limits.winding_to_ambient == pytest.approx(4.55, rel=1e-15)
 
 

@@ -168,8 +168,8 @@ def test_stall_torque_no_load_speed_and_time_constant() -> None:
     assert dc.armature_voltage_constant * m.rated_torque == pytest.approx(
         1.5 * 4 * phase.flux_linkage * u / 1.0, rel=1e-15
     )
-    assert m.no_load_speed == pytest.approx(u / (4 * phase.flux_linkage), rel=1e-14)
-    assert m.no_load_speed == pytest.approx(
+    assert m.unloaded_speed == pytest.approx(u / (4 * phase.flux_linkage), rel=1e-14)
+    assert m.unloaded_speed == pytest.approx(
         560.0 / math.sqrt(2.0) / 60.0 * 1000.0 * RPM, rel=1e-14
     )  # line to line, rms
     # The rotor is as good as locked: 1e12 kg·m².
@@ -178,7 +178,7 @@ def test_stall_torque_no_load_speed_and_time_constant() -> None:
     assert result["motor_torque"].values == pytest.approx(expected, rel=1e-9, abs=1e-9)
     # Without load it ends at no-load speed, after 40 time constants of R J/(1.5 (p psi)²) and of L_q/R.
     ends = lm.simulate(axis(m, 1.0, duration=2.0))["motor_speed"][-1]
-    assert float(ends) == pytest.approx(m.no_load_speed, rel=1e-9)
+    assert float(ends) == pytest.approx(m.unloaded_speed, rel=1e-9)
 
 
 def test_it_follows_the_equations_in_d_and_q_with_ideal_decoupling() -> None:
@@ -252,7 +252,7 @@ def test_a_train_a_linear_model_and_an_explanation_take_it() -> None:
 def test_its_voltage_is_changed_by_dc_voltage_and_by_nothing_else(tmp_path) -> None:
     m, scenario = motor(), axis(motor(), 0.4)
     half = scenario.replace(**{"motor.dc_voltage": "280 V"})
-    assert half.motor.no_load_speed == pytest.approx(m.no_load_speed / 2.0, rel=1e-15)
+    assert half.motor.unloaded_speed == pytest.approx(m.unloaded_speed / 2.0, rel=1e-15)
     with pytest.raises(lm.InputError, match="has its voltage from dc_voltage"):
         m.at_voltage(300.0)
     with pytest.raises(lm.InputError, match="has rated_voltage, of no use to a synchronous"):
@@ -260,7 +260,7 @@ def test_its_voltage_is_changed_by_dc_voltage_and_by_nothing_else(tmp_path) -> N
     source = scenario.replace(**{"motor.kind": "torque_source"})
     assert source.motor.winding == m.winding
     with pytest.raises(lm.InputError, match="torque source has no speed"):
-        _ = source.motor.no_load_speed
+        _ = source.motor.unloaded_speed
 
 
 @pytest.mark.parametrize(

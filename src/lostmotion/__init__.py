@@ -98,6 +98,7 @@ if TYPE_CHECKING:
     from .model.self_locking import overrunning as overrunning
     from .model.self_locking import self_locking as self_locking
     from .model.shaft import DragCurve as DragCurve
+    from .model.shaft import EddyCurrentDrag as EddyCurrentDrag
     from .model.shaft import FrictionCurve as FrictionCurve
     from .model.shaft import QuadraticDrag as QuadraticDrag
     from .model.shaft import Shaft as Shaft
@@ -246,7 +247,7 @@ _HOMES = {
     "model.losses": ("ConstantEfficiency", "LossMap", "MeshEfficiency", "WormMesh"),
     "model.motor": ("Motor", "MotorLimits", "ShaftMotor"),
     "model.self_locking": ("Overrunning", "SelfLocking", "overrunning", "self_locking"),
-    "model.shaft": ("DragCurve", "FrictionCurve", "QuadraticDrag", "Shaft"),
+    "model.shaft": ("DragCurve", "EddyCurrentDrag", "FrictionCurve", "QuadraticDrag", "Shaft"),
     "model.signals": ("CommandSignal", "ForceSignal", "TorqueSignal"),
     "model.springs": ("Spring",),
     "model.synchronous_motor": ("PhaseValues", "Winding"),

@@ -29,14 +29,18 @@ void Equations::compose_motors(const Key& key, Regime& r) const {
     for (std::size_t m = 0; m < train_.motors.size(); ++m) {
         const ShaftMotor& motor = train_.motors[m];
         const MotorPlace& p = places_.motors[m];
-        if (p.controller != nowhere && motor.law.kind == Motor::torque_source) {
-            r.motor_torque.push_back(motor.law.rated_torque * forms_.controller_command(p.controller, key));
-            continue;
-        }
+        const Motor::Terms of = forms_.motor_terms(static_cast<int>(m));
         const int limit = p.branch == nowhere ? 0 : key.branch[p.branch];
-        r.motor_torque.push_back(motor.law.kind == Motor::torque_source && limit != 0
-                                     ? terms_.one(limit * motor.torque_limit)
-                                     : motor.law.torque<Row>(forms_.motor_terms(static_cast<int>(m))));
+        if (motor.law.has_torque_state())
+            r.motor_torque.push_back(motor.law.torque<Row>(of));
+        else if (p.controller != nowhere)
+            r.motor_torque.push_back(motor.law.torque(of, forms_.controller_command(p.controller, key)));
+        else if (limit == 0)
+            r.motor_torque.push_back(motor.law.torque<Row>(of));
+        else if (motor.law.kind == Motor::torque_source)
+            r.motor_torque.push_back(terms_.one(limit * motor.torque_limit));
+        else
+            r.motor_torque.push_back(motor.law.torque(of, terms_.one(limit * motor.command_limit())));
     }
 }
 
@@ -187,7 +191,7 @@ void Equations::set_rates(const Key& key, const std::vector<Row>& acceleration, 
     for (std::size_t m = 0; m < train_.motors.size(); ++m) {
         const Motor& motor = train_.motors[m].law;
         const MotorPlace& p = places_.motors[m];
-        if (motor.kind != Motor::dc) continue;
+        if (!motor.has_torque_state()) continue;
         const Motor::Terms terms = forms_.motor_terms(static_cast<int>(m));
         r.rate[p.torque] = p.controller == nowhere
                                ? motor.torque_rate<Row>(terms, p.branch == nowhere ? 0 : key.branch[p.branch])

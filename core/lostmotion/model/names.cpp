@@ -71,7 +71,7 @@ std::vector<bool> moved_states(const Assembly& a) {
     std::vector<bool> moves(static_cast<std::size_t>(a.layout().states), true);
     for (std::size_t m = 0; m < a.train().motors.size(); ++m)
         if (const int k = a.places().motors[m].torque; k != nowhere)
-            moves[static_cast<std::size_t>(k)] = a.train().motors[m].law.kind == Motor::dc;
+            moves[static_cast<std::size_t>(k)] = a.train().motors[m].law.has_torque_state();
     for (std::size_t g = 0; g < a.train().gears.size(); ++g)
         if (const int k = a.places().gears[g].twist; k != nowhere)
             moves[static_cast<std::size_t>(k)] = !a.train().gears[g].rigid();

@@ -59,7 +59,7 @@ void Places::place_states(const Train& train) {
                      narrowest;
     int next = 0;
     for (std::size_t m = 0; m < motors.size(); ++m)
-        if (all || train.motors[m].law.kind == Motor::dc) motors[m].torque = next++;
+        if (all || train.motors[m].law.has_torque_state()) motors[m].torque = next++;
     for (ShaftPlace& s : shafts) s.speed = next++;
     for (std::size_t g = 0; g < gears.size(); ++g)
         if (all || !train.gears[g].rigid()) gears[g].twist = next++;

@@ -95,7 +95,7 @@ void balanced_scale(const Assembly& a, State& s, int first_angle) {
     for (std::size_t k = 0; k < train.controllers.size(); ++k) {
         const ShaftMotor& motor = train.motors[static_cast<std::size_t>(train.controllers[k].motor)];
         const Motor& law = motor.law;
-        const double of_output = law.kind == Motor::dc
+        const double of_output = law.has_torque_state()
                                      ? law.electrical_time_constant / law.stall_torque()
                                      : s[p.shafts[motor.shaft].speed] * inertia(motor.shaft) / law.rated_torque;
         controller_scale(a, static_cast<int>(k), of_output, s);

@@ -13,7 +13,7 @@ struct Motor {
     double friction_torque = 0.0;            // T_10 [N m], dry friction of the bearings
     double rated_torque = 1.0;               // M_DR [N m]
     double rated_speed = 1.0;                // omega_DR [rad/s]
-    double electrical_time_constant = 1e-3;  // tau_a [s]
+    double electrical_time_constant = 1e-3;  // tau_a [s]; 0: the torque follows voltage and speed at once
     double armature_voltage_constant = 2.0;  // k_N [-], stall torque / rated torque at rated voltage
     double voltage_limit = std::numeric_limits<double>::infinity();  // of |E_Z| [-]
 
@@ -22,10 +22,20 @@ struct Motor {
         int torque, speed, command, one;
     };
 
+    // Whether the torque is a state; else it follows from command and speed.
+    bool has_torque_state() const { return kind == dc && electrical_time_constant > 0.0; }
+
     // Torque on the rotor [N m]. A torque source follows its command, in units of the rated torque, without delay.
     template <class F>
     F torque(const Terms& of) const {
-        return kind == dc ? F::unit(of.torque) : F::unit(of.command, rated_torque);
+        return has_torque_state() ? F::unit(of.torque) : torque(of, F::unit(of.command));
+    }
+    // Of a motor whose torque is no state, with the voltage, or the command of a torque source, as a form. That of a DC
+    // motor is the limit of eq. (2) for tau_a = 0: M_D = M_DR (k_N E_Z - (k_N - 1) w/w_DR).
+    template <class F>
+    F torque(const Terms& of, const F& voltage) const {
+        if (kind == torque_source) return rated_torque * voltage;
+        return stall_torque() * voltage - F::unit(of.speed, rated_torque * (armature_voltage_constant - 1.0) / rated_speed);
     }
 
     // dM_D/dt by eq. (2), with E_Z = E_C, or the limit with the sign of `amplifier` if that is not 0.
@@ -48,6 +58,7 @@ struct Motor {
     // that torque gives within its time constant.
     double balanced_speed(double inertia) const {
         if (kind != dc) return 1.0;
+        if (!has_torque_state()) return rated_speed;
         const double back_emf = inertia * (armature_voltage_constant - 1.0) * rated_torque;
         return back_emf > 0.0 ? std::sqrt(electrical_time_constant * rated_speed / back_emf)
                               : electrical_time_constant / inertia;

@@ -17,7 +17,7 @@ void describe(F& f, TorsionCurve& curve) {
     for (int k = 0; k < curve.outermost_piece(); ++k) breaks.push_back(curve.upper(k));
     for (int k = 0; k <= curve.outermost_piece(); ++k) slopes.push_back(curve.slope(k));
     f.list("breaks", breaks, Range::positive);
-    f.list("slopes", slopes, Range::not_negative);
+    f.list("slopes", slopes);
     if constexpr (F::reads) {
         if (f.well() && slopes.size() != breaks.size() + 1) f.wrong("slopes", "must be one more than breaks");
         if (f.well() && !rising(breaks)) f.wrong("breaks", "must rise");
@@ -86,7 +86,7 @@ void describe(F& f, Motor& m) {
     f.number("friction_torque", m.friction_torque, Range::not_negative);
     f.number("rated_torque", m.rated_torque, Range::positive);
     f.number("rated_speed", m.rated_speed, Range::positive);
-    f.number("electrical_time_constant", m.electrical_time_constant, Range::positive);
+    f.number("electrical_time_constant", m.electrical_time_constant, Range::not_negative);
     f.number("armature_voltage_constant", m.armature_voltage_constant, Range::positive);
     f.number("command_limit", m.voltage_limit, Range::limit);
 }
@@ -107,6 +107,8 @@ void describe(F& f, Gearbox& g) {
     if constexpr (F::reads) {
         if (f.well() && g.compliance == Gearbox::torsion_curve && !(g.curve.max_slope() > 0.0))
             f.wrong("stiffness", "must be > 0 somewhere");
+        for (int k = 0; f.well() && k <= g.curve.outermost_piece(); ++k)
+            if (g.curve.slope(k) < 0.0) f.wrong("stiffness", "must not fall");
     }
 }
 

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from .. import _core
 from ..inputs.part import Part
 from ..inputs.quantities import NotNegative, ViscousFriction
-from .shaft import DragCurve, QuadraticDrag
+from .shaft import DragCurve, EddyCurrentDrag, QuadraticDrag
 
 
 class Damper(Part):
@@ -21,7 +21,7 @@ class Damper(Part):
     """shaft"""
     viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
     """torque over the slip, in proportion"""
-    drag: Annotated[DragCurve | QuadraticDrag, Field(discriminator="kind")] | None = None
+    drag: Annotated[DragCurve | QuadraticDrag | EddyCurrentDrag, Field(discriminator="kind")] | None = None
     """torque over the magnitude of the slip, in addition"""
 
     @model_validator(mode="after")

@@ -78,7 +78,15 @@ DC_KEYS = (
     "electrical_time_constant",
     "armature_voltage_constant",
     "voltage_limit",
+    "stall_torque",
+    "no_load_speed",
+    "stall_current",
+    "no_load_current",
 )
+# Keys of a DC motor known by its line from stall to no load, in place of its rated point.
+LINE_KEYS = ("stall_torque", "no_load_speed")
+CURRENT_KEYS = ("stall_current", "no_load_current")
+POINT_KEYS = ("rated_speed", "armature_voltage_constant")
 # Keys of `motor.limits` that the winding of a synchronous motor says.
 SAID_BY_WINDING = ("resistance", "torque_constant", "max_current")
 
@@ -100,10 +108,19 @@ class Motor(Part):
     rated_voltage: Annotated[Voltage, Positive] | None = None
     """u_ZR, that of command 1. A change over a record or a base, by `--set` or in a study is the same motor at another voltage: rated_speed and
     armature_voltage_constant follow so that stall torque and no-load speed go with the voltage, unless they are given too"""
-    electrical_time_constant: Annotated[Time, Positive] | None = None
-    """tau_a"""
+    electrical_time_constant: Annotated[Time, NotNegative] | None = None
+    """tau_a; 0: the torque follows voltage and speed at once, which is the default with stall_torque and no_load_speed"""
     armature_voltage_constant: Annotated[Number, Limit(gt=1.0)] | None = None
     """k_N, stall torque / rated torque at rated voltage"""
+    stall_torque: Annotated[Torque, Positive] | None = None
+    """at rated voltage, with no_load_speed in place of rated_speed and armature_voltage_constant; what the shaft gives, if the currents
+    are stated"""
+    no_load_speed: Annotated[Speed, Positive] | None = None
+    """at rated voltage without load; without friction too, unless the currents are stated"""
+    stall_current: Annotated[Current, Positive] | None = None
+    """at rated voltage, with no_load_current"""
+    no_load_current: Annotated[Current, Positive] | None = None
+    """I_0: the friction of the motor is stall_torque I_0/(I_S - I_0), in place of friction_torque"""
     voltage_limit: Annotated[Voltage, Positive] | None = None
     """largest voltage of the amplifier"""
     winding: Winding | None = None
@@ -115,9 +132,13 @@ class Motor(Part):
     @model_validator(mode="after")
     def _complete(self) -> Self:
         if self.kind == "dc":
+            self._check_line()
+            self._take_rated_point()
             for key in ("rated_speed", "electrical_time_constant", "armature_voltage_constant"):
                 if getattr(self, key) is None:
-                    raise ValueError(f'lacks {key}, which a motor of kind "dc" needs')
+                    raise ValueError(
+                        f'lacks {key}, which a motor of kind "dc" needs; or give stall_torque and no_load_speed'
+                    )
         else:
             self._refuse(
                 DC_KEYS, f"of no use to a {'torque_source' if self.kind == 'torque_source' else 'synchronous motor'}"
@@ -138,6 +159,57 @@ class Motor(Part):
             if self.limits is not None and self.limits.max_voltage is not None:
                 raise ValueError("has voltage_limit and limits.max_voltage, which say the same of a DC motor; give one")
         return self
+
+    def _check_line(self) -> None:
+        """Stall torque and no-load speed come together, in place of a rated point; so do the currents."""
+        for one, other in (LINE_KEYS, LINE_KEYS[::-1], CURRENT_KEYS, CURRENT_KEYS[::-1]):
+            if getattr(self, one) is not None and getattr(self, other) is None:
+                raise ValueError(f"has {one} without {other}; give both")
+        if self.stall_torque is None:
+            if self.stall_current is not None:
+                raise ValueError(
+                    "has stall_current and no_load_current, which belong to stall_torque and no_load_speed; give these"
+                )
+            return
+        self._refuse(POINT_KEYS, "which stall_torque and no_load_speed say")
+        if "rated_torque" in self.model_fields_set and self.rated_torque >= self.stall_torque:
+            raise ValueError(
+                f"has a rated_torque of {self.rated_torque:g} N*m, which must be below its stall_torque of {self.stall_torque:g} N*m"
+            )
+        if self.stall_current is not None and self.no_load_current is not None:
+            if self.no_load_current >= self.stall_current:
+                raise ValueError(
+                    f"has a no_load_current of {self.no_load_current:g} A, which must be below its stall_current of {self.stall_current:g} A"
+                )
+            if "friction_torque" in self.model_fields_set:
+                raise ValueError("has friction_torque and no_load_current, which say the same; give one of them")
+
+    def _take_rated_point(self) -> None:
+        """The rated point of (2) in place of stall torque and no-load speed, which are another way to write it.
+
+        Without a rated torque it is the middle of the line. With the currents, the friction T is part of the line:
+        k_M I_0 = T and k_M I_S = M_S + T, and the speed without friction is w_0/(1 - I_0/I_S).
+        """
+        if self.stall_torque is None or self.no_load_speed is None:
+            return
+        stall, speed, friction = self.stall_torque, self.no_load_speed, self.friction_torque
+        if self.stall_current is not None and self.no_load_current is not None:
+            friction = stall * self.no_load_current / (self.stall_current - self.no_load_current)
+            stall += friction
+            speed /= 1.0 - self.no_load_current / self.stall_current
+        torque = self.rated_torque if "rated_torque" in self.model_fields_set else 0.5 * stall
+        k_N = stall / torque
+        point = {
+            "rated_torque": torque,
+            "friction_torque": friction,
+            "armature_voltage_constant": k_N,
+            "rated_speed": speed * (k_N - 1.0) / k_N,
+            "electrical_time_constant": self.electrical_time_constant or 0.0,
+        }
+        line = (*LINE_KEYS, *CURRENT_KEYS)
+        self.__dict__.update(point | dict.fromkeys(line))
+        self.model_fields_set.update(point)
+        self.model_fields_set.difference_update(line)
 
     def _refuse(self, keys: tuple[str, ...], why: str) -> None:
         idle = [key for key in keys if getattr(self, key) is not None]
@@ -209,7 +281,7 @@ class Motor(Part):
         return limits.resistance / (limits.torque_constant * limits.torque_constant), 25.0
 
     @property
-    def no_load_speed(self) -> float:
+    def unloaded_speed(self) -> float:
         """Speed [rad/s] at command 1 without any load or friction, by (2)."""
         dc = self.as_dc()
         if dc.rated_speed is None or dc.armature_voltage_constant is None:
@@ -274,7 +346,7 @@ class Motor(Part):
                 f"{voltage:g} V must be above {minimum:.4g} V, at which the motor stalls under its rated torque; "
                 "or give rated_speed and armature_voltage_constant too"
             )
-        speed = share * self.no_load_speed * (k_N - 1.0) / k_N
+        speed = share * self.unloaded_speed * (k_N - 1.0) / k_N
         return self.model_copy(
             update={"rated_voltage": voltage, "armature_voltage_constant": k_N, "rated_speed": speed}
         )

@@ -49,21 +49,25 @@ class FrictionCurve(Part):
 
 
 class DragCurve(Part):
-    """Torque against the motion over the magnitude of the speed: straight lines, the last of which goes on."""
+    """Torque against the motion over the magnitude of the speed: straight lines through points."""
 
     kind: Literal["curve"] = "curve"
     speeds: tuple[Annotated[Speed, NotNegative], ...] = Field(min_length=2, max_length=100)
     """rising from 0"""
     torques: tuple[Annotated[Torque, NotNegative], ...]
     """the first is 0: what holds at rest is friction"""
+    beyond: Literal["extend", "hold"] = "extend"
+    """beyond the last point: the last line goes on, or the last torque stays"""
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
         check_points(self.speeds, self.torques)
         if self.torques[0] != 0.0:
             raise ValueError(f"has a torque of {self.torques[0]} N*m at rest; what holds at rest is friction_torque")
-        if self.torques[-1] < self.torques[-2]:
-            raise ValueError("falls at its end, so that it would drive at high speed; add a point")
+        if self.beyond == "extend" and self.torques[-1] < self.torques[-2]:
+            raise ValueError(
+                'falls at its end, so that it would drive at high speed; add a point, or give beyond = "hold", which keeps the last torque'
+            )
         if not any(self.torques):
             raise ValueError("has no torque at any speed; leave drag out")
         return self
@@ -71,6 +75,8 @@ class DragCurve(Part):
     def core(self) -> _core.TorsionCurve:
         points = list(zip(self.speeds, self.torques, strict=True))
         slopes = [(T2 - T1) / (w2 - w1) for (w1, T1), (w2, T2) in itertools.pairwise(points)]
+        if self.beyond == "hold":
+            return _core.TorsionCurve(list(self.speeds[1:]), [*slopes, 0.0])
         return _core.TorsionCurve(list(self.speeds[1:-1]), slopes)
 
 
@@ -86,6 +92,59 @@ class QuadraticDrag(Part):
     def core(self) -> _core.TorsionCurve:
         top = self.coefficient * self.max_speed * self.max_speed
         return _core.quadratic_drag(self.coefficient, self.max_speed, SHARE * top if self.error is None else self.error)
+
+
+class EddyCurrentDrag(Part):
+    """Torque ``2 peak_torque s/(1 + s^2)`` of an eddy-current brake with ``s = w/critical_speed``, by straight lines; beyond `max_speed` the
+    last torque stays.
+    """
+
+    kind: Literal["eddy_current"]
+    peak_torque: Annotated[Torque, Positive]
+    """at the critical speed"""
+    critical_speed: Annotated[Speed, Positive]
+    max_speed: Annotated[Speed, Positive]
+    """up to which the straight lines follow the law"""
+    error: Annotated[Torque, Positive] | None = None
+    """by which they depart from it at most; left out, 0.1 % of the peak torque"""
+
+    def core(self) -> _core.TorsionCurve:
+        error = SHARE * self.peak_torque if self.error is None else self.error
+        share = 0.99 * error / self.peak_torque  # the largest departure of a chord is found at 32 places
+        top = self.max_speed / self.critical_speed
+        points, torques = [0.0], [0.0]
+        while points[-1] < top:
+            s = _chord_end(points[-1], share)
+            # A short last chord would be another piece for nothing.
+            points.append(top if s > top - 0.1 * (s - points[-1]) else s)
+            torques.append(2.0 * points[-1] / (1.0 + points[-1] * points[-1]))
+            if len(points) > MOST_POINTS:
+                raise ValueError(
+                    f"has an error of {error:g} N*m, which takes more than {MOST_POINTS} straight lines; give a larger one"
+                )
+        speeds = [self.critical_speed * s for s in points]
+        peak = [self.peak_torque * m for m in torques]
+        return DragCurve(speeds=tuple(speeds), torques=tuple(peak), beyond="hold").core()
+
+
+MOST_POINTS = 100
+
+
+def _chord_end(begin: float, error: float) -> float:
+    """Where a chord of ``2 s/(1 + s^2)`` ends that begins at a value of s and departs from the curve by an error."""
+    low, high = begin, begin + 1.0
+    while _departure(begin, high) < error and high < 1e9:
+        high = begin + 2.0 * (high - begin)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _departure(begin, middle) < error else (low, middle)
+    return low
+
+
+def _departure(a: float, b: float) -> float:
+    """Largest distance of ``2 s/(1 + s^2)`` from its chord from a to b, at 32 places between."""
+    f = [2.0 * s / (1.0 + s * s) for s in (a + (b - a) * k / 32.0 for k in range(33))]
+    return max(abs(f[k] - (f[0] + (f[-1] - f[0]) * k / 32.0)) for k in range(33))
 
 
 class Shaft(Part):
@@ -105,7 +164,7 @@ class Shaft(Part):
     """by which straight lines depart from that curve at most; left out, 0.1 % of T_S - T_C"""
     friction_curve: FrictionCurve | None = None
     """dry friction over speed, in place of friction_torque and stribeck_speed"""
-    drag: Annotated[DragCurve | QuadraticDrag, Field(discriminator="kind")] | None = None
+    drag: Annotated[DragCurve | QuadraticDrag | EddyCurrentDrag, Field(discriminator="kind")] | None = None
 
     def __repr__(self) -> str:
         unit = "kg" if self.domain == "translation" else "kg·m²"

@@ -100,7 +100,7 @@ def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
     """Load speed [rad/s] at command 1 of a rigid drive without inertia, friction and load, for each run."""
 
     def of(scenario: Scenario) -> float:
-        return scenario.motor.no_load_speed / scenario.gearbox.ratio
+        return scenario.motor.unloaded_speed / scenario.gearbox.ratio
 
     base = study.scenario
     assert isinstance(base, Scenario)

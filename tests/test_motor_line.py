@@ -1,0 +1,225 @@
+"""Motors known by stall torque and no-load speed, without electrical time constant; drag curves that fall."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.integrate
+
+import lostmotion as lm
+from lostmotion.errors import InputError
+
+SERVO: dict[str, Any] = {
+    "shafts": {"joint": {"inertia": 0.02, "friction_torque": 1.03}},
+    "motors": {"m": {"shaft": "joint", "rotor_inertia": 0.005, "stall_torque": 3.1, "no_load_speed": 7.02}},
+    "command": {"m": {"ramps": [{"rise": 1.0, "duration": 1.0}]}},
+    "simulation": {"duration": 2.0, "sample_interval": 1e-3},
+}
+
+
+def scenario(**changes: Any) -> lm.TrainScenario:
+    data = {key: dict(value) for key, value in SERVO.items()}
+    for table, values in changes.items():
+        data[table] = values
+    return lm.TrainScenario(**data)
+
+
+def motor(**changes: Any) -> dict[str, Any]:
+    return {"m": {**SERVO["motors"]["m"], **changes}}
+
+
+def test_a_hobby_servo_starts_and_ends_where_its_line_says() -> None:
+    """Torque M = M_S (u - w/w_0): break-away at u = 1.03/3.1, then J w' = M - T, steady at w_0 (1 - T/M_S)."""
+    result = lm.simulate(scenario())
+    assert float(lm.switchings_of(result)["instant"][0]) == pytest.approx(1.03 / 3.1, abs=1e-12)
+    b, J, T = 3.1 / 7.02, 0.025, 1.03
+
+    def speed(t: float, w: np.ndarray) -> np.ndarray:
+        return np.asarray((3.1 * min(t, 1.0) - b * w - T) / J)
+
+    begin = T / 3.1
+    for end in (0.9, 1.0):
+        run = scipy.integrate.solve_ivp(speed, (begin, end), [0.0], method="DOP853", rtol=1e-12, atol=1e-14)
+        assert float(result["joint_speed"].sel(time=end)) == pytest.approx(run.y[0, -1], rel=1e-10)
+    w_1, w_end = float(result["joint_speed"].sel(time=1.0)), 7.02 * (1.0 - T / 3.1)
+    assert w_end == pytest.approx(4.6875, abs=1e-4)
+    assert float(result["joint_speed"][-1]) == pytest.approx(w_end + (w_1 - w_end) * math.exp(-b / J), rel=1e-12)
+    assert abs(lm.energy_of(result)["residual"]) < 1e-10
+
+
+def test_it_is_the_limit_of_a_short_time_constant() -> None:
+    """The difference falls in proportion to the time constant."""
+    line = lm.simulate(scenario())["joint_speed"]
+    off = [
+        float(abs(lm.simulate(scenario(motors=motor(electrical_time_constant=tau)))["joint_speed"] - line).max())
+        for tau in (1e-4, 1e-5)
+    ]
+    assert off[0] / off[1] == pytest.approx(10.0, rel=0.05)
+
+
+def test_both_solvers_agree_with_a_voltage_limit_that_acts() -> None:
+    limited = scenario(
+        motors=motor(rated_voltage=14.8, voltage_limit=9.0), command={"m": {"amplitude": 1.5, "frequency": 0.7}}
+    )
+    exact = lm.simulate(limited)
+    other = lm.simulate(limited, solver="dormand-prince", relative_tolerance=1e-10)
+    assert float(abs(exact["joint_speed"] - other["joint_speed"]).max()) < 1e-8
+    assert float(exact["m_torque"].max()) <= 3.1 * 9.0 / 14.8 * 2.0
+
+
+def test_currents_put_the_friction_into_the_line() -> None:
+    """k_M I_0 = T and k_M I_S = M_S + T: with friction the motor stalls at M_S and runs without load at w_0, as its sheet says."""
+    own = lm.ShaftMotor(
+        shaft="s", rotor_inertia=1e-3, stall_torque=2.0, no_load_speed=50.0, stall_current=10.0, no_load_current=0.5
+    )
+    T = 2.0 * 0.5 / 9.5
+    assert own.friction_torque == pytest.approx(T, rel=1e-15)
+    assert own.armature_voltage_constant is not None
+    assert own.rated_torque * own.armature_voltage_constant - T == pytest.approx(2.0, rel=1e-15)
+    free = lm.TrainScenario(
+        shafts={"s": {}},
+        motors={"m": own},
+        command={"m": {"mean": 1.0}},
+        simulation={"duration": 20.0, "sample_interval": 0.1},
+    )
+    assert float(lm.simulate(free)["s_speed"][-1]) == pytest.approx(50.0, rel=1e-9)
+
+
+def test_the_short_form_and_the_rated_point_give_the_same_bits() -> None:
+    drive = lm.load("voltage-limited-start")
+    assert isinstance(drive, lm.Scenario)
+    data = drive.model_dump(exclude_none=True)
+    for key in ("rated_torque", "rated_speed", "armature_voltage_constant", "electrical_time_constant"):
+        data["motor"].pop(key, None)
+    line = lm.Scenario(**data | {"motor": data["motor"] | {"stall_torque": 4.0, "no_load_speed": 300.0}})
+    point = {
+        "rated_torque": 2.0,
+        "rated_speed": 150.0,
+        "armature_voltage_constant": 2.0,
+        "electrical_time_constant": 0.0,
+    }
+    same = lm.Scenario(**data | {"motor": data["motor"] | point})
+    assert np.array_equal(lm.simulate(line)["load_speed"], lm.simulate(same)["load_speed"])
+    assert lm.Scenario(**line.model_dump(exclude_none=True)) == line
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"no_load_speed": None}, "has stall_torque without no_load_speed; give both"),
+        ({"rated_speed": 3.0}, "has rated_speed, which stall_torque and no_load_speed say; leave it out"),
+        ({"rated_torque": 3.2}, "has a rated_torque of 3.2 N*m, which must be below its stall_torque of 3.1 N*m"),
+        ({"stall_current": 2.0}, "has stall_current without no_load_current; give both"),
+        (
+            {"stall_current": 2.0, "no_load_current": 2.0},
+            "no_load_current of 2 A, which must be below its stall_current",
+        ),
+        (
+            {"stall_current": 2.0, "no_load_current": 0.1, "friction_torque": 0.1},
+            "which say the same; give one of them",
+        ),
+        ({"kind": "torque_source"}, "has stall_torque, no_load_speed, of no use to a torque_source; leave them out"),
+    ],
+)
+def test_a_line_that_contradicts_itself_is_refused(changes: dict[str, Any], words: str) -> None:
+    given = {key: value for key, value in motor(**changes)["m"].items() if value is not None}
+    with pytest.raises(InputError) as refused:
+        lm.ShaftMotor(**given)
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize("current", ["ideal", "pi"])
+def test_a_controlled_motor_keeps_to_its_line(tmp_path: Path, current: str) -> None:
+    """A reversal at the voltage limit is followed: torque is the request clipped to 40 (1 -+ w/30) N m."""
+    axis = lm.TrainScenario(
+        shafts={"joint": {"inertia": 0.3}},
+        motors={
+            "m": {
+                "shaft": "joint", "rotor_inertia": 0.02, "stall_torque": 40.0, "no_load_speed": 30.0, "rated_voltage": 24.0,
+                "voltage_limit": 24.0,
+            }
+        },
+        controllers={
+            "m": {
+                "sample_time": 5e-4, "encoder": {"ideal": True}, "current": {"kind": current},
+                "reference": {"kind": "torque", "mean": 23.7, "steps": [{"time": 0.4, "height": -47.4}]},
+            }
+        },
+        simulation={"duration": 1.0, "sample_interval": 1e-3},
+    )  # fmt: skip
+    result = lm.simulate(axis)
+    line = 40.0 / 30.0
+    # Between two samples the speed changes by at most 80 rad/s^2 * 0.5 ms, and the torque along the line.
+    within = line * 80.0 * 5e-4
+    assert float(result["m_torque"].sel(time=0.5)) == pytest.approx(-23.7, abs=within)
+    top = 40.0 - line * result["joint_speed"]
+    assert float((result["m_torque"] - top).max()) < within
+    assert float(result["joint_speed"][-1]) == pytest.approx(-19.2, abs=0.2)
+
+
+DISC: dict[str, Any] = {
+    "motors": {"m": {"kind": "torque_source", "shaft": "disc", "rotor_inertia": 0.0}},
+    "command": {"m": {"mean": 0.0}},
+    "initial": {"speeds": {"disc": 80.0}},
+    "simulation": {"duration": 5.0, "sample_interval": 0.01},
+}
+
+
+def test_a_falling_drag_curve_holds_its_last_torque() -> None:
+    """From 120 rad/s at a constant 12.3 N m to 80 rad/s at t = 40/12.3 s, then along the curve, by scipy."""
+    speeds, torques = [0, 5, 10, 20, 40, 80], [0, 40, 50, 40, 23.5, 12.3]
+    data = DISC | {"initial": {"speeds": {"disc": 120.0}}, "simulation": {"duration": 8.0, "sample_interval": 0.01}}
+    drag = {"kind": "curve", "speeds": speeds, "torques": torques, "beyond": "hold"}
+    result = lm.simulate(lm.TrainScenario(shafts={"disc": {"inertia": 1.0, "drag": drag}}, **data))
+    w = result["disc_speed"]
+    assert float(w.sel(time=3.0)) == pytest.approx(120.0 - 12.3 * 3.0, rel=1e-13)
+    begin = 40.0 / 12.3
+    # In each piece w' = -(a + b w) has a closed form.
+    t, at = begin, 80.0
+    for (w_0, T_0), (w_1, T_1) in zip(
+        list(zip(speeds, torques, strict=True))[-2::-1], list(zip(speeds, torques, strict=True))[:0:-1], strict=True
+    ):
+        b = (T_1 - T_0) / (w_1 - w_0)
+        a = T_1 - b * w_1
+        if T_0 == 0.0:
+            break
+        lasts = math.log((a + b * at) / (a + b * w_0)) / b
+        if t + lasts > 8.0:
+            break
+        t, at = t + lasts, float(w_0)
+        nearest = float(w.interp(time=t))
+        assert nearest == pytest.approx(at, abs=0.5 * 50.0 * 50.0 * 0.01**2)  # interpolation over one sample
+    assert at <= 10.0
+
+
+def test_a_curve_that_falls_at_its_end_names_the_remedy() -> None:
+    with pytest.raises(InputError, match='give beyond = "hold", which keeps the last torque'):
+        lm.DragCurve(speeds=(0.0, 1.0, 2.0), torques=(0.0, 2.0, 1.0))
+
+
+def test_an_eddy_current_brake_slows_down_as_its_law_says() -> None:
+    """J w' = -2 M s/(1 + s^2): ln s + s^2/2 falls by 2 M t/(J w_k), down to half the critical speed."""
+    M, w_k = 50.0, 10.0
+    drag = {"kind": "eddy_current", "peak_torque": M, "critical_speed": w_k, "max_speed": 80.0, "error": 0.05}
+    result = lm.simulate(lm.TrainScenario(shafts={"disc": {"inertia": 1.0, "drag": drag}}, **DISC))
+    w = result["disc_speed"].to_numpy()
+    w, t = w[w > 5.0], result["time"].to_numpy()[w > 5.0]
+    measure = np.log(w) + 0.5 * (w / w_k) ** 2
+    expected = w_k / (2.0 * M) * (measure[0] - measure)
+    # An error e of the torque T changes the time by the integral of J e/T^2 over the speed; T falls to 12.3 N m at most.
+    assert len(w) > 200
+    assert np.all(np.abs(t - expected) <= 0.05 / 12.3**2 * (80.0 - w) + 1e-12)
+
+
+@pytest.mark.parametrize("error", [0.5, 0.05])
+def test_the_straight_lines_of_an_eddy_current_brake_keep_to_their_error(error: float) -> None:
+    drag = lm.EddyCurrentDrag(kind="eddy_current", peak_torque=50.0, critical_speed=10.0, max_speed=300.0, error=error)
+    w = np.linspace(0.0, 300.0, 20001)
+    core = drag.core()
+    curve = np.array([core.torque(x) for x in w.tolist()])
+    law = 100.0 * (w / 10.0) / (1.0 + (w / 10.0) ** 2)
+    assert np.max(np.abs(curve - law)) <= error
