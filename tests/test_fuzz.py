@@ -15,7 +15,7 @@ from fuzz.__main__ import KINDS
 from fuzz.faults import FAULTS
 from fuzz.watchdog import Case, failure_of
 
-NEEDS = {"log_files": ("asammdf", "nptdms", "mcap", "rosbags", "h5py"), "study_folders": ("pyarrow",)}
+NEEDS = {"log_files": ("asammdf", "nptdms", "mcap", "rosbags", "h5py", "openpyxl"), "study_folders": ("pyarrow",)}
 COUNTS = {
     "scenario_files": 15,
     "command_lines": 5,

@@ -78,6 +78,34 @@ def as_mdf(path: Path) -> None:
         file.save(path)
 
 
+def as_npz(path: Path) -> None:
+    np.savez_compressed(path, t=TIME, position=ANGLE, mass=0.5, kind="servo")
+
+
+def as_npy(path: Path) -> None:
+    np.save(path, np.array(list(zip(TIME, ANGLE, strict=True)), dtype=[("t", "f8"), ("position", "f8")]))
+
+
+def as_hdf5(path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        run = file.create_group("run")
+        run["time"], run["position"] = 1e3 * TIME, np.degrees(ANGLE)
+        run["time"].attrs["units"], run["position"].attrs["units"] = "ms", "deg"
+        file.attrs["mass"], file.attrs["operator"] = 0.5, "somebody"
+
+
+def as_xlsx(path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.append(["# mass", 0.5])
+    sheet.append(["time [ms]", "position [deg]"])
+    for t, x in zip(TIME, ANGLE, strict=True):
+        sheet.append([1e3 * t, np.degrees(x)])
+    book.save(path)
+
+
 def as_json(path: Path) -> None:
     path.write_text(json.dumps({"mass": 0.5, "entries": entries()}))
 
@@ -91,6 +119,9 @@ def as_json(path: Path) -> None:
         ("log.parquet", as_parquet, True),
         ("log.tdms", as_tdms, True),
         ("log.mf4", as_mdf, False),
+        ("log.npz", as_npz, True),
+        ("log.npy", as_npy, False),
+        ("log.xlsx", as_xlsx, True),
         ("log.json", as_json, True),
     ],
 )
@@ -287,6 +318,160 @@ def test_stamps_that_messages_do_not_carry_are_refused(tmp_path: Path) -> None:
         read_log(path, time="/servo/goal.header.stamp")
 
 
+@pytest.mark.parametrize("write", [as_hdf5])
+def test_datasets_of_hdf5_are_channels_with_units_and_attributes(tmp_path: Path, write: Callable[[Path], Any]) -> None:
+    log = read_log(written(tmp_path, "log.h5", write))
+    assert log.time == pytest.approx(TIME, abs=1e-12)
+    assert np.radians(log.values("run/position")) == pytest.approx(ANGLE, abs=1e-12)
+    assert log.channels["run/position"].unit == "deg"
+    assert log.header == {"mass": 0.5, "operator": "somebody"}
+
+
+def test_fields_and_matrices_of_hdf5_are_channels(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    table = np.array([(t, x, b"run") for t, x in zip(TIME, ANGLE, strict=True)], dtype="f8,f8,S3")
+    table.dtype.names = ("time", "position", "phase")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["table"], file["pair"], file["short"] = table, np.stack([ANGLE, -ANGLE], axis=1), TIME[:5]
+    log = read_log(tmp_path / "log.h5")
+    assert set(log.channels) == {"table.position", "pair column 1", "pair column 2"}
+    assert log.values("pair column 2").tolist() == (-ANGLE).tolist()
+    assert any("left out: short (5)" in note for note in log.notes), log.notes
+
+
+def test_columns_of_a_matrix_are_channels(tmp_path: Path) -> None:
+    import scipy.io
+
+    data = np.stack([TIME, ANGLE, -ANGLE], axis=1)
+    scipy.io.savemat(tmp_path / "log.mat", {"data": data, "mass": 0.5})
+    np.save(tmp_path / "log.npy", np.asfortranarray(data))
+    for name, of in (("log.mat", "data "), ("log.npy", "")):
+        log = read_log(tmp_path / name)
+        assert log.time.tolist() == TIME.tolist()
+        assert {n: c.values.tolist() for n, c in log.channels.items()} == {
+            f"{of}column 2": ANGLE.tolist(),
+            f"{of}column 3": (-ANGLE).tolist(),
+        }
+        assert log.notes == (f"has no vector of the time; {of}column 1 is taken for it",)
+        assert read_log(tmp_path / name, time=f"{of}column 3").time.tolist() == (-ANGLE).tolist()
+    scipy.io.savemat(tmp_path / "log.mat", {"t": TIME, "data": data.T})
+    with_rows = read_log(tmp_path / "log.mat")
+    assert with_rows.notes == ("arrays not of the length of t (200) are left out: data (3 x 200)",)
+
+
+def test_time_stamps_of_numpy_are_seconds(tmp_path: Path) -> None:
+    stamps = np.datetime64("2024-05-01T12:00:00.5", "ns") + np.round(1e9 * TIME).astype("m8[ns]")
+    np.savez(tmp_path / "log.npz", time=stamps, position=ANGLE, names=np.array(["a", "b"]))
+    log = read_log(tmp_path / "log.npz")
+    assert log.time == pytest.approx(TIME, abs=1e-12)
+    assert log.notes == ("arrays that are no numbers are left out: names",)
+
+
+def columns(separator: str, number: Callable[[float], str], heading: str = "") -> str:
+    rows = [separator.join(map(number, pair)) for pair in zip(TIME.tolist(), ANGLE.tolist(), strict=True)]
+    return "\n".join([*([heading] if heading else []), *rows]) + "\n"
+
+
+def comma(value: float) -> str:
+    return f"{value!r}".replace(".", ",")
+
+
+COMMAS = """its commas are read as decimal commas, such as '0,0' in line 2; logs.decimal = "," says so"""
+UNNAMED = "has no heading; its columns are named column 1, column 2 and so on"
+DIALECTS: dict[str, tuple[str, str, str]] = {
+    "commas": (columns(",", repr, "time [s],position [rad]"), "position", ""),
+    "spaces": (columns("  ", repr, "time [s]   position [rad]"), "position", ""),
+    "tabs": (columns("\t", repr, "time\tposition"), "position", ""),
+    "semicolons at the ends of lines too": (
+        columns(";", lambda v: f"{v!r}", "time;position;").replace("\n", ";\n").replace(";;", ";"),
+        "position",
+        "",
+    ),
+    "semicolons and decimal commas": (columns(";", comma, "time;position"), "position", COMMAS),
+    "spaces and decimal commas": (columns(" ", comma, "time position"), "position", COMMAS),
+    "tabs and decimal commas": (columns("\t", comma, "time\tposition"), "position", COMMAS),
+    "no heading": (columns(",", repr), "column 2", UNNAMED),
+    "no heading, spaces": (columns(" ", repr), "column 2", UNNAMED),
+    "units in the line below": (columns(",", repr, "time,position\ns,rad"), "position", ""),
+    "commas in the heading": (columns(";", repr, "time [s];position, left [rad]"), "position, left", ""),
+}
+
+
+@pytest.mark.parametrize("what", DIALECTS)
+def test_text_is_read_however_its_columns_are_separated(tmp_path: Path, what: str) -> None:
+    text, name, note = DIALECTS[what]
+    (tmp_path / "log.txt").write_text(text)
+    log = read_log(tmp_path / "log.txt")
+    assert log.time.tolist() == TIME.tolist()
+    assert {n: c.values.tolist() for n, c in log.channels.items()} == {name: ANGLE.tolist()}
+    assert log.notes == ((note,) if note else ())
+
+
+def test_the_heading_that_numpy_writes_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "log.dat"
+    np.savetxt(path, np.stack([TIME, ANGLE], axis=1), header="mass = 0.5\ntime [s] position [rad]", fmt="%.17g")
+    log = read_log(path)
+    assert log.time.tolist() == TIME.tolist()
+    assert log.values("position").tolist() == ANGLE.tolist()
+    assert log.channels["position"].unit == "rad" and log.header == {"mass": 0.5}
+    assert log.notes == ("its heading is the comment above the values: time, position",)
+
+
+def test_a_comma_that_the_task_declares_needs_no_doubt(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("time;x\n0;1,500\n1;2,250\n")
+    log = read_log(path, decimal=",")
+    assert log.values("x").tolist() == [1.5, 2.25] and log.notes == ()
+    with pytest.raises(lm.InputError, match="line 2: '1,500' in column x is no number; write all numbers"):
+        read_log(path, decimal=".")
+    path.write_text("time;x\n0;1,500\n1;0,5\n")  # no number has a nought before thousands
+    assert read_log(path).values("x").tolist() == [1.5, 0.5]
+
+
+@pytest.mark.parametrize("separator", [",", ";", " "])
+@pytest.mark.parametrize("zone", ["Z", "+02:00", ""])
+def test_time_stamps_are_seconds_from_the_first(tmp_path: Path, separator: str, zone: str) -> None:
+    """To the nanosecond, beyond a midnight; with the sign of the day between date and time or a blank."""
+    late = np.round(1e9 * TIME).astype("m8[ns]") + np.datetime64("2024-02-28T23:59:59.123456789")
+    texts = [f"{str(t).replace('T', 'T' if zone else ' ')}{zone}" for t in late]
+    rows = [f"{t}{separator}{x!r}" for t, x in zip(texts, ANGLE.tolist(), strict=True)]
+    (tmp_path / "log.csv").write_text("\n".join([f"time{separator}position", *rows]))
+    log = read_log(tmp_path / "log.csv")
+    assert log.time == pytest.approx(TIME, abs=1e-12)
+    assert log.values("position").tolist() == ANGLE.tolist()
+    assert len(log.notes) == (0 if zone else 1) and all("have no zone" in note for note in log.notes)
+
+
+def test_a_change_of_the_zone_is_no_step_of_the_time(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(
+        "time,x\n2024-10-27T02:59:59.5+02:00,1\n2024-10-27T02:00:00+01:00,2\n2024-10-27T01:00:00.5Z,3\n"
+    )
+    assert read_log(tmp_path / "log.csv").time.tolist() == [0.0, 0.5, 1.0]
+
+
+def test_headers_of_text_have_colons_or_equals_signs(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("# mass = 0.5\n# kp: 8\n% rig name = left one\ntime,x\n0,1\n1,2\n")
+    assert read_log(tmp_path / "log.csv").header == {"mass": 0.5, "kp": 8.0, "rig_name": "left one"}
+
+
+def test_dates_and_other_sheets_of_a_workbook(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    from datetime import datetime, timedelta
+
+    book = openpyxl.Workbook()
+    book.active.title = "empty"
+    sheet, rest = book.create_sheet("run"), book.create_sheet("remarks")
+    rest.append(["nothing"])
+    for row in (["when", "position"], [], *([datetime(2024, 5, 1) + timedelta(seconds=k / 10), k] for k in range(20))):
+        sheet.append(row)
+    sheet["B7"] = None
+    book.save(tmp_path / "log.xlsx")
+    log = read_log(tmp_path / "log.xlsx")
+    assert log.time == pytest.approx(np.arange(20) / 10, abs=1e-6)
+    assert np.flatnonzero(np.isnan(log.values("position"))).tolist() == [4]
+    assert log.notes[-1] == "sheet run is read; left out are empty, remarks"
+
+
 @pytest.mark.parametrize(
     ("heading", "channels"),
     [
@@ -424,16 +609,38 @@ FILES: dict[str, tuple[str, bytes | str, str]] = {
         '{"entries": [{"timestamp": 0, "x": 1}, {"timestamp": 1, "x": "fast"}]}',
         "is no number",
     ),
-    "no heading": ("f.csv", "0,1\n1,2\n2,3\n", "has no heading"),
     "cut line": ("g.csv", "time,x\n0,1\n1\n", "line 3: has 1 values for 2 columns"),
     "word in a column": ("h.csv", "time,x\n0,1\n1,fast\n", "'fast' in column x is no number"),
     "column twice": ("i.csv", "time,x,x\n0,1,1\n1,2,2\n", "twice"),
     "unit of the time": ("j.csv", "time [fortnight],x\n0,1\n1,2\n", "the unit 'fortnight' of the time"),
-    "decimal comma": (
+    "decimal commas and points": (
         "o.csv",
-        "time;x\n0,1;1\n1,2;2\n",
-        "line 2: '0,1' in column time is no number; write decimal points",
+        "time;x\n0,1;1\n1.2;2\n",
+        "line 3: '1.2' in column time is no number; write all numbers with decimal points",
     ),
+    "commas between columns and before decimals": (
+        "q.csv",
+        "time,x\n0,1,1,5\n0,2,2,5\n",
+        "line 2: has 4 values for 2 columns",
+    ),
+    "one column": ("r.csv", "time\n0\n1\n", "has one column; a log needs the time and one channel at least"),
+    "a comma that may be one between thousands": (
+        "s.csv",
+        "time;x\n0;1,500\n1;2,250\n",
+        "line 2: '1,500' may have a decimal comma, or one between thousands; give logs.decimal = \",\"",
+    ),
+    "time stamps with and without a zone": (
+        "t.csv",
+        "time,x\n2024-05-01T12:00:00Z,1\n2024-05-01T12:00:01,2\n",
+        "line 3: some time stamps have a zone and others have none",
+    ),
+    "time stamps and numbers": ("u.csv", "time,x\n2024-05-01T12:00:00Z,1\n1,2\n", "has time stamps and numbers"),
+    "time stamps in a column that is not the time": (
+        "v.csv",
+        "x,when\n1,2024-05-01T12:00:00Z\n2,2024-05-01T12:00:01Z\n",
+        "in column when is no number; if it is the time, name the column with logs.time",
+    ),
+    "no such date": ("w.csv", "time,x\n2024-02-30T12:00:00Z,1\n2024-05-01T12:00:01Z,2\n", "line 2: .* is no number"),
     "too long a cell": ("p.csv", "time,x\n0,1\n1," + "1" * 200_000, r"line 3: cannot be read \(field larger"),
     "not text": ("k.csv", b"\xff\xfe\x00\x01", "is not UTF-8"),
     "not MATLAB": ("l.mat", b"something else", "is not a MATLAB file"),

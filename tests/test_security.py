@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import io
 import json
 import os
 import pickle
@@ -11,6 +12,7 @@ import struct
 import subprocess
 import sys
 import tracemalloc
+import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -21,8 +23,9 @@ import pytest
 from typer.testing import CliRunner
 
 import lostmotion as lm
+import test_identification_logs as logs
 from lostmotion.cli import app
-from lostmotion.identification import csv_log, servo_json
+from lostmotion.identification import servo_json, spreadsheet_log, text_log
 from lostmotion.identification.conversions import conversion_of
 from lostmotion.identification.readers import TABLES, read_log
 from lostmotion.inputs.limits import memory_limit, size_of
@@ -524,10 +527,205 @@ def test_the_memory_of_logs_in_text_is_not_underestimated(tmp_path: Path, what: 
         tracemalloc.stop()
     estimate = []
     with pytest.MonkeyPatch.context() as patch:
-        for module in (csv_log, servo_json):
+        for module in (text_log, servo_json):
             patch.setattr(module, "check_memory", lambda needed, *_: estimate.append(needed))
         read_log(path)
     assert 0.95 * taken < max(estimate) < 4.0 * taken
+
+
+def packed(path: Path, content: dict[str, bytes], method: int = zipfile.ZIP_DEFLATED) -> Path:
+    with zipfile.ZipFile(path, "w", method) as archive:
+        for name, data in content.items():
+            archive.writestr(name, data)
+    return path
+
+
+def described(shape: tuple[int, ...], kind: Any = "<f8") -> bytes:
+    """An NPY file that announces an array, without its values."""
+    stream = io.BytesIO()
+    about = {"descr": kind, "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(stream, about)
+    return stream.getvalue()
+
+
+def test_arrays_of_objects_are_not_unpickled(tmp_path: Path) -> None:
+    command = np.array([Command(tmp_path / "mark"), 1.0], dtype=object)
+    np.save(tmp_path / "log.npy", command, allow_pickle=True)
+    np.savez(tmp_path / "log.npz", t=TIME, x=command)
+    refused(tmp_path / "log.npy", "holds Python objects, which are not read; save arrays of numbers")
+    refused(tmp_path / "log.npz", ": x: holds Python objects")
+    assert not (tmp_path / "mark").exists()
+    np.load(tmp_path / "log.npy", allow_pickle=True)
+    assert (tmp_path / "mark").exists()  # so it would have been
+
+
+def test_announced_sizes_of_numpy_files_are_bounded(tmp_path: Path, small_limit: int) -> None:
+    (tmp_path / "log.npy").write_bytes(described((20_000_000_000,)))
+    refused(tmp_path / "log.npy", "needs 160 GB of memory or more")
+    (tmp_path / "log.npy").write_bytes(described((200,)) + bytes(800))
+    refused(tmp_path / "log.npy", "announces 1600 bytes and holds 800; it may have been cut off")
+    refused(packed(tmp_path / "log.npz", {"t.npy": described((20_000_000_000,))}), ": t: needs 160 GB")
+    bomb = described((1_000_000,)) + bytes(8_000_000)
+    assert packed(tmp_path / "log.npz", {"t.npy": bomb}).stat().st_size < 20_000
+    refused(tmp_path / "log.npz", "needs 8 MB of memory or more, and the limit is 2 MB")
+    refused(packed(tmp_path / "log.npz", {"t.npy": described((-1,))}), "is not a file of NumPy")
+    (tmp_path / "log.npy").write_bytes(b"\x93NUMPY\x01\x00\xff\xff" + b"(" * 65535)
+    refused(tmp_path / "log.npy", "is not a file of NumPy")
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+@pytest.mark.parametrize("ending", [".npz", ".xlsx"])
+def test_members_that_are_decompressed_without_a_bound_are_refused(tmp_path: Path, ending: str, method: int) -> None:
+    pytest.importorskip("openpyxl")
+    refused(packed(tmp_path / f"log{ending}", {"t.npy": bytes(1000)}, method), "by a method other than deflate")
+
+
+@pytest.mark.parametrize("ending", [".npz", ".xlsx", ".h5"])
+def test_archives_that_are_cut_off_are_refused(tmp_path: Path, ending: str) -> None:
+    write = {".npz": logs.as_npz, ".xlsx": logs.as_xlsx, ".h5": logs.as_hdf5}[ending]
+    write(tmp_path / f"log{ending}")
+    content = (tmp_path / f"log{ending}").read_bytes()
+    for share in (0.3, 0.6, 0.95):
+        (tmp_path / f"log{ending}").write_bytes(content[: round(share * len(content))])
+        refused(tmp_path / f"log{ending}", "is not an? (file of NumPy|XLSX file|HDF5 file)")
+
+
+@pytest.mark.parametrize("fill", [virtual, linked, external, announced, overlong])
+def test_hdf5_logs_are_checked_as_those_of_matlab(tmp_path: Path, fill: Callable[[Any], Any]) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["t"] = TIME
+        fill(file.create_group("run"))
+    refused(tmp_path / "log.h5", "is a link|refers to data|needs 160 GB|longer than it announces")
+
+
+def test_groups_of_hdf5_within_themselves_have_an_end(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["t"], file["x"] = TIME, TIME
+        for k in range(300):
+            file[f"again {k}"] = file["/"]
+    assert set(read_log(tmp_path / "log.h5").channels) == {"x"}
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["a/b/c/d/e/f/g/t"] = TIME
+    refused(tmp_path / "log.h5", "a/b/c/d/e/f: is a group within too many others")
+
+
+SHEET = (
+    b'<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>'
+    b'<row r="1"><c r="A1" t="inlineStr"><is><t>time</t></is></c><c r="B1" t="inlineStr"><is><t>x</t></is></c></row>%s'
+    b"</sheetData></worksheet>"
+)
+ENTITIES = b'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>'
+
+
+def as_workbook(path: Path, changes: dict[str, bytes]) -> Path:
+    """A workbook of openpyxl with some of its parts in another way."""
+    logs.as_xlsx(path)
+    with zipfile.ZipFile(path) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()} | changes
+    if "xl/sharedStrings.xml" in parts:
+        kind = b"application/vnd.openxmlformats-officedocument.spreadsheetml.sharedStrings+xml"
+        listed = b'<Override PartName="/xl/sharedStrings.xml" ContentType="%s"/></Types>' % kind
+        types = parts["[Content_Types].xml"]
+        parts["[Content_Types].xml"] = types if kind in types else types.replace(b"</Types>", listed)
+    return packed(path, parts)
+
+
+def row(number: int, cells: bytes) -> bytes:
+    return b'<row r="%d">%s</row>' % (number, cells)
+
+
+WORKBOOKS: dict[str, tuple[str, bytes, str]] = {
+    "many rows": ("xl/worksheets/sheet1.xml", SHEET % (b"<row/>" * 100_000), "needs .* of memory"),
+    "a row of many cells": (
+        "xl/worksheets/sheet1.xml",
+        SHEET % row(2, b"<c/>" * 10_000),
+        "needs .* of memory",
+    ),
+    "rows of far cells": (
+        "xl/worksheets/sheet1.xml",
+        SHEET % b"".join(row(k, b'<c r="XFD%d"/>' % k) for k in range(2, 100)),
+        "needs .* of memory",
+    ),
+    "elements outside of rows": ("xl/worksheets/sheet1.xml", SHEET % (b"<x/>" * 100_000), "needs .* of memory"),
+    "styles": ("xl/styles.xml", b"<styleSheet>" + b"<xf/>" * 100_000 + b"</styleSheet>", "needs .* of memory"),
+    "texts": ("xl/sharedStrings.xml", b"<sst>" + b"<si/>" * 100_000 + b"</sst>", "needs .* of memory"),
+    "zeros": ("xl/media/picture.png", bytes(8_000_000), "needs 8.* MB of memory"),
+    "entities": ("xl/worksheets/sheet1.xml", ENTITIES + SHEET % b"", "defines entities"),
+    "entities of the workbook": ("xl/workbook.xml", ENTITIES + b"<workbook/>", "defines entities"),
+    "a row far away": ("xl/worksheets/sheet1.xml", SHEET % row(10**12, b""), "row 1000000000000 comes after row 1"),
+    "rows back": ("xl/worksheets/sheet1.xml", SHEET % (row(5, b"") + row(3, b"")), "row 3 comes after row 5"),
+    "a column far away": ("xl/worksheets/sheet1.xml", SHEET % row(2, b'<c r="ZZZ2"/>'), "has a cell ZZZ"),
+    "a formula": (
+        "xl/worksheets/sheet1.xml",
+        SHEET % row(2, b'<c r="A2"><v>1</v></c><c r="B2"><f>WEBSERVICE("http://x")</f><v/></c>'),
+        "row 2 has a formula without its value; open the file in a spreadsheet program, and save it",
+    ),
+    "an error": (
+        "xl/worksheets/sheet1.xml",
+        SHEET % row(2, b'<c r="A2"><v>1</v></c><c r="B2" t="e"><f>1/0</f><v>#DIV/0!</v></c>'),
+        "row 2: '#DIV/0!' in column x is no number",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", WORKBOOKS)
+def test_workbooks_are_bounded_and_hold_values(tmp_path: Path, small_limit: int, what: str) -> None:
+    pytest.importorskip("openpyxl")
+    name, content, said = WORKBOOKS[what]
+    refused(as_workbook(tmp_path / "log.xlsx", {name: content}), said)
+
+
+def test_values_of_formulas_are_read(tmp_path: Path) -> None:
+    pytest.importorskip("openpyxl")
+    rows = b"".join(
+        row(k, b'<c r="A%d"><v>%d</v></c><c r="B%d"><f>2*A%d</f><v>%d</v></c>' % (k, k, k, k, 2 * k))
+        for k in range(2, 9)
+    )
+    log = read_log(as_workbook(tmp_path / "log.xlsx", {"xl/worksheets/sheet1.xml": SHEET % rows}))
+    assert log.time.tolist() == list(range(2, 9)) and log.values("x").tolist() == list(range(4, 18, 2))
+
+
+MEASURED: dict[str, dict[str, bytes]] = {
+    "cells": {
+        "xl/worksheets/sheet1.xml": SHEET
+        % b"".join(row(k, b'<c r="A%d"><v>%d</v></c><c r="B%d"><v>1.5</v></c>' % (k, k, k)) for k in range(2, 8_000))
+    },
+    "rows with a height": {
+        "xl/worksheets/sheet1.xml": SHEET
+        % b"".join(b'<row ht="15" r="%d"><c><v>%d</v></c><c><v>1</v></c></row>' % (k, k) for k in range(2, 20_000))
+    },
+    "styles": {
+        "xl/styles.xml": b'<styleSheet xmlns="%s"><cellXfs>%s</cellXfs></styleSheet>'
+        % (b"http://schemas.openxmlformats.org/spreadsheetml/2006/main", b"<xf/>" * 8_000)
+    },
+    "texts": {
+        "xl/sharedStrings.xml": b'<sst xmlns="%s">%s</sst>'
+        % (
+            b"http://schemas.openxmlformats.org/spreadsheetml/2006/main",
+            b"".join(b"<si><t>%d</t></si>" % k for k in range(30_000)),
+        )
+    },
+}
+
+
+@pytest.mark.parametrize("what", MEASURED)
+def test_the_memory_of_workbooks_is_not_underestimated(tmp_path: Path, what: str) -> None:
+    pytest.importorskip("openpyxl")
+    path = as_workbook(tmp_path / "log.xlsx", MEASURED[what])
+    estimate = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(spreadsheet_log, "check_memory", lambda needed, *_: estimate.append(needed))
+        read_log(path)
+    gc.collect()
+    tracemalloc.start(1)
+    try:
+        read_log(path)
+        _, taken = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert taken < max(estimate) < 10.0 * taken
 
 
 def test_a_log_that_is_cut_off_says_so(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

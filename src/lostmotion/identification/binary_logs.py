@@ -1,4 +1,4 @@
-"""Logs in the formats of measuring tools: MATLAB, Parquet, MDF 4, TDMS, each read by its library."""
+"""Logs in the formats of measuring tools: MATLAB, HDF5, Parquet, MDF 4, TDMS, each read by its library."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import struct
 import zlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,22 +16,24 @@ import numpy as np
 from ..errors import InputError, need
 from ..inputs.hdf5_files import datasets
 from ..inputs.limits import check_memory, memory_limit
-from ..inputs.validation import did_you_mean
+from ..inputs.validation import did_you_mean, listed
 from .conversions import conversion_of
 from .logs import Channel, Log, as_number, quiet_ends, reason, warnings_of
 from .mdf_blocks import check_mdf_blocks
+from .tables import TIME_NAMES
 
 MATLAB_NUMBERS = {*(f"{u}int{n}" for u in ("", "u") for n in (8, 16, 32, 64)), "double", "single", "char", "logical"}
 COMPRESSED = 15  # type of an element of a MATLAB file
 PIECE = 2**20  # [bytes] that are decompressed at once
 ALGEBRAIC = 3  # type of a conversion of MDF 4
 MDF_NUMBERS = range(6)  # data types of MDF 4: integers and floating-point numbers of both byte orders
+LEVELS = 5  # of groups of HDF5 within each other
+LONGEST_WORD = 65536  # [bytes] of an attribute of HDF5
 WAVEFORM = {"wf_increment", "wf_start_offset"}  # properties of a TDMS channel that holds its time
-TIME_NAMES = ("time", "t", "timestamp", "times", "tm")
 
 
 def read_mat_log(path: Path, *, time: str = "") -> Log:
-    """Of a MATLAB file: vectors of one length are channels, single numbers and words the header.
+    """Read a MATLAB file: vectors of one length and columns of matrices are channels, single numbers and words the header.
 
     Version 7.3 is read by h5py, older ones by scipy.
 
@@ -38,8 +41,25 @@ def read_mat_log(path: Path, *, time: str = "") -> Log:
     ------
     InputError
     """
-    variables = _hdf5_variables(path) if _begins_with(path, b"MATLAB 7.3") else _mat5_variables(path)
-    return _of_variables(path, variables, {}, time)
+    if not _begins_with(path, b"MATLAB 7.3"):
+        return log_of_variables(path, _mat5_variables(path), {}, time)
+    found, units, _ = _hdf5_variables(path, matlab=True)
+    return log_of_variables(path, found, units, time)
+
+
+def read_hdf5_log(path: Path, *, time: str = "") -> Log:
+    """Read an HDF5 file: datasets of one length are channels, attributes of the file and single values the header.
+
+    The attribute ``units`` or ``unit`` of a dataset is its unit. Datasets in groups are named ``GROUP/NAME``; attributes of the group of
+    the time belong to the header too.
+
+    Raises
+    ------
+    InputError
+    """
+    found, units, attributes = _hdf5_variables(path, matlab=False)
+    log = log_of_variables(path, found, units, time)
+    return replace(log, header={**log.header, **attributes})
 
 
 def _begins_with(path: Path, text: bytes) -> bool:
@@ -87,23 +107,53 @@ def _mat5_bytes(path: Path) -> int:
     return total
 
 
-def _hdf5_variables(path: Path) -> dict[str, Any]:
-    need("h5py", "Reading MATLAB 7.3 files", "identify")
+def _hdf5_variables(path: Path, *, matlab: bool) -> tuple[dict[str, Any], dict[str, str], dict[str, Any]]:
+    """(values, units, attributes of the file) by name."""
+    kind = "MATLAB 7.3" if matlab else "HDF5"
+    need("h5py", f"Reading {kind} files", "identify")
     import h5py
 
     found: dict[str, Any] = {}
+    units: dict[str, str] = {}
     try:
         with h5py.File(path, "r") as file:
-            for name, node in datasets(path, file).items():
-                if node.dtype.kind not in "biuf":
-                    continue
-                value = np.squeeze(node[()])
-                text = node.attrs.get("MATLAB_class", b"") == b"char"
-                found[name] = "".join(map(chr, np.atleast_1d(value))) if text else value
+            for name, node in datasets(path, file, depth=0 if matlab else LEVELS).items():
+                if matlab and node.dtype.kind in "biuf":
+                    value = np.squeeze(node[()].T)
+                    text = node.attrs.get("MATLAB_class", b"") == b"char"
+                    found[name] = "".join(map(chr, np.atleast_1d(value))) if text else value
+                elif node.dtype.names is not None:
+                    found |= {
+                        f"{name}.{part}": node[part] for part in node.dtype.names if node.dtype[part].kind in "biuf"
+                    }
+                elif node.dtype.kind in "biuf" or node.shape == ():
+                    found[name] = _text(node[()])
+                if not matlab:
+                    own = _attributes(node)
+                    units[name] = str(own.get("units", own.get("unit", "")))
+            attributes = {} if matlab else _attributes(file)
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not a MATLAB 7.3 file ({reason(error)})") from None
+        raise InputError(f"{path}: is not a {kind} file ({reason(error)})") from None
+    return found, units, attributes
+
+
+def _text(value: Any) -> Any:
+    return value.decode(errors="replace") if isinstance(value, bytes) else value
+
+
+def _attributes(node: Any) -> dict[str, Any]:
+    """Single numbers and words among the attributes of a group or a dataset."""
+    found = {}
+    for name in node.attrs:
+        about = node.attrs.get_id(name)
+        if math.prod(about.shape or ()) == 1 and about.dtype.itemsize <= LONGEST_WORD and about.dtype.kind in "biufSO":
+            value = node.attrs[name]
+            value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
+            value = as_number(_text(value))
+            if isinstance(value, int | float | str):
+                found[name] = value
     return found
 
 
@@ -143,7 +193,7 @@ def read_parquet_log(path: Path, *, time: str = "") -> Log:
             column = column.cast(pa.timestamp("ns")).cast(pa.int64())
             units[name] = "ns"
         columns[name] = column.to_numpy()
-    log = _of_variables(path, columns, units, time)
+    log = log_of_variables(path, columns, units, time)
     return Log(
         log.name, log.time, log.channels, {**log.header, **{k: as_number(v) for k, v in header.items()}}, log.notes
     )
@@ -278,31 +328,67 @@ def read_tdms_log(path: Path, *, time: str = "") -> Log:
     except Exception as error:  # the library raises what its parts raise
         raise InputError(f"{path}: is not a TDMS file ({reason(error)})") from None
     variables |= {name: value for name, value in properties.items() if isinstance(value, int | float | str)}
-    log = _of_variables(path, variables, units, time)
+    log = log_of_variables(path, variables, units, time)
     return log.noted(f"may be cut off or damaged; npTDMS reports: {said[0]}") if said else log
 
 
-def _of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[str, str], time: str) -> Log:
-    """Vectors of the length of the time are channels, single values the header."""
-    vectors = {n: np.asarray(v) for n, v in variables.items() if np.ndim(v) == 1 and np.asarray(v).dtype.kind in "biuf"}
-    lower = {name.lower(): name for name in vectors}
-    name = time or next((lower[n] for n in TIME_NAMES if n in lower), "")
-    if name not in vectors:
-        meant = did_you_mean(name or "time", vectors, f"its vectors are {', '.join(vectors) or 'none'}")
+def log_of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[str, str], time: str) -> Log:
+    """The log of named values: vectors and columns of matrices of the length of the time are channels, single values the header.
+
+    The columns of a matrix ``x`` are ``x column 1``, ``x column 2`` and so on. If the file holds nothing but one matrix, its first column
+    is the time.
+
+    Raises
+    ------
+    InputError
+        There is no time.
+    """
+    arrays = {n: np.asarray(v) for n, v in variables.items() if np.ndim(v) > 0 and np.asarray(v).dtype.kind in "biuf"}
+    vectors = {n: v for n, v in arrays.items() if v.ndim == 1}
+    matrices = {n: v for n, v in arrays.items() if v.ndim == 2 and v.shape[0] > v.shape[1]}
+    of_matrix = {name: [f"{name} column {k + 1}".strip() for k in range(x.shape[1])] for name, x in matrices.items()}
+    notes = []
+    name = time or _time_name(vectors)
+    if not name and not vectors and len(matrices) == 1:
+        name = next(iter(of_matrix.values()))[0]
+        notes.append(f"has no vector of the time; {name} is taken for it")
+    clock = next((vectors[n] for n in vectors if n == name), None)
+    if clock is None:
+        clock = next((matrices[n][:, c.index(name)] for n, c in of_matrix.items() if name in c), None)
+    if clock is None:
+        known = [*vectors, *(column for columns in of_matrix.values() for column in columns)]
+        meant = did_you_mean(name or "time", known, f"its vectors are {listed(known) or 'none'}")
         raise InputError(
             f"{path}: has no vector of the time{f' {name}' if name else ''}; name it with logs.time; {meant}"
         )
-    values = vectors[name].astype(float) * {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}.get(units.get(name, ""), 1.0)
+    values = clock.astype(float) * {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}.get(units.get(name, ""), 1.0)
     if units.get(name) == "ns":
-        values = values - values[0]
+        whole = clock.astype(np.int64) if clock.dtype.kind in "iu" else clock
+        values = 1e-9 * (whole - whole[0]).astype(float)
+    columns = dict(vectors)
+    for n, x in matrices.items():
+        if len(x) == len(values):
+            columns |= {column: x[:, k] for k, column in enumerate(of_matrix[n])}
+    check_memory(8.0 * sum(v.size for v in columns.values()), str(path))
     channels = {
-        n: Channel(v.astype(float), units.get(n, "")) for n, v in vectors.items() if n != name and len(v) == len(values)
+        n: Channel(v.astype(float), units.get(n, "")) for n, v in columns.items() if n != name and len(v) == len(values)
     }
     header = {n: as_number(v) for n, v in variables.items() if np.ndim(v) == 0 and not isinstance(v, bytes)}
-    other = [f"{n} ({len(v)})" for n, v in vectors.items() if len(v) != len(values)]
-    log = Log(path.name, values, channels, {k: v for k, v in header.items() if isinstance(v, int | float | str)})
-    return (
-        log.noted(f"vectors not of the length of {name} ({len(values)}) are left out: {', '.join(other)}")
-        if other
-        else log
-    )
+    other = [
+        f"{n} ({' x '.join(map(str, v.shape))})"
+        for n, v in arrays.items()
+        if len(v) != len(values) or not (v.ndim == 1 or n in matrices)
+    ]
+    if other:
+        notes.append(f"arrays not of the length of {name} ({len(values)}) are left out: {listed(other)}")
+    plain = {k: v for k, v in header.items() if isinstance(v, int | float | str)}
+    return Log(path.name, values, channels, plain, tuple(notes))
+
+
+def _time_name(vectors: Mapping[str, Any]) -> str:
+    """Name of the vector that is the time by its name, without the group that it is in; empty if none or several are."""
+    for wanted in TIME_NAMES:
+        found = [name for name in vectors if name.rpartition("/")[2].rpartition(".")[2].lower() == wanted]
+        if found:
+            return found[0] if len(found) == 1 else ""
+    return ""

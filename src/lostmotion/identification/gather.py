@@ -10,6 +10,7 @@ from typing import Any
 from ..errors import InputError
 from .formulas import Formula
 from .ladder import start_point
+from .leave_out import refuse_leave_out
 from .measuring import numbers_of
 from .prepare import Prepared, prepared
 from .readers import find_logs, read_log
@@ -33,8 +34,9 @@ def gathered(rig: Rig, directory: Path) -> tuple[list[Prepared], dict[str, str]]
     left_out: dict[str, str] = {}
     for path, name in names.items():
         try:
-            read = read_log(path, time=task.logs.time)
-            logs.append(prepared(task, replace(read, name=name), rig.units))
+            read = read_log(path, time=task.logs.time, decimal=task.logs.decimal)
+            origin = {"file": path.name, "folder": path.resolve().parent.name}
+            logs.append(prepared(task, replace(read, name=name), rig.units, origin))
         except InputError as problem:
             left_out[name] = _without(str(problem), path, name)
     known = frozenset().union(*(log.facts for log in logs))
@@ -47,6 +49,7 @@ def gathered(rig: Rig, directory: Path) -> tuple[list[Prepared], dict[str, str]]
         more = f" (the first of {len(left_out)} of {len(paths)} logs that cannot be used)" if len(left_out) > 1 else ""
         raise InputError(f"{name}: {why}{more}")
     _refuse_conditions(rig, logs)
+    refuse_leave_out(task, logs)
     return logs, {name: left_out[name] for name in names.values() if name in left_out}
 
 

@@ -21,6 +21,7 @@ from .gather import gathered
 from .identifiability import Undetermined, at_bounds, resting_on
 from .intervals import Interval, bootstrap, profile, widest
 from .ladder import GAIN, RungResult, begun_with, chosen, climb, first_fit, free_on, is_rough, problem_of, start_point
+from .leave_out import ConditionError, left_out_errors
 from .misfit import Misfit, hidden, misfits
 from .odd_logs import OddLog, odd_logs
 from .pauses import split_at_pauses
@@ -58,6 +59,8 @@ class IdentificationResult:
     """how inputs go on between samples, of those that the task leaves open: and why"""
     misfits: list[Misfit] = field(default_factory=list, kw_only=True)
     """channels whose residuals are no noise, or far above the stated deviation"""
+    conditions: list[ConditionError] = field(default_factory=list, kw_only=True)
+    """errors of the logs of each condition of ``fit.leave_out``, with and without them in the fit"""
     odd: list[OddLog] = field(default_factory=list, kw_only=True)
     """logs that disagree with the others, and the fault that explains each"""
     scenario: TrainScenario
@@ -141,6 +144,7 @@ class IdentificationResult:
                     n = sum(not math.isnan(e.mae) for e in own)
                     unit = f" {self.unit(channel)}".rstrip()
                     lines.append(f"  {channel}, {_logs(n)} {what}: MAE {mae:.5g}{unit}, RMSE {rmse:.5g}{unit}")
+        lines += [f"  {condition.text(self.error_unit)}" for condition in self.conditions]
         lines += [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
         return lines + [f"  {text}" for text in [*self.differences(), *self.inputs, *self.starts()]]
 
@@ -303,6 +307,9 @@ def identify_logs(
         logs = [log for log in logs if log.name not in {o.log for o in spoiled}]
     result.left_out = left_out | {o.log: o.text for o in odd}
     result.odd = [*odd, *more]
+    result.conditions = left_out_errors(
+        result.rig or rig, Engine(result.rig or rig, threads), result.logs, result.fit, result.chosen, notify
+    )
     return result
 
 

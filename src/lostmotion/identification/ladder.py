@@ -145,10 +145,10 @@ def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, noti
         rough = [name for name in added if name not in entry.multi_start and is_rough(rig, name, rung)]
         best, minima = _other_minima(rig, engine, train, rung, point, best, rough, notify)
         point = best.point
-        best.point = point = _with_own(rig, engine, logs, point, rung)
+        best.point = point = with_own(rig, engine, logs, point, rung)
         unsure = undetermined(problem, best)
         errors = log_errors(logs, engine.residuals(logs, point, rung))
-        means = _means(task, errors, best)
+        means = mean_errors(task, errors, best)
         found.append(RungResult(entry.name, best, errors, *means, engine.failed, unsure, minima))
     return found
 
@@ -231,7 +231,7 @@ def _cost(problem: Problem, fit: Fit, other: Fit) -> float:
     return problem.cost(residuals, other.deviations, fit.point, other.correlation)
 
 
-def _with_own(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point, rung: int) -> Point:
+def with_own(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point, rung: int) -> Point:
     """What a log that is held out has of its own, such as its zero, is fitted to it; the parameters stay."""
     held_out = [log for log in logs if log.held_out]
     if not rig.task.nuisance or not held_out:
@@ -277,7 +277,7 @@ def first_fit(rig: Rig, engine: Engine, few: Sequence[Prepared], start: Point, n
     return _some(rig, engine, few, 0, start, lambda iteration, cost: notify(rig.rungs()[0].name, iteration, cost))
 
 
-def _means(task: Identification, errors: list[LogError], fit: Fit) -> tuple[float, float]:
+def mean_errors(task: Identification, errors: list[LogError], fit: Fit) -> tuple[float, float]:
     """Mean absolute errors of the logs fitted and held out, over all channels."""
     units = dict(zip(task.measured, fit.deviations if len(task.measured) > 1 else np.ones(1), strict=True))
     means = []

@@ -158,13 +158,17 @@ def is_unit(text: str) -> bool:
     return True
 
 
-def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepared:
+def prepared(
+    task: Identification, log: Log, units: Mapping[str, str], origin: Mapping[str, str] | None = None
+) -> Prepared:
     """A log of the task, screened.
 
     Parameters
     ----------
     units
         SI units of inputs and measured variables of the rig by name.
+    origin
+        What formulas may name of its file, ``file`` and ``folder``, unless its header has the same key.
 
     Raises
     ------
@@ -196,7 +200,10 @@ def prepared(task: Identification, log: Log, units: Mapping[str, str]) -> Prepar
         )
     if not keep.all():
         log = log.only(keep, f"{np.sum(~keep)} samples before logs.first or after logs.last are left out")
-    facts = _facts(log)
+    origin = origin or {}
+    for name in origin.keys() & header.keys():
+        log = log.noted(f"{name} in its header counts, in place of that of its own file")
+    facts = {**origin, **_facts(log)}
     for name in (*task.parameters, *task.nuisance):
         if name in facts:
             log = log.noted(

@@ -8,17 +8,25 @@ from pathlib import Path
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.limits import check_memory
-from .binary_logs import read_mat_log, read_mdf_log, read_parquet_log, read_tdms_log
-from .csv_log import read_csv_log
+from .binary_logs import read_hdf5_log, read_mat_log, read_mdf_log, read_parquet_log, read_tdms_log
 from .logs import Log
+from .numpy_logs import read_numpy_log
 from .robot_logs import read_mcap_log, read_ros_bag
 from .servo_json import read_servo_json
+from .spreadsheet_log import read_xlsx_log
+from .text_log import read_text_log
 
 TABLES: dict[str, Callable[..., Log]] = {
-    ".csv": read_csv_log,
-    ".txt": read_csv_log,
-    ".tsv": read_csv_log,
+    ".csv": read_text_log,
+    ".txt": read_text_log,
+    ".tsv": read_text_log,
+    ".dat": read_text_log,
+    ".xlsx": read_xlsx_log,
+    ".npz": read_numpy_log,
+    ".npy": read_numpy_log,
     ".mat": read_mat_log,
+    ".h5": read_hdf5_log,
+    ".hdf5": read_hdf5_log,
     ".parquet": read_parquet_log,
     ".mf4": read_mdf_log,
     ".tdms": read_tdms_log,
@@ -30,14 +38,17 @@ ENDINGS = (".json", *TABLES)
 
 
 @checked
-def read_log(path: str | Path, *, time: str = "") -> Log:
-    """Read a log: CSV, MATLAB, Parquet, MDF 4, TDMS, MCAP, bag of ROS, or JSON of a servo recorder, by the ending of its name.
+def read_log(path: str | Path, *, time: str = "", decimal: str = "") -> Log:
+    """Read a log of any of the formats in ``docs/identification.md``, by the ending of its name.
 
     Parameters
     ----------
     time
         Name of the channel of the time, where it is not found by itself; of an MCAP file or a bag the topic,
         or ``TOPIC.header.stamp``.
+    decimal
+        What separates decimals in text, ``"."`` or ``","``. If empty, a comma is taken only where the text has no other reading, and the
+        log carries a note on it.
 
     Raises
     ------
@@ -47,6 +58,8 @@ def read_log(path: str | Path, *, time: str = "") -> Log:
         The library of the format is not installed.
     """
     path = Path(path)
+    if decimal not in ("", ".", ","):
+        raise InputError(f'argument decimal: {decimal!r} is neither "." nor ","; leave it out to have it found')
     if path.is_dir():
         raise InputError(f"{path}: is a directory; name the logs in it")
     if not path.exists():
@@ -59,6 +72,8 @@ def read_log(path: str | Path, *, time: str = "") -> Log:
         return read_servo_json(path, time=time)
     if ending not in TABLES:
         raise InputError(f"{path}: is no log by its ending; logs end in {', '.join(ENDINGS)}")
+    if TABLES[ending] is read_text_log:
+        return read_text_log(path, time=time, decimal=decimal)
     return TABLES[ending](path, time=time)
 
 

@@ -33,8 +33,10 @@ class LogFiles(Part):
     """names or patterns, relative to the identification file; a directory stands for all logs in it"""
     time: str = ""
     """channel of the time, where it is not found by itself"""
+    decimal: Literal["", ".", ","] = ""
+    """what separates decimals in text files; left out, a comma only where a file has no other reading, with a note"""
     held_out: FormulaText | None = None
-    """condition on the header, such as ``kp == 8``; logs that meet it are compared, not fitted"""
+    """condition on the header, such as ``kp == 8`` or ``folder == "long arm"``; logs that meet it are compared, not fitted"""
     header: Elements[Any] = Field(default_factory=nothing)
     """of logs that lack it: values by key, such as ``arm_mass = 0``"""
     channels: Elements[str] = Field(default_factory=nothing)
@@ -125,6 +127,9 @@ class FitOptions(Part):
     iterations: Annotated[Whole, Field(ge=1, le=500)] = 30
     first_logs: Annotated[Whole, Field(ge=1)] = 12
     """of which the search begins, before it takes all"""
+    leave_out: tuple[str, ...] = ()
+    """keys of the header, ``file`` or ``folder``: for each value of one, the model taken is fitted again without the logs that have it, and
+    their error is reported"""
     first: FormulaText | None = None
     """condition on the header of the logs with which the search begins, in place of `first_logs`: those without impacts"""
     regression: Switch = True

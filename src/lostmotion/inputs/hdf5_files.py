@@ -32,7 +32,7 @@ def datasets(path: Path, file: Any, limit: int = LOG, depth: int = 0) -> dict[st
         The file announces or contains more data than the limit, or refers to other files.
     """
     found: dict[str, Any] = {}
-    _collect(path, file, "", found, depth)
+    _collect(path, file, "", found, depth, set())
     texts = sum(node.size for node in found.values() if node.dtype.hasobject)  # each may be as long as the file
     check_memory(texts * path.stat().st_size + sum(map(_needed, found.values())), str(path), limit)
     for node in found.values():
@@ -40,16 +40,23 @@ def datasets(path: Path, file: Any, limit: int = LOG, depth: int = 0) -> dict[st
     return found
 
 
-def _collect(path: Path, group: Any, where: str, found: dict[str, Any], depth: int) -> None:
+def _collect(path: Path, group: Any, where: str, found: dict[str, Any], depth: int, seen: set[int]) -> None:
+    """Datasets of a group; one that several names lead to is read once, so that groups within themselves have an end."""
     import h5py
 
+    address = h5py.h5o.get_info(group.id).addr
+    if address in seen:
+        return
+    seen.add(address)
     for name in group:
         at = f"{where}{name}"
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
             raise InputError(f"{path}: {at}: is a link to another place or file; save the data itself")
         node = group[name]
         if isinstance(node, h5py.Group) and depth > 0:
-            _collect(path, node, f"{at}/", found, depth - 1)
+            _collect(path, node, f"{at}/", found, depth - 1, seen)
+        elif isinstance(node, h5py.Group) and where:
+            raise InputError(f"{path}: {at}: is a group within too many others; save its datasets nearer to the root")
         elif isinstance(node, h5py.Dataset):
             if node.is_virtual or node.external:
                 raise InputError(f"{path}: {at}: refers to data in other files; save the data itself")

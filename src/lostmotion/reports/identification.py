@@ -86,6 +86,7 @@ def identification_report(name: str, result: IdentificationResult) -> Report:
             Table(
                 "Values", ("parameter", "value", "from", "to", "unit", "interval"), parameter_rows(result), INTERVALS
             ),
+            *([_conditions(result)] if result.conditions else []),
             *(Prose(title, texts, listed=True) for title, texts in lists.items() if texts),
             *[group for group in groups if not group.name.startswith("overlays")],
             Table(
@@ -131,6 +132,16 @@ def error_rows(result: IdentificationResult) -> list[list[str]]:
         ]
         for e in result.errors
     ]
+
+
+def _conditions(result: IdentificationResult) -> Table:
+    """Errors of the logs of each condition, with and without them in the fit."""
+    unit = f" [{result.error_unit}]" if result.error_unit else ""
+    rows = [[c.name, str(c.logs), f"{c.fitted:.5g}", c.failed or f"{c.left_out:.5g}"] for c in result.conditions]
+    heading = ("condition", "logs", f"mean absolute error, fitted{unit}", f"fitted without them{unit}")
+    return Table(
+        "Leave one condition out", heading, rows, "For each condition the model is fitted again without its logs."
+    )
 
 
 def _held_out(rung: RungResult) -> str:
