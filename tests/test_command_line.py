@@ -325,7 +325,7 @@ MAY_IMPORT = {
     "drive check position-axis": set(),
     "rig schaeffler-rt1-h-20-100": DATASETS | FIGURES,
     "response paper-2dof-nl-small --amplitudes 0.1 --frequencies 1.0,2.0": DATASETS | NETCDF | FIGURES,
-    "servo position-axis": DATASETS | FIGURES | {"scipy", "rich"},
+    "servo position-axis": {"scipy", "rich"},
     "track direction-finder": FIGURES | {"rich"},
     "study study.toml": DATASETS,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -145,11 +145,19 @@ def pointing_budget(
     )
     angles = _view(loaded, view or {})
     cases = _cases(loaded, robustness=robustness)
+    changed: dict[Case, TrainScenario] = {}
+    known: dict[TrainScenario, Found] = {}
     with thread_pool(os.cpu_count()) as pool:
-        runs = {case: pool.submit(_case, loaded, list(changes), start, progress) for case, changes in cases.items()}
-        found = {case: run.result() for case, run in runs.items()}
+        for one, errors_of in pool.map(lambda s: (s, _run(s, start)), _different(loaded, cases, changed)):
+            known[one] = errors_of
+            if progress is not None:
+                progress()
+    if progress is not None:
+        for _ in range(len(cases) - len(known)):
+            progress()
+    found = {case: known[one] for case, one in changed.items()}
     time, errors, measured, whole = found["whole", ""]
-    of = {case: errors_of[3] for case, errors_of in found.items()}
+    of = {case: numbers for case, (*_, numbers) in found.items()}
 
     def group(kind: str) -> dict[Any, Errors]:
         return {name: value for (own, name), value in of.items() if own == kind}
@@ -277,13 +285,18 @@ def _view(scenario: TrainScenario, view: Mapping[str, float | str]) -> dict[str,
 Found = tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray], Errors]
 
 
-def _case(
-    scenario: TrainScenario, changes: list[Callable[..., None]], after: float, progress: Callable[[], None] | None
-) -> Found:
-    found = _run((without(scenario, changes) if changes else None) or scenario, after)
-    if progress is not None:
-        progress()
-    return found
+def _different(
+    scenario: TrainScenario,
+    cases: Mapping[Case, Sequence[Callable[..., None]]],
+    changed: dict[Case, TrainScenario],
+) -> Iterator[TrainScenario]:
+    """The scenarios of the cases, each once: different changes may leave the same. Enters in `changed` which case has which."""
+    seen = set()
+    for case, changes in cases.items():
+        changed[case] = one = (without(scenario, list(changes)) if changes else None) or scenario
+        if one not in seen:
+            seen.add(one)
+            yield one
 
 
 def _run(scenario: TrainScenario, after: float) -> Found:

@@ -23,7 +23,7 @@ from .data import inertias
 from .regimes import Axis, speed_of
 
 if TYPE_CHECKING:
-    import xarray
+    from ..simulation.results import RunArrays
 
 STEPPED = ("current", "speed", "position")  # loops that a reference can step; that of i_d has none of its own
 HALVINGS = 12  # of a step, until no limit acts on it
@@ -75,12 +75,12 @@ def settled(time: np.ndarray, error: np.ndarray, window: float) -> float:
     return float(time[outside[-1] + 1] - time[0]) if outside[-1] + 1 < len(time) else math.nan
 
 
-def ran(axis: Axis, **simulation: float) -> xarray.Dataset:
+def ran(axis: Axis, **simulation: float) -> RunArrays:
     """The run of an axis, at once or with other times."""
     scenario = axis.scenario
     if simulation:
         scenario = changed(scenario, simulation=scenario.simulation.model_copy(update=simulation))
-    return run(scenario, energy=False).dataset()
+    return run(scenario, energy=False)
 
 
 def changed(scenario: TrainScenario, **fields: Any) -> TrainScenario:
@@ -107,8 +107,8 @@ def step_response(axis: Axis, loop: str) -> StepResponse:
             break
         size *= 0.5
     name, unit = axis.measured["torque" if loop == "current" else loop]
-    value = data[name].values
-    return StepResponse(loop, size, unit, limited, data["time"].values, value - value[0])
+    value = data[name]
+    return StepResponse(loop, size, unit, limited, data["time"], value - value[0])
 
 
 def _first_size(axis: Axis, loop: str) -> float:
@@ -136,7 +136,7 @@ def step_duration(axis: Axis, loop: str) -> float:
     return max(times)
 
 
-def _step(axis: Axis, loop: str, size: float) -> xarray.Dataset:
+def _step(axis: Axis, loop: str, size: float) -> RunArrays:
     kind = {"current": "torque"}.get(loop, loop)
     start = axis.scenario.initial.angles.get(axis.shaft, 0.0) if loop == "position" else 0.0
     shown = size / axis.ratio if loop == "speed" else size
@@ -153,7 +153,7 @@ def _step(axis: Axis, loop: str, size: float) -> xarray.Dataset:
     return ran(with_controller(axis, **fields), duration=duration, sample_interval=interval)
 
 
-def _is_limited(axis: Axis, loop: str, data: xarray.Dataset) -> bool:
+def _is_limited(axis: Axis, loop: str, data: RunArrays) -> bool:
     c, motor = axis.controller, axis.train.motors[axis.motor]
     within = 1.0 - 1e-9
     found = []
@@ -165,10 +165,10 @@ def _is_limited(axis: Axis, loop: str, data: xarray.Dataset) -> bool:
         found.append((f"{axis.motor}_command", motor.command_limit))
     if motor.torque_limit is not None:
         found.append((axis.train.motor_torque_of(axis.motor), motor.torque_limit))
-    most = {name: float(np.abs(data[name].values).max()) for name, _ in found}
+    most = {name: float(np.abs(data[name]).max()) for name, _ in found}
     if isinstance(c.current, FieldOriented) and motor.winding is not None and motor.winding.max_current is not None:
         for what, limit in (("voltage", motor.phase_voltage), ("current", math.sqrt(2.0) * motor.winding.max_current)):
-            pair = (data[f"{axis.motor}_{which}_{what}"].values for which in ("direct", "quadrature"))
+            pair = (data[f"{axis.motor}_{which}_{what}"] for which in ("direct", "quadrature"))
             found.append((what, limit))
             most[what] = float(np.hypot(*pair).max())
     return any(most[name] >= within * limit for name, limit in found)
@@ -213,12 +213,12 @@ class Settling:
 def following(axis: Axis) -> Following:
     """Over the run of the scenario."""
     data = ran(axis)
-    time, reference = data["time"].values, axis.controller.reference
+    time, reference = data["time"], axis.controller.reference
     wanted = reference.at(time)[0]
     name, unit = axis.measured[reference.kind]
     if reference.kind == "speed":
         name, unit = f"{axis.shaft}_speed", axis.train.speed_unit(axis.shaft)
-    error = wanted - data[name].values
+    error = wanted - data[name]
     rms = math.sqrt(float(np.mean(error**2)))
     encoder = encoder_shaft(axis)
     unseen = np.zeros_like(error)

@@ -9,7 +9,6 @@ time-invariant system, from whose samples all is computed; nothing is averaged o
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -28,7 +27,6 @@ CURRENTS = {"direct current": _core.CurrentAxis.direct, "current": _core.Current
 
 Row = np.ndarray
 """a signal as a linear form over the state at a tick, and the inputs"""
-Entering = Callable[[int, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -158,24 +156,44 @@ class SampledLoop:
             whole = F @ whole
         return whole
 
-    def _samples(self, signal: str, w: np.ndarray, entering: Entering, direct: np.ndarray) -> np.ndarray:
-        """A signal at the samples of the loop, where what enters the state at each tick goes as exp(j w t).
+    @cached_property
+    def _onward(self) -> np.ndarray:
+        """Of each tick: from the state after it to the state at the next sample of the loop."""
+        found = [np.eye(len(self.ticks[0][0]))]
+        for F, _, _ in self.ticks[:0:-1]:
+            found.append(found[-1] @ F)
+        return np.array(found[::-1], complex)
+
+    @cached_property
+    def _entered(self) -> np.ndarray:
+        """Of each tick: from its inputs to the state at the next sample of the loop."""
+        return np.asarray(self._onward @ np.array([G for _, G, _ in self.ticks]))
+
+    def _turned(self, w: np.ndarray) -> np.ndarray:
+        """How far a sine is on at each tick, exp(j w t), over frequencies and ticks."""
+        return np.asarray(np.exp(1j * self.tick * np.outer(w, np.arange(len(self.ticks)))))
+
+    def _summed(self, w: np.ndarray, matrices: np.ndarray, entering: np.ndarray) -> np.ndarray:
+        """The sum over the ticks of their matrices times what enters, which goes as exp(j w t)."""
+        ticks, n, m = matrices.shape
+        both = (self._turned(w) @ matrices.reshape(ticks, n * m)).reshape(len(w), n, m)
+        return np.asarray((both @ entering[:, :, None])[:, :, 0])
+
+    def _samples(self, signal: str, w: np.ndarray, forced: np.ndarray, direct: np.ndarray) -> np.ndarray:
+        """A signal at the samples of the loop, where all that enters goes as exp(j w t).
 
         Parameters
         ----------
         w
             Angular frequencies [rad/s].
-        entering
-            Of a tick and its matrix of the inputs: what is added to the state, over the frequencies.
+        forced
+            What has entered the state from one sample to the next, over the frequencies.
         direct
             The inputs at the sample, over the frequencies.
         """
-        whole, z = self.transition, np.exp(1j * w * self.tick)
+        whole, turn = self.transition, np.exp(1j * w * self.tick * len(self.ticks))
         n = len(whole)
-        forced = np.zeros((len(w), n), complex)
-        for k, (F, G, _) in enumerate(self.ticks):
-            forced = forced @ F.T + entering(k, G) * (z**k)[:, None]
-        state = np.linalg.solve((z ** len(self.ticks))[:, None, None] * np.eye(n) - whole, forced[:, :, None])[:, :, 0]
+        state = np.linalg.solve(turn[:, None, None] * np.eye(n) - whole, forced[:, :, None])[:, :, 0]
         row = self.ticks[0][2][signal]
         return np.asarray(state @ row[:n] + direct @ row[n:])
 
@@ -198,7 +216,7 @@ class SampledLoop:
         inputs[:, 0] = np.exp(-1j * w * delay)
         if feedforward:
             inputs[:, 1], inputs[:, 2] = 1j * w, -w * w
-        return self._samples(signal or f"{self.loop}_measured", w, lambda _, G: inputs @ G.T, inputs)
+        return self._samples(signal or f"{self.loop}_measured", w, self._summed(w, self._entered, inputs), inputs)
 
     def closed_loop(self, frequency: Any, *, feedforward: bool = False) -> np.ndarray:
         """As `response`, with what is measured as the reference has it: the speed of the motor as that of the reference's shaft [Hz]."""
@@ -211,7 +229,7 @@ class SampledLoop:
         one = np.zeros((len(w), len(INPUTS)))
         one[:, INPUTS.index("measured")] = 1.0
         # What enters counts at the samples of the loop alone.
-        return -self._samples(f"{self.loop}_measured", w, lambda k, G: (one if k == 0 else 0.0 * one) @ G.T, one)
+        return -self._samples(f"{self.loop}_measured", w, one @ self._entered[0].T, one)
 
     def compliance(self, frequency: Any, shaft: str, load: str) -> np.ndarray:
         """Angle of a shaft [rad], or position of a slide [m], at the samples, for a load torque of 1 N·m or force of 1 N that is a sine of continuous time [Hz]."""
@@ -220,17 +238,17 @@ class SampledLoop:
         force = np.zeros((len(w), len(self.transition)), complex)
         nothing = np.zeros((len(w), len(INPUTS)))
 
-        def of_winding(k: int, _: np.ndarray) -> np.ndarray:
-            assert winding is not None
-            force[:, : n + 2] = winding.forced(b, w, k % winding.every)
-            return force
-
-        if winding is not None:
-            return self._samples(self.axis.train.angle_of(shaft), w, of_winding, nothing)
-        z, eye = np.exp(1j * w * self.tick), np.eye(n)
-        over_tick = (z[:, None, None] * eye - self.regime.over_tick[:, :-1]) @ b
-        force[:, :n] = np.linalg.solve(1j * w[:, None, None] * eye - m.A, over_tick[:, :, None])[:, :, 0]
-        return self._samples(self.axis.train.angle_of(shaft), w, lambda _, __: force, nothing)
+        if winding is None:
+            z, eye = np.exp(1j * w * self.tick), np.eye(n)
+            over_tick = (z[:, None, None] * eye - self.regime.over_tick[:, :-1]) @ b
+            force[:, :n] = np.linalg.solve(1j * w[:, None, None] * eye - m.A, over_tick[:, :, None])[:, :, 0]
+            forced = self._summed(w, self._onward, force)
+        else:
+            forced = np.zeros_like(force)
+            for k, (onward, turn) in enumerate(zip(self._onward, self._turned(w).T, strict=True)):
+                force[:, : n + 2] = winding.forced(b, w, k % winding.every)
+                forced += turn[:, None] * (force @ onward.T)
+        return self._samples(self.axis.train.angle_of(shaft), w, forced, nothing)
 
 
 def _angular(frequency: Any) -> np.ndarray:
