@@ -158,7 +158,7 @@ def test_a_change_closes_the_gap_of_a_motor(tmp_path: Path):
 
 def test_the_rig_answers_in_its_own_words():
     for arguments, words in (
-        (["maxon-ec-i-52-606793"], "maxon-ec-i-52-606793 is a motor; a gearbox is wanted here"),
+        (["maxon-ec-i-52-606793"], "maxon-ec-i-52-606793 is a motor; a gearbox or screw is wanted here"),
         (["paper-gearbox", "--set", "losfactor=2"], "losfactor: is not known; did you mean loss_factor?"),
         (["paper-gearbox", "--set", "stiffness.slops=[2]"], "stiffness.slops: is not known; did you mean slopes?"),
         (["paper-gearbox", "--set", "inertia=1 kg*m"], "inertia"),

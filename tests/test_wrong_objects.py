@@ -59,6 +59,7 @@ RESPONSE = lm.frequency_response(SCENARIO, [1.0, 2.0, 4.0], [0.5, 1.0], threads=
 LINEAR = lm.linearize(SCENARIO, lm.Initial())
 SHEET = next(r for r in lm.catalogue() if r.name == "schaeffler-rt1-h-20-100")
 RIG = lm.TestRig(SCENARIO.gearbox)
+SCREW = lm.Screw(input="motor", output="table", lead="10 mm", stiffness="200 N/um", efficiency=0.9)
 STUDY = lm.Study(scenario=SCENARIO, vary=[{"key": "load.inertia", "values": [1.0]}], keep={"top": "peak(load_speed)"})
 
 
@@ -118,6 +119,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "to_control": (lm.to_control, {"response": RESPONSE, "amplitude": 1.0, "output": "load_speed"}),
     "Simulation": (lm.Simulation, {"drive": SCENARIO, "step": 1e-3, "initial": None, "loaded": None, "law": None, "error_bound": False}),
     "Simulation of a train": (lm.Simulation, {"drive": TRAIN, "step": 1e-3, "initial": None, "loaded": ["worm"]}),
+    "measure_screw": (lm.measure_screw, {"screw": SCREW, "sheet": None, "load": 1000.0, "progress": dangle}),
     "TestRig": (lm.TestRig, {"gearbox": SCENARIO.gearbox}),
     "ResultAccessor": (lm.ResultAccessor, {"dataset": RESULT}),
     "InputError": (lm.InputError, {"text": "x"}),
@@ -154,6 +156,7 @@ SLOW = {
     "LivePage",
     "check_drive",
     "measure",
+    "measure_screw",
     "commission",
     "identify",
     "load_identification",

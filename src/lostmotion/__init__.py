@@ -83,6 +83,7 @@ if TYPE_CHECKING:
     from .model.linear import PitchHarmonic as PitchHarmonic
     from .model.linear import Rack as Rack
     from .model.linear import Screw as Screw
+    from .model.linear import ScrewData as ScrewData
     from .model.linear import Slide as Slide
     from .model.linear import StiffnessCurve as StiffnessCurve
     from .model.load import Load as Load
@@ -185,6 +186,8 @@ if TYPE_CHECKING:
     from .test_rig.measurement import RigReport as RigReport
     from .test_rig.measurement import measure as measure
     from .test_rig.rig import TestRig as TestRig
+    from .test_rig.screw_measurement import ScrewReport as ScrewReport
+    from .test_rig.screw_measurement import measure_screw as measure_screw
     from .version import __version__ as __version__
 
 # Where each public name lives; it is imported when first used, so that `import lostmotion` stays quick.
@@ -241,6 +244,7 @@ _HOMES = {
         "PitchHarmonic",
         "Rack",
         "Screw",
+        "ScrewData",
         "Slide",
         "StiffnessCurve",
     ),
@@ -293,6 +297,7 @@ _HOMES = {
     "test_rig.loop": ("Loop",),
     "test_rig.measurement": ("RigReport", "measure"),
     "test_rig.rig": ("TestRig",),
+    "test_rig.screw_measurement": ("ScrewReport", "measure_screw"),
     "version": ("__version__",),
 }
 # Modules whose functions return datasets: with them comes `result.lm`.

@@ -47,12 +47,11 @@ def complete_scenario(incomplete: str) -> list[str]:
     return [*(n for n in names if n.startswith(incomplete)), *_files(incomplete)]
 
 
-def complete_gearbox(incomplete: str) -> list[str]:
-    """Gearboxes of the catalogue and files."""
-    from ..data_sheets.gearbox_sheet import GearboxSheet
-    from ..data_sheets.records import catalogue as records
+def complete_on_rig(incomplete: str) -> list[str]:
+    """Gearboxes and screws of the catalogue, and files."""
+    from ..data_sheets.records import catalogue, table_of
 
-    names = [r.name for r in records() if isinstance(r, GearboxSheet)]
+    names = [r.name for r in catalogue() if table_of(r) in ("gearbox", "screw")]
     return [*(n for n in names if n.startswith(incomplete)), *_files(incomplete)]
 
 

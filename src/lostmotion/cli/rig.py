@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import InputError
-from .arguments import FiguresOption, complete_gearbox
+from .arguments import FiguresOption, complete_on_rig
 from .targets import try_directory, writing
 from .terminal import busy, progress
 
 if TYPE_CHECKING:
+    from ..data_sheets.gearbox_sheet import GearboxSheet
+    from ..data_sheets.linear_sheets import ScrewSheet
     from ..model.angle_torques import TorqueHarmonic
-    from ..test_rig.measurement import RigReport
+    from ..test_rig.comparison import Comparison
 
 
 def rig(
-    gearbox: Annotated[
+    name: Annotated[
         str,
         typer.Argument(
-            metavar="GEARBOX",
-            help="Name in the catalogue, or a file with one record (.toml).",
-            autocompletion=complete_gearbox,
+            metavar="NAME",
+            help="Gearbox or screw: name in the catalogue, or a file with one record (.toml).",
+            autocompletion=complete_on_rig,
         ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
@@ -51,27 +54,63 @@ def rig(
     ] = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Measure a gearbox on the virtual test rig and compare with its data sheet.
+    """Measure a gearbox or a screw on the virtual test rig and compare with its data sheet.
 
-    Writes rig.html (one page) and the measurements as CSV.
+    Writes rig.html (one page) and the measurements as CSV. A screw is measured at a tenth of its dynamic capacity.
 
     \b
     lostmotion rig schaeffler-rt1-h-20-100
     lostmotion rig my-gearbox.toml -o sheet --set loss_factor=1.3
+    lostmotion rig rexroth-25x10rx3-i4 --set "supported_length=600 mm"
     lostmotion rig my-gearbox.toml --logs campaign --ripple "2 0.02 N*m"
     """
     from ..data_sheets.gearbox_sheet import GearboxSheet
-    from ..data_sheets.records import find
+    from ..data_sheets.linear_sheets import ScrewSheet
+    from ..data_sheets.records import find_one_of
     from ..reports.pictures import endings
-    from ..simulation.scenario_files import gearbox_from_record
 
     pictures = endings(figures)
     if ripple is not None and logs is None:
         raise InputError("--ripple: is for the logs of a campaign; give --logs DIR, too")
     try_directory(output if logs is None else logs)
-    sheet = find(gearbox, "gearbox")
+    sheet = find_one_of(name, ("gearbox", "screw"))
+    if isinstance(sheet, ScrewSheet):
+        if logs is not None:
+            raise InputError(f"--logs: {sheet.name} is a screw, and logs are written of gearboxes; leave --logs out")
+        _rig_of_screw(name, sheet, overrides or (), output, pictures)
+        return
     assert isinstance(sheet, GearboxSheet)
-    part, notes = gearbox_from_record(gearbox, overrides or ())
+    _rig_of_gearbox(name, sheet, overrides or (), output, pictures, logs, ripple)
+
+
+def _rig_of_screw(
+    name: str, sheet: ScrewSheet, overrides: Sequence[str], output: Path, pictures: Sequence[str]
+) -> None:
+    from ..simulation.scenario_files import screw_from_record
+    from ..test_rig.screw_measurement import WORK, measure_screw
+
+    screw = screw_from_record(name, overrides)
+    with progress(WORK, "Measuring") as step:
+        report = measure_screw(screw, sheet, progress=step)
+    with writing(output), busy("Writing"):
+        from ..reports.screw_rig import summary_rows, write_screw_sheet
+
+        page = write_screw_sheet(output, sheet.name, report, sheet, (), pictures)
+    _print_all(sheet.title or sheet.name, report.comparisons, summary_rows(report), (), page)
+
+
+def _rig_of_gearbox(
+    name: str,
+    sheet: GearboxSheet,
+    overrides: Sequence[str],
+    output: Path,
+    pictures: Sequence[str],
+    logs: Path | None,
+    ripple: str | None,
+) -> None:
+    from ..simulation.scenario_files import gearbox_from_record
+
+    part, notes = gearbox_from_record(name, overrides)
     if logs is not None:
         from ..identification.campaign import write_campaign
 
@@ -89,9 +128,19 @@ def rig(
         from ..reports.rig import summary_rows, write_sheet
 
         page = write_sheet(output, sheet.name, report, sheet, notes, pictures)
-    print(sheet.title or sheet.name)
-    _print_comparisons(report)
-    for what, value in summary_rows(report):
+    _print_all(sheet.title or sheet.name, report.comparisons, summary_rows(report), notes, page)
+
+
+def _print_all(
+    title: str,
+    comparisons: Sequence[Comparison],
+    rows: Sequence[tuple[str, str]],
+    notes: Sequence[str],
+    page: Path,
+) -> None:
+    print(title)
+    _print_comparisons(comparisons)
+    for what, value in rows:
         print(f"  {what}: {value}")
     for note in notes:
         print(f"  note: {note}")
@@ -110,10 +159,10 @@ def _ripple(text: str) -> TorqueHarmonic:
         raise InputError(f'--ripple: "{text}": {error}') from None
 
 
-def _print_comparisons(report: RigReport) -> None:
-    if report.comparisons:
+def _print_comparisons(comparisons: Sequence[Comparison]) -> None:
+    if comparisons:
         print(f"  {'':<44} {'sheet':>10} {'rig':>10} {'rig/sheet - 1':>14}")
-    for c in report.comparisons:
+    for c in comparisons:
         unit = "" if c.unit == "1" else f" [{c.unit}]"
         remark = f"  ({c.remark})" if c.remark else ""
         print(f"  {c.quantity + unit:<44} {c.catalogue:>10.5g} {c.rig:>10.5g} {c.difference:>+14.1e}{remark}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -166,3 +166,27 @@ def find(reference: str, table: str) -> Sheet:
             f"{reference} is {called(table_of(record))}; {called(table)} is wanted here; `lostmotion catalogue` lists them"
         )
     raise InputError(f"{table.replace('_', ' ')} {shown(reference)} is not in the catalogue; {hint}")
+
+
+def find_one_of(reference: str, tables: Sequence[str]) -> Sheet:
+    """As `find`, of one of several kinds.
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
+    if reference.endswith(".toml"):
+        of_file = {table_of(record) for record in read_sheets(Path(reference))}
+        return find(reference, next((table for table in tables if table in of_file), tables[0]))
+    wanted = " or ".join(table.replace("_", " ") for table in tables)
+    record = _named(reference)
+    if record is None:
+        same = [r.name for r in catalogue() if table_of(r) in tables]
+        hint = names_like(reference, same, "`lostmotion catalogue` lists them")
+        raise InputError(f"{wanted} {shown(reference)} is not in the catalogue; {hint}")
+    if table_of(record) not in tables:
+        raise InputError(
+            f"{reference} is {called(table_of(record))}; a {wanted} is wanted here; `lostmotion catalogue` lists them"
+        )
+    return record

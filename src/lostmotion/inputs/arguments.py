@@ -43,6 +43,8 @@ WANTED = {
     "Gear": "a Gear of a drive train",
     "Gearbox": 'a Gearbox, such as gearbox("schaeffler-rt1-h-20-100") returns',
     "GearboxSheet": "a GearboxSheet, such as catalogue() lists",
+    "ScrewData": 'a Screw, such as Screw(input="motor", output="table", lead="10 mm")',
+    "ScrewSheet": "a ScrewSheet, such as catalogue() lists",
     "Initial": "a state, such as Initial(motor_speed=100)",
     "Scenario": "a Scenario, such as load(path) returns",
     "Simulation": "a Simulation",

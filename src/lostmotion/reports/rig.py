@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from ..data_sheets.gearbox_sheet import GearboxSheet
+from ..data_sheets.sheet import Record
 from ..model.torsion import Rigid
+from ..test_rig.comparison import Comparison
 from ..test_rig.measurement import RigReport
 from ..test_rig.rig import LOST_MOTION_LOAD
 from ..units.practical import RPM, practical
@@ -142,16 +144,19 @@ def _overrunning_rows(report: RigReport) -> list[tuple[str, str]]:
 # --- the page ---
 
 
+def largest_difference(comparisons: Sequence[Comparison]) -> str:
+    """How far the rig is from the sheet."""
+    if not comparisons:
+        return "There is no data sheet to compare with."
+    worst = max(comparisons, key=lambda c: abs(c.difference))
+    counted = f"{len(comparisons)} quantities of the data sheet are measured"
+    return f"{counted}; the largest difference is {_percent(worst.difference)} ({worst.quantity})."
+
+
 def _verdict(report: RigReport) -> Headline:
     """How far the rig is from the sheet, and what the torsion and the locking are."""
-    lines = []
+    lines = [largest_difference(report.comparisons)]
     differs = [c for c in report.comparisons if c.remark]
-    if report.comparisons:
-        worst = max(report.comparisons, key=lambda c: abs(c.difference))
-        counted = f"{len(report.comparisons)} quantities of the data sheet are measured"
-        lines.append(f"{counted}; the largest difference is {_percent(worst.difference)} ({worst.quantity}).")
-    else:
-        lines.append("There is no data sheet to compare with.")
     for c in differs[:1]:
         more = f", and {len(differs) - 1} more below" if len(differs) > 1 else ""
         lines.append(f"With a remark: {c.quantity}: {c.remark}{more}.")
@@ -169,38 +174,58 @@ def _percent(share: float) -> str:
     return f"{round(100.0 * share, 1) + 0.0:+.1f} %"  # no -0.0
 
 
-def rig_report(name: str, report: RigReport, sheet: GearboxSheet | None = None, notes: Iterable[str] = ()) -> Report:
-    """The page of a gearbox on the rig."""
-    kind = f"{sheet.manufacturer} {sheet.kind.replace('_', ' ')} gearbox, " if sheet is not None else ""
-    told = [sheet.note] if sheet is not None and sheet.note else []
-    parts: list[Table | Group | Prose] = []
-    if report.comparisons:
-        rows = [
-            [
-                c.quantity,
-                f"{c.catalogue:.5g}",
-                f"{c.rig:.5g}",
-                _percent(c.difference),
-                "" if c.unit == "1" else c.unit,
-                c.remark,
-            ]
-            for c in report.comparisons
+def comparison_table(comparisons: Sequence[Comparison]) -> list[Table | Group | Prose]:
+    """The data of the sheet beside those of the rig; nothing where there are none."""
+    if not comparisons:
+        return []
+    rows = [
+        [
+            c.quantity,
+            f"{c.catalogue:.5g}",
+            f"{c.rig:.5g}",
+            _percent(c.difference),
+            "" if c.unit == "1" else c.unit,
+            c.remark,
         ]
-        marked = frozenset(k for k, c in enumerate(report.comparisons) if c.remark)
-        head = ("quantity", "catalogue", "rig", "difference", "unit", "remark")
-        parts.append(Table("Catalogue and rig", head, rows, marked=marked))
-    if notes := [*told, *notes]:
-        parts.append(Prose("", notes, noted=True))
-    data = [list(row) for row in (rows_of(sheet) if sheet is not None else rows_of_part(report.gearbox))]
-    parts += [
-        Table("Further measurements", ("quantity", "value"), [list(row) for row in summary_rows(report)]),
-        Table("The data sheet", ("quantity", "value", "source"), data),
+        for c in comparisons
     ]
+    marked = frozenset(k for k, c in enumerate(comparisons) if c.remark)
+    head = ("quantity", "catalogue", "rig", "difference", "unit", "remark")
+    return [Table("Catalogue and rig", head, rows, marked=marked)]
+
+
+def sheet_parts(
+    sheet: Record | None, measured: Sequence[tuple[str, str]], own: Sequence[tuple[str, str, str]] = ()
+) -> list[Table | Group | Prose]:
+    """Further measurements, and the data sheet with its sources and gaps; without a sheet the part's own data."""
+    parts: list[Table | Group | Prose] = [
+        Table("Further measurements", ("quantity", "value"), [list(row) for row in measured])
+    ]
+    data = [list(row) for row in (own if sheet is None else rows_of(sheet))]
+    if data:
+        parts.append(Table("The data sheet", ("quantity", "value", "source"), data))
     if sheet is not None:
         sources = [f"{s.status} ({', '.join(s.data)}): {s.text}" for s in sheet.sources]
         parts += [Prose("Sources", sources)] if sources else []
         gaps = [[gap.datum, gap.where] for gap in sheet.gaps]
         parts += [Table("What the sheet lacks", ("datum", "where to read it"), gaps)] if gaps else []
+    return parts
+
+
+def compared_rows(comparisons: Sequence[Comparison]) -> str:
+    """The comparison as a CSV file."""
+    header = ["quantity", "unit", "catalogue", "rig", "relative difference", "remark"]
+    return table_csv(header, ([c.quantity, c.unit, c.catalogue, c.rig, c.difference, c.remark] for c in comparisons))
+
+
+def rig_report(name: str, report: RigReport, sheet: GearboxSheet | None = None, notes: Iterable[str] = ()) -> Report:
+    """The page of a gearbox on the rig."""
+    kind = f"{sheet.manufacturer} {sheet.kind.replace('_', ' ')} gearbox, " if sheet is not None else ""
+    told = [sheet.note] if sheet is not None and sheet.note else []
+    parts = comparison_table(report.comparisons)
+    if notes := [*told, *notes]:
+        parts.append(Prose("", notes, noted=True))
+    parts += sheet_parts(sheet, summary_rows(report), rows_of_part(report.gearbox))
     caption = "Measured on the simulated gearbox; points: the catalogue."
     return Report(
         title=sheet.title if sheet is not None and sheet.title else name,
@@ -226,8 +251,6 @@ def write_sheet(
     Path
         Of the page.
     """
-    header = ["quantity", "unit", "catalogue", "rig", "relative difference", "remark"]
-    compared = ([c.quantity, c.unit, c.catalogue, c.rig, c.difference, c.remark] for c in report.comparisons)
     table = report.map
     rows = [
         [float(mu), RPM * float(n), float(eta), float(loss)]
@@ -237,5 +260,5 @@ def write_sheet(
         for n, eta, loss in zip(table["input_speed"].values, etas, losses, strict=True)
     ]
     head = ["relative_load", "input_speed [rpm]", "efficiency", "loss_torque at the input [N*m]"]
-    tables = {"comparison.csv": table_csv(header, compared), "efficiency.csv": table_csv(head, rows)}
+    tables = {"comparison.csv": compared_rows(report.comparisons), "efficiency.csv": table_csv(head, rows)}
     return write_report(directory, "rig.html", rig_report(name, report, sheet, notes), tables, pictures)

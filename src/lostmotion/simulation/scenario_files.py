@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..data_sheets.components import gearbox_table
+from ..data_sheets.linear_components import linear_table
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import follow, unit_in_schema
@@ -16,6 +17,7 @@ from ..inputs.toml_files import RESULTS, no_such_file, read_toml
 from ..inputs.toml_text import toml_text, without_empty
 from ..inputs.validation import names_like, shortened, shown
 from ..model.gearbox import Gearbox
+from ..model.linear import ScrewData
 from .keys import parse_override, set_values
 from .scenario import Scenario, from_tables
 from .series_files import read_series
@@ -297,3 +299,19 @@ def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[
         return Gearbox(**values), built.notes if built else ()
     except InputError as error:
         raise InputError(f"gearbox {reference}: {error}") from None
+
+
+def screw_from_record(reference: str, overrides: Iterable[str] = ()) -> ScrewData:
+    """A record's screw with ``KEY=VALUE`` changes, as beside `from` in `[screws.NAME]`.
+
+    Raises
+    ------
+    InputError
+    """
+    changes: dict[str, Any] = {}
+    set_values(changes, ((key.removeprefix("screw."), value) for key, value in map(parse_override, overrides)))
+    values = linear_table("screw", reference, changes, "screw")
+    try:
+        return ScrewData(**values)
+    except InputError as error:
+        raise InputError(f"screw {reference}: {error}") from None
