@@ -69,7 +69,7 @@ double Breakaway::input_torque(int g, double T, int s) const {
     const double T_1 = assembly_.per_input(g, key_) * T;
     if (!gear.has_dry_losses())
         return gear.law.losses == Gearbox::constant_efficiency ? T_1 / gear.law.efficiency : T_1;
-    return T_1 + s * gear.loss(s * T, 0.0).torque / gear.law.ratio;
+    return T_1 + s * gear.loss(s * gear.sense() * T, 0.0).torque / gear.reduction();
 }
 
 std::vector<double> Breakaway::edges(int g) const {

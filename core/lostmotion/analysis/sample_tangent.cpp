@@ -26,7 +26,7 @@ void SampleTangent::add_shared(std::size_t g, const RegimeTangent& t, const doub
     for (const VariedTrain::Beside& b : trains_.beside()) {
         const model::Gear& other = b.assembly().train().gears[g];
         to[b.parameter] += b.weight * shared.held / shared.capacity *
-                           (other.loss(shared.driven, 0.0).torque / other.law.ratio - shared.loss);
+                           (other.loss(shared.driven, 0.0).torque / other.reduction() - shared.loss);
     }
 }
 

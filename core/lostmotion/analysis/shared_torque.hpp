@@ -11,7 +11,7 @@ namespace lostmotion {
 // with C the capacity of the contact in the direction of F, and l the loss of the gear at its output torque T_2.
 struct SharedTorque {
     double held = 0.0, capacity = 0.0, loss = 0.0;               // F, C, l [N m]
-    double driven = 0.0;                                         // T_2 [N m] in the direction of F
+    double driven = 0.0;                                         // T_2 [N m] as it is turned in the direction of F
     double by_friction = 0.0, by_output = 0.0, by_margin = 0.0;  // derivatives by F, T_2 and the margin C - |F|
     const model::Row *friction = nullptr, *output = nullptr;     // F and T_2
     const model::Guard* margin = nullptr;                        // its guard; nullptr: nothing is shared
@@ -37,12 +37,12 @@ SharedTorque shared_torque(const model::Assembly& a, const model::Regime& r, std
     const double C = out.capacity = value(margin->form) + s * F;
     if (!(C > 0.0)) return {};
     out.margin = &*margin;
-    out.driven = s * value(*out.output);
+    out.driven = s * g.sense() * value(*out.output);
     const model::MeshLoss loss = g.loss(out.driven, 0.0);
-    out.loss = loss.torque / g.law.ratio;
+    out.loss = loss.torque / g.reduction();
     out.by_margin = -F * out.loss / (C * C);
     out.by_friction = out.loss / C + s * out.by_margin;
-    out.by_output = F * s * loss.per_torque / (g.law.ratio * C);
+    out.by_output = F * s * g.sense() * loss.per_torque / (g.reduction() * C);
     return out;
 }
 

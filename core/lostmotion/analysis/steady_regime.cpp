@@ -31,7 +31,7 @@ model::Key key_of(const model::Assembly& a, const SteadyMotion& motion) {
         if (!gear.rigid()) set(p.gears[g].piece, piece_at(gear.law.curve, motion.torque[g]));
         if (!gear.has_dry_losses()) continue;
         const double w = motion.speed[static_cast<std::size_t>(gear.input)];
-        const double mu = sign(w) * motion.torque[g] / gear.rated_torque();
+        const double mu = sign(w) * gear.sense() * motion.torque[g] / gear.rated_torque();
         set(p.gears[g].cell, gear.loss_cell(mu, std::fabs(w) / gear.law.rated_input_speed));
     }
     for (const auto& e : p.acting) set(e->branch, e->locate_steady(motion.speed[static_cast<std::size_t>(e->shaft)]));

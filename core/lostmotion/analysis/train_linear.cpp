@@ -45,7 +45,7 @@ LinearRegime linearize(const model::Assembly& a, const std::vector<TrainChannel>
         const double rated = gear.law.rated_output_torque;
         if (shared.margin != nullptr) {  // what it holds at rest, in the direction of what the contact holds
             const model::MeshLoss loss = gear.loss(shared.driven, 0.0);
-            const double slope = (shared.held >= 0.0 ? 1.0 : -1.0) * loss.per_torque / rated;
+            const double slope = (shared.held >= 0.0 ? 1.0 : -1.0) * gear.sense() * loss.per_torque / rated;
             std::vector<double> total = row(slope * *shared.output);
             total.back() += loss.torque / rated - slope * value(*shared.output);
             return total;
@@ -54,7 +54,7 @@ LinearRegime linearize(const model::Assembly& a, const std::vector<TrainChannel>
         const double way = gear.has_dry_losses()        ? p.key.modes[static_cast<std::size_t>(input.contact)]
                            : p.now.x[input.speed] < 0.0 ? -1.0
                                                         : 1.0;
-        return row(way / rated * (gear.law.ratio * r.input_torque[k] - r.output_torque[k]));
+        return row(gear.sense() * way / rated * (gear.law.ratio * r.input_torque[k] - r.output_torque[k]));
     };
     LinearRegime out;
     for (std::size_t k = 0; k < names.size(); ++k) {

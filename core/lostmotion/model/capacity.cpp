@@ -18,8 +18,8 @@ std::vector<CapacityShare> shaft_capacity(const Assembly& a, int shaft, double w
         }
     for (std::size_t g = 0; g < train.gears.size() && T_2 != nullptr; ++g)
         if (const Gear& gear = train.gears[g]; gear.input == shaft && gear.has_dry_losses())
-            shares.push_back({gear.name, gear.loss(T_2[g], w).torque / gear.law.ratio,
-                              gear.loss(-T_2[g], w).torque / gear.law.ratio});
+            shares.push_back({gear.name, gear.loss(gear.sense() * T_2[g], w).torque / gear.reduction(),
+                              gear.loss(-gear.sense() * T_2[g], w).torque / gear.reduction()});
     return shares;
 }
 

@@ -92,7 +92,7 @@ std::string TrainCheck::elements() const {
     for (std::size_t k = 0; k < train_.gears.size(); ++k) {
         const Gear& g = train_.gears[k];
         const std::string name = named("gear", g.name, k);
-        if (!(g.law.ratio > 0.0)) return name + " has the ratio " + std::to_string(g.law.ratio) + "; it must be > 0";
+        if (g.law.ratio == 0.0) return name + " has the ratio 0; it must not be 0";
         if (g.efficiencies && !(g.efficiencies->driving() > 0.0))
             return name + " has a drive efficiency of " + std::to_string(g.efficiencies->driving()) +
                    "; it must be > 0: no torque would turn it";

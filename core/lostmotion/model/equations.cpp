@@ -79,7 +79,7 @@ void Equations::compose_gear(int gear, const Key& key, Regime& r, std::vector<Ro
     }
     const double s = mode(key, places_.shafts[g.input].contact);
     if (s == 0.0) return;
-    loss[gear] = forms_.losses(gear, T_2).turning(g.loss_plane(key.branch[p.cell]), s) / i;
+    loss[gear] = forms_.losses(gear, T_2).turning(g.loss_plane(key.branch[p.cell]), s) / g.reduction();
 }
 
 // What its dry contact takes.

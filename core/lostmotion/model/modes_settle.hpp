@@ -74,7 +74,7 @@ void SwitchedTrain<Sizes>::locate_losses(const Now& now, const std::array<double
         if (!gear.has_dry_losses()) continue;
         const GearPlace& p = places().gears[g];
         const int s = trial.modes[places().shafts[gear.input].contact];
-        const double mu = T_2[g] / gear.rated_torque();
+        const double mu = gear.sense() * T_2[g] / gear.rated_torque();
         const double v = std::fabs(now.x[places().shafts[gear.input].speed]) / gear.law.rated_input_speed;
         trial.branch[p.cell] = static_cast<std::int16_t>(s == 0 ? gear.load_interval(mu) : gear.loss_cell(s * mu, v));
         trial.branch[p.cell_back] = static_cast<std::int16_t>(s == 0 ? gear.load_interval(-mu) : 0);

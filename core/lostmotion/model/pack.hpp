@@ -90,9 +90,10 @@ template <class D>
 struct PackedRegime {
     Key key;
     std::array<PackedForm<D>, D::states> rate{};
-    std::array<PackedForm<D>, D::contacts> output_torque{};   // of each gear [N m]
-    std::array<PackedForm<D>, D::contacts> input_torque{};    // of each gear, with dry losses while it turns [N m]
-    std::array<PackedForm<D>, D::contacts> mesh_loss{};       // of each gear, i T_1 - T_2 [N m]
+    std::array<PackedForm<D>, D::contacts> output_torque{};  // of each gear [N m]
+    std::array<PackedForm<D>, D::contacts> input_torque{};   // of each gear, with dry losses while it turns [N m]
+    std::array<PackedForm<D>, D::contacts>
+        mesh_loss{};  // of each gear, what it takes at its output, |i| T_1 - T_2 as turned by the input [N m]
     std::array<PackedForm<D>, D::contacts> contact_torque{};  // of each contact [N m]
     std::array<PackedGuard<D>, D::guards> guards{};
     int n_guards = 0;
@@ -115,7 +116,8 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
     for (std::size_t g = 0; g < r.output_torque.size(); ++g) {
         out.output_torque[g] = pack<D>(r.output_torque[g], n);
         out.input_torque[g] = pack<D>(r.input_torque[g], n);
-        out.mesh_loss[g] = pack<D>(a.train().gears[g].law.ratio * r.input_torque[g] - r.output_torque[g], n);
+        out.mesh_loss[g] = pack<D>(
+            a.train().gears[g].sense() * (a.train().gears[g].law.ratio * r.input_torque[g] - r.output_torque[g]), n);
     }
     for (std::size_t c = 0; c < r.contact_torque.size(); ++c) out.contact_torque[c] = pack<D>(r.contact_torque[c], n);
     out.complete = r.guards.size() <= static_cast<std::size_t>(D::guards);

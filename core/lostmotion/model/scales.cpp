@@ -6,7 +6,7 @@ double rated_speed(const Train& train, int shaft) {
     for (const Gear& g : train.gears)
         if (g.input == shaft) return g.law.rated_input_speed;
     for (const Gear& g : train.gears)
-        if (g.output == shaft) return g.law.rated_input_speed / g.law.ratio;
+        if (g.output == shaft) return g.law.rated_input_speed / g.reduction();
     for (const ShaftMotor& m : train.motors)
         if (m.shaft == shaft) return m.law.rated_speed;
     return 1.0;

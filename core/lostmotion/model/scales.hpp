@@ -75,7 +75,7 @@ void balanced_scale(const Assembly& a, State& s, int first_angle) {
     for (int part = 0; part < a.layout().angles; ++part) s[first_angle + part] = s[p.shafts[p.last_shaft[part]].speed];
     for (std::size_t g = 0; g < train.gears.size(); ++g) {
         const Gear& gear = train.gears[g];
-        const double in = s[p.shafts[gear.input].speed], i = gear.law.ratio, J = inertia(gear.input);
+        const double in = s[p.shafts[gear.input].speed], i = gear.reduction(), J = inertia(gear.input);
         double& out = s[p.shafts[gear.output].speed];
         double twist;
         if (gear.rigid()) {

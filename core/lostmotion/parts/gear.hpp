@@ -33,6 +33,9 @@ struct Gear {
     bool has_dry_losses() const { return efficiencies || law.losses == Gearbox::loss_map; }
     bool has_backlash() const { return !rigid() && law.curve.slope(0) == 0.0; }
     bool parts_flanks() const { return mesh_damping > 0.0 && has_backlash(); }
+    // i < 0: the output turns against the input. Losses see the torque in the direction in which the input turns it.
+    double sense() const { return law.ratio < 0.0 ? -1.0 : 1.0; }
+    double reduction() const { return std::fabs(law.ratio); }
     double per_housing() const { return 1.0 - 1.0 / law.ratio; }                          // of the twist's rate
     double rated_torque() const { return efficiencies ? 1.0 : law.rated_output_torque; }  // scales mu
 
@@ -43,7 +46,7 @@ struct Gear {
     }
     template <class F>
     LossTerms<F> loss_terms(int one, int speed, const F& T_2) const {
-        return {rated_torque(), law.rated_input_speed, law.ratio, one, speed, T_2};
+        return {rated_torque(), law.rated_input_speed, reduction(), one, speed, sense() * T_2};
     }
     Plane loss_plane(int cell) const {
         return with_losses([&](const auto& m) { return m.plane(cell); });

@@ -35,7 +35,8 @@ struct Motor {
     template <class F>
     F torque(const Terms& of, const F& voltage) const {
         if (kind == torque_source) return rated_torque * voltage;
-        return stall_torque() * voltage - F::unit(of.speed, rated_torque * (armature_voltage_constant - 1.0) / rated_speed);
+        return stall_torque() * voltage -
+               F::unit(of.speed, rated_torque * (armature_voltage_constant - 1.0) / rated_speed);
     }
 
     // dM_D/dt by eq. (2), with E_Z = E_C, or the limit with the sign of `amplifier` if that is not 0.

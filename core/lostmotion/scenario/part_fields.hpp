@@ -93,7 +93,7 @@ void describe(F& f, Motor& m) {
 
 template <class F>
 void describe(F& f, Gearbox& g) {
-    f.number("ratio", g.ratio, Range::positive);
+    f.number("ratio", g.ratio);
     f.number("inertia", g.inertia, Range::not_negative);
     f.number("viscous_friction", g.viscous_friction, Range::not_negative);
     f.choice("compliance", g.compliance, 2);
@@ -105,6 +105,7 @@ void describe(F& f, Gearbox& g) {
     f.number("rated_input_speed", g.rated_input_speed, Range::positive);
     f.number("rated_output_torque", g.rated_output_torque, Range::positive);
     if constexpr (F::reads) {
+        if (f.well() && g.ratio == 0.0) f.wrong("ratio", "must not be 0");
         if (f.well() && g.compliance == Gearbox::torsion_curve && !(g.curve.max_slope() > 0.0))
             f.wrong("stiffness", "must be > 0 somewhere");
         for (int k = 0; f.well() && k <= g.curve.outermost_piece(); ++k)

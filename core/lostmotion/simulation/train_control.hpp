@@ -29,8 +29,9 @@ ClosedLoop<D> closed_loop_of(const model::Assembly& a, const Control& control, c
         p.speed = packed(model::Row::unit(a.places().shafts[static_cast<std::size_t>(axis.speed_shaft)].speed));
         const Motor& law = a.train().motors[static_cast<std::size_t>(axis.motor)].law;
         const int rotor = a.train().motors[static_cast<std::size_t>(axis.motor)].shaft;
-        p.motor_torque = packed(law.torque<model::Row>({motor.torque, a.places().shafts[static_cast<std::size_t>(rotor)].speed,
-                                                        n.first_input + motor.command, n.one}));
+        p.motor_torque =
+            packed(law.torque<model::Row>({motor.torque, a.places().shafts[static_cast<std::size_t>(rotor)].speed,
+                                           n.first_input + motor.command, n.one}));
         if (const auto angle = model::shaft_angle(a, rotor)) p.rotor_angle = packed(*angle);
         p.rotor_speed = packed(model::Row::unit(a.places().shafts[static_cast<std::size_t>(rotor)].speed));
         if (axis.law.camera.present) p.shaft_angle = packed(*model::shaft_angle(a, axis.reference_shaft));

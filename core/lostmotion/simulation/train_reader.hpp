@@ -146,7 +146,7 @@ class TrainReader {
         Vec capacity = evaluate(friction, at, k), own{};
         for (std::size_t g = 0; g < model_.assembly.train().gears.size(); ++g) {
             if (gear(g).input != gear(index).input || !gear(g).has_dry_losses()) continue;
-            const Vec loss = loss_at_rest(g, F, at, k) / gear(g).law.ratio;
+            const Vec loss = loss_at_rest(g, F, at, k) / gear(g).reduction();
             capacity += loss;
             if (g == index) own = loss;
         }
@@ -160,7 +160,7 @@ class TrainReader {
     Vec loss_at_rest(std::size_t index, Vec F, const Instants& at, int k) const {
         Vec loss = evaluate(regime_.output_torque[index], at, k);
         for (int lane = 0; lane < vec_width; ++lane)
-            loss[lane] = gear(index).loss_at_rest(F[lane] >= 0.0 ? loss[lane] : -loss[lane]);
+            loss[lane] = gear(index).loss_at_rest(gear(index).sense() * (F[lane] >= 0.0 ? loss[lane] : -loss[lane]));
         return loss;
     }
     // From the loss of a speed forward.

@@ -106,6 +106,10 @@ class InverseModel(InverseModelFields):
                 f"inverse_model: takes one gear from the shaft {motor_shaft} to {shaft} and no other at either; "
                 "take feedforward for other trains"
             )
+        if between[0].ratio < 0.0:
+            raise InputError(
+                "inverse_model: takes no gear that reverses; give the ratio above 0 and turn the signs of the load, or take feedforward"
+            )
         return between[0]
 
     def _losses(self, gear: Gear) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..inputs.quantities import NotNegative, ViscousFriction
+from ..inputs.quantities import NotNegative, Number, ViscousFriction
 from .angle_torques import TransmissionError
 from .gearbox import Gearbox, Transmission
 from .losses import ConstantEfficiency, LossMap, MeshEfficiency, WormMesh, efficiency_map
@@ -17,6 +17,8 @@ from .torsion import LinearStiffness, Rigid, TorsionCurve
 class Gear(Transmission):
     """A stage between two shafts: a gearbox, a belt, a worm, or, with the ratio 1, a coupling."""
 
+    ratio: Number
+    """i_C, input speed / output speed; below 0, the output turns against the input"""
     input: str
     """shaft"""
     output: str
@@ -42,6 +44,8 @@ class Gear(Transmission):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
+        if self.ratio == 0.0:
+            raise ValueError("has the ratio 0; give input speed / output speed, below 0 for a gear that reverses")
         if isinstance(self.losses, LossMap):
             for key in ("rated_input_speed", "rated_output_torque"):
                 if getattr(self, key) is None:
@@ -49,7 +53,8 @@ class Gear(Transmission):
         return self
 
     def gearbox(self) -> Gearbox:
-        """The same gear alone, as the test rig takes it: without mesh damping and transmission error, its losses as a map.
+        """The same gear alone, as the test rig takes it: without mesh damping and transmission error, its losses as a map. One that
+        reverses is taken as one that does not: its values are the same.
 
         Raises
         ------
@@ -64,7 +69,10 @@ class Gear(Transmission):
         losses = self.losses
         if isinstance(losses, MeshEfficiency | WormMesh):
             losses = efficiency_map(*losses.efficiencies())
-        return Gearbox(**{name: getattr(self, name) for name in Gearbox.model_fields} | {"losses": losses})
+        return Gearbox(
+            **{name: getattr(self, name) for name in Gearbox.model_fields}
+            | {"losses": losses, "ratio": abs(self.ratio)}
+        )
 
     @classmethod
     def of(cls, gearbox: Gearbox, *, input: str, output: str) -> Self:

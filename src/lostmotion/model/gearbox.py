@@ -37,7 +37,7 @@ class GearboxLimits(Part):
 class Transmission(Part):
     """What gearboxes and gears of a drive train have in common: ratio, inertia, compliance."""
 
-    ratio: Annotated[Number, Positive]
+    ratio: Number
     """i_C, input speed / output speed"""
     inertia: Annotated[Inertia, NotNegative] = 0.0
     """J_R, on the input shaft"""
@@ -63,6 +63,8 @@ class Transmission(Part):
 class Gearbox(Transmission):
     """A compliance and a loss law, each chosen freely."""
 
+    ratio: Annotated[Number, Positive]
+    """i_C, input speed / output speed"""
     rated_input_speed: Annotated[Speed, Positive]
     """n_1R"""
     rated_output_torque: Annotated[Torque, Positive]

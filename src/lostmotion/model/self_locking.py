@@ -201,7 +201,7 @@ def self_locking(
     Raises
     ------
     InputError
-        The train has no such gear, or one whose housing turns; no torque is given, and the gear has no rated one.
+        The train has no such gear, or one whose housing turns or that reverses; no torque is given, and the gear has no rated one.
     """
     if gear not in train.gears:
         known = list(train.gears)
@@ -210,6 +210,10 @@ def self_locking(
     if turning := [name for name, g in train.gears.items() if g.housing is not None]:
         raise InputError(
             f"the housing of gear {turning[0]} turns; what its load drives has no verdict here, only a run"
+        )
+    if reversing := [name for name, g in train.gears.items() if g.ratio < 0.0]:
+        raise InputError(
+            f"gear {reversing[0]} reverses; what loads drive has a verdict for ratios above 0: turn the signs of what is behind it"
         )
     core = train.core(())
     part = train.gears[gear]

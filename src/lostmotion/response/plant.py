@@ -209,7 +209,7 @@ def _plant_of_train(scenario: TrainScenario) -> Plant:
         if gear.rated_input_speed is not None:
             floors |= {
                 f"{gear.input}_speed": gear.rated_input_speed,
-                f"{gear.output}_speed": gear.rated_input_speed / gear.ratio,
+                f"{gear.output}_speed": gear.rated_input_speed / abs(gear.ratio),
             }
     return Plant(
         core=core,

@@ -1,0 +1,115 @@
+"""Gears of negative ratio: closed forms, and the mirrored motion of what is behind them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from lostmotion.errors import InputError
+
+
+def test_a_bevel_differential_of_two_motors() -> None:
+    """w_a - w_c = -(w_b - w_c). With M_a + M_b on the carrier, (J_c + 4 J/2) w_c' = M_a + M_b, and J (w_a - w_b)' = M_a - M_b."""
+    J, carrier, a, b = 1e-4, 0.02, 0.3, 0.1
+    train = lm.TrainScenario(
+        shafts={"a": {}, "b": {}, "carrier": {"inertia": carrier, "torque": {"mean": 0.0}}},
+        motors={n: {"kind": "torque_source", "shaft": n[1], "rotor_inertia": J} for n in ("ma", "mb")},
+        gears={"bevel": {"input": "a", "output": "b", "housing": "carrier", "ratio": -1.0}},
+        command={"ma": {"mean": a}, "mb": {"mean": b}},
+        simulation={"duration": 1.0, "sample_interval": 0.01},
+    )
+    end = lm.simulate(train).isel(time=-1)
+    mean, half = (a + b) / (carrier + 2.0 * J), 0.5 * (a - b) / J
+    assert float(end["carrier_speed"]) == pytest.approx(mean, rel=1e-12)
+    assert float(end["a_speed"]) == pytest.approx(mean + half, rel=1e-12)
+    assert float(end["b_speed"]) == pytest.approx(mean - half, rel=1e-12)
+
+
+LOSSES: dict[str, dict[str, Any]] = {
+    "none": {"kind": "constant_efficiency", "efficiency": 1.0},
+    "constant": {"kind": "constant_efficiency", "efficiency": 0.8},
+    "two efficiencies": {"kind": "mesh_efficiency", "drive_efficiency": 0.7, "backdrive_efficiency": 0.4},
+    "self-locking": {"kind": "mesh_efficiency", "drive_efficiency": 0.45, "backdrive_efficiency": -0.2},
+    "map": {
+        "kind": "map", "loads": [-1.0, 0.0, 1.0], "speeds": [0.0, 0.5, 1.0],
+        "values": [[0.35, 0.3, 0.32], [0.05, 0.08, 0.1], [0.2, 0.15, 0.17]],
+    },
+}  # fmt: skip
+STIFFNESS: dict[str, dict[str, Any]] = {
+    "rigid": {"kind": "rigid"},
+    "spring": {"kind": "linear", "stiffness": 900.0},
+    "gap": {"kind": "curve", "slopes": [400.0, 1500.0], "breaks": [0.01], "backlash": 0.02},
+}
+
+
+def axis(ratio: float, losses: str, stiffness: str, seed: int) -> lm.TrainScenario:
+    """Motor, gear, load; what is on the load is turned around with the ratio."""
+    draw = np.random.default_rng(seed)
+    way = 1.0 if ratio > 0.0 else -1.0
+    gear: dict[str, Any] = {"input": "motor", "output": "load", "ratio": ratio, "stiffness": STIFFNESS[stiffness]}
+    gear |= {"losses": LOSSES[losses], "rated_input_speed": 20.0, "rated_output_torque": 8.0}
+    if stiffness == "spring":
+        gear["hysteresis"] = {"efficiency": 0.9}
+    return lm.TrainScenario(
+        shafts={
+            "motor": {"friction_torque": draw.uniform(0.0, 0.1), "viscous_friction": 1e-3},
+            "load": {
+                "inertia": draw.uniform(0.02, 0.3),
+                "friction_torque": draw.uniform(0.0, 0.5),
+                "torque": {"mean": way * draw.uniform(-2.0, 2.0), "amplitude": way * 3.0, "frequency": 1.3},
+            },
+        },
+        motors={"m": {"kind": "torque_source", "shaft": "motor", "rotor_inertia": 5e-3}},
+        gears={"g": gear},
+        command={"m": {"amplitude": draw.uniform(0.5, 2.0), "frequency": 0.9, "phase": draw.uniform(0.0, 6.0)}},
+        simulation={"duration": 2.0, "sample_interval": 1e-2},
+    )
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("stiffness", STIFFNESS)
+@pytest.mark.parametrize("losses", LOSSES)
+def test_the_load_behind_a_reversing_gear_moves_mirrored(losses: str, stiffness: str, seed: int) -> None:
+    if losses == "self-locking" and stiffness == "rigid":
+        pytest.skip("jams: rigid friction has no motion or several")
+    straight = lm.simulate(axis(6.0, losses, stiffness, seed))
+    reverse = lm.simulate(axis(-6.0, losses, stiffness, seed))
+    mirrored = ("load_speed", "load_angle", "g_twist", "g_output_torque")
+    for name in straight.data_vars:
+        if name.startswith("load_load_torque") or "contact" in str(name):
+            continue
+        sign = -1.0 if name in mirrored else 1.0
+        assert np.array_equal(sign * reverse[name].values + 0.0, straight[name].values + 0.0, equal_nan=True), name
+    one, other = lm.energy_of(straight), lm.energy_of(reverse)
+    for flow in one:
+        assert other[flow] == pytest.approx(one[flow], rel=1e-9, abs=1e-9), flow
+    assert abs(other["residual"]) < 1e-9 * max(1.0, other["turned_over"])
+
+
+@pytest.mark.parametrize("losses", ["two efficiencies", "map"])
+def test_both_solvers_agree_on_reversing_gears(losses: str) -> None:
+    scenario = axis(-6.0, losses, "gap", 11)
+    exact = lm.simulate(scenario)
+    other = lm.simulate(scenario, solver="dormand-prince", relative_tolerance=1e-10)
+    assert float(abs(exact["load_speed"] - other["load_speed"]).max()) < 1e-6
+
+
+def test_linear_models_of_a_reversing_gear_have_the_same_poles() -> None:
+    poles = []
+    for ratio in (6.0, -6.0):
+        simulation = lm.Simulation(axis(ratio, "constant", "gap", 1))
+        simulation.advance(0.5, m_command=1.0)
+        poles.append(np.sort_complex(np.linalg.eigvals(lm.linearize(simulation).A)))
+    assert np.allclose(*poles, rtol=1e-12, atol=1e-12)
+
+
+def test_ratio_zero_and_a_reversing_inverse_model_are_refused() -> None:
+    with pytest.raises(InputError, match="has the ratio 0; give input speed / output speed"):
+        lm.Gear(input="a", output="b", ratio=0.0)
+    with pytest.raises(InputError, match="reverses; what loads drive has a verdict for ratios above 0"):
+        lm.self_locking(axis(-6.0, "two efficiencies", "spring", 0).train(), "g", 5.0)
+    with pytest.raises(InputError, match="ratio: -50"):
+        lm.load("paper-2dof-nl-small").replace(**{"gearbox.ratio": -50.0})
